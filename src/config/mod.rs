@@ -1,0 +1,1 @@
+//! Reading configuration text: spans, collected mistakes, nearest names.

@@ -1,0 +1,1 @@
+//! One device: configuration, open, exchange, statistics, close.

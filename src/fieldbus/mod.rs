@@ -1,0 +1,1 @@
+//! The bus traits, and one room per bus.

@@ -1,0 +1,1 @@
+//! The process image: wait-free hand-over, edge counters, age, event ring.

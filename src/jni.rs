@@ -1,0 +1,1 @@
+//! The native methods of the Java class `tickbus.Tickbus`.

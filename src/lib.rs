@@ -1,0 +1,30 @@
+//! Puts a simulated machine on a real PLC's fieldbus.
+//!
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms of
+//! this crate follow the way of the data, and each uses only the rooms above it in this list (a
+//! test checks that; `docs/ARCHITECTURE.md` tells why):
+//!
+//! | room | what lives there |
+//! |---|---|
+//! | [`time`] | integer nanoseconds, the injected clock, the stop token |
+//! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
+//! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
+//! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
+//! | [`fieldbus`] | the bus traits, and one room per bus |
+//! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
+//! | [`driver`] | one device: configuration, open, exchange, statistics, close |
+//! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
+//! | [`cli`] | the `tickbus` command |
+//!
+//! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
+//! simulation writes; `%Q` is a PLC output, which the simulation reads.
+
+pub mod cli;
+pub mod config;
+pub mod driver;
+pub mod fieldbus;
+pub mod image;
+mod jni;
+pub mod plc;
+pub mod signal;
+pub mod time;

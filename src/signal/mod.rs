@@ -1,0 +1,17 @@
+//! Signals: named, typed, scaled values in the process image, and the codec plan made from them.
+
+mod address;
+mod order;
+mod plan;
+mod scale;
+mod slot;
+mod table;
+mod types;
+
+pub use address::Area;
+pub use order::ByteOrder;
+pub use plan::{Conversions, Plan};
+pub use scale::Scale;
+pub use slot::Slot;
+pub use table::{Latch, Signal, SignalTable, Station};
+pub use types::DataType;

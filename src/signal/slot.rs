@@ -1,0 +1,21 @@
+//! The 8-byte slots through which a simulation and the driver exchange values.
+
+/// One value, as 64 bits.
+///
+/// A slot holds an IEEE 754 double, except for an unscaled LWORD, LINT or ULINT, whose 64 bits do not
+/// fit into one and stand there as an integer ([`Signal::is_integer_slot`](super::Signal)).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct Slot(pub u64);
+
+impl Slot {
+    /// A slot that holds a double.
+    pub const fn from_real(value: f64) -> Self {
+        Self(value.to_bits())
+    }
+
+    /// The double that the slot holds.
+    pub const fn real(self) -> f64 {
+        f64::from_bits(self.0)
+    }
+}

@@ -1,0 +1,213 @@
+//! Clocks, as they are handed in.
+
+use std::fmt;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use once_cell::sync::Lazy;
+
+use super::stop::Shared;
+use super::{Nanos, Stop};
+
+/// A source of time that can also be waited on.
+pub trait Clock: Send + Sync + fmt::Debug {
+    /// The time now.
+    fn now(&self) -> Nanos;
+
+    /// The time as it was a few milliseconds ago at most, without a call into the system.
+    ///
+    /// This is what the tick path reads.
+    fn coarse(&self) -> Nanos;
+
+    /// Waits until `deadline`, or until `stop` is stopped or woken, whichever is first.
+    fn wait_until(&self, deadline: Nanos, stop: &Stop);
+}
+
+/// How far [`Monotonic::coarse`] may lag.
+const COARSE_STEP: Nanos = Nanos::from_millis(2);
+
+/// The operating system's monotonic clock; its epoch is the first use in the process.
+///
+/// One thread per process keeps the coarse time, for as long as any clone lives.
+#[derive(Debug)]
+pub struct Monotonic {
+    coarse: Arc<AtomicI64>,
+    stop: Stop,
+    keeper: Option<JoinHandle<()>>,
+}
+
+static EPOCH: Lazy<Instant> = Lazy::new(Instant::now);
+
+fn monotonic_now() -> Nanos {
+    Nanos(i64::try_from(EPOCH.elapsed().as_nanos()).unwrap_or(i64::MAX))
+}
+
+impl Monotonic {
+    /// The process's clock, started on first use and shared by all who hold it.
+    ///
+    /// # Errors
+    ///
+    /// The system refused the thread that keeps the coarse time.
+    pub fn shared() -> std::io::Result<Arc<Self>> {
+        static SHARED: Mutex<Weak<Monotonic>> = Mutex::new(Weak::new());
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(clock) = shared.upgrade() {
+            return Ok(clock);
+        }
+        let coarse = Arc::new(AtomicI64::new(monotonic_now().0));
+        let stop = Stop::new();
+        let keeper = std::thread::Builder::new().name("tickbus-clock".into()).spawn({
+            let (coarse, stop) = (Arc::clone(&coarse), stop.clone());
+            move || {
+                while !stop.is_stopped() {
+                    coarse.store(monotonic_now().0, Ordering::Relaxed);
+                    wait_monotonic(monotonic_now() + COARSE_STEP, &stop);
+                }
+            }
+        })?;
+        let clock = Arc::new(Self { coarse, stop, keeper: Some(keeper) });
+        *shared = Arc::downgrade(&clock);
+        Ok(clock)
+    }
+}
+
+impl Drop for Monotonic {
+    fn drop(&mut self) {
+        self.stop.stop();
+        if let Some(keeper) = self.keeper.take() {
+            // The keeper cannot panic; were it to, there is nobody left to tell.
+            let _ = keeper.join();
+        }
+    }
+}
+
+fn wait_monotonic(deadline: Nanos, stop: &Stop) {
+    stop.wait_while(|| {
+        let remaining = deadline - monotonic_now();
+        (remaining > Nanos::ZERO).then(|| Some(remaining.to_duration()))
+    });
+}
+
+impl Clock for Monotonic {
+    fn now(&self) -> Nanos {
+        monotonic_now()
+    }
+
+    fn coarse(&self) -> Nanos {
+        Nanos(self.coarse.load(Ordering::Relaxed))
+    }
+
+    fn wait_until(&self, deadline: Nanos, stop: &Stop) {
+        wait_monotonic(deadline, stop);
+    }
+}
+
+/// A clock that stands still until it is told to advance: for tests, and for simulation time.
+#[derive(Debug, Default)]
+pub struct Manual {
+    now: AtomicI64,
+    waiters: Mutex<Vec<Weak<Shared>>>,
+}
+
+impl Manual {
+    /// A clock that shows zero.
+    pub fn new() -> Arc<Self> {
+        Arc::default()
+    }
+
+    /// Moves the clock on by `span` and wakes every wait whose deadline has come.
+    pub fn advance(&self, span: Nanos) {
+        self.set(self.now() + span);
+    }
+
+    /// Sets the clock to `now`; a clock never goes back, so an earlier time changes nothing.
+    pub fn set(&self, now: Nanos) {
+        self.now.fetch_max(now.0, Ordering::SeqCst);
+        for waiter in self.waiters.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            if let Some(waiter) = waiter.upgrade() {
+                waiter.nudge();
+            }
+        }
+    }
+}
+
+impl Clock for Manual {
+    fn now(&self) -> Nanos {
+        Nanos(self.now.load(Ordering::SeqCst))
+    }
+
+    fn coarse(&self) -> Nanos {
+        Nanos(self.now.load(Ordering::Relaxed))
+    }
+
+    fn wait_until(&self, deadline: Nanos, stop: &Stop) {
+        let me = stop.downgrade();
+        {
+            let mut waiters = self.waiters.lock().unwrap_or_else(PoisonError::into_inner);
+            waiters.retain(|waiter| waiter.strong_count() > 0 && !waiter.ptr_eq(&me));
+            waiters.push(me);
+        }
+        stop.wait_while(|| (self.now() < deadline).then_some(None));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc;
+
+    #[test]
+    fn manual_wait_ends_at_its_deadline_and_not_before() {
+        let clock = Manual::new();
+        let stop = Stop::new();
+        let (sender, receiver) = mpsc::channel();
+        let waiting = std::thread::spawn({
+            let (clock, stop) = (Arc::clone(&clock), stop.clone());
+            move || {
+                clock.wait_until(Nanos(10), &stop);
+                sender.send(clock.now()).expect("the test still listens");
+            }
+        });
+        clock.advance(Nanos(9));
+        assert!(receiver.try_recv().is_err());
+        clock.advance(Nanos(1));
+        assert_eq!(receiver.recv(), Ok(Nanos(10)));
+        waiting.join().expect("no panic");
+    }
+
+    #[test]
+    fn stop_ends_a_wait_for_never() {
+        let clock = Manual::new();
+        let stop = Stop::new();
+        let waiting = std::thread::spawn({
+            let (clock, stop) = (Arc::clone(&clock), stop.clone());
+            move || clock.wait_until(Nanos::MAX, &stop)
+        });
+        stop.stop();
+        waiting.join().expect("no panic");
+        assert!(stop.is_stopped());
+    }
+
+    #[test]
+    fn a_wake_that_comes_early_counts_once() {
+        let clock = Manual::new();
+        let stop = Stop::new();
+        stop.wake();
+        clock.wait_until(Nanos::MAX, &stop);
+        clock.set(Nanos(5));
+        clock.wait_until(Nanos(5), &stop);
+        assert!(!stop.is_stopped());
+    }
+
+    #[test]
+    fn the_shared_clock_is_one() {
+        let one = Monotonic::shared().expect("a thread");
+        let two = Monotonic::shared().expect("a thread");
+        assert!(Arc::ptr_eq(&one, &two));
+        let before = one.now();
+        one.wait_until(before + Nanos::from_millis(1), &Stop::new());
+        assert!(two.now() >= before + Nanos::from_millis(1));
+    }
+}

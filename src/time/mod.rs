@@ -1,0 +1,13 @@
+//! Time, handed in: integer nanoseconds, the injected [`Clock`], and the [`Stop`] token.
+//!
+//! Nothing outside this room reads a clock of the operating system. Protocol cores take `now` as an
+//! argument; adapters and supervision take a [`Clock`], which is [`Monotonic`] in production and
+//! [`Manual`] in tests and wherever simulation time rules.
+
+mod clock;
+mod nanos;
+mod stop;
+
+pub use clock::{Clock, Manual, Monotonic};
+pub use nanos::{Nanos, ParseDurationError};
+pub use stop::Stop;

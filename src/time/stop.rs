@@ -1,0 +1,79 @@
+//! The token that ends a thread's work, and wakes it for that.
+
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
+use std::time::Duration;
+
+/// Says "stop" to a thread, and wakes it when it waits.
+///
+/// Clones share one state. A thread that waits on a [`Clock`](super::Clock) gives its token along,
+/// so that stopping never has to wait for a deadline.
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<Shared>);
+
+#[derive(Debug, Default)]
+pub(super) struct Shared {
+    state: Mutex<State>,
+    woken: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    stopped: bool,
+    /// Set by [`Stop::wake`], taken by the next wait: a wake that comes before the wait counts.
+    wake: bool,
+}
+
+impl Stop {
+    /// A token that has not been stopped.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Stops, for good, and wakes whoever waits.
+    pub fn stop(&self) {
+        self.0.lock().stopped = true;
+        self.0.woken.notify_all();
+    }
+
+    /// Whether [`stop`](Self::stop) was called.
+    pub fn is_stopped(&self) -> bool {
+        self.0.lock().stopped
+    }
+
+    /// Ends the present or the next wait of the thread, without stopping it.
+    pub fn wake(&self) {
+        self.0.lock().wake = true;
+        self.0.woken.notify_all();
+    }
+
+    pub(super) fn downgrade(&self) -> Weak<Shared> {
+        Arc::downgrade(&self.0)
+    }
+
+    /// Waits until stopped, woken, or `remaining()` gives `None`; `Some(None)` waits for a nudge.
+    pub(super) fn wait_while(&self, mut remaining: impl FnMut() -> Option<Option<Duration>>) {
+        let mut state = self.0.lock();
+        while !state.stopped && !std::mem::take(&mut state.wake) {
+            state = match remaining() {
+                None => return,
+                Some(None) => self.0.woken.wait(state).unwrap_or_else(PoisonError::into_inner),
+                Some(Some(span)) => {
+                    self.0.woken.wait_timeout(state, span).unwrap_or_else(PoisonError::into_inner).0
+                }
+            };
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> std::sync::MutexGuard<'_, State> {
+        // A panic elsewhere leaves two booleans, which are valid in any combination.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes a waiting thread look at its deadline again.
+    pub(super) fn nudge(&self) {
+        drop(self.lock());
+        self.woken.notify_all();
+    }
+}

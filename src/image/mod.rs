@@ -22,7 +22,7 @@ mod triple;
 
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
 pub use ring::{Consumer, Event, Producer, event_ring};
-pub use station::{Arrival, BusStation, Directions, TickStation, station};
+pub use station::{Arrival, BusStation, Directions, Receiver, TickStation, station};
 pub use triple::{Reader, Writer, triple_buffer};
 
 /// One frame of the process image, with what travels beside its bytes.

@@ -47,6 +47,16 @@ pub struct TickStation {
     beside: Arc<Beside>,
 }
 
+/// Takes what [`TickStation::read`] has to show.
+pub trait Receiver {
+    /// The frame's bytes, with every edge made visible; called when they may have changed.
+    fn levels(&mut self, bytes: &[u8]);
+
+    /// How many edges of the latched signal with this index in the signal table have arrived since
+    /// the last read; called for every latched signal when any count may have changed.
+    fn edges(&mut self, signal: usize, count: u32);
+}
+
 /// What [`TickStation::read`] found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arrival {
@@ -145,18 +155,9 @@ impl TickStation {
         result
     }
 
-    /// Takes over the newest rx frame, and calls `show` with the bytes to decode if they changed.
-    ///
-    /// Bytes of latched signals are shaped so that every edge is seen. `edges` is called, whenever
-    /// any of them may have changed, with each latched signal's index in the signal table and its
-    /// count of edges since the last read.
+    /// Takes over the newest rx frame and shows it to `receiver`, if there is anything new to see.
     #[inline]
-    pub fn read(
-        &mut self,
-        now: Nanos,
-        show: impl FnOnce(&[u8]),
-        mut edges: impl FnMut(usize, u32),
-    ) -> Arrival {
+    pub fn read(&mut self, now: Nanos, receiver: &mut impl Receiver) -> Arrival {
         let fresh = self.rx.update();
         let age = age(now, self.beside.peer_alive.load(Ordering::Relaxed));
         let (shaper, shaped, forced) = (&mut self.rx_shaper, &mut self.shaped, &mut self.forced);
@@ -165,20 +166,20 @@ impl TickStation {
             let changed = fresh || shapes || *forced;
             if shapes {
                 for (bit, count) in shaper.bits().iter().zip(shaper.new_edges(&frame.edges)) {
-                    edges(bit.signal, count);
+                    receiver.edges(bit.signal, count);
                 }
                 shaped.copy_from_slice(&frame.bytes);
                 shaper.shape(&frame.edges, now, shaped);
                 shaper.confirm();
-                show(shaped);
+                receiver.levels(shaped);
             } else if changed {
                 if *forced {
                     // No edge now, but there were some at the last read.
-                    shaper.bits().iter().for_each(|bit| edges(bit.signal, 0));
+                    shaper.bits().iter().for_each(|bit| receiver.edges(bit.signal, 0));
                 }
                 shaper.pass(&frame.bytes);
                 shaper.confirm();
-                show(&frame.bytes);
+                receiver.levels(&frame.bytes);
             }
             *forced = shapes;
             Arrival {
@@ -299,14 +300,26 @@ mod tests {
         })
     }
 
+    #[derive(Default)]
+    struct Seen {
+        level: Option<u8>,
+        edges: Vec<(usize, u32)>,
+    }
+
+    impl Receiver for Seen {
+        fn levels(&mut self, bytes: &[u8]) {
+            self.level = Some(bytes[0]);
+        }
+
+        fn edges(&mut self, signal: usize, count: u32) {
+            self.edges.push((signal, count));
+        }
+    }
+
     fn read(tick: &mut TickStation, now: i64) -> (Arrival, Option<u8>, Vec<(usize, u32)>) {
-        let (mut shown, mut edges) = (None, Vec::new());
-        let arrival = tick.read(
-            Nanos(now),
-            |bytes| shown = Some(bytes[0]),
-            |signal, count| edges.push((signal, count)),
-        );
-        (arrival, shown, edges)
+        let mut seen = Seen::default();
+        let arrival = tick.read(Nanos(now), &mut seen);
+        (arrival, seen.level, seen.edges)
     }
 
     #[test]

@@ -1,1 +1,5 @@
 //! One device: configuration, open, exchange, statistics, close.
+
+mod status;
+
+pub use status::Code;

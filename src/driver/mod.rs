@@ -1,1 +1,5 @@
 //! One device: configuration, open, exchange, statistics, close.
+
+mod config;
+
+pub use config::{Config, Timing};

@@ -7,8 +7,9 @@ use crate::image::{Arrival, TickStation};
 use crate::signal::{Area, Plan, SignalTable, Slot};
 use crate::time::Nanos;
 
+use super::open::Line;
 use super::statistics::Counters;
-use super::{Code, Driver, Line, SlotMap};
+use super::{Code, Driver, SlotMap};
 
 /// What an exchange found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,12 +49,17 @@ impl Station {
         tick: TickStation,
         table: &SignalTable,
         index: usize,
-        role: Role,
+        (tx, rx): (Area, Area),
         rx_fail_safe: Box<[u8]>,
     ) -> Self {
-        let (tx, rx) = areas(role);
         let (encode, decode) = (Plan::new(table, index, tx), Plan::new(table, index, rx));
-        Self { tick, encode, decode, rx_fail_safe, stale: true }
+        Self {
+            tick,
+            encode,
+            decode,
+            rx_fail_safe,
+            stale: true,
+        }
     }
 
     pub(super) fn cycles(&self) -> u64 {
@@ -67,7 +73,13 @@ impl Station {
         counters.not_a_number += u64::from(bent.not_a_number);
     }
 
-    fn receive(&mut self, now: Nanos, max_age: Nanos, slots: &mut [Slot], map: &SlotMap) -> Arrival {
+    fn receive(
+        &mut self,
+        now: Nanos,
+        max_age: Nanos,
+        slots: &mut [Slot],
+        map: &SlotMap,
+    ) -> Arrival {
         let decode = &self.decode;
         let arrival = self.tick.read(now, &mut Receiver { decode, slots, map });
         let stale = arrival.age > max_age;
@@ -109,7 +121,11 @@ impl Driver {
     ///
     /// When there are fewer slots than [`SlotMap::count`].
     pub fn exchange(&mut self, simulation_time: Nanos, slots: &mut [Slot]) -> Exchange {
-        assert!(slots.len() >= self.slots.count, "the exchange needs all {} slots", self.slots.count);
+        assert!(
+            slots.len() >= self.slots.count,
+            "the exchange needs all {} slots",
+            self.slots.count
+        );
         let now = match &self.line {
             Line::Free(_) => self.clock.coarse(),
             Line::Stepped { .. } => simulation_time,
@@ -122,7 +138,12 @@ impl Driver {
             Line::Free(_) => Ok(simulation_time),
             Line::Stepped { bus, port } => bus.exchange(simulation_time, port),
         };
-        let mut worst = Exchange { code: Code::Fresh, sequence: 0, age: Nanos::ZERO, granted: now };
+        let mut worst = Exchange {
+            code: Code::Fresh,
+            sequence: 0,
+            age: Nanos::ZERO,
+            granted: now,
+        };
         for station in &mut self.stations {
             let arrival = station.receive(now, self.max_age, slots, &self.slots);
             worst.sequence += arrival.sequence;

@@ -6,14 +6,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+use crate::fieldbus::loopback::FreeLoopback;
 use crate::fieldbus::{BusError, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{BusEnd, Receiver, TickEnd, image};
 use crate::plc::{Program, Scan};
 use crate::signal::{Area, DataType, SignalTable};
 use crate::time::{Clock, Nanos, Stop};
 
+use super::Config;
 use super::open::directions;
-use super::supervise::panic_text;
+use super::supervise::{BusThread, panic_text};
 
 /// What the hosted program has seen and made, for comparison with the other end.
 #[derive(Debug)]
@@ -33,7 +35,10 @@ struct Bit {
 
 impl Tally {
     fn new(table: &SignalTable) -> Self {
-        let signals = table.signals.iter().filter(|signal| signal.data_type == DataType::Bool);
+        let signals = table
+            .signals
+            .iter()
+            .filter(|signal| signal.data_type == DataType::Bool);
         let bits = signals.map(|signal| Bit {
             name: signal.name.clone(),
             area: signal.area,
@@ -41,7 +46,10 @@ impl Tally {
             mask: 1 << signal.bit,
             rises: AtomicU64::new(0),
         });
-        Self { scans: AtomicU64::new(0), bits: bits.collect() }
+        Self {
+            scans: AtomicU64::new(0),
+            bits: bits.collect(),
+        }
     }
 
     /// Counts the rising edges from `before` to `now`.
@@ -57,7 +65,12 @@ impl Tally {
     pub(super) fn write(&self, text: &mut String) {
         let _ = writeln!(text, "plc.scans={}", self.scans.load(Ordering::Relaxed));
         for bit in &self.bits {
-            let _ = writeln!(text, "plc.rises.{}={}", bit.name, bit.rises.load(Ordering::Relaxed));
+            let _ = writeln!(
+                text,
+                "plc.rises.{}={}",
+                bit.name,
+                bit.rises.load(Ordering::Relaxed)
+            );
         }
     }
 }
@@ -90,14 +103,27 @@ impl Receiver for Inputs {
 impl Cpu {
     /// Inputs, program, outputs: one scan at `now`.
     fn scan(&mut self, now: Nanos) {
-        let Self { program, tick, inputs, outputs, outputs_before, max_age, tally } = self;
+        let Self {
+            program,
+            tick,
+            inputs,
+            outputs,
+            outputs_before,
+            max_age,
+            tally,
+        } = self;
         let station = &mut tick.stations[0];
         inputs.before.copy_from_slice(&inputs.bytes);
         let arrival = station.read(now, inputs);
         tally.count(Area::Input, &inputs.before, &inputs.bytes);
         let alive = arrival.age <= *max_age;
         outputs_before.copy_from_slice(outputs);
-        program.scan(&mut Scan { now, alive, inputs: &inputs.bytes, outputs });
+        program.scan(&mut Scan {
+            now,
+            alive,
+            inputs: &inputs.bytes,
+            outputs,
+        });
         tally.count(Area::Output, outputs_before, outputs);
         station.write(now, |frame| frame.copy_from_slice(outputs));
         tally.scans.fetch_add(1, Ordering::Relaxed);
@@ -111,33 +137,59 @@ fn plc(program: Box<dyn Program>, table: &SignalTable, max_age: Nanos) -> (Cpu, 
     let station = &table.stations[0];
     let inputs = vec![0; station.input_bytes].into_boxed_slice();
     let outputs = vec![0; station.output_bytes].into_boxed_slice();
-    let inputs = Inputs { before: inputs.clone(), bytes: inputs };
-    let cpu = Cpu { program, tick, inputs, outputs_before: outputs.clone(), outputs, max_age, tally };
+    let inputs = Inputs {
+        before: inputs.clone(),
+        bytes: inputs,
+    };
+    let cpu = Cpu {
+        program,
+        tick,
+        inputs,
+        outputs_before: outputs.clone(),
+        outputs,
+        max_age,
+        tally,
+    };
     (cpu, bus)
 }
 
-/// A hosted program on a thread of its own; dropping it stops the thread.
+/// A hosted program on a thread of its own, with the bus thread of its end of the link; dropping it
+/// stops both.
 #[derive(Debug)]
 pub(super) struct HostThread {
     tally: Arc<Tally>,
+    fault: Arc<Mutex<Option<String>>>,
     stop: Stop,
     thread: Option<JoinHandle<()>>,
-    fault: Arc<Mutex<Option<String>>>,
+    #[expect(dead_code, reason = "kept for its drop")]
+    bus: BusThread,
 }
 
 impl HostThread {
-    /// Starts scanning `program` every `interval`; gives the bus's end of its image too.
+    /// Starts scanning `program` every `interval`, with `bus` between it and the driver of `config`.
     pub(super) fn start(
         program: Box<dyn Program>,
-        table: &SignalTable,
-        max_age: Nanos,
+        config: &Config,
+        bus: FreeLoopback,
         interval: Nanos,
         clock: Arc<dyn Clock>,
-    ) -> std::io::Result<(Self, BusEnd)> {
-        let (mut cpu, bus) = plc(program, table, max_age);
+    ) -> std::io::Result<Self> {
+        let name = format!("plc {}", program.name());
+        let (mut cpu, bus_end) = plc(program, &config.table, config.timing.max_age);
+        let status = LinkStatus::new(&name);
+        // A CPU whose program has died must not keep its last outputs on the bus.
+        let watchdog = Some((interval + interval).max(config.timing.max_age));
+        let port = Port::new(
+            bus_end,
+            Arc::clone(&clock),
+            Role::Controller,
+            watchdog,
+            status.clone(),
+        );
+        let reconnect = config.timing.reconnect.clone();
+        let bus = BusThread::start(Box::new(bus), port, reconnect, status, &name)?;
         let (tally, stop) = (Arc::clone(&cpu.tally), Stop::new());
         let fault = Arc::new(Mutex::new(None));
-        let name = format!("plc {}", cpu.program.name());
         let thread = std::thread::Builder::new().name(name).spawn({
             let (stop, fault) = (stop.clone(), Arc::clone(&fault));
             move || {
@@ -149,7 +201,13 @@ impl HostThread {
                 }
             }
         })?;
-        Ok((Self { tally, stop, thread: Some(thread), fault }, bus))
+        Ok(Self {
+            tally,
+            fault,
+            stop,
+            thread: Some(thread),
+            bus,
+        })
     }
 
     pub(super) fn tally(&self) -> &Tally {
@@ -158,7 +216,10 @@ impl HostThread {
 
     /// What the program's panic said, if it stopped by one.
     pub(super) fn fault(&self) -> Option<String> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.fault
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 }
 
@@ -178,7 +239,11 @@ fn scan_until_stopped(cpu: &mut Cpu, interval: Nanos, clock: &dyn Clock, stop: &
         let now = clock.now();
         cpu.scan(now);
         // Like a PLC: a scan that comes late is late, and none is made up for.
-        deadline = if deadline + interval > now { deadline + interval } else { now + interval };
+        deadline = if deadline + interval > now {
+            deadline + interval
+        } else {
+            now + interval
+        };
         clock.wait_until(deadline, stop);
     }
 }
@@ -208,7 +273,16 @@ impl SteppedHost {
         let port = Port::new(bus, clock, Role::Controller, None, status);
         let (tx, rx) = port.sizes(0);
         let wire = vec![0; tx.max(rx)].into();
-        (Self { cpu, port, interval, due: None, wire }, tally)
+        (
+            Self {
+                cpu,
+                port,
+                interval,
+                due: None,
+                wire,
+            },
+            tally,
+        )
     }
 }
 

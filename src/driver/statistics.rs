@@ -38,8 +38,22 @@ impl Counters {
 /// One `key=value` per line.
 impl fmt::Display for Counters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { ticks, fresh, unchanged, stale, failed, saturated, not_a_number } = self;
-        writeln!(f, "ticks={ticks}\nfresh={fresh}\nunchanged={unchanged}\nstale={stale}")?;
-        writeln!(f, "failed={failed}\nsaturated={saturated}\nnot_a_number={not_a_number}")
+        let Self {
+            ticks,
+            fresh,
+            unchanged,
+            stale,
+            failed,
+            saturated,
+            not_a_number,
+        } = self;
+        writeln!(
+            f,
+            "ticks={ticks}\nfresh={fresh}\nunchanged={unchanged}\nstale={stale}"
+        )?;
+        writeln!(
+            f,
+            "failed={failed}\nsaturated={saturated}\nnot_a_number={not_a_number}"
+        )
     }
 }

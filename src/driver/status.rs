@@ -14,6 +14,25 @@ impl Code {
     }
 }
 
+impl Code {
+    /// The worse of two: an error over stale, stale over unchanged, unchanged over fresh.
+    #[must_use]
+    pub fn worse(self, other: Self) -> Self {
+        let rank = |code: Self| {
+            if code.code() < 0 {
+                i32::MAX
+            } else {
+                code.code()
+            }
+        };
+        if rank(other) > rank(self) {
+            other
+        } else {
+            self
+        }
+    }
+}
+
 /// `STALE (2): nothing has come …`
 impl std::fmt::Display for Code {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -26,14 +26,19 @@ impl BusThread {
         name: &str,
     ) -> std::io::Result<Self> {
         let stop = Stop::new();
-        let thread = std::thread::Builder::new().name(format!("bus {name}")).spawn({
-            let stop = stop.clone();
-            move || {
-                let clock = Arc::clone(port.clock());
-                serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
-            }
-        })?;
-        Ok(Self { stop, thread: Some(thread) })
+        let thread = std::thread::Builder::new()
+            .name(format!("bus {name}"))
+            .spawn({
+                let stop = stop.clone();
+                move || {
+                    let clock = Arc::clone(port.clock());
+                    serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
+                }
+            })?;
+        Ok(Self {
+            stop,
+            thread: Some(thread),
+        })
     }
 }
 
@@ -66,14 +71,19 @@ fn serve(
                 }
                 let pause = reconnect[attempt.min(reconnect.len() - 1)];
                 attempt += 1;
-                status.enter(LinkState::Failed, &format!("{error}; next attempt in {pause}"));
+                status.enter(
+                    LinkState::Failed,
+                    &format!("{error}; next attempt in {pause}"),
+                );
                 clock.wait_until(clock.now() + pause, stop);
             }
             Err(panic) => {
                 let text = panic_text(&*panic);
                 status.enter(
                     LinkState::Failed,
-                    &format!("the bus thread panicked ({text}); close the driver and open it again"),
+                    &format!(
+                        "the bus thread panicked ({text}); close the driver and open it again"
+                    ),
                 );
                 return;
             }

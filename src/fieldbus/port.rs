@@ -55,7 +55,11 @@ impl LinkStatus {
     /// The state of the line of the driver called `driver`, which is closed so far.
     pub fn new(driver: &str) -> Self {
         let (state, reason) = (AtomicU8::new(0), Mutex::new("not opened yet".to_owned()));
-        Self(Arc::new(Shared { driver: driver.to_owned(), state, reason }))
+        Self(Arc::new(Shared {
+            driver: driver.to_owned(),
+            state,
+            reason,
+        }))
     }
 
     /// The state, without a lock.
@@ -83,7 +87,12 @@ impl LinkStatus {
         } else {
             log::Level::Info
         };
-        log::log!(level, "driver \"{}\" is {}: {reason}", self.0.driver, state.name());
+        log::log!(
+            level,
+            "driver \"{}\" is {}: {reason}",
+            self.0.driver,
+            state.name()
+        );
         reason.clone_into(&mut known);
         self.0.state.store(state as u8, Ordering::Relaxed);
     }

@@ -175,7 +175,10 @@ impl TickStation {
             } else if changed {
                 if *forced {
                     // No edge now, but there were some at the last read.
-                    shaper.bits().iter().for_each(|bit| receiver.edges(bit.signal, 0));
+                    shaper
+                        .bits()
+                        .iter()
+                        .for_each(|bit| receiver.edges(bit.signal, 0));
                 }
                 shaper.pass(&frame.bytes);
                 shaper.confirm();

@@ -8,10 +8,10 @@ mod slot;
 mod table;
 mod types;
 
-pub use address::Area;
+pub use address::{AREA_LIMIT, Address, AddressError, Addressing, Area, Width};
 pub use order::ByteOrder;
 pub use plan::{Conversions, Plan};
 pub use scale::Scale;
 pub use slot::Slot;
 pub use table::{Latch, Signal, SignalTable, Station};
-pub use types::DataType;
+pub use types::{DataType, UnknownType};

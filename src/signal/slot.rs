@@ -18,4 +18,24 @@ impl Slot {
     pub const fn real(self) -> f64 {
         f64::from_bits(self.0)
     }
+
+    /// A slot that holds a signed 64-bit integer.
+    pub const fn from_signed(value: i64) -> Self {
+        Self(value.cast_unsigned())
+    }
+
+    /// The signed 64-bit integer that the slot holds.
+    pub const fn signed(self) -> i64 {
+        self.0.cast_signed()
+    }
+
+    /// A slot that holds an unsigned 64-bit integer.
+    pub const fn from_unsigned(value: u64) -> Self {
+        Self(value)
+    }
+
+    /// The unsigned 64-bit integer that the slot holds.
+    pub const fn unsigned(self) -> u64 {
+        self.0
+    }
 }

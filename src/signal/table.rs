@@ -1,6 +1,6 @@
 //! The signal table of one driver.
 
-use super::{Area, ByteOrder, DataType, Scale, Slot};
+use super::{Address, Area, ByteOrder, DataType, Scale, Slot};
 use crate::time::Nanos;
 
 /// Which edges of a BOOL signal must not get lost between two exchanges.
@@ -45,6 +45,27 @@ pub struct Signal {
     pub fail_safe: Slot,
 }
 
+impl Signal {
+    /// Whether its slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.
+    pub const fn is_integer_slot(&self) -> bool {
+        self.scale.is_none()
+            && matches!(
+                self.data_type,
+                DataType::Lword | DataType::Lint | DataType::Ulint
+            )
+    }
+
+    /// Its place in the image of its station.
+    pub const fn address(&self) -> Address {
+        Address {
+            area: self.area,
+            width: self.data_type.width(),
+            byte: self.byte,
+            bit: self.bit,
+        }
+    }
+}
+
 /// One station (slave, unit, node) of a driver, with a frame of its own for either area.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Station {
@@ -63,4 +84,21 @@ pub struct SignalTable {
     pub stations: Vec<Station>,
     /// In file order, which is slot order.
     pub signals: Vec<Signal>,
+}
+
+impl Station {
+    /// Size of one of its areas in bytes.
+    pub const fn bytes(&self, area: Area) -> usize {
+        match area {
+            Area::Input => self.input_bytes,
+            Area::Output => self.output_bytes,
+        }
+    }
+}
+
+impl SignalTable {
+    /// Index of the signal with this name.
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.signals.iter().position(|signal| signal.name == name)
+    }
 }

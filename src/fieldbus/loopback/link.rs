@@ -102,8 +102,9 @@ impl End {
         }
         if locked.lanes[lane(role)].attached {
             return Err(BusError::Refused(format!(
-                "loopback link \"{name}\" already has a {role}; close that one, or give this driver \
+                "loopback link \"{name}\" already has a {}; close that one, or give this driver \
                  another link name or role",
+                role.name(),
             )));
         }
         let frames = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();

@@ -6,8 +6,10 @@
 
 mod free;
 mod link;
+mod options;
 mod stepped;
 
 pub use free::FreeLoopback;
 pub use link::{End, private_link};
+pub use options::{Mode, Options, Peer};
 pub use stepped::SteppedLoopback;

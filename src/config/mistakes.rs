@@ -1,0 +1,199 @@
+//! Mistakes in configuration text: collected, placed, and shown all at once.
+
+use std::cell::RefCell;
+use std::fmt;
+
+/// One mistake: where it is, what is wrong, and what would be right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// Line and column, both from 1; columns count characters. `None` when the file as a whole is
+    /// wrong, as one that is not there.
+    pub place: Option<(usize, usize)>,
+    /// What is wrong.
+    pub what: String,
+    /// What would be right.
+    pub right: String,
+}
+
+/// All mistakes of one file, in line order; at least one.
+///
+/// Its text has one line for each: `file:line:column: what; what would be right`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistakes {
+    file: String,
+    list: Vec<Mistake>,
+}
+
+impl Mistakes {
+    /// The one mistake that the file as a whole is.
+    pub fn of_file(file: &str, what: impl Into<String>, right: impl Into<String>) -> Self {
+        let only = Mistake {
+            place: None,
+            what: what.into(),
+            right: right.into(),
+        };
+        Self {
+            file: file.to_owned(),
+            list: vec![only],
+        }
+    }
+
+    /// Each of them, in line order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Mistake> {
+        self.list.iter()
+    }
+
+    /// How many there are.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+}
+
+impl<'a> IntoIterator for &'a Mistakes {
+    type Item = &'a Mistake;
+    type IntoIter = std::slice::Iter<'a, Mistake>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl fmt::Display for Mistakes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, Mistake { place, what, right }) in self.list.iter().enumerate() {
+            if index > 0 {
+                f.write_str("\n")?;
+            }
+            f.write_str(&self.file)?;
+            if let Some((line, column)) = place {
+                write!(f, ":{line}:{column}")?;
+            }
+            write!(f, ": {what}; {right}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Mistakes {}
+
+/// Collects the mistakes of one text while it is being read.
+#[derive(Debug)]
+pub struct Collector<'t> {
+    file: String,
+    text: &'t str,
+    line_starts: Vec<usize>,
+    found: RefCell<Vec<(usize, Mistake)>>,
+}
+
+impl<'t> Collector<'t> {
+    /// For `text`, which came from `file`.
+    pub fn new(file: &str, text: &'t str) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let line_starts = std::iter::once(0)
+            .chain(ends.map(|(at, _)| at + 1))
+            .collect();
+        Self {
+            file: file.to_owned(),
+            text,
+            line_starts,
+            found: RefCell::default(),
+        }
+    }
+
+    /// Takes down a mistake at byte offset `at` of the text.
+    pub fn report(&self, at: usize, what: impl Into<String>, right: impl Into<String>) {
+        let place = Some(self.place(at));
+        let mistake = Mistake {
+            place,
+            what: what.into(),
+            right: right.into(),
+        };
+        self.found.borrow_mut().push((at, mistake));
+    }
+
+    /// The line, from 1, of byte offset `at`.
+    pub fn line(&self, at: usize) -> usize {
+        self.line_starts.partition_point(|start| *start <= at)
+    }
+
+    /// Whether nothing has been reported yet.
+    pub fn is_empty(&self) -> bool {
+        self.found.borrow().is_empty()
+    }
+
+    /// All mistakes in line order, each once; `None` when there are none.
+    pub fn finish(self) -> Option<Mistakes> {
+        let mut found = self.found.into_inner();
+        found.sort_by_key(|(at, _)| *at);
+        let mut list: Vec<Mistake> = found.into_iter().map(|(_, mistake)| mistake).collect();
+        list.dedup();
+        (!list.is_empty()).then_some(Mistakes {
+            file: self.file,
+            list,
+        })
+    }
+
+    fn place(&self, at: usize) -> (usize, usize) {
+        let line = self.line(at);
+        let start = self.line_starts[line - 1];
+        let rest = &self.text[start..];
+        let column = rest
+            .char_indices()
+            .take_while(|(offset, _)| start + offset < at)
+            .count()
+            + 1;
+        (line, column)
+    }
+}
+
+/// A text from a file as a message may show it: short, and without control characters.
+pub fn shown(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let mut shown: String = text.chars().take(LONGEST).flat_map(printable).collect();
+    if text.chars().nth(LONGEST).is_some() {
+        shown.push('…');
+    }
+    shown
+}
+
+fn printable(c: char) -> impl Iterator<Item = char> {
+    let escape = c.is_control().then(|| c.escape_default());
+    let plain = (!c.is_control()).then_some(c);
+    escape.into_iter().flatten().chain(plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mistakes_come_in_line_order_and_once() {
+        let text = "erste\r\nzwölf = 1\n";
+        let collector = Collector::new("a.cfg", text);
+        collector.report(text.find('=').unwrap(), "second", "b");
+        collector.report(0, "first", "a");
+        collector.report(text.find('=').unwrap(), "second", "b");
+        collector.report(text.len(), "end", "c");
+        let mistakes = collector.finish().expect("mistakes");
+        assert_eq!(
+            mistakes.to_string(),
+            "a.cfg:1:1: first; a\na.cfg:2:7: second; b\na.cfg:3:1: end; c"
+        );
+        assert_eq!(Collector::new("a.cfg", text).finish(), None);
+    }
+
+    #[test]
+    fn a_file_as_a_whole_has_no_line() {
+        assert_eq!(
+            Mistakes::of_file("a.cfg", "x", "y").to_string(),
+            "a.cfg: x; y"
+        );
+    }
+
+    #[test]
+    fn shown_text_is_short_and_printable() {
+        assert_eq!(shown("a\tb\u{1b}"), "a\\tb\\u{1b}");
+        assert_eq!(shown(&"é".repeat(41)), format!("{}…", "é".repeat(40)));
+    }
+}

@@ -1,0 +1,59 @@
+//! The right name nearest to a wrong one.
+
+/// Words longer than this are not compared: no name that we know is as long, and the comparison
+/// takes time by the square of the length.
+const LONGEST: usize = 64;
+
+/// The candidate most like `word`, if one is like it at all; letter case does not count.
+pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+    let word = word.trim().to_lowercase();
+    let length = word.chars().take(LONGEST + 1).count();
+    if length > LONGEST {
+        return None;
+    }
+    candidates
+        .into_iter()
+        .filter(|candidate| candidate.len() <= 4 * LONGEST)
+        .map(|candidate| {
+            (
+                strsim::damerau_levenshtein(&word, &candidate.to_lowercase()),
+                candidate,
+            )
+        })
+        .filter(|(distance, candidate)| {
+            let longer = length.max(candidate.chars().count());
+            *distance == 0 || (*distance <= longer.div_ceil(3) && *distance < longer)
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// What would be right instead of `word`: the nearest candidate if there is one, else all of them.
+pub fn did_you_mean(word: &str, kinds: &str, candidates: &[&str]) -> String {
+    match nearest(word, candidates.iter().copied()) {
+        Some(near) => format!("did you mean \"{near}\"?"),
+        None => format!("{kinds} are {}", candidates.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slips_find_their_name() {
+        let keys = ["name", "address", "type", "latch", "fail_safe"];
+        for (wrong, right) in [
+            ("adress", Some("address")),
+            ("Latch", Some("latch")),
+            ("failsafe", Some("fail_safe")),
+            ("tpye", Some("type")),
+            ("colour", None),
+            ("x", None),
+            ("", None),
+        ] {
+            assert_eq!(nearest(wrong, keys), right, "{wrong}");
+        }
+        assert_eq!(nearest(&"a".repeat(1_000_000), keys), None);
+    }
+}

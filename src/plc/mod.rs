@@ -6,8 +6,11 @@
 
 use crate::time::Nanos;
 
+pub mod blocks;
+mod drum;
 mod mirror;
 
+pub use drum::Drum;
 pub use mirror::Mirror;
 
 /// What a program sees and makes in one scan.

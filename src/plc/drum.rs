@@ -37,8 +37,8 @@ pub struct Drum<const STEPS: usize> {
     patterns: [u16; STEPS],
     dwell: Option<[u16; STEPS]>,
     fault: Option<[u16; STEPS]>,
-    step_before: bool,
-    enabled_before: bool,
+    /// `step` as the last call found it; none if that call was not enabled.
+    step_before: Option<bool>,
     /// The step that `entered` is about; 0 before the first call.
     timed: u16,
     entered: Nanos,
@@ -58,8 +58,7 @@ impl<const STEPS: usize> Drum<STEPS> {
             patterns,
             dwell: None,
             fault: None,
-            step_before: false,
-            enabled_before: false,
+            step_before: None,
             timed: 0,
             entered: Nanos::ZERO,
         }
@@ -89,14 +88,13 @@ impl<const STEPS: usize> Drum<STEPS> {
         let in_range =
             steps.contains(&usize::from(self.active)) && steps.contains(&usize::from(self.preset));
         if !enable || !in_range {
-            self.enabled_before = false;
+            self.step_before = None;
             self.drum_coil = false;
             return false;
         }
 
-        let rising = step && !self.step_before && self.enabled_before;
-        self.step_before = step;
-        self.enabled_before = true;
+        let rising = step && self.step_before == Some(false);
+        self.step_before = Some(step);
         if reset {
             self.active = self.preset;
         } else if rising {

@@ -42,6 +42,7 @@ pub struct Qualifiers {
 /// where a dash marks the latch that `R` clears. The action runs (`A`) in every call with `Q`, and
 /// once for `P1` and `P0`; with the final scan also once after `Q` has gone.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "one block's memory")]
 pub struct ActionControl {
     /// `Q`, as of the last call.
     pub q: bool,
@@ -113,7 +114,7 @@ impl ActionControl {
         let first = self.first.call(on.p1);
         let last = self.last && !on.p0;
         self.last = on.p0;
-        self.q || first || last || (self.final_scan && q_before && !self.q)
+        self.q || first || last || (self.final_scan && q_before)
     }
 }
 

@@ -187,9 +187,11 @@ impl Outputs {
 mod tests {
     use super::*;
 
+    type Read = fn(Inputs) -> bool;
+
     #[test]
     fn every_input_has_its_own_bit() {
-        let all: [(fn(Inputs) -> bool, usize, u8); 10] = [
+        let all: [(Read, usize, u8); 10] = [
             (Inputs::package_1, 0, 3),
             (Inputs::package_2, 0, 4),
             (Inputs::home_1, 0, 5),

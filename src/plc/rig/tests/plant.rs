@@ -130,6 +130,10 @@ impl Wheel {
 
 /// The machine.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches that the tests flip"
+)]
 pub(super) struct Plant {
     pub(super) la1: Lift,
     pub(super) la2: Lift,
@@ -213,10 +217,11 @@ impl Plant {
             .all(|lift| lift.target.is_none())
             && self.im1.left == 0
             && self.im2.left == 0;
-        if let Some(step) = WORDS.iter().position(|&w| w == self.msb_first(word)) {
-            if still && !self.mute {
-                self.complete |= 1 << step;
-            }
+        if let Some(step) = WORDS.iter().position(|&w| w == self.msb_first(word))
+            && still
+            && !self.mute
+        {
+            self.complete |= 1 << step;
         }
     }
 

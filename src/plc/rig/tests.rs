@@ -63,6 +63,27 @@ fn a_referenced_lift_in_mid_path_comes_home_by_a_second_acknowledge() {
 }
 
 #[test]
+fn a_lift_that_fails_again_after_the_acknowledge_aborts_the_homing() {
+    let mut cell = Cell::new(La1Code::MsbFirst);
+    cell.plant.not_ok = true;
+    cell.until("the lifts", |cell| cell.seen.word & 0x0404 != 0);
+    cell.plant.not_ok = true;
+    cell.scan();
+    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, 0));
+}
+
+#[test]
+fn a_homing_that_lost_the_link_begins_with_its_full_time() {
+    let mut cell = Cell::new(La1Code::MsbFirst);
+    cell.scans(5);
+    cell.alive = false;
+    cell.scans(950);
+    cell.alive = true;
+    cell.until_phase(READY);
+    assert_eq!(cell.phases, [0, 1, 0, 1, 2]);
+}
+
+#[test]
 fn three_cycles_command_exactly_the_words_of_the_protocol() {
     let mut cell = Cell::ready();
     cell.press(START);

@@ -11,9 +11,9 @@
 //! | 6 finalise | homes | parked when home; abort when homing fails |
 //! | 7 parked | Parked lamp; nothing moves | home on Start |
 //!
-//! Any phase leads to initialise as soon as the peer is not alive. Stop is remembered in every
-//! phase but initialise and parked, until the rig is parked. Start and Reset count only where the
-//! table names them, and only at the moment they are pressed.
+//! Any phase leads to initialise as soon as the peer is not alive. While it is alive, Stop is
+//! remembered from any phase but parked, until the rig is parked. Start and Reset count only where
+//! the table names them, and only at the moment they are pressed.
 //!
 //! Homing goes through these steps:
 //!

@@ -94,6 +94,11 @@ public final class RigPicture {
                     : "fill=\"#dde4e9\" stroke=\"#b4c0ca\" stroke-width=\"1.5\"");
             svg.text(54, y + 5, "font-size=\"14\" " + (lit[i] ? INK + " font-weight=\"600\"" : PALE), names[i]);
         }
+        for (int i = 0; i < 2; i++) {
+            String paint = i == 0 ? "fresh" : "treated";
+            svg.rect(155, 64 + 25 * i, 14, 17, 4, "fill=\"url(#" + paint + ")\" stroke=\"#1f4a66\"");
+            svg.text(178, 77 + 25 * i, "font-size=\"14\" " + INK, paint);
+        }
     }
 
     private static void bar(Rig rig, Svg svg) {
@@ -111,7 +116,7 @@ public final class RigPicture {
         if (rig.notOk()) {
             svg.rect(0, top - 32, WIDTH, 32, 0, "fill=\"#b83232\"");
             svg.text(28, top - 11, "font-size=\"14.5\" font-weight=\"600\" fill=\"#ffffff\"",
-                    "Not OK: " + String.join("; ", rig.faults()));
+                    "Not OK: " + rig.faults().get(0) + (rig.faults().size() > 1 ? " …" : ""));
         }
     }
 

@@ -29,11 +29,11 @@ final class RigScene {
 
     private static final String STEEL = "fill=\"url(#steel)\" stroke=\"#6d7f8f\"";
     private static final String PLATE = "fill=\"#e3e9ee\" stroke=\"#6d7f8f\" stroke-width=\"1.2\"";
-    private static final String CLEAR_PLATE = "fill=\"#d5e2ec\" fill-opacity=\"0.82\" stroke=\"#6d7f8f\"";
     private static final String MOTOR = "fill=\"url(#motor)\" stroke=\"#26333d\"";
     private static final String HOLE = "fill=\"#93a3b0\" stroke=\"#62727f\"";
     private static final String LABEL = "font-size=\"13.5\" fill=\"#4a5b6b\"";
     private static final String CENTRED = " text-anchor=\"middle\"";
+    private static final String ENDING = " text-anchor=\"end\"";
 
     private final Rig rig;
     private final Svg svg;
@@ -50,6 +50,7 @@ final class RigScene {
 
     void draw() {
         undercarriage();
+        belt(-RADIUS1 - RIM + 4, -RADIUS1 - RIM - 118);
         wheel1();
         wheel2();
         lamp();
@@ -85,11 +86,25 @@ final class RigScene {
         things.add(new Thing(0, () -> cylinder(0, 0, 12, -3, 13, STEEL, STEEL)));
         things.add(new Thing(0.1, () -> column(Lift.LA1, LIFT1, 0, Geometry.SLEEVE_FLOOR - 6)));
         paint(things);
+        belt(RADIUS1 + RIM + 4, RADIUS1 + RIM + 106);
+    }
+
+    /** A roller conveyor between the wheel and the world, at the infeed in front or the outfeed behind. */
+    private void belt(double from, double to) {
+        double half = 24;
+        svg.path(String.format(Locale.ROOT, "M%.1f %.1fH%.1fV%.1fH%.1fZ",
+                x(-half), y(from, -6), x(half), y(to, -6), x(-half)), "fill=\"#aab8c3\" stroke=\"#6d7f8f\"");
+        double step = Math.signum(to - from) * 13;
+        for (int i = 1; i * 13 < Math.abs(to - from); i++) {
+            double near = from + i * step;
+            svg.stroke(x(-half + 3), y(near, -6), x(half - 3), y(near, -6),
+                    "stroke=\"#e9eef2\" stroke-width=\"3\" stroke-linecap=\"round\"");
+        }
     }
 
     private void wheel2() {
         double floor = Geometry.SLEEVE_FLOOR;
-        cylinder(MIDDLE2, 0, floor - 3, floor - 11, RADIUS2 + RIM, STEEL, CLEAR_PLATE);
+        cylinder(MIDDLE2, 0, floor - 3, floor - 11, RADIUS2 + RIM, STEEL, PLATE);
         List<Thing> things = new ArrayList<>();
         for (int i = 0; i < 2; i++) {
             double angle = Math.toRadians(rig.wheel2Angle() + 180 * i);
@@ -125,12 +140,7 @@ final class RigScene {
         if (cup < from || cup > to) {
             return;
         }
-        String colour = rig.vacuum(lift) ? "#e8862e" : "#3b4a57";
-        double px = x(across);
-        svg.path(String.format(Locale.ROOT, "M%.1f %.1fL%.1f %.1fH%.1fL%.1f %.1fZ",
-                px - 15, y(0, cup), px - 7, y(0, cup - 9), px + 7, px + 15, y(0, cup)),
-                "fill=\"" + colour + "\" stroke=\"#26333d\"");
-        svg.ellipse(px, y(0, cup), 15, 15 * NEAR / ACROSS, "fill=\"" + colour + "\" stroke=\"#26333d\"");
+        cup(lift, x(across), y(0, cup));
         for (Bottle bottle : bottles) {
             boolean here = lift == Lift.LA1
                     ? bottle.place() == Bottle.Place.CUP1 || bottle.place() == Bottle.Place.STUCK1
@@ -139,6 +149,19 @@ final class RigScene {
                 bottle(bottle, across, 0);
             }
         }
+    }
+
+    private void cup(Lift lift, double px, double py) {
+        boolean sunk = rig.position(lift) <= Geometry.REACH;
+        if (sunk && !rig.homed(lift == Lift.LA1 ? 1 : 2)) {
+            return;
+        }
+        String look = "fill=\"" + (rig.vacuum(lift) ? "#e8862e" : "#3b4a57") + "\" stroke=\"#26333d\"";
+        if (!sunk) {
+            svg.path(String.format(Locale.ROOT, "M%.1f %.1fL%.1f %.1fH%.1fL%.1f %.1fZ",
+                    px - 15, py, px - 7, py + 9, px + 7, px + 15, py), look);
+        }
+        svg.ellipse(px, py, 15, 15 * NEAR / ACROSS, look);
     }
 
     private void rod(double across, double from, double to) {
@@ -201,32 +224,39 @@ final class RigScene {
         if (!blocked && rig.cupHeight(lift) > height) {
             svg.rect(px - 4.5, py - 2, 9, 4, 0, "fill=\"#d5dde4\"");
         }
-        svg.text(px + 72, py + 5, LABEL, "package " + (lift.ordinal() + 1) + (blocked ? " blocked" : ""));
+        String words = "package " + (lift.ordinal() + 1) + (blocked ? " blocked" : "");
+        if (lift == Lift.LA1) {
+            svg.text(px - 73, py + 5, LABEL + ENDING, words);
+        } else {
+            svg.text(px + 73, py + 5, LABEL, words);
+        }
     }
 
     private void signs() {
-        homing(1, x(0) - (RADIUS1 + RIM) * ACROSS - 14, y(0, -8));
-        homing(2, x(MIDDLE2), y(RADIUS2 + RIM, Geometry.SLEEVE_FLOOR - 12) + 12);
-        svg.text(x(0), y(RADIUS1 + RIM, -12) + 34, LABEL + CENTRED, "▲ infeed");
-        svg.text(x(0) - 20, y(-RADIUS1 - RIM, -3) - 84, LABEL + CENTRED, "outfeed ▲");
-        svg.text(x(0), y(RADIUS1 + RIM, -12) + 56, LABEL + CENTRED,
-                String.format(Locale.ROOT, "index wheel 1 at %.0f°", rig.wheel1Angle()));
-        svg.text(x(MIDDLE2) + 46, y(0, 70), LABEL,
+        double left = x(-RADIUS1 - RIM);
+        sensor(1, left - 14, y(0, -8));
+        svg.text(24, y(0, -8) - 30, LABEL, "homing 1");
+        svg.text(24, y(0, -8) + 74, LABEL, String.format(Locale.ROOT, "index wheel 1 at %.0f°", rig.wheel1Angle()));
+        double right = x(MIDDLE2 + RADIUS2 + RIM);
+        sensor(2, right + 14, y(0, Geometry.SLEEVE_FLOOR - 7));
+        svg.text(right + 30, y(0, Geometry.SLEEVE_FLOOR - 7) + 5, LABEL, "homing 2");
+        svg.text(right + 5, y(0, Geometry.SLEEVE_FLOOR - 7) - 24, LABEL,
                 String.format(Locale.ROOT, "chamber wheel at %.0f°", rig.wheel2Angle()));
-        lift(Lift.LA1, x(LIFT1) + 26, y(0, -70));
-        lift(Lift.LA2, x(LIFT2) + 26, y(0, 60));
+        svg.text(x(30), y(RADIUS1 + RIM + 78, -6), LABEL, "infeed");
+        svg.text(x(-31), y(-RADIUS1 - RIM - 78, -6), LABEL + ENDING, "outfeed");
+        lift(Lift.LA1, x(LIFT1) + 25, y(0, 66));
+        lift(Lift.LA2, x(LIFT2) + 27, y(0, 66));
     }
 
     private void lift(Lift lift, double px, double py) {
-        svg.text(px, py, LABEL, String.format(Locale.ROOT, "lift %d at %.0f mm",
-                lift.ordinal() + 1, rig.position(lift)));
-        svg.text(px, py + 18, LABEL, "SC" + (lift.ordinal() + 1) + (rig.vacuum(lift) ? " holds vacuum" : " off"));
+        int number = lift.ordinal() + 1;
+        svg.text(px, py, LABEL, String.format(Locale.ROOT, "lift %d at %.0f mm", number, rig.position(lift)));
+        svg.text(px, py + 18, LABEL, "SC" + number + (rig.vacuum(lift) ? " on" : " off"));
     }
 
-    private void homing(int wheel, double px, double py) {
+    private void sensor(int wheel, double px, double py) {
         svg.rect(px - 9, py - 8, 18, 16, 4, "fill=\"#3b4a57\"");
         svg.ellipse(px, py, 4, 4, rig.homed(wheel) ? "fill=\"#58d68d\"" : "fill=\"#7c8b97\"");
-        svg.text(px, py + 25, LABEL + CENTRED, "homing " + wheel);
     }
 
     private void shadow(double across, double half) {

@@ -78,10 +78,10 @@ public final class Bottle {
         return treated;
     }
 
-    void feed(int newId, int pocket) {
+    /** A new bottle gets its number. */
+    void number(int newId) {
         id = newId;
         treated = false;
-        put(Place.POCKET, pocket, Geometry.POCKET_FLOOR);
     }
 
     void put(Place newPlace, int newSlot, double newHeight) {

@@ -46,6 +46,12 @@ public final class Geometry {
     /** Station of the outfeed on index wheel 1. */
     public static final double OUTFEED = 180.0;
 
+    /** Station of the chamber wheel over lift 1. */
+    public static final double OVER_LIFT1 = 0.0;
+
+    /** Station of the chamber wheel over lift 2. */
+    public static final double OVER_LIFT2 = 180.0;
+
     /** Half the window of a homing sensor around an index position: a jogging wheel has time to stop inside it. */
     public static final double HOMING_WINDOW = 10.0;
 

@@ -109,6 +109,8 @@ final class LiftPath {
         } else if (to < from) {
             down(from, to);
         }
+        gripAtRest(lower);
+        gripAtRest(upper);
         if (cup.held() != null) {
             cup.held().raise(cupHeight());
         }
@@ -207,7 +209,7 @@ final class LiftPath {
     }
 
     private void gripAtRest(Seat seat) {
-        if (seat != null && cup.canGrip() && near(seat) && seat.bottle() != null) {
+        if (seat != null && cup.canGrip() && near(seat) && !seat.wheelTurning() && seat.bottle() != null) {
             cup.grip(seat.take(), cupHeight());
         }
     }

@@ -85,6 +85,11 @@ final class Cell {
         return wheel1.moving() || wheel2.moving() || path1.drive().moving() || path2.drive().moving();
     }
 
+    /** A run bit is high that has no effect, because a fault came after it rose. */
+    boolean ignores(Inputs in) {
+        return in.high(Inputs.LA1_RUN) && !run1 || in.high(Inputs.LA2_RUN) && !run2;
+    }
+
     Faults faults() {
         return faults;
     }

@@ -84,8 +84,14 @@ final class LiftDrive {
         }
     }
 
-    /** The run command fell: ramps down where it is. */
+    /**
+     * The run command fell: ramps down where it is. A lift that the bottom switch already sees sinks the last half
+     * millimetre onto its stop, because a control drops the run command as soon as it sees the switch.
+     */
     void stop() {
+        if (target == 0 && atBottom()) {
+            return;
+        }
         referencing = false;
         if (wedged) {
             underWay = false;

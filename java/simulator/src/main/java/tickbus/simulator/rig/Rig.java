@@ -77,7 +77,8 @@ public final class Rig implements Machine {
         cell.step(in, nanos);
         time += nanos;
         panel.advance(nanos);
-        monitor.look(in.pattern(), in.rising(Inputs.ACKNOWLEDGE), cell.faults().latched(), cell.moving());
+        boolean busy = cell.moving() || cell.ignores(in);
+        monitor.look(in.pattern(), in.rising(Inputs.ACKNOWLEDGE), cell.faults().latched(), busy);
         monitor.lamp(in.high(Inputs.LAMP), in.high(Inputs.LA2_RUN));
         show();
     }

@@ -30,14 +30,14 @@ final class StepMonitor {
      * @param newPattern motion and suction bits of the command word
      * @param acknowledge Acknowledge rose
      * @param fault Not OK is on
-     * @param moving some drive is under way
+     * @param busy some drive is under way, or deaf to a run bit
      */
-    void look(int newPattern, boolean acknowledge, boolean fault, boolean moving) {
+    void look(int newPattern, boolean acknowledge, boolean fault, boolean busy) {
         if (newPattern != pattern) {
             pattern = newPattern;
             step = stepOf(newPattern);
             state = State.WAITING;
-        } else if (state == State.WAITING && step > 0 && !moving) {
+        } else if (state == State.WAITING && step > 0 && !busy) {
             state = State.COMPLETE;
             if (step == STEPS) {
                 cycles++;

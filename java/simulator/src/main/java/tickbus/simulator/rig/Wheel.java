@@ -104,20 +104,22 @@ final class Wheel {
         wrap();
         if (!ramp.moving()) {
             state = State.REST;
-            if (pending) {
-                startIndex();
-            } else if (free && offset() != 0 && inHomingWindow()) {
+            if (free && nearPulse()) {
                 state = State.CAPTURING;
                 ramp.moveTo(angle() - offset(), CREEP_SPEED, CREEP_STEEPNESS, CREEP_STEEPNESS);
+            } else if (pending) {
+                startIndex();
             }
         }
     }
 
     private void index() {
-        boolean settling = state == State.STOPPING || state == State.CAPTURING;
-        if (state == State.REST && !pending) {
+        boolean settling = state == State.STOPPING || state == State.CAPTURING || (state == State.REST && nearPulse());
+        if (pending) {
+            retriggers++;
+        } else if (state == State.REST && !settling) {
             startIndex();
-        } else if (settling && !pending) {
+        } else if (settling) {
             // The end of homing is the wheel's own affair: a command that comes meanwhile is not lost.
             pending = true;
         } else {
@@ -130,6 +132,10 @@ final class Wheel {
         state = State.INDEXING;
         double target = (Math.floor(angle() / pitch) + 1) * pitch;
         ramp.moveTo(target, speed, steepness, steepness);
+    }
+
+    private boolean nearPulse() {
+        return offset() != 0 && inHomingWindow();
     }
 
     /** Signed distance from the nearest index position. */

@@ -2,6 +2,7 @@ package tickbus.simulator.demo;
 
 import java.util.ArrayDeque;
 import java.util.Deque;
+import java.util.Locale;
 import java.util.function.BooleanSupplier;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.rig.Button;
@@ -59,8 +60,7 @@ final class Operator {
         for (int cycle = 1; cycle < jamCycle; cycle++) {
             runCycle(cycle);
         }
-        fault("jam in cycle " + jamCycle, "Not OK and the Fault lamp", 20, this::jam,
-                () -> rig.notOk() && watcher.faultLamp());
+        fault("jam in cycle " + jamCycle, "Not OK and the Fault lamp", 20, this::jam, this::jamShown);
         fault("looking at the fault", "one second to pass", 2, () -> { }, () -> elapsed() >= SECOND);
         fault("clearing the jam", "half a second to pass", 2, this::clear, () -> elapsed() >= SECOND / 2);
         fault("recovery", "Not OK off and the Running lamp", 30, () -> press(Button.RESET),
@@ -94,8 +94,7 @@ final class Operator {
             return;
         }
         if (!stage.faultExpected && (rig.notOk() || watcher.faultLamp())) {
-            String cause = rig.notOk() ? String.join("; ", rig.faults()) : "the PLC's Fault lamp is on, the rig is well";
-            throw new DemoFailure("unexpected fault in stage " + stage.name + ": " + cause);
+            throw unexpectedFault();
         }
         if (stage.over.getAsBoolean()) {
             next();
@@ -130,12 +129,25 @@ final class Operator {
     private void press(Button button) {
         rig.press(button);
         String name = button.name();
-        say("presses " + name.charAt(0) + name.substring(1).toLowerCase(java.util.Locale.ROOT));
+        say("presses " + name.charAt(0) + name.substring(1).toLowerCase(Locale.ROOT));
     }
 
     private void jam() {
         rig.jamNext(Lift.LA2);
         say("makes the next bottle at lift 2 stick");
+    }
+
+    private boolean jamShown() {
+        boolean fault = rig.notOk() || watcher.faultLamp();
+        if (fault && !rig.jammed()) {
+            throw unexpectedFault();
+        }
+        return rig.notOk() && watcher.faultLamp();
+    }
+
+    private DemoFailure unexpectedFault() {
+        String cause = rig.notOk() ? String.join("; ", rig.faults()) : "the PLC's Fault lamp is on, the rig is well";
+        return new DemoFailure("unexpected fault in stage " + stage.name + ": " + cause);
     }
 
     private void clear() {

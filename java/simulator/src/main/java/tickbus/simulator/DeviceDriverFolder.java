@@ -138,8 +138,13 @@ public final class DeviceDriverFolder {
         List<ControlInterfaceDeviceDriver> drivers = new ArrayList<>();
         try {
             Constructor<? extends ControlInterfaceDeviceDriver> constructor = constructor(loader);
-            for (Path cfg : configurations.values()) {
-                drivers.add(open(constructor, cfg));
+            for (Map.Entry<Integer, Path> one : configurations.entrySet()) {
+                ControlInterfaceDeviceDriver driver = open(constructor, one.getValue());
+                drivers.add(driver);
+                if (driver.id() != one.getKey()) {
+                    throw new WrongInput(one.getValue().getFileName() + ": its driver says that it has the id "
+                            + driver.id() + ", but the simulator reads " + one.getKey() + " from the file");
+                }
             }
             return new DriverSet(drivers, loader);
         } catch (RuntimeException | Error e) {

@@ -193,10 +193,9 @@ final class Binder {
     private void visit(BoundRow row, List<BoundRow> path, List<BoundRow> ordered) {
         if (row.active) {
             List<BoundRow> cycle = path.subList(path.indexOf(row), path.size());
-            StringBuilder names = new StringBuilder(row.row.result());
-            for (int i = cycle.size() - 1; i >= 0; i--) {
-                names.append(" -> ").append(cycle.get(i).row.result());
-            }
+            StringBuilder names = new StringBuilder();
+            cycle.forEach(one -> names.append(one.row.result()).append(" -> "));
+            names.append(row.row.result());
             BoundRow first = cycle.stream().min(Comparator.comparingInt(one -> one.row.line())).orElseThrow();
             mistake(first.row, "a cycle, each value waits for the next: " + names);
             return;

@@ -70,14 +70,14 @@ final class Operator {
         }
         stage("cycle " + cycles, "its step 2", 20, () -> { },
                 () -> watcher.cycles() == cycles - 1 && watcher.step() == 2);
-        stage("stop in cycle " + cycles, "cycles completed: " + cycles, 20, () -> press(Button.STOP),
+        stage("stop in cycle " + cycles, "its end", 20, () -> press(Button.STOP),
                 () -> watcher.cycles() >= cycles);
         stage("parking", "the Parked lamp", 20, () -> { }, watcher::parkedLamp);
         stage("settling", "all edges to pass and the PLC to scan", 5, () -> firstScan = peer.scans(), this::settled);
     }
 
     private void runCycle(int cycle) {
-        stage("cycle " + cycle, "cycles completed: " + cycle, 20, () -> { }, () -> watcher.cycles() >= cycle);
+        stage("cycle " + cycle, "its end", 20, () -> { }, () -> watcher.cycles() >= cycle);
     }
 
     private void stage(String name, String awaited, int limitSeconds, Runnable begin, BooleanSupplier over) {

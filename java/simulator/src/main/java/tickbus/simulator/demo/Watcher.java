@@ -67,13 +67,13 @@ final class Watcher {
     void look() {
         long now = simulator.simulationNanos();
         lookAtLink(now);
-        if (phase() != lastPhase) {
-            lastPhase = phase();
-            timeline.add(now, "PLC", "phase " + phaseName());
-        }
         if (cycles() != lastCycles) {
             lastCycles = cycles();
             timeline.add(now, "PLC", "cycles completed: " + lastCycles);
+        }
+        if (phase() != lastPhase) {
+            lastPhase = phase();
+            timeline.add(now, "PLC", "phase " + phaseName());
         }
         if (step() != lastStep) {
             lastStep = step();

@@ -88,7 +88,7 @@ class OperatorTest {
     @Test
     void aDrumThatHangsIsATimeOutOfItsStage() throws IOException {
         assertEquals(1, play(3, plc -> plc.deafStep = 4));
-        fails("stage cycle 1: waited 20s of simulation time for cycles completed: 1; the PLC is in phase run, step 4");
+        fails("stage cycle 1: waited 20s of simulation time for its end; the PLC is in phase run, step 4");
     }
 
     @Test

@@ -18,10 +18,6 @@ final class Beam {
         this.height = height;
     }
 
-    double height() {
-        return height;
-    }
-
     /** Base of a bottle that the beam meets at mid-height. */
     double middle() {
         return height - Geometry.BOTTLE_HEIGHT / 2;

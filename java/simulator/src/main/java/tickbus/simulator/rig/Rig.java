@@ -290,6 +290,25 @@ public final class Rig implements Machine {
     }
 
     /**
+     * The step that the control shows on its panel.
+     *
+     * @return 1 to 6, or 0 outside production
+     */
+    public int panelStep() {
+        return (int) in.value(Inputs.STEP);
+    }
+
+    /**
+     * Whether a lamp of the operator panel is lit.
+     *
+     * @param number 0 Ready, 1 Running, 2 Fault, 3 Parked
+     * @return the commanded state
+     */
+    public boolean panelLamp(int number) {
+        return in.high(Inputs.READY + number);
+    }
+
+    /**
      * The cycles that the control shows on its panel.
      *
      * @return cycles since its program started

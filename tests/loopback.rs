@@ -93,9 +93,8 @@ fn a_stepped_program_scans_on_simulation_time() {
         seen.push(if end.get("out") == 1.0 { '1' } else { '0' });
     }
     assert_eq!(
-        seen,
-        "000000000000000000001111111111".replace("", ""),
-        "held until the scan has seen it"
+        seen, "000000000000000000001111111111",
+        "held until a scan has seen it"
     );
     assert_eq!(end.statistic("plc.scans"), "3");
     assert_eq!(end.statistic("plc.rises.in"), "1");

@@ -83,6 +83,7 @@ pub struct Collector<'t> {
     file: String,
     text: &'t str,
     line_starts: Vec<usize>,
+    broken_lines: Vec<usize>,
     found: RefCell<Vec<(usize, Mistake)>>,
 }
 
@@ -97,6 +98,7 @@ impl<'t> Collector<'t> {
             file: file.to_owned(),
             text,
             line_starts,
+            broken_lines: Vec::new(),
             found: RefCell::default(),
         }
     }
@@ -117,9 +119,30 @@ impl<'t> Collector<'t> {
         self.line_starts.partition_point(|start| *start <= at)
     }
 
-    /// Whether nothing has been reported yet.
-    pub fn is_empty(&self) -> bool {
-        self.found.borrow().is_empty()
+    /// Notes that the line of byte offset `at` has a syntax error and is left out.
+    pub(super) fn break_line(&mut self, at: usize) {
+        self.broken_lines.push(self.line(at));
+    }
+
+    /// Whether any line is left out. What is not in the text may then stand there.
+    pub fn is_broken(&self) -> bool {
+        !self.broken_lines.is_empty()
+    }
+
+    /// Whether no line is left out between byte offset `at` and the next table header.
+    pub(super) fn is_whole_from(&self, at: usize) -> bool {
+        let first = self.line(at);
+        let header = |line: &usize| {
+            self.text[self.line_starts[*line]..]
+                .trim_start()
+                .starts_with('[')
+        };
+        // Only a broken line makes the search for the next header worth its time.
+        self.broken_lines
+            .iter()
+            .filter(|line| **line >= first)
+            .min()
+            .is_none_or(|broken| (first..*broken).any(|line| header(&line)))
     }
 
     /// All mistakes in line order, each once; `None` when there are none.

@@ -1,7 +1,15 @@
 //! Reading configuration text: spans, collected mistakes, nearest names.
+//!
+//! [`read_text`] parses TOML and hands over its root [`Table`]. A reader takes its keys one by one and
+//! reports each mistake to the text's [`Collector`] where it stands, so that a person sees all of
+//! them at once. Nothing here knows what the keys mean.
 
 mod mistakes;
 mod nearest;
+mod source;
+mod table;
 
 pub use mistakes::{Collector, Mistake, Mistakes, shown};
 pub use nearest::{did_you_mean, nearest};
+pub use source::read_text;
+pub use table::{Table, Value};

@@ -28,11 +28,24 @@ pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// What would be right instead of `word`: the nearest candidate if there is one, else all of them.
+/// What would be right instead of `word`: the nearest candidate, or those that begin like it, else
+/// all of them; `kinds` is what they are called together.
 pub fn did_you_mean(word: &str, kinds: &str, candidates: &[&str]) -> String {
-    match nearest(word, candidates.iter().copied()) {
-        Some(near) => format!("did you mean \"{near}\"?"),
-        None => format!("{kinds} are {}", candidates.join(", ")),
+    if let Some(near) = nearest(word, candidates.iter().copied()) {
+        return format!("did you mean \"{near}\"?");
+    }
+    let begins = word.trim().to_lowercase();
+    let alike =
+        |candidate: &&&str| begins.len() > 1 && candidate.to_lowercase().starts_with(&begins);
+    let near: Vec<String> = candidates
+        .iter()
+        .filter(alike)
+        .map(|c| format!("\"{c}\""))
+        .collect();
+    if near.is_empty() {
+        format!("{kinds} are {}", candidates.join(", "))
+    } else {
+        format!("did you mean {}?", near.join(" or "))
     }
 }
 

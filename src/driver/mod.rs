@@ -3,6 +3,7 @@
 mod config;
 mod exchange;
 mod host;
+mod layout;
 mod open;
 mod statistics;
 mod status;

@@ -6,9 +6,15 @@
 
 use crate::time::Nanos;
 
+mod drum;
 mod mirror;
 
+pub mod blocks;
+pub mod rig;
+
+pub use drum::Drum;
 pub use mirror::Mirror;
+pub use rig::{La1Code, Rig};
 
 /// What a program sees and makes in one scan.
 #[derive(Debug)]
@@ -42,13 +48,13 @@ pub trait Program: Send {
 }
 
 /// The names that [`program`] knows.
-pub const PROGRAMS: [&str; 1] = [Mirror::NAME];
+pub const PROGRAMS: [&str; 2] = [Rig::NAME, Mirror::NAME];
 
 /// Why [`program`] gave none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProgramError {
     /// No built-in program has that name.
-    #[error("no PLC program is called \"{name}\"; the built-in programs are {}", list(&PROGRAMS))]
+    #[error("no PLC program is called \"{name}\"; the built-in programs are {}", list(&PROGRAMS, "and"))]
     UnknownName {
         /// The name that was asked for.
         name: String,
@@ -56,7 +62,7 @@ pub enum ProgramError {
     /// The program has no such option.
     #[error(
         "the PLC program \"{program}\" has no option \"{option}\"; {}",
-        if known.is_empty() { "it takes none".to_owned() } else { format!("it takes {}", list(known)) }
+        if known.is_empty() { "it takes none".to_owned() } else { format!("it takes {}", list(known, "and")) }
     )]
     UnknownOption {
         /// The program.
@@ -70,7 +76,7 @@ pub enum ProgramError {
     #[error(
         "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; \
          write {}",
-        list(known)
+        list(known, "or")
     )]
     BadValue {
         /// The program.
@@ -84,16 +90,16 @@ pub enum ProgramError {
     },
 }
 
-/// Writes `"a", "b" or "c"`.
-fn list(names: &[&str]) -> String {
+/// Writes `"a", "b" or "c"`, with `last` before the last one.
+fn list(names: &[&str], last: &str) -> String {
     let mut text = String::new();
     for (index, name) in names.iter().enumerate() {
-        if index > 0 {
-            text.push_str(if index + 1 == names.len() {
-                " or "
-            } else {
-                ", "
-            });
+        if index > 0 && index + 1 == names.len() {
+            text.push(' ');
+            text.push_str(last);
+            text.push(' ');
+        } else if index > 0 {
+            text.push_str(", ");
         }
         text.push('"');
         text.push_str(name);
@@ -111,6 +117,7 @@ fn list(names: &[&str]) -> String {
 /// text says which would be right.
 pub fn program(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>, ProgramError> {
     match name {
+        Rig::NAME => Ok(Box::new(Rig::from_options(options)?)),
         Mirror::NAME => Ok(Box::new(Mirror::new(options)?)),
         _ => Err(ProgramError::UnknownName {
             name: name.to_owned(),
@@ -140,8 +147,21 @@ mod tests {
     #[test]
     fn refusals_name_what_would_be_right() {
         assert_eq!(
+            refusal("rigg", &[]),
+            "no PLC program is called \"rigg\"; the built-in programs are \"rig\" and \"mirror\""
+        );
+        assert_eq!(
             refusal("mirror", &[("speed", "fast")]),
             "the PLC program \"mirror\" has no option \"speed\"; it takes none"
+        );
+        assert_eq!(
+            refusal("rig", &[("la1", "msb-first")]),
+            "the PLC program \"rig\" has no option \"la1\"; it takes \"la1_code\""
+        );
+        assert_eq!(
+            refusal("rig", &[("la1_code", "MSB")]),
+            "the option \"la1_code\" of the PLC program \"rig\" cannot be \"MSB\"; write \
+             \"msb-first\" or \"lsb-first\""
         );
     }
 }

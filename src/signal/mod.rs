@@ -4,6 +4,7 @@ mod address;
 mod order;
 mod plan;
 mod scale;
+pub mod section;
 mod slot;
 mod table;
 mod types;

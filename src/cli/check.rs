@@ -1,0 +1,326 @@
+//! `tickbus check FILE`: prints the signal table of a driver.cfg, or every mistake in it.
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use super::Outcome;
+use crate::driver::{Config, Timing};
+use crate::fieldbus::{Options, loopback};
+use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
+use crate::time::Nanos;
+
+/// Read a driver.cfg; print its signal table, or every mistake in it.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The driver.cfg to check.
+    file: PathBuf,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    // A reader that has gone away (`| head`) needs no report of it.
+    match Config::load(&arguments.file) {
+        Ok(config) => {
+            let _ = std::io::stdout()
+                .lock()
+                .write_all(report(&config).as_bytes());
+            Outcome::Done
+        }
+        Err(mistakes) => {
+            let _ = writeln!(
+                std::io::stderr().lock(),
+                "{mistakes}\ncheck: failed mistakes={}",
+                mistakes.len()
+            );
+            Outcome::WrongInput
+        }
+    }
+}
+
+/// The whole report on a good driver.cfg.
+fn report(config: &Config) -> String {
+    let mut out = String::new();
+    let stations = &config.table.stations;
+    let taken = words_of_values(&config.table.signals);
+    let mut line = |head: &str, text: &str| {
+        writeln!(out, "{head:9} {text}").expect("a String takes all");
+    };
+    line("driver", &format!("{} \"{}\"", config.id, config.name));
+    line("role", role(config));
+    line("bus", &bus(&config.bus));
+    line("timing", &timing(&config.timing));
+    for station in stations {
+        let name = if station.name.is_empty() {
+            ""
+        } else {
+            &format!("\"{}\": ", station.name)
+        };
+        let sizes = format!(
+            "{}, {}",
+            size(station, Area::Input),
+            size(station, Area::Output)
+        );
+        line(
+            if station.name.is_empty() {
+                "image"
+            } else {
+                "station"
+            },
+            &format!("{name}{sizes}"),
+        );
+    }
+    out.push('\n');
+    out.push_str(&aligned(
+        &HEADINGS,
+        config
+            .table
+            .signals
+            .iter()
+            .map(|signal| row(signal, stations, &taken)),
+    ));
+    let total = |area| {
+        stations
+            .iter()
+            .map(|station| station.bytes(area))
+            .sum::<usize>()
+    };
+    writeln!(
+        out,
+        "\ncheck: ok signals={} input_bytes={} output_bytes={}",
+        config.table.signals.len(),
+        total(Area::Input),
+        total(Area::Output)
+    )
+    .expect("a String takes all");
+    out
+}
+
+fn role(config: &Config) -> &'static str {
+    match config.role {
+        crate::fieldbus::Role::Device => "device: the machine, which writes %I and reads %Q",
+        crate::fieldbus::Role::Controller => "controller: the PLC, which reads %I and writes %Q",
+    }
+}
+
+fn bus(options: &Options) -> String {
+    let Options::Loopback(loopback::Options { mode, peer, events }) = options;
+    let mut text = options.kind().to_owned();
+    text.push_str(match mode {
+        loopback::Mode::Free => ", free-running",
+        loopback::Mode::Stepped => ", stepped by the simulation",
+    });
+    match peer {
+        loopback::Peer::Link(name) => text.push_str(&format!(", link \"{name}\"")),
+        loopback::Peer::Program {
+            name,
+            options,
+            scan,
+        } => {
+            text.push_str(&format!(", hosts the PLC program \"{name}\", scan {scan}"));
+            for (key, value) in options {
+                text.push_str(&format!(", {key} {value}"));
+            }
+        }
+    }
+    if *events {
+        text.push_str(", with events");
+    }
+    text
+}
+
+fn timing(timing: &Timing) -> String {
+    let cycle = timing
+        .cycle
+        .map(|cycle| format!("cycle {cycle}, "))
+        .unwrap_or_default();
+    let watchdog = timing.watchdog.map_or_else(
+        || "no watchdog".to_owned(),
+        |watchdog| format!("watchdog {watchdog}"),
+    );
+    let waits: Vec<String> = timing.reconnect.iter().map(Nanos::to_string).collect();
+    format!(
+        "{cycle}stale after {}, {watchdog}, reconnect after {}",
+        timing.max_age,
+        waits.join(" ")
+    )
+}
+
+fn size(station: &Station, area: Area) -> String {
+    let bytes = station.bytes(area);
+    format!(
+        "{area} {bytes} {}",
+        if bytes == 1 { "byte" } else { "bytes" }
+    )
+}
+
+const HEADINGS: [&str; 11] = [
+    "station",
+    "address",
+    "in word",
+    "type",
+    "order",
+    "direction",
+    "latch",
+    "scale",
+    "unit",
+    "fail-safe",
+    "name",
+];
+
+fn row(
+    signal: &Signal,
+    stations: &[Station],
+    taken: &HashSet<WordKey>,
+) -> [String; HEADINGS.len()] {
+    let station = &stations[signal.station];
+    [
+        if stations.len() > 1 {
+            station.name.clone()
+        } else {
+            String::new()
+        },
+        signal.address().to_string(),
+        bit_of_word(signal, station, taken),
+        signal.data_type.to_string(),
+        if signal.order == ByteOrder::Abcd {
+            String::new()
+        } else {
+            signal.order.to_string()
+        },
+        match signal.area {
+            Area::Input => "simulation → PLC input",
+            Area::Output => "PLC output → simulation",
+        }
+        .to_owned(),
+        latch(signal),
+        signal.scale.map(scale).unwrap_or_default(),
+        signal.unit.clone().unwrap_or_default(),
+        fail_safe(signal),
+        signal.name.clone(),
+    ]
+}
+
+/// The WORD around a BOOL, by station, area and even byte offset.
+type WordKey = (usize, Area, usize);
+
+/// The WORDs of which some part is a signal that is no BOOL.
+fn words_of_values(signals: &[Signal]) -> HashSet<WordKey> {
+    let values = signals
+        .iter()
+        .filter(|signal| signal.data_type != DataType::Bool);
+    values
+        .flat_map(|signal| {
+            let bytes = signal.byte..signal.byte + signal.data_type.size_bytes();
+            bytes.map(|byte| (signal.station, signal.area, byte & !1))
+        })
+        .collect()
+}
+
+/// Which bit of the big-endian WORD at the even byte below it a BOOL is: the bus cards of old, and
+/// many a wiring list, count that way. Empty where there is no such WORD.
+fn bit_of_word(signal: &Signal, station: &Station, taken: &HashSet<WordKey>) -> String {
+    let size = Width::Word.bytes();
+    let even = signal.byte & !1;
+    if signal.data_type != DataType::Bool
+        || even + size > station.bytes(signal.area)
+        || taken.contains(&(signal.station, signal.area, even))
+    {
+        return String::new();
+    }
+    let here = (signal.byte - even, usize::from(signal.bit));
+    (0..Width::Word.bits())
+        .find(|bit| ByteOrder::Abcd.bit_position(size, *bit) == here)
+        .map(|bit| format!("{}W{even} bit {bit}", signal.area))
+        .unwrap_or_default()
+}
+
+fn latch(signal: &Signal) -> String {
+    let edge = match signal.latch {
+        None => return String::new(),
+        Some(Latch::Rising) => "rising",
+        Some(Latch::Falling) => "falling",
+        Some(Latch::Both) => "both",
+    };
+    if signal.hold == Nanos::ZERO {
+        edge.to_owned()
+    } else {
+        format!("{edge}, hold {}", signal.hold)
+    }
+}
+
+fn scale(scale: Scale) -> String {
+    let gain = format!("raw × {}", short(scale.gain));
+    if scale.offset == 0.0 {
+        gain
+    } else {
+        let sign = if scale.offset < 0.0 { '−' } else { '+' };
+        format!("{gain} {sign} {}", short(scale.offset.abs()))
+    }
+}
+
+fn fail_safe(signal: &Signal) -> String {
+    let slot = signal.fail_safe;
+    match signal.data_type {
+        DataType::Bool => (if slot.real() == 0.0 { "false" } else { "true" }).to_owned(),
+        data_type if signal.is_integer_slot() => {
+            if data_type.is_signed() {
+                slot.signed().to_string()
+            } else {
+                slot.unsigned().to_string()
+            }
+        }
+        _ => short(slot.real()),
+    }
+}
+
+/// A number in at most seven significant digits.
+fn short(number: f64) -> String {
+    let rounded: f64 = format!("{number:.6e}")
+        .parse()
+        .expect("a number as it was just written");
+    let size = rounded.abs();
+    if size == 0.0 || (1e-4..1e15).contains(&size) {
+        rounded.to_string()
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+/// Rows under their headings in columns; a column without a word in it is left out.
+fn aligned<const N: usize>(
+    headings: &[&str; N],
+    rows: impl Iterator<Item = [String; N]>,
+) -> String {
+    let rows: Vec<[String; N]> = rows.collect();
+    if rows.is_empty() {
+        return String::from("no signals\n");
+    }
+    let length = |text: &str| text.chars().count();
+    let widths: [usize; N] = std::array::from_fn(|column| {
+        let longest = rows
+            .iter()
+            .map(|row| length(&row[column]))
+            .max()
+            .unwrap_or(0);
+        if longest == 0 {
+            0
+        } else {
+            longest.max(length(headings[column]))
+        }
+    });
+    let mut out = String::new();
+    let mut put = |cells: [&str; N]| {
+        let columns = cells.iter().zip(widths).filter(|(_, width)| *width > 0);
+        let cells: Vec<String> = columns
+            .map(|(cell, width)| format!("{cell:width$}"))
+            .collect();
+        out.push_str(cells.join("  ").trim_end());
+        out.push('\n');
+    };
+    put(*headings);
+    for row in &rows {
+        put(row.each_ref().map(String::as_str));
+    }
+    out
+}

@@ -1,0 +1,393 @@
+//! Tables and values of configuration text, read key by key.
+
+use std::ops::RangeInclusive;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::{Collector, did_you_mean, nearest, shown};
+use crate::time::Nanos;
+
+/// One table, read key by key; [`finish`](Self::finish) then reports what is missing and what is
+/// unknown.
+#[derive(Debug)]
+pub struct Table<'a> {
+    collector: &'a Collector<'a>,
+    title: String,
+    at: usize,
+    entries: &'a DeTable<'a>,
+    known: Vec<&'static str>,
+    missing: Vec<(&'static str, String)>,
+    whole: bool,
+}
+
+impl<'a> Table<'a> {
+    /// The root table of a text.
+    pub(super) fn root(collector: &'a Collector<'a>, entries: &'a DeTable<'a>) -> Self {
+        let whole = !collector.is_broken();
+        Self::new(collector, "the file".to_owned(), 0, entries, whole)
+    }
+
+    fn new(
+        collector: &'a Collector<'a>,
+        title: String,
+        at: usize,
+        entries: &'a DeTable<'a>,
+        whole: bool,
+    ) -> Self {
+        Self {
+            collector,
+            title,
+            at,
+            entries,
+            known: Vec::new(),
+            missing: Vec::new(),
+            whole,
+        }
+    }
+
+    /// The value of `key`, if it is there.
+    pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
+        self.known.push(key);
+        let (_, value) = self.entries.get_key_value(key)?;
+        Some(Value {
+            collector: self.collector,
+            key: format!("\"{key}\""),
+            value,
+        })
+    }
+
+    /// The value of `key`; when it is not there, `right` says what to write.
+    pub fn require(&mut self, key: &'static str, right: impl Into<String>) -> Option<Value<'a>> {
+        let value = self.take(key);
+        if value.is_none() {
+            self.missing.push((key, right.into()));
+        }
+        value
+    }
+
+    /// Says that `key` has to be there after all; `right` says what to write.
+    pub fn lacks(&mut self, key: &'static str, right: impl Into<String>) {
+        if !self.entries.contains_key(key) {
+            self.missing.push((key, right.into()));
+        }
+    }
+
+    /// All keys with their values, whatever they are called.
+    pub fn all(&self) -> impl Iterator<Item = (&'a str, Value<'a>)> + use<'a> {
+        let collector = self.collector;
+        self.entries.iter().map(move |(key, value)| {
+            let key = key.get_ref().as_ref();
+            (
+                key,
+                Value {
+                    collector,
+                    key: format!("\"{}\"", shown(key)),
+                    value,
+                },
+            )
+        })
+    }
+
+    /// Whether no line of it was left out for a syntax error. If one was, a key that is not there may
+    /// stand in that line, and rules about several keys cannot be checked.
+    pub fn is_whole(&self) -> bool {
+        self.whole
+    }
+
+    /// Byte offset of its beginning.
+    pub fn at(&self) -> usize {
+        self.at
+    }
+
+    /// Where the mistakes of its text go.
+    pub fn collector(&self) -> &'a Collector<'a> {
+        self.collector
+    }
+
+    /// Takes down a mistake of the table as a whole.
+    pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
+        self.collector.report(self.at, what, right);
+    }
+
+    /// Reports the keys that are unknown, and those that were required and are not there.
+    pub fn finish(mut self) {
+        for (key, _) in self.entries {
+            let name = key.get_ref().as_ref();
+            if self.known.contains(&name) {
+                continue;
+            }
+            let right = match nearest(name, self.unused()) {
+                Some(near) => {
+                    // A misspelt key is one mistake, not an unknown key and a missing one.
+                    self.missing.retain(|(missing, _)| *missing != near);
+                    format!("did you mean \"{near}\"?")
+                }
+                None => did_you_mean(name, "keys here", &self.known),
+            };
+            let what = format!("unknown key \"{}\" in {}", shown(name), self.title);
+            self.collector.report(key.span().start, what, right);
+        }
+        self.finish_open();
+    }
+
+    /// Reports the keys that were required and are not there; others may be there as they like.
+    pub fn finish_open(self) {
+        if self.whole {
+            for (key, right) in &self.missing {
+                self.wrong(format!("{} has no \"{key}\"", self.title), right.clone());
+            }
+        }
+    }
+
+    /// The known keys that are not there: what a misspelt key most likely means.
+    fn unused(&self) -> Vec<&'static str> {
+        self.known
+            .iter()
+            .copied()
+            .filter(|key| !self.entries.contains_key(*key))
+            .collect()
+    }
+}
+
+/// One value of a table or list. Its getters report a value of the wrong kind and answer `None`.
+#[derive(Clone, Debug)]
+pub struct Value<'a> {
+    collector: &'a Collector<'a>,
+    key: String,
+    value: &'a Spanned<DeValue<'a>>,
+}
+
+impl<'a> Value<'a> {
+    /// Byte offset of its beginning.
+    pub fn at(&self) -> usize {
+        self.value.span().start
+    }
+
+    /// The line, from 1, where it begins.
+    pub fn line(&self) -> usize {
+        self.collector.line(self.at())
+    }
+
+    /// Takes down a mistake at this value.
+    pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
+        self.collector.report(self.at(), what, right);
+    }
+
+    /// The value is a boolean.
+    pub fn is_boolean(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::Boolean(_))
+    }
+
+    /// The value is an integer.
+    pub fn is_integer(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::Integer(_))
+    }
+
+    /// A text.
+    pub fn text(&self, right: &str) -> Option<&'a str> {
+        match self.value.get_ref() {
+            DeValue::String(text) => Some(text),
+            _ => self.of_wrong_kind(right),
+        }
+    }
+
+    /// A text for people: not empty, of at most `longest` characters, none of them a control
+    /// character, and without blanks around it.
+    pub fn label(&self, longest: usize, right: &str) -> Option<&'a str> {
+        let text = self.text(right)?;
+        let key = &self.key;
+        if text.trim().is_empty() {
+            self.wrong(format!("{key} is empty"), right);
+        } else if text.chars().any(char::is_control) {
+            self.wrong(
+                format!("{key} has a control character in it: \"{}\"", shown(text)),
+                "write it with printable characters only",
+            );
+        } else if text.trim() != text {
+            self.wrong(
+                format!("{key} has blanks around it: \"{}\"", shown(text)),
+                format!("write \"{}\"", shown(text.trim())),
+            );
+        } else if text.chars().nth(longest).is_some() {
+            self.wrong(
+                format!(
+                    "{key} is longer than {longest} characters: \"{}\"",
+                    shown(text)
+                ),
+                "shorten it",
+            );
+        } else {
+            return Some(text);
+        }
+        None
+    }
+
+    /// A boolean.
+    pub fn boolean(&self) -> Option<bool> {
+        match self.value.get_ref() {
+            DeValue::Boolean(value) => Some(*value),
+            _ => self.of_wrong_kind("write true or false"),
+        }
+    }
+
+    /// A whole number within `range`.
+    pub fn whole(&self, range: RangeInclusive<i128>) -> Option<i128> {
+        let right = format!(
+            "write a whole number from {} to {}",
+            range.start(),
+            range.end()
+        );
+        let DeValue::Integer(digits) = self.value.get_ref() else {
+            return self.of_wrong_kind(&right);
+        };
+        let number = i128::from_str_radix(digits.as_str(), digits.radix()).ok();
+        let fitting = number.filter(|number| range.contains(number));
+        if fitting.is_none() {
+            self.wrong(
+                format!("{} is {}", self.key, shown(&digits.to_string())),
+                right,
+            );
+        }
+        fitting
+    }
+
+    /// A finite number, with or without a fraction.
+    pub fn number(&self, right: &str) -> Option<f64> {
+        let (number, written) = match self.value.get_ref() {
+            DeValue::Integer(digits) => {
+                let number = i128::from_str_radix(digits.as_str(), digits.radix()).ok();
+                #[expect(clippy::cast_precision_loss, reason = "asked for as a double")]
+                (number.map(|number| number as f64), digits.to_string())
+            }
+            DeValue::Float(digits) => (digits.as_str().parse().ok(), digits.to_string()),
+            _ => return self.of_wrong_kind(right),
+        };
+        let finite = number.filter(|number| number.is_finite());
+        if finite.is_none() {
+            self.wrong(
+                format!("{} is {}, beyond every number", self.key, shown(&written)),
+                right,
+            );
+        }
+        finite
+    }
+
+    /// A duration longer than nothing.
+    pub fn duration(&self) -> Option<Nanos> {
+        let text = self.text("write a duration in quotes, such as \"10ms\"")?;
+        match text.parse::<Nanos>() {
+            Ok(Nanos::ZERO) => {
+                self.wrong(
+                    format!("{} is no time at all", self.key),
+                    "write a longer duration",
+                );
+                None
+            }
+            Ok(span) => Some(span),
+            Err(error) => {
+                let error = error.to_string();
+                let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
+                self.wrong(format!("\"{}\" is {what}", shown(text)), right);
+                None
+            }
+        }
+    }
+
+    /// One of the names in `choices`; `kinds` is what they are called together, such as "roles".
+    pub fn choice<T: Copy>(&self, kinds: &str, choices: &[(&str, T)]) -> Option<T> {
+        let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
+        let text = self.text(&format!("{kinds} are {}", quoted(&names)))?;
+        let chosen = choices
+            .iter()
+            .find(|(name, _)| *name == text)
+            .map(|(_, chosen)| *chosen);
+        if chosen.is_none() {
+            self.wrong(
+                format!("\"{}\" is none of the {kinds}", shown(text)),
+                did_you_mean(text, kinds, &names),
+            );
+        }
+        chosen
+    }
+
+    /// The elements of a list.
+    pub fn list(&self, right: &str) -> Option<Vec<Self>> {
+        match self.value.get_ref() {
+            DeValue::Array(list) => Some(self.elements(list)),
+            _ => self.of_wrong_kind(right),
+        }
+    }
+
+    /// A table.
+    pub fn table(&self, title: &str) -> Option<Table<'a>> {
+        match self.value.get_ref() {
+            DeValue::Table(entries) => Some(self.as_table(title, entries)),
+            _ => self.of_wrong_kind(&format!("write {title} as a table")),
+        }
+    }
+
+    /// All tables of a list of tables, which stand in the text under `title`, such as `[[signal]]`.
+    pub fn tables(&self, title: &str) -> Vec<Table<'a>> {
+        match self.value.get_ref() {
+            DeValue::Array(list) => self
+                .elements(list)
+                .iter()
+                .filter_map(|element| element.table(title))
+                .collect(),
+            DeValue::Table(entries) => {
+                self.wrong(
+                    format!("{} is a single table", self.key),
+                    format!("write {title}, with two brackets"),
+                );
+                vec![self.as_table(title, entries)]
+            }
+            _ => {
+                let _: Option<()> = self.of_wrong_kind(&format!("write {title} tables"));
+                Vec::new()
+            }
+        }
+    }
+
+    fn elements(&self, list: &'a toml::de::DeArray<'a>) -> Vec<Self> {
+        let element = |(index, value)| {
+            let key = format!("element {} of {}", index + 1, self.key);
+            Self {
+                collector: self.collector,
+                key,
+                value,
+            }
+        };
+        list.iter().enumerate().map(element).collect()
+    }
+
+    fn as_table(&self, title: &str, entries: &'a DeTable<'a>) -> Table<'a> {
+        let whole = self.collector.is_whole_from(self.at());
+        Table::new(self.collector, title.to_owned(), self.at(), entries, whole)
+    }
+
+    fn of_wrong_kind<T>(&self, right: &str) -> Option<T> {
+        let kind = match self.value.get_ref() {
+            DeValue::String(_) => "a text",
+            DeValue::Integer(_) => "a whole number",
+            DeValue::Float(_) => "a number with a fraction",
+            DeValue::Boolean(_) => "a boolean",
+            DeValue::Datetime(_) => "a date or time",
+            DeValue::Array(list) if list.iter().any(|e| e.get_ref().is_table()) => {
+                "a list of tables"
+            }
+            DeValue::Array(_) => "a list",
+            DeValue::Table(_) => "a table",
+        };
+        self.wrong(format!("{} is {kind}", self.key), right);
+        None
+    }
+}
+
+fn quoted(names: &[&str]) -> String {
+    names
+        .iter()
+        .map(|name| format!("\"{name}\""))
+        .collect::<Vec<_>>()
+        .join(", ")
+}

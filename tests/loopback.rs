@@ -1,6 +1,7 @@
 //! The loopback: the conformance suite, and what is its own.
 #![allow(
     missing_docs,
+    unreachable_pub,
     clippy::float_cmp,
     reason = "tests; the values are small whole numbers"
 )]

@@ -6,6 +6,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use super::Outcome;
+use crate::config::short_number;
 use crate::driver::{Config, Timing};
 use crate::fieldbus::{Options, loopback};
 use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
@@ -250,12 +251,12 @@ fn latch(signal: &Signal) -> String {
 }
 
 fn scale(scale: Scale) -> String {
-    let gain = format!("raw × {}", short(scale.gain));
+    let gain = format!("raw × {}", short_number(scale.gain));
     if scale.offset == 0.0 {
         gain
     } else {
         let sign = if scale.offset < 0.0 { '−' } else { '+' };
-        format!("{gain} {sign} {}", short(scale.offset.abs()))
+        format!("{gain} {sign} {}", short_number(scale.offset.abs()))
     }
 }
 
@@ -270,20 +271,7 @@ fn fail_safe(signal: &Signal) -> String {
                 slot.unsigned().to_string()
             }
         }
-        _ => short(slot.real()),
-    }
-}
-
-/// A number in at most seven significant digits.
-fn short(number: f64) -> String {
-    let rounded: f64 = format!("{number:.6e}")
-        .parse()
-        .expect("a number as it was just written");
-    let size = rounded.abs();
-    if size == 0.0 || (1e-4..1e15).contains(&size) {
-        rounded.to_string()
-    } else {
-        format!("{rounded:e}")
+        _ => short_number(slot.real()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Mistakes in configuration text: collected, placed, and shown all at once.
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fmt;
 
 /// One mistake: where it is, what is wrong, and what would be right.
@@ -77,14 +78,22 @@ impl fmt::Display for Mistakes {
 
 impl std::error::Error for Mistakes {}
 
+/// A mistake whose line and column are not yet counted.
+#[derive(Debug)]
+struct Found {
+    at: usize,
+    what: String,
+    right: String,
+}
+
 /// Collects the mistakes of one text while it is being read.
 #[derive(Debug)]
 pub struct Collector<'t> {
     file: String,
     text: &'t str,
     line_starts: Vec<usize>,
-    broken_lines: Vec<usize>,
-    found: RefCell<Vec<(usize, Mistake)>>,
+    broken_lines: BTreeSet<usize>,
+    found: RefCell<Vec<Found>>,
 }
 
 impl<'t> Collector<'t> {
@@ -98,20 +107,15 @@ impl<'t> Collector<'t> {
             file: file.to_owned(),
             text,
             line_starts,
-            broken_lines: Vec::new(),
+            broken_lines: BTreeSet::new(),
             found: RefCell::default(),
         }
     }
 
     /// Takes down a mistake at byte offset `at` of the text.
     pub fn report(&self, at: usize, what: impl Into<String>, right: impl Into<String>) {
-        let place = Some(self.place(at));
-        let mistake = Mistake {
-            place,
-            what: what.into(),
-            right: right.into(),
-        };
-        self.found.borrow_mut().push((at, mistake));
+        let (what, right) = (what.into(), right.into());
+        self.found.borrow_mut().push(Found { at, what, right });
     }
 
     /// The line, from 1, of byte offset `at`.
@@ -121,7 +125,7 @@ impl<'t> Collector<'t> {
 
     /// Notes that the line of byte offset `at` has a syntax error and is left out.
     pub(super) fn break_line(&mut self, at: usize) {
-        self.broken_lines.push(self.line(at));
+        self.broken_lines.insert(self.line(at));
     }
 
     /// Whether any line is left out. What is not in the text may then stand there.
@@ -132,41 +136,42 @@ impl<'t> Collector<'t> {
     /// Whether no line is left out between byte offset `at` and the next table header.
     pub(super) fn is_whole_from(&self, at: usize) -> bool {
         let first = self.line(at);
-        let header = |line: &usize| {
-            self.text[self.line_starts[*line]..]
+        let header = |line: usize| {
+            self.text[self.line_starts[line]..]
                 .trim_start()
                 .starts_with('[')
         };
-        // Only a broken line makes the search for the next header worth its time.
-        self.broken_lines
-            .iter()
-            .filter(|line| **line >= first)
-            .min()
-            .is_none_or(|broken| (first..*broken).any(|line| header(&line)))
+        let broken = self.broken_lines.range(first..).next();
+        broken.is_none_or(|broken| (first..*broken).any(header))
     }
 
     /// All mistakes in line order, each once; `None` when there are none.
     pub fn finish(self) -> Option<Mistakes> {
-        let mut found = self.found.into_inner();
-        found.sort_by_key(|(at, _)| *at);
-        let mut list: Vec<Mistake> = found.into_iter().map(|(_, mistake)| mistake).collect();
+        let mut found = self.found.take();
+        found.sort_by_key(|found| found.at);
+        let mut list = Vec::with_capacity(found.len());
+        // Counted on from one mistake to the next: a line may be long and have many of them.
+        let (mut line, mut column, mut counted) = (0, 0, 0);
+        for Found { at, what, right } in found {
+            let at = at.min(self.text.len());
+            if self.line(at) != line {
+                line = self.line(at);
+                (column, counted) = (1, self.line_starts[line - 1]);
+            }
+            let rest = self.text[counted..].char_indices();
+            column += rest.take_while(|(offset, _)| counted + offset < at).count();
+            counted = counted.max(at);
+            list.push(Mistake {
+                place: Some((line, column)),
+                what,
+                right,
+            });
+        }
         list.dedup();
         (!list.is_empty()).then_some(Mistakes {
             file: self.file,
             list,
         })
-    }
-
-    fn place(&self, at: usize) -> (usize, usize) {
-        let line = self.line(at);
-        let start = self.line_starts[line - 1];
-        let rest = &self.text[start..];
-        let column = rest
-            .char_indices()
-            .take_while(|(offset, _)| start + offset < at)
-            .count()
-            + 1;
-        (line, column)
     }
 }
 

@@ -6,10 +6,13 @@
 
 mod mistakes;
 mod nearest;
+mod number;
 mod source;
+mod syntax;
 mod table;
 
 pub use mistakes::{Collector, Mistake, Mistakes, shown};
 pub use nearest::{did_you_mean, nearest};
+pub use number::short_number;
 pub use source::read_text;
 pub use table::{Table, Value};

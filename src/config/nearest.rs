@@ -8,21 +8,21 @@ const LONGEST: usize = 64;
 pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     let word = word.trim().to_lowercase();
     let length = word.chars().take(LONGEST + 1).count();
-    if length > LONGEST {
+    if length == 0 || length > LONGEST {
         return None;
     }
     candidates
         .into_iter()
         .filter(|candidate| candidate.len() <= 4 * LONGEST)
-        .map(|candidate| {
-            (
-                strsim::damerau_levenshtein(&word, &candidate.to_lowercase()),
-                candidate,
-            )
-        })
-        .filter(|(distance, candidate)| {
-            let longer = length.max(candidate.chars().count());
-            *distance == 0 || (*distance <= longer.div_ceil(3) && *distance < longer)
+        .filter_map(|candidate| {
+            let other = candidate.chars().count();
+            let limit = length.max(other).div_ceil(3).min(length.max(other) - 1);
+            // A difference in length alone may be too much, and is known at once.
+            let near = length.abs_diff(other) <= limit;
+            let distance = || strsim::damerau_levenshtein(&word, &candidate.to_lowercase());
+            near.then(distance)
+                .filter(|distance| *distance <= limit)
+                .map(|d| (d, candidate))
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)

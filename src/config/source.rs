@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
-use super::{Collector, Table, shown};
+use super::syntax::{Kind, faults, line_around};
+use super::{Collector, Table};
 
 /// Texts longer than this are no configuration.
 const LONGEST: usize = 16 << 20;
@@ -39,9 +39,9 @@ pub fn read_text<'t, T>(
 /// The text without its broken lines, each of them reported; every byte keeps its offset.
 fn repaired<'t>(collector: &mut Collector<'t>, text: &'t str) -> Option<Cow<'t, str>> {
     let mut text = Cow::Borrowed(text);
-    // Taking out the line that opens an endless value brings the lines below it to light, and with
-    // them errors that are real. Taking out any other line brings to light what only the tree knows,
-    // such as doubled keys; a new error of syntax is then a consequence of the repair.
+    // Without the line that opens an endless value, the lines below it come to light, and with them
+    // errors that are real. Without any other broken line, what comes to light is what only the tree
+    // of the whole knows; a new error of grammar is then a consequence of the repair.
     let mut trusted = true;
     for _ in 0..ROUNDS {
         let faults = faults(&text);
@@ -49,200 +49,100 @@ fn repaired<'t>(collector: &mut Collector<'t>, text: &'t str) -> Option<Cow<'t, 
             return Some(text);
         }
         let mut after = text.clone().into_owned();
-        let endless = faults.iter().any(|fault| fault.kind == Kind::Endless);
         let mut readable = true;
         for fault in &faults {
-            let trusted = trusted || fault.kind != Kind::Syntax;
-            if trusted {
+            let line = line_around(&text, fault.at);
+            let real = trusted || fault.kind != Kind::Grammar;
+            readable &= real && !fault.header && !text[line.clone()].trim().is_empty();
+            if real {
                 collector.report(fault.at, fault.what.clone(), fault.right.clone());
             }
-            let line = line_around(&text, fault.at);
-            let content = text[line.clone()].trim();
-            readable &= trusted && !content.is_empty() && !content.starts_with('[');
             collector.break_line(fault.at);
             after.replace_range(line.clone(), &" ".repeat(line.len()));
         }
         if !readable {
             return None;
         }
-        trusted = endless;
+        trusted = faults.iter().any(|fault| fault.kind == Kind::Endless);
         text = Cow::Owned(after);
     }
     None
 }
 
-/// The line around byte offset `at`, without its line end.
-fn line_around(text: &str, at: usize) -> std::ops::Range<usize> {
-    let bytes = text.as_bytes();
-    let at = at.min(bytes.len());
-    let start = bytes[..at]
-        .iter()
-        .rposition(|byte| *byte == b'\n')
-        .map_or(0, |found| found + 1);
-    let end = bytes[at..]
-        .iter()
-        .position(|byte| *byte == b'\n')
-        .map_or(bytes.len(), |n| at + n);
-    let end = if end > start && bytes[end - 1] == b'\r' {
-        end - 1
-    } else {
-        end
-    };
-    start..end
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    /// The grammar is broken.
-    Syntax,
-    /// A list, table or text never ends, and swallows what follows.
-    Endless,
-    /// Every line reads well, but not together.
-    Structure,
-}
-
-#[derive(Debug)]
-struct Fault {
-    at: usize,
-    kind: Kind,
-    what: String,
-    right: String,
-}
-
-/// The syntax errors of a text in order, the first of each line.
-fn faults(text: &str) -> Vec<Fault> {
-    let (root, errors) = DeTable::parse_recoverable(text);
-    let mut faults: Vec<Fault> = errors.iter().map(|error| translate(error, text)).collect();
-    faults.sort_by_key(|fault| fault.at);
-    if let Some(endless) = errors
-        .iter()
-        .find_map(|error| endless(error, text, root.get_ref()))
-    {
-        faults.retain(|fault| fault.at < endless.at);
-        faults.push(endless);
-    }
-    faults.dedup_by_key(|fault| line_around(text, fault.at).start);
-    faults
-}
-
-/// The value that never ends, if that is what the error is about.
-fn endless(error: &toml::de::Error, text: &str, root: &DeTable<'_>) -> Option<Fault> {
-    let message = error.message();
-    let (what, right) = if message.starts_with("unclosed array,") {
-        ("this list is never closed", "end it with ]")
-    } else if message.starts_with("unclosed inline table,") {
-        ("this table is never closed", "end it with }")
-    } else if message.starts_with("invalid multi-line") {
-        (
-            "this text is never closed",
-            "end it with the same three quotes that begin it",
-        )
-    } else {
-        return None;
-    };
-    let end = error.span()?.start;
-    let at = around(root, end)?;
-    // Of several that are open the outermost is shown, and that may be of the other kind.
-    let (what, right) = match text.get(at..=at)? {
-        "[" => ("this list is never closed", "end it with ]"),
-        "{" => ("this table is never closed", "end it with }"),
-        _ => (what, right),
-    };
-    Some(Fault {
-        at,
-        kind: Kind::Endless,
-        what: what.to_owned(),
-        right: right.to_owned(),
-    })
-}
-
-/// Where the outermost value that reaches to `end` begins.
-fn around(table: &DeTable<'_>, end: usize) -> Option<usize> {
-    table.iter().find_map(|(_, value)| around_value(value, end))
-}
-
-fn around_value(value: &Spanned<DeValue<'_>>, end: usize) -> Option<usize> {
-    let span = value.span();
-    let covers = span.start < end && end <= span.end;
-    match value.get_ref() {
-        DeValue::Table(_) | DeValue::Array(_) | DeValue::String(_) if covers => Some(span.start),
-        // The span of a table with a header, and of a list of those, is that of the header alone.
-        DeValue::Table(table) => around(table, end),
-        DeValue::Array(list) => list.iter().find_map(|element| around_value(element, end)),
-        _ => None,
-    }
-}
-
-/// A parser's message in this project's words: what is wrong, what would be right.
-fn translate(error: &toml::de::Error, text: &str) -> Fault {
-    let span = error.span().unwrap_or(0..0);
-    let at = span.start.min(text.len());
-    let piece = shown(text.get(span).unwrap_or("").trim());
-    let line = text[line_around(text, at)].trim();
-    let (message, expected) = error
-        .message()
-        .split_once(", expected ")
-        .unwrap_or((error.message(), ""));
-    let kind = match message {
-        "duplicate key" => Kind::Structure,
-        _ if message.starts_with("cannot extend") => Kind::Structure,
-        _ => Kind::Syntax,
-    };
-    let (what, right) = match message {
-        "string values must be quoted" if piece.is_empty() => (
-            "a value is missing".to_owned(),
-            "write key = value".to_owned(),
-        ),
-        "string values must be quoted" => (
-            format!("{piece} is not a value"),
-            "a text stands in quotes, a comment begins with #".to_owned(),
-        ),
-        "key with no value" if line.ends_with(']') => (
-            "a table header is not opened".to_owned(),
-            "begin it with [".to_owned(),
-        ),
-        "key with no value" => (
-            "a key has no value".to_owned(),
-            "write key = value".to_owned(),
-        ),
-        "duplicate key" if line.starts_with('[') => (
-            format!("the table {piece} is there already"),
-            if piece == "signal" || piece == "station" {
-                format!("write [[{piece}]], with two brackets, for each of several")
-            } else {
-                "write its keys into one table".to_owned()
-            },
-        ),
-        "duplicate key" => (
-            format!("the key {piece} stands twice in one table"),
-            "keep one of them".to_owned(),
-        ),
-        "unclosed table" | "unclosed array table" => (
-            "a table header is not closed".to_owned(),
-            format!("end it with {}", closing(line)),
-        ),
-        _ if message.starts_with("invalid basic string")
-            || message.starts_with("invalid literal") =>
-        {
-            (
-                "a text is not closed".to_owned(),
-                format!("end it with {expected}"),
+    /// Reads a text; its mistakes, and the top keys that are left.
+    fn read(text: &str) -> (Vec<String>, Option<Vec<String>>) {
+        let mut collector = Collector::new("f", text);
+        let keys = read_text(&mut collector, text, |root| {
+            Some(
+                root.all()
+                    .map(|(key, _)| key.to_owned())
+                    .collect::<Vec<_>>(),
             )
-        }
-        _ if expected.is_empty() || expected == "nothing" => (
-            message.to_owned(),
-            "remove it, or see the rules of TOML at toml.io".to_owned(),
-        ),
-        _ => (message.to_owned(), format!("TOML expects {expected} here")),
-    };
-    Fault {
-        at,
-        kind,
-        what,
-        right,
+        });
+        let mistakes = collector.finish().map(|mistakes| mistakes.to_string());
+        (
+            mistakes
+                .iter()
+                .flat_map(|text| text.lines())
+                .map(str::to_owned)
+                .collect(),
+            keys,
+        )
     }
-}
 
-fn closing(line: &str) -> &'static str {
-    if line.starts_with("[[") { "]]" } else { "]" }
+    #[test]
+    fn broken_lines_are_told_and_the_others_read() {
+        let (mistakes, keys) = read("a = 1\nb 2\nc = x\nd = 4\nd = 5\n");
+        assert_eq!(
+            mistakes,
+            [
+                "f:2:3: a key has no value; write key = value",
+                "f:3:5: x is not a value; a text stands in quotes, a comment begins with #",
+                "f:5:1: the key d stands twice in one table; keep one of them",
+            ]
+        );
+        assert_eq!(keys.unwrap(), ["a", "d"]);
+    }
+
+    #[test]
+    fn what_is_never_closed_is_told_where_it_begins() {
+        for (open, what) in [
+            ("[1, 2", "this list is never closed; end it with ]"),
+            ("[[1, 2]", "this list is never closed; end it with ]"),
+            ("{ x = 1", "this table is never closed; end it with }"),
+            ("{ x = [1, 2]", "this table is never closed; end it with }"),
+            (
+                "\"\"\"x",
+                "this text is never closed; end it with the three quotes that begin it",
+            ),
+        ] {
+            let (mistakes, keys) = read(&format!("a = 1\nb = {open}\n\n[[c]]\nd = 2\n[e]\n"));
+            assert_eq!(mistakes, [format!("f:2:5: {what}")], "{open}");
+            assert_eq!(keys.unwrap(), ["a", "c", "e"], "{open}");
+        }
+    }
+
+    #[test]
+    fn a_broken_header_ends_the_reading_but_not_the_telling() {
+        let (mistakes, keys) = read("[a\nx = 1\n[b]\nx = \n");
+        assert_eq!(
+            mistakes,
+            [
+                "f:1:3: a table header is not closed; end it with ]",
+                "f:4:5: a value is missing; write key = value",
+            ]
+        );
+        assert_eq!(keys, None);
+    }
+
+    #[test]
+    fn deep_nesting_is_refused() {
+        let (mistakes, _) = read(&format!("a = {}\n", "[".repeat(100_000)));
+        assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+        assert!(mistakes[0].contains("too deep"), "{mistakes:?}");
+    }
 }

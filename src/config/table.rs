@@ -8,6 +8,9 @@ use toml::de::{DeTable, DeValue};
 use super::{Collector, did_you_mean, nearest, shown};
 use crate::time::Nanos;
 
+/// What messages call the root table.
+const ROOT: &str = "the file";
+
 /// One table, read key by key; [`finish`](Self::finish) then reports what is missing and what is
 /// unknown.
 #[derive(Debug)]
@@ -17,7 +20,7 @@ pub struct Table<'a> {
     at: usize,
     entries: &'a DeTable<'a>,
     known: Vec<&'static str>,
-    missing: Vec<(&'static str, String)>,
+    missing: Vec<(Vec<&'static str>, String)>,
     whole: bool,
 }
 
@@ -25,7 +28,7 @@ impl<'a> Table<'a> {
     /// The root table of a text.
     pub(super) fn root(collector: &'a Collector<'a>, entries: &'a DeTable<'a>) -> Self {
         let whole = !collector.is_broken();
-        Self::new(collector, "the file".to_owned(), 0, entries, whole)
+        Self::new(collector, ROOT.to_owned(), 0, entries, whole)
     }
 
     fn new(
@@ -61,15 +64,15 @@ impl<'a> Table<'a> {
     pub fn require(&mut self, key: &'static str, right: impl Into<String>) -> Option<Value<'a>> {
         let value = self.take(key);
         if value.is_none() {
-            self.missing.push((key, right.into()));
+            self.missing.push((vec![key], right.into()));
         }
         value
     }
 
-    /// Says that `key` has to be there after all; `right` says what to write.
-    pub fn lacks(&mut self, key: &'static str, right: impl Into<String>) {
-        if !self.entries.contains_key(key) {
-            self.missing.push((key, right.into()));
+    /// Says that one of `keys` has to be there after all; `right` says what to write.
+    pub fn require_one_of(&mut self, keys: &[&'static str], right: impl Into<String>) {
+        if !keys.iter().any(|key| self.entries.contains_key(*key)) {
+            self.missing.push((keys.to_vec(), right.into()));
         }
     }
 
@@ -120,7 +123,7 @@ impl<'a> Table<'a> {
             let right = match nearest(name, self.unused()) {
                 Some(near) => {
                     // A misspelt key is one mistake, not an unknown key and a missing one.
-                    self.missing.retain(|(missing, _)| *missing != near);
+                    self.missing.retain(|(keys, _)| !keys.contains(&near));
                     format!("did you mean \"{near}\"?")
                 }
                 None => did_you_mean(name, "keys here", &self.known),
@@ -134,9 +137,20 @@ impl<'a> Table<'a> {
     /// Reports the keys that were required and are not there; others may be there as they like.
     pub fn finish_open(self) {
         if self.whole {
-            for (key, right) in &self.missing {
-                self.wrong(format!("{} has no \"{key}\"", self.title), right.clone());
+            for (keys, right) in &self.missing {
+                let keys: Vec<String> = keys.iter().map(|key| self.shown_key(key)).collect();
+                let what = format!("{} has no {}", self.title, keys.join(" and no "));
+                self.wrong(what, right.clone());
             }
+        }
+    }
+
+    /// A key as a message shows it: the keys of the root table are tables, by their headers.
+    fn shown_key(&self, key: &str) -> String {
+        if self.title == ROOT {
+            format!("[{key}]")
+        } else {
+            format!("\"{key}\"")
         }
     }
 
@@ -182,6 +196,15 @@ impl<'a> Value<'a> {
     /// The value is an integer.
     pub fn is_integer(&self) -> bool {
         matches!(self.value.get_ref(), DeValue::Integer(_))
+    }
+
+    /// A number as it is written; empty for everything else.
+    pub fn written(&self) -> String {
+        match self.value.get_ref() {
+            DeValue::Integer(digits) => shown(&digits.to_string()),
+            DeValue::Float(digits) => shown(digits.as_str()),
+            _ => String::new(),
+        }
     }
 
     /// A text.
@@ -254,19 +277,18 @@ impl<'a> Value<'a> {
 
     /// A finite number, with or without a fraction.
     pub fn number(&self, right: &str) -> Option<f64> {
-        let (number, written) = match self.value.get_ref() {
-            DeValue::Integer(digits) => {
-                let number = i128::from_str_radix(digits.as_str(), digits.radix()).ok();
-                #[expect(clippy::cast_precision_loss, reason = "asked for as a double")]
-                (number.map(|number| number as f64), digits.to_string())
-            }
-            DeValue::Float(digits) => (digits.as_str().parse().ok(), digits.to_string()),
+        let number = match self.value.get_ref() {
+            #[expect(clippy::cast_precision_loss, reason = "asked for as a double")]
+            DeValue::Integer(digits) => i128::from_str_radix(digits.as_str(), digits.radix())
+                .ok()
+                .map(|number| number as f64),
+            DeValue::Float(digits) => digits.as_str().parse().ok(),
             _ => return self.of_wrong_kind(right),
         };
         let finite = number.filter(|number| number.is_finite());
         if finite.is_none() {
             self.wrong(
-                format!("{} is {}, beyond every number", self.key, shown(&written)),
+                format!("{} is {}, beyond every number", self.key, self.written()),
                 right,
             );
         }
@@ -319,21 +341,22 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A table.
-    pub fn table(&self, title: &str) -> Option<Table<'a>> {
+    /// A table, which messages call `title`.
+    pub fn table(&self, title: &str, right: &str) -> Option<Table<'a>> {
         match self.value.get_ref() {
             DeValue::Table(entries) => Some(self.as_table(title, entries)),
-            _ => self.of_wrong_kind(&format!("write {title} as a table")),
+            _ => self.of_wrong_kind(right),
         }
     }
 
     /// All tables of a list of tables, which stand in the text under `title`, such as `[[signal]]`.
     pub fn tables(&self, title: &str) -> Vec<Table<'a>> {
+        let right = format!("write {title} tables");
         match self.value.get_ref() {
             DeValue::Array(list) => self
                 .elements(list)
                 .iter()
-                .filter_map(|element| element.table(title))
+                .filter_map(|element| element.table(title, &right))
                 .collect(),
             DeValue::Table(entries) => {
                 self.wrong(
@@ -343,7 +366,7 @@ impl<'a> Value<'a> {
                 vec![self.as_table(title, entries)]
             }
             _ => {
-                let _: Option<()> = self.of_wrong_kind(&format!("write {title} tables"));
+                let _: Option<()> = self.of_wrong_kind(&right);
                 Vec::new()
             }
         }

@@ -130,13 +130,13 @@ fn read(path: &Path, mut root: Table<'_>) -> Option<Config> {
     let signals = root.take("signal");
 
     let driver = driver
-        .and_then(|value| value.table("[driver]"))
+        .and_then(|value| value.table("[driver]", "write a [driver] table"))
         .map(read_driver);
     let addressing = driver
         .as_ref()
         .map_or(Addressing::Bytes, |driver| driver.addressing);
     let fieldbus = fieldbus
-        .and_then(|value| value.table("[fieldbus]"))
+        .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
         .map(read_fieldbus);
     let declared = stations.map(|value| value.tables("[[station]]"));
     let signals = signals
@@ -164,8 +164,8 @@ fn read(path: &Path, mut root: Table<'_>) -> Option<Config> {
         .as_ref()
         .is_some_and(|table| table.stations.iter().all(empty))
     {
-        root.lacks(
-            "signal",
+        root.require_one_of(
+            &["signal"],
             "write a [[signal]] section with name and address for each signal",
         );
     }
@@ -285,4 +285,217 @@ fn read_reconnect(value: &Value<'_>) -> Option<Vec<Nanos>> {
     }
     let spans: Vec<Option<Nanos>> = list.iter().map(Value::duration).collect();
     spans.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fieldbus::loopback::{self, Mode, Peer};
+    use crate::signal::{Area, ByteOrder, DataType, Latch, Signal, Slot};
+
+    const HEAD: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\n\
+                        link = \"cell\"\n";
+
+    /// Reads one signal from the keys of its section.
+    #[track_caller]
+    fn signal(keys: &str) -> Signal {
+        let text = format!("{HEAD}[[signal]]\nname = \"A\"\n{keys}\n");
+        match Config::parse("test.cfg", &text) {
+            Ok(mut config) => config.table.signals.remove(0),
+            Err(mistakes) => panic!("{mistakes}"),
+        }
+    }
+
+    fn rig() -> Config {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("driver.cfg");
+        Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    }
+
+    /// The rig's words as its builders counted them: each bit of the WORD, and its signal.
+    const COMMAND_WORD: [(usize, &str); 13] = [
+        (0, "IM1 index"),
+        (1, "IM1 jog"),
+        (2, "LA1 run"),
+        (3, "LA1 code low"),
+        (4, "LA1 code high"),
+        (5, "SC1"),
+        (7, "IM2 index"),
+        (8, "IM2 jog"),
+        (10, "LA2 run"),
+        (11, "LA2 up"),
+        (12, "SC2"),
+        (13, "Lamp"),
+        (15, "Acknowledge"),
+    ];
+    const STATUS_WORD: [(usize, &str); 11] = [
+        (0, "Step 1 complete"),
+        (1, "Step 2 complete"),
+        (2, "Step 3 complete"),
+        (3, "Step 4 complete"),
+        (4, "Step 5 complete"),
+        (5, "Step 6 complete"),
+        (11, "Package sensor 1"),
+        (12, "Package sensor 2"),
+        (13, "Homing sensor 1"),
+        (14, "Homing sensor 2"),
+        (15, "Not OK"),
+    ];
+
+    #[test]
+    fn both_rig_words_lie_bit_by_bit_as_their_builders_counted() {
+        let table = rig().table;
+        for (area, word) in [
+            (Area::Output, &COMMAND_WORD[..]),
+            (Area::Input, &STATUS_WORD[..]),
+        ] {
+            for (bit, name) in word {
+                let signal = &table.signals[table.position(name).expect(name)];
+                assert_eq!(
+                    (signal.area, signal.data_type),
+                    (area, DataType::Bool),
+                    "{name}"
+                );
+                // Big-endian: bit n of the WORD at byte k is byte k + 1 - n/8, bit n mod 8.
+                let place = (signal.byte, usize::from(signal.bit));
+                assert_eq!(place, (1 - bit / 8, bit % 8), "{name}");
+                assert_eq!(place, ByteOrder::Abcd.bit_position(2, *bit), "{name}");
+                // The word itself with this bit set, as a big-endian PLC sends it.
+                let frame = (1u16 << bit).to_be_bytes();
+                assert_eq!(usize::from(frame[signal.byte]), 1 << signal.bit, "{name}");
+                // With the bytes swapped the bit moves into the other byte.
+                let swapped = ByteOrder::Dcba.bit_position(2, *bit);
+                assert_eq!(swapped, (bit / 8, bit % 8), "{name}");
+                assert_eq!(
+                    usize::from((1u16 << bit).to_le_bytes()[swapped.0]),
+                    1 << swapped.1
+                );
+                assert_eq!(ByteOrder::Badc.bit_position(2, *bit), swapped, "{name}");
+            }
+            let in_word = table
+                .signals
+                .iter()
+                .filter(|signal| signal.area == area && signal.byte < 2);
+            assert_eq!(in_word.count(), word.len());
+        }
+    }
+
+    #[test]
+    fn the_rig_reads_whole() {
+        let config = rig();
+        assert_eq!(
+            (config.id, config.name.as_str(), config.role),
+            (4711, "Test rig", Role::Device)
+        );
+        let bytes = |area| config.table.stations[0].bytes(area);
+        assert_eq!((bytes(Area::Input), bytes(Area::Output)), (8, 8));
+        assert_eq!(config.timing.cycle, Some(Nanos::from_millis(2)));
+        assert_eq!(config.timing.max_age, Nanos::from_millis(250));
+        assert_eq!(config.timing.watchdog, None);
+        let program = Peer::Program {
+            name: "rig".to_owned(),
+            options: Vec::new(),
+            scan: Nanos::from_millis(10),
+        };
+        let bus = loopback::Options {
+            mode: Mode::Free,
+            peer: program,
+            events: false,
+        };
+        assert_eq!(config.bus, Options::Loopback(bus));
+        let position = &config.table.signals[config.table.position("LA1 position").unwrap()];
+        let scale = position.scale.expect("a scale");
+        assert!((scale.value(27_648.0) - 250.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_type_follows_from_the_address_unless_it_is_stated() {
+        for (keys, data_type) in [
+            ("address = \"%I0.0\"", DataType::Bool),
+            ("address = \"%IB0\"", DataType::Byte),
+            ("address = \"%IW0\"", DataType::Word),
+            ("address = \"%ID0\"", DataType::Dword),
+            ("address = \"%IL0\"", DataType::Lword),
+            ("address = \"%ID0\"\ntype = \"real\"", DataType::Real),
+        ] {
+            assert_eq!(signal(keys).data_type, data_type, "{keys}");
+        }
+    }
+
+    #[test]
+    fn fail_safe_values_are_exact_and_of_the_slot_s_own_kind() {
+        for (keys, slot) in [
+            (
+                "address = \"%QX0.0\"\nfail_safe = true",
+                Slot::from_real(1.0),
+            ),
+            ("address = \"%QX0.0\"\nfail_safe = 1", Slot::from_real(1.0)),
+            (
+                "address = \"%QW0\"\nfail_safe = 0xFFFF",
+                Slot::from_real(65_535.0),
+            ),
+            ("address = \"%QW0\"\nfail_safe = 7.0", Slot::from_real(7.0)),
+            (
+                "address = \"%QL0\"\nfail_safe = 18446744073709551615",
+                Slot::from_unsigned(u64::MAX),
+            ),
+            (
+                "address = \"%QL0\"\ntype = \"LINT\"\nfail_safe = -9223372036854775807",
+                Slot::from_signed(-i64::MAX),
+            ),
+            (
+                "address = \"%QL0\"\ntype = \"LREAL\"\nfail_safe = -0.5",
+                Slot::from_real(-0.5),
+            ),
+            // All bits zero, where nothing is stated: 4 mA, not an impossible 0.
+            (
+                "address = \"%QW0\"\nscale = { raw = [0, 27648], value = [4, 20] }",
+                Slot::from_real(4.0),
+            ),
+            (
+                "address = \"%QL0\"\nscale = { raw = [0, 10], value = [0, 1] }\nfail_safe = 0.5",
+                Slot::from_real(0.5),
+            ),
+        ] {
+            assert_eq!(signal(keys).fail_safe, slot, "{keys}");
+        }
+    }
+
+    #[test]
+    fn latches_hold() {
+        let signal = signal("address = \"%IX0.0\"\nlatch = \"falling\"\nhold = \"20ms\"");
+        assert_eq!(
+            (signal.latch, signal.hold),
+            (Some(Latch::Falling), Nanos::from_millis(20))
+        );
+    }
+
+    #[test]
+    fn times_have_their_defaults() {
+        let timing = |keys: &str| {
+            let text = format!("{HEAD}{keys}\ninput_bytes = 1\n");
+            Config::parse("test.cfg", &text)
+                .unwrap_or_else(|m| panic!("{m}"))
+                .timing
+        };
+        assert_eq!(timing("").reconnect, RECONNECT);
+        assert_eq!(timing("").max_age, LEAST_MAX_AGE);
+        assert_eq!(timing("cycle = \"50ms\"").max_age, Nanos::from_millis(500));
+        assert_eq!(timing("cycle = \"1ms\"").max_age, LEAST_MAX_AGE);
+        assert_eq!(
+            timing("cycle = \"50ms\"\nmax_age = \"60ms\"").max_age,
+            Nanos::from_millis(60)
+        );
+    }
+
+    #[test]
+    fn a_thousand_mistakes_are_told_in_no_time() {
+        let mut text = HEAD.to_owned();
+        for number in 0..1000 {
+            text.push_str(&format!(
+                "[[signal]]\nname = \"S{number}\"\naddress = \"%QX0.0\"\nhold = x\n"
+            ));
+        }
+        let mistakes = Config::parse("test.cfg", &text).expect_err("mistakes");
+        assert_eq!(mistakes.len(), 1000);
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
 use crate::config::{Table, Value, did_you_mean, shown};
-use crate::signal::section::{NAME_LIMIT, Section};
+use crate::signal::section::{NAME_LIMIT, STATION, Section};
 use crate::signal::{AREA_LIMIT, Area, SignalTable, Station};
 
 /// The most signals of one driver.
@@ -176,7 +176,7 @@ fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -
         }
         return Some(0);
     };
-    let name = value.text("write the name of a station in quotes")?;
+    let name = value.text(STATION)?;
     if name.is_empty() {
         value.wrong("\"station\" is empty", "write the name of a [[station]]");
         return None;
@@ -260,9 +260,10 @@ fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usiz
     for section in in_area().filter(|section| end(section) > stated) {
         section.address.wrong(
             format!(
-                "{} ends at byte {}, but {area} has {stated} bytes (line {})",
+                "{} ends at byte {}, but {area} has {stated} {} (line {})",
                 section.label(),
                 end(section) - 1,
+                if stated == 1 { "byte" } else { "bytes" },
                 value.line(),
             ),
             format!("use an address below byte {stated}, or enlarge {area}"),

@@ -313,3 +313,91 @@ impl fmt::Display for Address {
         f.pad(&text)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<String, String> {
+        text.parse::<Address>()
+            .map(|address| address.to_string())
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn addresses_read_and_print() {
+        for (text, printed) in [
+            ("%QX1.0", "%QX1.0"),
+            ("%q1.7", "%QX1.7"),
+            ("%I0.3", "%IX0.3"),
+            ("%ix65535.7", "%IX65535.7"),
+            ("%IB0", "%IB0"),
+            ("%iw4", "%IW4"),
+            ("%QD3", "%QD3"),
+            (" %IL65528 ", "%IL65528"),
+            ("%QX01.00", "%QX1.0"),
+        ] {
+            assert_eq!(parse(text).as_deref(), Ok(printed), "{text}");
+        }
+    }
+
+    #[test]
+    fn elements_are_counted_by_their_size() {
+        for (text, byte) in [
+            ("%IW1", 2),
+            ("%ID3", 12),
+            ("%QL2", 16),
+            ("%QB5", 5),
+            ("%IX10.3", 10),
+            ("%IW32767", 65_534),
+        ] {
+            let address = Address::parse(text, Addressing::Elements).expect(text);
+            assert_eq!(address.byte, byte, "{text}");
+        }
+        assert!(Address::parse("%IW32768", Addressing::Elements).is_err());
+    }
+
+    #[test]
+    fn every_place_reads_back_as_it_prints() {
+        for area in [Area::Input, Area::Output] {
+            for width in [
+                Width::Bit,
+                Width::Byte,
+                Width::Word,
+                Width::Double,
+                Width::Long,
+            ] {
+                for byte in [0, 1, 7, AREA_LIMIT - width.bytes()] {
+                    for bit in 0..if width == Width::Bit { 8 } else { 1 } {
+                        let address = Address {
+                            area,
+                            width,
+                            byte,
+                            bit,
+                        };
+                        assert_eq!(address.to_string().parse(), Ok(address));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bit_of_the_word_is_a_bit_of_the_other_byte() {
+        assert_eq!(
+            parse("%QX0.15").unwrap_err(),
+            "bit 15 in the address \"%QX0.15\" does not exist; bits go from 0 to 7; bit 15 of %QW0 is \
+             %QX0.7"
+        );
+    }
+
+    #[test]
+    fn what_is_no_address_is_refused() {
+        let long = format!("%IW{}", "9".repeat(1000));
+        for text in [
+            "", "%", "%I", "%X0.0", "%QX0.", "%QX.0", "%QW1 2", "%IW+1", "%İ0.1", "%Iß", &long,
+        ] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+}

@@ -11,9 +11,8 @@ mod word;
 
 use std::ops::Range;
 
-use self::bits::Bits;
 use self::number::{Codec, Integer64, Number, Real, Unscaled};
-use self::run::{Member, Run, lay_out};
+use self::run::{Gaps, Member, Run};
 use super::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot};
 
 /// What encoding had to bend, as counts.
@@ -44,11 +43,8 @@ pub struct Plan {
     /// How many slots and frame bytes the plan reaches over.
     slots: usize,
     bytes: usize,
-    bits: Bits,
-    runs: Box<[Box<dyn Run>]>,
-    /// Bytes that no signal touches.
-    gaps: Box<[Range<usize>]>,
-    fail_safes: Box<[(usize, Slot)]>,
+    runs: Vec<Box<dyn Run>>,
+    fail_safes: Vec<(usize, Slot)>,
 }
 
 impl Plan {
@@ -69,18 +65,16 @@ impl Plan {
         let bytes = ends
             .max()
             .map_or(station_bytes, |end| end.max(station_bytes));
-        let (bools, numbers): (Vec<_>, Vec<_>) =
-            (members.iter()).partition(|(_, signal)| signal.data_type == DataType::Bool);
+        let gaps = gaps(&members, bytes);
+        let mut runs = runs(&members);
+        if !gaps.is_empty() {
+            runs.push(Box::new(Gaps(gaps)));
+        }
         Self {
             slots: members.last().map_or(0, |(slot, _)| slot + 1),
             bytes,
-            bits: Bits::new(&bools),
-            runs: runs(&numbers).into(),
-            gaps: gaps(&members, bytes).into(),
-            fail_safes: members
-                .iter()
-                .map(|(slot, s)| (*slot, s.fail_safe))
-                .collect(),
+            runs,
+            fail_safes: (members.iter().map(|(slot, s)| (*slot, s.fail_safe))).collect(),
         }
     }
 
@@ -92,10 +86,6 @@ impl Plan {
     pub fn encode(&self, slots: &[Slot], frame: &mut [u8]) -> Conversions {
         self.check(slots.len(), frame.len());
         let mut conversions = Conversions::default();
-        for gap in &self.gaps {
-            frame[gap.clone()].fill(0);
-        }
-        self.bits.encode(slots, frame, &mut conversions);
         for run in &self.runs {
             run.encode(slots, frame, &mut conversions);
         }
@@ -109,7 +99,6 @@ impl Plan {
     /// When `frame` or `slots` is shorter than the plan was made for.
     pub fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
         self.check(slots.len(), frame.len());
-        self.bits.decode(frame, slots);
         for run in &self.runs {
             run.decode(frame, slots);
         }
@@ -173,7 +162,7 @@ impl Kind {
     /// The runs of `members`, all of this kind.
     fn runs(self, members: &[Member]) -> Vec<Box<dyn Run>> {
         match self.data_type {
-            DataType::Bool => Vec::new(),
+            DataType::Bool => bits::lay_out(members),
             DataType::Sint => self.number::<i8>(members),
             DataType::Byte | DataType::Usint => self.number::<u8>(members),
             DataType::Int => self.number::<i16>(members),
@@ -198,15 +187,15 @@ impl Kind {
 
     fn codec<C: Codec>(self, members: &[Member]) -> Vec<Box<dyn Run>> {
         match self.order {
-            ByteOrder::Abcd => lay_out::<C, word::Abcd>(members),
-            ByteOrder::Cdab => lay_out::<C, word::Cdab>(members),
-            ByteOrder::Badc => lay_out::<C, word::Badc>(members),
-            ByteOrder::Dcba => lay_out::<C, word::Dcba>(members),
+            ByteOrder::Abcd => run::lay_out::<C, word::Abcd>(members),
+            ByteOrder::Cdab => run::lay_out::<C, word::Cdab>(members),
+            ByteOrder::Badc => run::lay_out::<C, word::Badc>(members),
+            ByteOrder::Dcba => run::lay_out::<C, word::Dcba>(members),
         }
     }
 }
 
-/// The runs of all signals that are not BOOL.
+/// The runs of all signals.
 fn runs(members: &[Member]) -> Vec<Box<dyn Run>> {
     let mut kinds: Vec<(Kind, Vec<Member>)> = Vec::new();
     for member in members {

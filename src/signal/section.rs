@@ -1,7 +1,7 @@
 //! The `[[signal]]` sections of a driver.cfg: the same on every bus.
 
 use super::{Address, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot, Width};
-use crate::config::{Table, Value, did_you_mean, shown};
+use crate::config::{Table, Value, did_you_mean, short_number, shown};
 use crate::time::Nanos;
 
 /// The longest name of a signal or station, in characters.
@@ -9,6 +9,9 @@ pub const NAME_LIMIT: usize = 120;
 
 /// The longest unit, in characters.
 const UNIT_LIMIT: usize = 40;
+
+/// What is right where a station is named.
+pub const STATION: &str = "write the name of a [[station]] in quotes";
 
 /// One `[[signal]]` section, read by itself.
 #[derive(Debug)]
@@ -61,6 +64,9 @@ pub fn read<'a>(mut table: Table<'a>, addressing: Addressing) -> Option<Section<
     let latched = latch.as_ref().map(latch_of);
     let held = hold.as_ref().map(Value::duration);
     let ordered = order.as_ref().map(order_of);
+    if place.is_none() || matches!(stated, Some(None)) {
+        check_shapes(scale.as_ref(), fail_safe.as_ref(), station.as_ref());
+    }
     let (address, place) = (address?, place?);
     // Without the address or the type the rules below would blame the wrong key, and without a line
     // that is left out they cannot be told from broken ones.
@@ -119,6 +125,23 @@ pub fn read<'a>(mut table: Table<'a>, addressing: Addressing) -> Option<Section<
         address,
         station,
     })
+}
+
+/// Checks as much as can be told of the values of a signal that has no type.
+fn check_shapes(
+    scale: Option<&Value<'_>>,
+    fail_safe: Option<&Value<'_>>,
+    station: Option<&Value<'_>>,
+) {
+    if let Some(scale) = scale {
+        scale_of(scale, DataType::Lreal);
+    }
+    if let Some(fail_safe) = fail_safe.filter(|value| !value.is_boolean()) {
+        fail_safe.number("write a number, or true or false for a BOOL");
+    }
+    if let Some(station) = station {
+        station.text(STATION);
+    }
 }
 
 /// A name: some printable characters, not one that tickbus keeps for itself.
@@ -272,7 +295,7 @@ fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
         value.wrong("a BOOL cannot be scaled", "remove \"scale\"");
         return None;
     }
-    let mut table = value.table("scale")?;
+    let mut table = value.table("scale", SHAPE)?;
     let raw = table.require("raw", SHAPE);
     let engineering = table.require("value", SHAPE);
     table.finish();
@@ -282,7 +305,10 @@ fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     for (number, element) in &raw_pair {
         if !fits_raw(*number, data_type) {
             element.wrong(
-                format!("raw {number} is beyond the range of {data_type}"),
+                format!(
+                    "raw {} is beyond the range of {data_type}",
+                    element.written()
+                ),
                 raw_range(data_type),
             );
             return None;
@@ -296,12 +322,12 @@ fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     let equal = |numbers: [f64; 2]| numbers[0] == numbers[1];
     if equal(raw_numbers) {
         raw.wrong(
-            format!("both raw values are {}", raw_numbers[0]),
+            format!("both raw values are {}", short_number(raw_numbers[0])),
             "write two different ones, such as raw = [0, 27648]",
         );
     } else if equal(numbers) {
         engineering.wrong(
-            format!("both scaled values are {}", numbers[0]),
+            format!("both scaled values are {}", short_number(numbers[0])),
             "write two different ones, such as value = [0.0, 250.0]",
         );
     } else if let Some(scale) = Scale::through(raw_numbers, numbers) {
@@ -349,7 +375,10 @@ fn raw_limits(data_type: DataType) -> (f64, f64) {
 fn raw_range(data_type: DataType) -> String {
     match data_type.range() {
         Some(range) => format!("{data_type} goes from {} to {}", range.start(), range.end()),
-        None => format!("{data_type} goes up to {:e}", raw_limits(data_type).1),
+        None => format!(
+            "{data_type} goes up to {}",
+            short_number(raw_limits(data_type).1)
+        ),
     }
 }
 
@@ -391,13 +420,14 @@ fn fail_safe_of(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
         Some(scale) => {
             let ends = [scale.value(least), scale.value(greatest)];
             let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+            let (low, high) = (short_number(low), short_number(high));
             format!(
                 "{} with this scale goes from {low} to {high}",
                 signal.data_type
             )
         }
     };
-    value.wrong(format!("fail_safe {number} does not fit"), right);
+    value.wrong(format!("fail_safe {} does not fit", value.written()), right);
     None
 }
 
@@ -412,7 +442,7 @@ fn fail_safe_bit(value: &Value<'_>) -> Option<Slot> {
     if number == 0.0 || number == 1.0 {
         return Some(Slot::from_real(number.abs()));
     }
-    value.wrong(format!("fail_safe {number} does not fit"), RIGHT);
+    value.wrong(format!("fail_safe {} does not fit", value.written()), RIGHT);
     None
 }
 
@@ -425,7 +455,7 @@ fn fail_safe_integer(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
         let number = value.number("write a whole number")?;
         if number.fract() != 0.0 {
             value.wrong(
-                format!("fail_safe {number} has a fraction"),
+                format!("fail_safe {} has a fraction", value.written()),
                 format!("write a whole number; {}", raw_range(signal.data_type)),
             );
             return None;
@@ -435,7 +465,7 @@ fn fail_safe_integer(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
         let whole = number as i128;
         if !range.contains(&whole) {
             value.wrong(
-                format!("fail_safe {number:e} does not fit"),
+                format!("fail_safe {} does not fit", value.written()),
                 raw_range(signal.data_type),
             );
             return None;

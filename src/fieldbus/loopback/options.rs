@@ -62,13 +62,11 @@ impl Options {
         let program = table.take("program");
         let program_options = table.take("program_options");
         let scan = table.take("scan");
-        if link.is_none() && program.is_none() && table.is_whole() {
-            table.wrong(
-                "the loopback has nobody at its other end",
-                "add program = \"rig\" to host a PLC program, or link = \"name\" to meet the driver \
-                 with the same link",
-            );
-        }
+        table.require_one_of(
+            &["program", "link"],
+            "add program = \"rig\" to host a PLC program at the other end, or link = \"name\" to \
+             meet the driver that names the same link",
+        );
         let whole = table.is_whole();
         table.finish();
 
@@ -131,7 +129,7 @@ fn read_program(
     let options = match (options, known) {
         (None, _) => Some(Vec::new()),
         (Some(value), known) => value
-            .table("program_options")
+            .table("program_options", "write them as { option = \"value\" }")
             .and_then(|table| read_options(&table, known.map(|(_, options)| *options)?)),
     };
     let (name, _) = known?;

@@ -9,21 +9,29 @@ use crate::signal::{Scale, Slot};
 
 /// The way between a slot and a word of one type, scaled or not.
 ///
-/// Encoding has two speeds. [`Codec::encode`] has no branches, so that a loop over it becomes vector
-/// code; it says whether the value fitted. [`Codec::bend`] is for a value that did not.
+/// Encoding has two speeds. [`Codec::raw`], [`Codec::fits`] and [`Codec::word`] have no branches, so
+/// that loops over them become vector code; [`Codec::bend`] is for a value that does not fit.
 pub(super) trait Codec: Debug + Send + Sync + 'static {
     /// What stands on the wire.
     type Word: Word;
-    /// What is known of each signal's scale.
+    /// The number between the slot and the word: scaled back, not yet rounded.
+    type Raw: Copy;
+    /// What is kept of each signal's scale.
     type Scale: Copy + Debug + Send + Sync + 'static;
 
     /// What this codec keeps of a signal's scale.
     fn scale(scale: Option<Scale>) -> Self::Scale;
 
-    /// The word of `slot`, and whether it is right. When it is not, it takes [`Codec::bend`].
-    fn encode(slot: Slot, scale: Self::Scale) -> (Self::Word, bool);
+    /// The raw number of `slot`.
+    fn raw(slot: Slot, scale: Self::Scale) -> Self::Raw;
 
-    /// The word of `slot`, saturated, or `fail_safe` for NaN; counted.
+    /// Whether `raw` can be encoded as it is.
+    fn fits(raw: Self::Raw) -> bool;
+
+    /// The word of a raw number that fits.
+    fn word(raw: Self::Raw) -> Self::Word;
+
+    /// The word of a slot whose raw number does not fit: saturated, or `fail_safe` for NaN; counted.
     fn bend(
         slot: Slot,
         scale: Self::Scale,
@@ -34,10 +42,25 @@ pub(super) trait Codec: Debug + Send + Sync + 'static {
     /// The slot that `word` stands for.
     fn decode(word: Self::Word, scale: Self::Scale) -> Slot;
 
+    /// The word of `slot`, whatever it holds.
+    fn encode(
+        slot: Slot,
+        scale: Self::Scale,
+        fail_safe: Self::Word,
+        conversions: &mut Conversions,
+    ) -> Self::Word {
+        let raw = Self::raw(slot, scale);
+        if Self::fits(raw) {
+            Self::word(raw)
+        } else {
+            Self::bend(slot, scale, fail_safe, conversions)
+        }
+    }
+
     /// The word of a signal's fail-safe value; zero where that is NaN itself.
     fn fail_safe(slot: Slot, scale: Self::Scale) -> Self::Word {
-        let (zero, _) = Self::encode(Slot::from_real(0.0), Self::scale(None));
-        Self::bend(slot, scale, zero, &mut Conversions::default())
+        let zero = Self::word(Self::raw(Slot::from_real(0.0), Self::scale(None)));
+        Self::encode(slot, scale, zero, &mut Conversions::default())
     }
 }
 
@@ -47,14 +70,23 @@ pub(super) struct Integer64;
 
 impl Codec for Integer64 {
     type Word = u64;
+    type Raw = u64;
     type Scale = Unscaled;
 
     fn scale(_: Option<Scale>) -> Unscaled {
         Unscaled
     }
 
-    fn encode(slot: Slot, _: Unscaled) -> (u64, bool) {
-        (slot.0, true)
+    fn raw(slot: Slot, _: Unscaled) -> u64 {
+        slot.0
+    }
+
+    fn fits(_: u64) -> bool {
+        true
+    }
+
+    fn word(raw: u64) -> u64 {
+        raw
     }
 
     fn bend(slot: Slot, _: Unscaled, _: u64, _: &mut Conversions) -> u64 {
@@ -72,24 +104,32 @@ pub(super) struct Real<N, S>(PhantomData<(N, S)>);
 
 impl<N: Number, S: Scaling> Codec for Real<N, S> {
     type Word = N::Word;
+    type Raw = f64;
     type Scale = S;
 
     fn scale(scale: Option<Scale>) -> S {
         S::of(scale)
     }
 
-    fn encode(slot: Slot, scale: S) -> (N::Word, bool) {
-        let raw = scale.raw(slot.real());
-        (N::to_word(raw), N::fits(raw))
+    fn raw(slot: Slot, scale: S) -> f64 {
+        scale.raw(slot.real())
     }
 
+    fn fits(raw: f64) -> bool {
+        N::fits(raw)
+    }
+
+    fn word(raw: f64) -> N::Word {
+        N::to_word(raw)
+    }
+
+    #[cold]
     fn bend(slot: Slot, scale: S, fail_safe: N::Word, conversions: &mut Conversions) -> N::Word {
-        let value = slot.real();
-        let raw = scale.raw(value);
+        let raw = Self::raw(slot, scale);
         if raw.is_nan() {
             conversions.not_a_number += 1;
             fail_safe
-        } else if N::fits(raw) || (N::HAS_INFINITY && value.is_infinite()) {
+        } else if N::HAS_INFINITY && slot.real().is_infinite() {
             N::to_word(raw)
         } else {
             conversions.saturated += 1;

@@ -1,7 +1,9 @@
 //! Runs: signals of one type, byte order and scaling, converted in one loop.
 
+use std::array;
 use std::fmt::Debug;
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use super::number::Codec;
 use super::word::{Order, Word};
@@ -14,8 +16,8 @@ pub(super) type Member<'a> = (usize, &'a Signal);
 /// Fewer neighbours than this are not worth a loop of their own.
 const SHORTEST_DENSE: usize = 4;
 
-/// How many values a dense run converts before it looks whether all of them fitted.
-const BLOCK: usize = 64;
+/// How many values a dense run encodes before it looks whether all of them fitted.
+const BLOCK: usize = 32;
 
 /// Some signals that are converted by the same instructions.
 pub(super) trait Run: Debug + Send + Sync {
@@ -24,6 +26,20 @@ pub(super) trait Run: Debug + Send + Sync {
 
     /// Decodes the run's bytes of the frame into their slots.
     fn decode(&self, frame: &[u8], slots: &mut [Slot]);
+}
+
+/// Bytes that no signal touches: encoded as zero.
+#[derive(Debug)]
+pub(super) struct Gaps(pub(super) Vec<Range<usize>>);
+
+impl Run for Gaps {
+    fn encode(&self, _: &[Slot], frame: &mut [u8], _: &mut Conversions) {
+        for gap in &self.0 {
+            frame[gap.clone()].fill(0);
+        }
+    }
+
+    fn decode(&self, _: &[u8], _: &mut [Slot]) {}
 }
 
 /// Lays out `members`, all of codec `C` and order `O` and in slot order: neighbours in both slots and
@@ -88,10 +104,9 @@ impl<C: Codec, O: Order> Dense<C, O> {
         }
     }
 
-    /// Encodes a block again in which some value did not fit.
-    #[cold]
+    /// Encodes values one by one, with a look at each.
     #[inline(never)]
-    fn bend(
+    fn one_by_one(
         slots: &[Slot],
         scales: &[C::Scale],
         fail_safes: &[C::Word],
@@ -100,7 +115,7 @@ impl<C: Codec, O: Order> Dense<C, O> {
     ) {
         let values = slots.iter().zip(scales).zip(fail_safes);
         for (((slot, scale), fail_safe), bytes) in values.zip(bytes.chunks_exact_mut(Self::BYTES)) {
-            O::arrange(C::bend(*slot, *scale, *fail_safe, conversions)).put(bytes);
+            O::arrange(C::encode(*slot, *scale, *fail_safe, conversions)).put(bytes);
         }
     }
 }
@@ -110,23 +125,30 @@ impl<C: Codec, O: Order> Run for Dense<C, O> {
         let Values { scales, fail_safes } = &self.values;
         let slots = &slots[self.slot..][..scales.len()];
         let bytes = &mut frame[self.byte..][..scales.len() * Self::BYTES];
-        let blocks = slots
-            .chunks(BLOCK)
-            .zip(scales.chunks(BLOCK))
-            .zip(fail_safes.chunks(BLOCK))
-            .zip(bytes.chunks_mut(BLOCK * Self::BYTES));
-        for (((slots, scales), fail_safes), bytes) in blocks {
-            let mut all_fit = true;
-            let values = slots.iter().zip(scales);
-            for ((slot, scale), bytes) in values.zip(bytes.chunks_exact_mut(Self::BYTES)) {
-                let (word, fits) = C::encode(*slot, *scale);
-                all_fit &= fits;
-                O::arrange(word).put(bytes);
-            }
-            if !all_fit {
-                Self::bend(slots, scales, fail_safes, bytes, conversions);
+        // Blocks of a length that the compiler knows become vector code without remainders.
+        let (slot_blocks, last_slots) = slots.as_chunks::<BLOCK>();
+        let (scale_blocks, last_scales) = scales.as_chunks::<BLOCK>();
+        let (fail_safe_blocks, last_fail_safes) = fail_safes.as_chunks::<BLOCK>();
+        let mut byte_blocks = bytes.chunks_exact_mut(BLOCK * Self::BYTES);
+        let blocks = slot_blocks.iter().zip(scale_blocks).zip(fail_safe_blocks);
+        for (((slots, scales), fail_safes), bytes) in blocks.zip(&mut byte_blocks) {
+            let raws: [C::Raw; BLOCK] = array::from_fn(|i| C::raw(slots[i], scales[i]));
+            if raws.iter().fold(true, |all, raw| all & C::fits(*raw)) {
+                for (raw, bytes) in raws.iter().zip(bytes.chunks_exact_mut(Self::BYTES)) {
+                    O::arrange(C::word(*raw)).put(bytes);
+                }
+            } else {
+                Self::one_by_one(slots, scales, fail_safes, bytes, conversions);
             }
         }
+        let last_bytes = byte_blocks.into_remainder();
+        Self::one_by_one(
+            last_slots,
+            last_scales,
+            last_fail_safes,
+            last_bytes,
+            conversions,
+        );
     }
 
     fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
@@ -177,11 +199,7 @@ impl<C: Codec, O: Order> Run for Scattered<C, O> {
         for ((place, scale), fail_safe) in self.places.iter().zip(scales).zip(fail_safes) {
             let slot = slots[place.slot as usize];
             let bytes = &mut frame[place.byte as usize..][..Self::BYTES];
-            let (mut word, fits) = C::encode(slot, *scale);
-            if !fits {
-                word = C::bend(slot, *scale, *fail_safe, conversions);
-            }
-            O::arrange(word).put(bytes);
+            O::arrange(C::encode(slot, *scale, *fail_safe, conversions)).put(bytes);
         }
     }
 

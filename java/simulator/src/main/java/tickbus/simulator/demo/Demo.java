@@ -14,6 +14,7 @@ import tickbus.simulator.Simulator;
 import tickbus.simulator.TimeSource;
 import tickbus.simulator.rig.Counters;
 import tickbus.simulator.rig.Rig;
+import tickbus.simulator.rig.RigPicture;
 import tickbus.simulator.text.Durations;
 
 /**
@@ -28,7 +29,7 @@ public final class Demo {
     private static final int USAGE = 2;
     private static final int INTERRUPTED = 130;
 
-    /** Step and share of the way at which the rig's picture tells most: both lifts up, the lamp on. */
+    /** Step and time in it at which the rig's picture tells most: both lifts up, the lamp on. */
     private static final int PICTURE_STEP = 5;
 
     private static final long PICTURE_NANOS = 400_000_000L;
@@ -209,8 +210,7 @@ public final class Demo {
 
     private String report(String verdict) {
         try {
-            Path folder = options.report().toAbsolutePath().getParent();
-            Files.createDirectories(folder);
+            folder();
             Files.writeString(options.report(), Report.write(options, verdict, timeline, watcher, edges));
             return verdict;
         } catch (IOException e) {
@@ -223,5 +223,15 @@ public final class Demo {
             return;
         }
         pictured = true;
+        try {
+            RigPicture.write(rig, folder().resolve("rig.svg"));
+        } catch (IOException e) {
+            throw new DemoFailure("the rig's picture cannot be written: " + e);
+        }
+    }
+
+    /** The report's folder, made if it is missing. */
+    private Path folder() throws IOException {
+        return Files.createDirectories(options.report().toAbsolutePath().getParent());
     }
 }

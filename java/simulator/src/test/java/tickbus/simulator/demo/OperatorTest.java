@@ -65,6 +65,7 @@ class OperatorTest {
         assertTrue(verdict().matches("demo: ok cycles=3 jams=1 ticks=\\d+ missed_edges=0 stale_ticks=0 report=.*"
                 + "report.txt"), verdict());
         assertEquals(1, plc.exits);
+        assertTrue(Files.readString(folder.resolve("demo/rig.svg")).contains("<svg"));
         String report = report();
         for (String part : List.of("Configuration", "Timeline", "takes the stuck bottle away", "phase recover",
                 "Rising edges at both ends", "IM1 index", "Faults", "Counters", "bottles treated",

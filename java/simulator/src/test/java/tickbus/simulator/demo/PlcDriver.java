@@ -18,7 +18,7 @@ import java.util.Set;
  * so that the demo's script is tested without any link. Its components are those that the rig's control
  * table names.
  */
-final class PlcDriver extends ControlInterfaceDeviceDriver {
+class PlcDriver extends ControlInterfaceDeviceDriver {
     static final int ID = 4711;
     private static final Set<String> NUMBERS = Set.of("Phase", "Step", "Cycles", "LA1 position", "LA2 position");
     private static final String[][] STEPS = {

@@ -1,0 +1,307 @@
+//! Syntax errors of TOML text, in this project's words.
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Error};
+
+use super::shown;
+
+/// What a syntax error does to the rest of the text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The grammar of its line is broken, and perhaps that of the lines below it.
+    Grammar,
+    /// A list, table or text never ends and swallows what follows.
+    Endless,
+    /// The lines can be told apart, but a key or a value is none.
+    Content,
+    /// A key or a table stands there twice.
+    Double,
+}
+
+/// One syntax error.
+#[derive(Debug)]
+pub(super) struct Fault {
+    /// Byte offset of its place.
+    pub(super) at: usize,
+    pub(super) kind: Kind,
+    /// Whether it makes a table header unreadable, so that the keys below it belong nowhere.
+    pub(super) header: bool,
+    pub(super) what: String,
+    pub(super) right: String,
+}
+
+/// The syntax errors of a text in order, the first of each line, without mere consequences.
+pub(super) fn faults(text: &str) -> Vec<Fault> {
+    let (root, mut errors) = DeTable::parse_recoverable(text);
+    let begin = |error: &Error| begin(error, text);
+    let endless = errors
+        .iter()
+        .find(|error| {
+            ENDLESS
+                .iter()
+                .any(|begin| error.message().starts_with(begin))
+        })
+        .and_then(|error| endless(error, text, root.get_ref()));
+    errors.sort_by_key(begin);
+    let mut faults: Vec<Fault> = Vec::new();
+    let mut end = None;
+    for error in &errors {
+        let at = begin(error);
+        if end.is_some_and(|end| at <= end) || endless.as_ref().is_some_and(|open| at >= open.at) {
+            continue;
+        }
+        end = Some(line_around(text, at).end);
+        faults.push(translate(error, text));
+    }
+    if let Some(endless) = endless {
+        // What precedes it in its own line leads to it.
+        let line = line_around(text, endless.at);
+        faults.retain(|fault| fault.at < line.start);
+        faults.push(endless);
+    }
+    without_consequences(faults, text)
+}
+
+/// The place that an error blames, at a character's beginning within the text.
+fn begin(error: &Error, text: &str) -> usize {
+    let at = error.span().map_or(0, |span| span.start).min(text.len());
+    (0..=at)
+        .rev()
+        .find(|at| text.is_char_boundary(*at))
+        .unwrap_or(0)
+}
+
+/// Drops the doubled keys that come of a broken table header above them.
+fn without_consequences(mut faults: Vec<Fault>, text: &str) -> Vec<Fault> {
+    // From where on no header has been seen since a broken one.
+    let mut lost: Option<usize> = None;
+    faults.retain(|fault| {
+        if let Some(from) = lost {
+            let mut lines = text[from..fault.at].lines();
+            let found = lines.any(|line| line.trim_start().starts_with('['));
+            lost = (!found).then_some(fault.at);
+        }
+        let consequence = lost.is_some() && fault.kind == Kind::Double && !fault.header;
+        if fault.header {
+            lost = Some(line_around(text, fault.at).end);
+        }
+        !consequence
+    });
+    faults
+}
+
+/// The line around byte offset `at`, without its line end.
+pub(super) fn line_around(text: &str, at: usize) -> std::ops::Range<usize> {
+    let bytes = text.as_bytes();
+    let at = at.min(bytes.len());
+    let start = bytes[..at]
+        .iter()
+        .rposition(|byte| *byte == b'\n')
+        .map_or(0, |found| found + 1);
+    let end = bytes[at..]
+        .iter()
+        .position(|byte| *byte == b'\n')
+        .map_or(bytes.len(), |n| at + n);
+    let end = if end > start && bytes[end - 1] == b'\r' {
+        end - 1
+    } else {
+        end
+    };
+    start..end
+}
+
+/// How the messages begin that tell of something without an end.
+const ENDLESS: [&str; 4] = [
+    "cannot recurse further",
+    "unclosed array,",
+    "unclosed inline table,",
+    "invalid multi-line",
+];
+
+/// The value that never ends, or goes too deep, of which one of [`ENDLESS`] tells.
+fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<Fault> {
+    let message = error.message();
+    let end = begin(error, text);
+    let (at, what, right) = if message.starts_with(ENDLESS[0]) {
+        (
+            end,
+            "lists and tables lie too deep in one another",
+            "nothing here needs more than two levels",
+        )
+    } else {
+        let at = open_value(root, text, end)?;
+        match text.as_bytes().get(at)? {
+            b'[' => (at, "this list is never closed", "end it with ]"),
+            b'{' => (at, "this table is never closed", "end it with }"),
+            _ => (
+                at,
+                "this text is never closed",
+                "end it with the three quotes that begin it",
+            ),
+        }
+    };
+    let (what, right) = (what.to_owned(), right.to_owned());
+    Some(Fault {
+        at,
+        kind: Kind::Endless,
+        header: false,
+        what,
+        right,
+    })
+}
+
+/// Where the outermost value begins that is still open at `end`.
+fn open_value(table: &DeTable<'_>, text: &str, end: usize) -> Option<usize> {
+    table
+        .iter()
+        .filter_map(|(_, value)| open_at(value, text, end))
+        .min()
+}
+
+fn open_at(value: &Spanned<DeValue<'_>>, text: &str, end: usize) -> Option<usize> {
+    let span = value.span();
+    let written = text.get(span.clone())?;
+    let reaches = span.start < end && end <= span.end;
+    let unclosed = (written.starts_with('[') && !written.ends_with(']'))
+        || (written.starts_with('{') && !written.ends_with('}'));
+    match value.get_ref() {
+        DeValue::Table(_) | DeValue::Array(_) if reaches || unclosed => Some(span.start),
+        DeValue::String(_) if reaches => Some(span.start),
+        // The span of a table with a header, and of a list of those, is that of the header alone.
+        DeValue::Table(table) => open_value(table, text, end),
+        DeValue::Array(list) => list
+            .iter()
+            .filter_map(|element| open_at(element, text, end))
+            .min(),
+        _ => None,
+    }
+}
+
+/// What kind of error the parser's message tells.
+fn kind_of(message: &str) -> Kind {
+    const BEGINNINGS: [&str; 9] = [
+        "extra ",
+        "invalid inline table",
+        "invalid key",
+        "invalid table",
+        "key with no value",
+        "unclosed ",
+        "unexpected key or value",
+        "unexpected content",
+        "unexpected `=`",
+    ];
+    const MISSING: [&str; 7] = [
+        "array",
+        "assignment",
+        "comma",
+        "inline table",
+        "key",
+        "table",
+        "value",
+    ];
+    let missing = message.strip_prefix("missing ");
+    let of_grammar = BEGINNINGS
+        .iter()
+        .any(|beginning| message.starts_with(beginning))
+        || missing.is_some_and(|missing| MISSING.iter().any(|what| missing.starts_with(what)));
+    if of_grammar {
+        Kind::Grammar
+    } else if message == "duplicate key" || message.starts_with("cannot extend") {
+        Kind::Double
+    } else {
+        Kind::Content
+    }
+}
+
+/// A parser's message in this project's words.
+fn translate(error: &Error, text: &str) -> Fault {
+    let at = begin(error, text);
+    let piece = shown(text.get(error.span().unwrap_or(0..0)).unwrap_or("").trim());
+    let line = text[line_around(text, at)].trim();
+    let (message, expected) = error
+        .message()
+        .split_once(", expected ")
+        .unwrap_or((error.message(), ""));
+    let opens_no_header = message == "key with no value" && line.ends_with(']');
+    let (what, right) = words(message, expected, &piece, line);
+    Fault {
+        at,
+        kind: kind_of(message),
+        header: line.starts_with('[') || opens_no_header,
+        what,
+        right,
+    }
+}
+
+/// What is wrong and what would be right, by the parser's message and what it expected, the piece of
+/// text that it blames, and the line around that.
+fn words(message: &str, expected: &str, piece: &str, line: &str) -> (String, String) {
+    let both = |what: &str, right: &str| (what.to_owned(), right.to_owned());
+    let foreign_comment = ["//", ";", "--", "/*"]
+        .iter()
+        .any(|sign| line.starts_with(sign));
+    match message {
+        _ if foreign_comment => both("this is no comment", "a comment begins with #"),
+        "string values must be quoted" if piece.is_empty() => {
+            both("a value is missing", "write key = value")
+        }
+        "string values must be quoted" => (
+            format!("{piece} is not a value"),
+            "a text stands in quotes, a comment begins with #".to_owned(),
+        ),
+        "key with no value" if line.ends_with(']') => {
+            both("a table header is not opened", "begin it with [")
+        }
+        "key with no value" => both("a key has no value", "write key = value"),
+        "duplicate key" if line.starts_with('[') => (
+            format!("there is a table {piece} already"),
+            if piece == "signal" || piece == "station" {
+                format!("write [[{piece}]], with two brackets, for each of several")
+            } else {
+                "write its keys into one table".to_owned()
+            },
+        ),
+        "duplicate key" => (
+            format!("the key {piece} stands twice in one table"),
+            "keep one of them".to_owned(),
+        ),
+        "unclosed table" => both("a table header is not closed", "end it with ]"),
+        "unclosed array table" => both("a table header is not closed", "end it with ]]"),
+        "missing comma between array elements" => {
+            both("a list lacks a comma", "write a comma between its elements")
+        }
+        "missing comma between key-value pairs" => both(
+            "a table in braces lacks a comma",
+            "write a comma between its keys",
+        ),
+        "unexpected key or value" | "unexpected content" => both(
+            "the line goes on after its end",
+            "write one key = value on each line",
+        ),
+        "invalid unquoted key" if line.contains(':') && !line.contains('=') => {
+            both("this line is no key with a value", "write key = value")
+        }
+        "invalid unquoted key" => (
+            format!("{piece} cannot stand in a key"),
+            "keys have letters, digits, - and _".to_owned(),
+        ),
+        "invalid key-value pair" => both("this line is no key with a value", "write key = value"),
+        "unexpected leading zero" => both("a number begins with 0", "write it without that"),
+        _ if message.starts_with("invalid basic string")
+            || message.starts_with("invalid literal") =>
+        {
+            (
+                String::from("a text is not closed"),
+                format!("end it with {expected}"),
+            )
+        }
+        _ if expected.is_empty() || expected == "nothing" => (
+            message.replace(';', ","),
+            "see toml.io for how TOML is written".to_owned(),
+        ),
+        _ => (
+            message.replace(';', ","),
+            format!("TOML expects {expected} here"),
+        ),
+    }
+}

@@ -1,0 +1,181 @@
+//! `tickbus check`, the real program, over good files and wrong ones.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Runs `tickbus check FILE` in `directory`.
+fn check(directory: &Path, file: impl AsRef<std::ffi::OsStr>) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .arg("check")
+        .arg(file)
+        .current_dir(directory)
+        .output()
+        .expect("the tickbus program runs")
+}
+
+/// Asserts exit code 1 with nothing printed but these mistakes and their count.
+#[track_caller]
+fn assert_mistakes(output: &Output, mistakes: &[String]) {
+    let told = String::from_utf8_lossy(&output.stderr);
+    let count = format!("check: failed mistakes={}", mistakes.len());
+    let told: Vec<&str> = told.lines().collect();
+    let expected: Vec<&str> = mistakes
+        .iter()
+        .chain([&count])
+        .map(String::as_str)
+        .collect();
+    assert_eq!(told, expected);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(output.stdout.is_empty());
+}
+
+fn wrong_files() -> Vec<PathBuf> {
+    let directory = fs::read_dir(repository().join("tests/wrong")).expect("the wrong files");
+    let mut files: Vec<PathBuf> = directory
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "cfg"))
+        .collect();
+    files.sort();
+    assert!(files.len() > 40, "the wrong files are there");
+    files
+}
+
+/// Each `tests/wrong/NAME.cfg` has its mistakes in `NAME.txt`. With the environment variable `BLESS`
+/// set, they are written there instead: read the difference before you commit it.
+#[test]
+fn every_wrong_file_has_exactly_its_mistakes() {
+    for file in wrong_files() {
+        let output = check(file.parent().unwrap(), file.file_name().unwrap());
+        let expected = file.with_extension("txt");
+        if std::env::var_os("BLESS").is_some() {
+            let told = String::from_utf8_lossy(&output.stderr);
+            let (mistakes, _) = told.rsplit_once("check: failed").expect("mistakes");
+            fs::write(&expected, mistakes).expect("the file is written");
+        }
+        let expected = fs::read_to_string(&expected)
+            .unwrap_or_else(|error| panic!("{}: {error}", expected.display()));
+        let expected: Vec<String> = expected.lines().map(str::to_owned).collect();
+        assert_mistakes(&output, &expected);
+    }
+}
+
+#[test]
+fn mistakes_have_the_shape_that_editors_know() {
+    for file in wrong_files() {
+        let name = file.file_name().unwrap().to_str().unwrap().to_owned();
+        let text = fs::read_to_string(&file).unwrap();
+        let mut before = (0, 0);
+        for line in fs::read_to_string(file.with_extension("txt"))
+            .unwrap()
+            .lines()
+        {
+            let mut parts = line.splitn(4, ':');
+            assert_eq!(parts.next(), Some(name.as_str()), "{line}");
+            let place: Vec<usize> = parts
+                .by_ref()
+                .take(2)
+                .map(|part| part.parse().expect(line))
+                .collect();
+            let &[row, column] = place.as_slice() else {
+                panic!("{line}")
+            };
+            assert!(before <= (row, column), "in order: {line}");
+            before = (row, column);
+            let of_file = text.split('\n').nth(row - 1).expect(line);
+            assert!(column <= of_file.chars().count() + 1, "{line}");
+            assert!(
+                parts.next().expect(line).contains("; "),
+                "what; what would be right: {line}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_rig_is_right() {
+    let output = check(repository(), "driver.cfg");
+    let printed = String::from_utf8(output.stdout).expect("UTF-8");
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    assert_eq!(output.status.code(), Some(0));
+    assert!(
+        printed.starts_with("driver    4711 \"Test rig\"\n"),
+        "{printed}"
+    );
+    assert_eq!(
+        printed.lines().last(),
+        Some("check: ok signals=38 input_bytes=8 output_bytes=8")
+    );
+    // From bit 8 on a bit of the word lies in its first byte: the lines that people get wrong.
+    for line in [
+        "%QX1.0   %QW0 bit 0   BOOL  PLC output → simulation  rising",
+        "%QX0.7   %QW0 bit 15  BOOL  PLC output → simulation  rising",
+        "%IX0.3   %IW0 bit 11  BOOL  simulation → PLC input   rising",
+    ] {
+        assert!(
+            printed.lines().any(|printed| printed.starts_with(line)),
+            "{line}\n{printed}"
+        );
+    }
+}
+
+#[test]
+fn a_full_table_prints_as_its_golden_file() {
+    let directory = repository().join("tests/right");
+    let printed = check(&directory, "everything.cfg").stdout;
+    let golden = directory.join("everything.txt");
+    if std::env::var_os("BLESS").is_some() {
+        fs::write(&golden, &printed).expect("the file is written");
+    }
+    assert_eq!(
+        String::from_utf8_lossy(&printed),
+        fs::read_to_string(golden).unwrap()
+    );
+}
+
+#[test]
+fn what_is_no_readable_text_is_told() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = |line: &str| vec![line.to_owned()];
+    assert_mistakes(
+        &check(directory.path(), "none.cfg"),
+        &file("none.cfg: there is no such file; check the path and the name"),
+    );
+    fs::create_dir(directory.path().join("folder.cfg")).unwrap();
+    assert_mistakes(
+        &check(directory.path(), "folder.cfg"),
+        &file(
+            "folder.cfg: this is a directory; name the configuration file in it, such as driver.cfg",
+        ),
+    );
+    fs::write(
+        directory.path().join("latin1.cfg"),
+        b"[driver]\nname = \"T\xFCr\"\n",
+    )
+    .unwrap();
+    assert_mistakes(
+        &check(directory.path(), "latin1.cfg"),
+        &file("latin1.cfg:2:10: the byte 0xFC is no UTF-8 text; save the file as UTF-8"),
+    );
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    for arguments in [
+        &[][..],
+        &["check"],
+        &["chekc", "driver.cfg"],
+        &["check", "a", "b"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+}

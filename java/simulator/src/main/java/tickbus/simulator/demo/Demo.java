@@ -177,7 +177,7 @@ public final class Demo {
                 + options.cycles());
         must(counters.jams() == 1, "there were " + counters.jams() + " jams instead of 1");
         must(counters.faults() == 1, "Not OK rose " + counters.faults() + " times instead of once");
-        must(watcher.lampErrors() == 0, "the lamp differed from the motion of lift 2 " + watcher.lampErrors()
+        must(counters.lampErrors() == 0, "the lamp differed from the motion of lift 2 " + counters.lampErrors()
                 + " times");
         must(counters.fallen() == 0, counters.fallen() + " bottles fell");
         must(counters.fed() == counters.delivered() + counters.removed() + counters.fallen() + inRig,

@@ -112,7 +112,7 @@ final class Report {
         table.row("collisions", rig.collisions());
         table.row("times Not OK rose", rig.faults());
         table.row("index commands ignored", rig.retriggers());
-        table.row("lamp errors", run.lampErrors());
+        table.row("lamp errors", rig.lampErrors());
         text.append(table.text("  "));
     }
 

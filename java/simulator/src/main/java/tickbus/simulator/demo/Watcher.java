@@ -47,8 +47,6 @@ final class Watcher {
     private boolean lastNotOk;
     private boolean lastComplete;
     private int rigCycles;
-    private long lastLampErrors;
-    private long lampErrors;
     private boolean lastStale;
     private long stepSince;
     private long staleTicks;
@@ -89,7 +87,11 @@ final class Watcher {
                 timeline.add(now, "PLC", "cycle " + (cycles() + 1) + ", step " + lastStep + ": " + stepName());
             }
         }
-        lookAtSteps();
+        boolean complete = lastStepComplete.getAsDouble() != 0;
+        if (complete && !lastComplete && phase() == RUN) {
+            rigCycles++;
+        }
+        lastComplete = complete;
         if (rig.notOk() != lastNotOk) {
             lastNotOk = rig.notOk();
             if (lastNotOk) {
@@ -100,21 +102,6 @@ final class Watcher {
                 timeline.add(now, "rig", "Not OK is off");
             }
         }
-    }
-
-    /**
-     * Counts what the rig says about steps, but only in the run phase: lowering both lifts with bottles on
-     * their cups while homing has the motion and suction of step 6, so the rig alone cannot tell.
-     */
-    private void lookAtSteps() {
-        boolean complete = lastStepComplete.getAsDouble() != 0;
-        long errors = rig.counters().lampErrors();
-        if (phase() == RUN) {
-            rigCycles += complete && !lastComplete ? 1 : 0;
-            lampErrors += errors - lastLampErrors;
-        }
-        lastComplete = complete;
-        lastLampErrors = errors;
     }
 
     private void lookAtLink(long now) {
@@ -177,14 +164,12 @@ final class Watcher {
         return (int) cycles.getAsDouble();
     }
 
-    /** Cycles as the machine sees them: how often step 6 was completed in the run phase. */
+    /**
+     * Cycles as the machine sees them: how often step 6 was completed in the run phase. Lowering both lifts
+     * with bottles on their cups while homing has the command word of step 6, so the rig alone cannot tell.
+     */
     int rigCycles() {
         return rigCycles;
-    }
-
-    /** How often the lamp differed from the commanded motion of lift 2 in the run phase. */
-    long lampErrors() {
-        return lampErrors;
     }
 
     String statusName() {

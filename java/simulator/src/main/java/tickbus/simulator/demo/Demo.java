@@ -173,7 +173,7 @@ public final class Demo {
         long inRig = rig.bottles().size();
         must(watcher.cycles() == options.cycles(), "the PLC counts " + watcher.cycles() + " cycles instead of "
                 + options.cycles());
-        must(watcher.rigCycles() == options.cycles(), "the rig counts " + watcher.rigCycles() + " cycles instead of "
+        must(counters.cycles() == options.cycles(), "the rig counts " + counters.cycles() + " cycles instead of "
                 + options.cycles());
         must(counters.jams() == 1, "there were " + counters.jams() + " jams instead of 1");
         must(counters.faults() == 1, "Not OK rose " + counters.faults() + " times instead of once");

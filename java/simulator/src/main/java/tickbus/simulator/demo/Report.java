@@ -101,7 +101,7 @@ final class Report {
         table.row("late ticks", simulator.lateTicks());
         table.row("dropped ticks", simulator.droppedTicks());
         table.row("cycles that the PLC counts", run.cycles());
-        table.row("cycles that the rig counts", run.rigCycles());
+        table.row("cycles that the rig counts", rig.cycles());
         table.row("bottles fed", rig.fed());
         table.row("bottles treated", rig.treated());
         table.row("bottles delivered", rig.delivered());

@@ -173,11 +173,11 @@ public final class Demo {
         long inRig = rig.bottles().size();
         must(watcher.cycles() == options.cycles(), "the PLC counts " + watcher.cycles() + " cycles instead of "
                 + options.cycles());
-        must(watcher.rigCycles() == options.cycles(), "the rig counts " + watcher.rigCycles() + " cycles instead of "
+        must(counters.cycles() == options.cycles(), "the rig counts " + counters.cycles() + " cycles instead of "
                 + options.cycles());
         must(counters.jams() == 1, "there were " + counters.jams() + " jams instead of 1");
         must(counters.faults() == 1, "Not OK rose " + counters.faults() + " times instead of once");
-        must(watcher.lampErrors() == 0, "the lamp differed from the motion of lift 2 " + watcher.lampErrors()
+        must(counters.lampErrors() == 0, "the lamp differed from the motion of lift 2 " + counters.lampErrors()
                 + " times");
         must(counters.fallen() == 0, counters.fallen() + " bottles fell");
         must(counters.fed() == counters.delivered() + counters.removed() + counters.fallen() + inRig,

@@ -101,7 +101,7 @@ final class Report {
         table.row("late ticks", simulator.lateTicks());
         table.row("dropped ticks", simulator.droppedTicks());
         table.row("cycles that the PLC counts", run.cycles());
-        table.row("cycles that the rig counts", run.rigCycles());
+        table.row("cycles that the rig counts", rig.cycles());
         table.row("bottles fed", rig.fed());
         table.row("bottles treated", rig.treated());
         table.row("bottles delivered", rig.delivered());
@@ -112,7 +112,7 @@ final class Report {
         table.row("collisions", rig.collisions());
         table.row("times Not OK rose", rig.faults());
         table.row("index commands ignored", rig.retriggers());
-        table.row("lamp errors", run.lampErrors());
+        table.row("lamp errors", rig.lampErrors());
         text.append(table.text("  "));
     }
 

@@ -23,7 +23,6 @@ final class Watcher {
     };
     private static final String[] STATUS = {"fresh", "unchanged", "stale"};
     private static final int STALE = 2;
-    private static final int RUN = 3;
     private static final long LONGEST_STALE_NANOS = 1_000_000_000L;
 
     private final Simulator simulator;
@@ -36,7 +35,6 @@ final class Watcher {
     private final DoubleSupplier phase;
     private final DoubleSupplier step;
     private final DoubleSupplier cycles;
-    private final DoubleSupplier lastStepComplete;
     private final DoubleSupplier status;
     private final DoubleSupplier age;
     private final List<String> faults = new ArrayList<>();
@@ -45,10 +43,6 @@ final class Watcher {
     private int lastStep;
     private int lastCycles;
     private boolean lastNotOk;
-    private boolean lastComplete;
-    private int rigCycles;
-    private long lastLampErrors;
-    private long lampErrors;
     private boolean lastStale;
     private long stepSince;
     private long staleTicks;
@@ -65,7 +59,6 @@ final class Watcher {
         phase = simulator.probe("machine:panel.phase");
         step = simulator.probe("machine:panel.step");
         cycles = simulator.probe("machine:panel.cycles");
-        lastStepComplete = simulator.probe("machine:step6.complete");
         status = simulator.probe(driver + ":bus.status");
         age = simulator.probe(driver + ":bus.age");
     }
@@ -89,7 +82,6 @@ final class Watcher {
                 timeline.add(now, "PLC", "cycle " + (cycles() + 1) + ", step " + lastStep + ": " + stepName());
             }
         }
-        lookAtSteps();
         if (rig.notOk() != lastNotOk) {
             lastNotOk = rig.notOk();
             if (lastNotOk) {
@@ -100,21 +92,6 @@ final class Watcher {
                 timeline.add(now, "rig", "Not OK is off");
             }
         }
-    }
-
-    /**
-     * Counts what the rig says about steps, but only in the run phase: lowering both lifts with bottles on
-     * their cups while homing has the motion and suction of step 6, so the rig alone cannot tell.
-     */
-    private void lookAtSteps() {
-        boolean complete = lastStepComplete.getAsDouble() != 0;
-        long errors = rig.counters().lampErrors();
-        if (phase() == RUN) {
-            rigCycles += complete && !lastComplete ? 1 : 0;
-            lampErrors += errors - lastLampErrors;
-        }
-        lastComplete = complete;
-        lastLampErrors = errors;
     }
 
     private void lookAtLink(long now) {
@@ -175,16 +152,6 @@ final class Watcher {
 
     int cycles() {
         return (int) cycles.getAsDouble();
-    }
-
-    /** Cycles as the machine sees them: how often step 6 was completed in the run phase. */
-    int rigCycles() {
-        return rigCycles;
-    }
-
-    /** How often the lamp differed from the commanded motion of lift 2 in the run phase. */
-    long lampErrors() {
-        return lampErrors;
     }
 
     String statusName() {

@@ -13,6 +13,9 @@ struct Row<'a> {
     remedy: &'a str,
 }
 
+/// A function of the enum: its name, its documentation, and the field that it gives.
+type Column = (&'static str, &'static str, for<'a> fn(&Row<'a>) -> &'a str);
+
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed={TABLE}");
@@ -65,8 +68,9 @@ fn row(at: usize, line: &str) -> Row<'_> {
 
 /// `NOT_OPEN` as `NotOpen`.
 fn variant(name: &str) -> String {
-    name.split('_')
-        .map(|word| format!("{}{}", &word[..1], word[1..].to_ascii_lowercase()))
+    let words = name.split('_');
+    words
+        .flat_map(|word| [word[..1].to_owned(), word[1..].to_ascii_lowercase()])
         .collect()
 }
 
@@ -95,14 +99,14 @@ fn generate(rows: &[Row<'_>]) -> String {
         rows.len(),
         all.join(", ")
     ));
-    let columns: [(&str, &str, fn(&Row<'_>) -> String); 3] = [
+    let columns: [Column; 3] = [
         (
             "name",
             "Its name, as the Java enum `tickbus.Status` spells it.",
-            |row| row.name.into(),
+            |row| row.name,
         ),
-        ("text", "What it means.", |row| row.text.into()),
-        ("remedy", "What to do about it.", |row| row.remedy.into()),
+        ("text", "What it means.", |row| row.text),
+        ("remedy", "What to do about it.", |row| row.remedy),
     ];
     for (function, doc, field) in columns {
         write(&format!("\n    /// {doc}"));

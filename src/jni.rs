@@ -1,1 +1,157 @@
 //! The native methods of the Java class `tickbus.Tickbus`.
+//!
+//! Each is one line into the rooms above. `xChangeData` is the tick: a raw function that takes no
+//! lock, makes no system call, allocates nothing and never throws. All the others go through the jni
+//! crate, and throw `tickbus.FieldbusException`.
+
+#![allow(
+    unsafe_code,
+    reason = "exported names and the pointers that the JVM hands in"
+)]
+
+mod device;
+mod failure;
+mod handles;
+mod open;
+mod shared;
+
+use std::ffi::c_void;
+use std::panic::catch_unwind;
+use std::path::Path;
+
+use jni::objects::{JClass, JLongArray, JObject, JString};
+use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jclass, jint, jlong};
+use jni::vm::JavaVM;
+use jni::{Env, EnvUnowned};
+
+use crate::driver::Code;
+
+use device::{Device, EVENT_WORDS, EVENTS};
+use failure::{Failure, ThrowFieldbusException};
+use handles::Handles;
+
+/// Every driver that this process has open.
+static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
+
+/// Called by the JVM when it loads the library.
+///
+/// # Safety
+///
+/// `vm` must be the pointer that the JVM hands in.
+#[unsafe(no_mangle)]
+unsafe extern "system" fn JNI_OnLoad(vm: *mut jni::sys::JavaVM, _reserved: *mut c_void) -> jint {
+    let found = catch_unwind(|| {
+        // SAFETY: the caller's promise.
+        unsafe { JavaVM::from_raw(vm) }.attach_current_thread(failure::find_exception)
+    });
+    if matches!(found, Ok(Ok(()))) {
+        JNI_VERSION_1_8
+    } else {
+        JNI_ERR
+    }
+}
+
+/// `static native long initializeNative(String driverCfg, Layout layout)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_initializeNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    driver_cfg: JString<'local>,
+    layout: JObject<'local>,
+) -> jlong {
+    env.with_env(|env| initialize(env, &driver_cfg, &layout))
+        .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native int xChangeData(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_xChangeData(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jint {
+    // The table catches a panic of the driver; nothing around it can panic.
+    DRIVERS
+        .with(handle, Device::exchange)
+        .unwrap_or_else(Code::code)
+}
+
+/// `static native void finalizeNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) {
+    env.with_env(|_| DRIVERS.close(handle, Device::close).map_err(Failure::plain))
+        .resolve::<ThrowFieldbusException>();
+}
+
+/// `static native String statisticsNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_statisticsNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) -> JString<'local> {
+    env.with_env(|env| {
+        let text = with(handle, |device| device.statistics())?;
+        Ok(env.new_string(text)?)
+    })
+    .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native int eventsNative(long handle, long[] into)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_eventsNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+    into: JLongArray<'local>,
+) -> jint {
+    env.with_env(|env| events(env, handle, &into))
+        .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native int emptyNative()`: what crossing the border costs, the baseline of the benchmarks.
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_emptyNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+) -> jint {
+    0
+}
+
+fn initialize(
+    env: &mut Env<'_>,
+    driver_cfg: &JString<'_>,
+    layout: &JObject<'_>,
+) -> Result<jlong, Failure> {
+    let place = DRIVERS.reserve().map_err(|code| {
+        Failure::coded(
+            code,
+            format!("{} drivers are open, and that is the most", handles::PLACES),
+        )
+    })?;
+    let path = driver_cfg.try_to_string(env)?;
+    let device = open::open(env, Path::new(&path), layout)?;
+    Ok(place.fill(device))
+}
+
+fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jint, Failure> {
+    let mut words = [0; EVENTS * EVENT_WORDS];
+    let room = into.len(env)?.min(words.len());
+    let count = with(handle, |device| device.events(&mut words[..room]))?;
+    into.set_region(env, 0, &words[..count * EVENT_WORDS])?;
+    Ok(jint::try_from(count).unwrap_or(jint::MAX))
+}
+
+/// Work on a driver, with the text of its panic where it has failed.
+fn with<R>(handle: jlong, work: impl FnOnce(&mut Device<open::Keep>) -> R) -> Result<R, Failure> {
+    DRIVERS
+        .with(handle, work)
+        .map_err(|code| match DRIVERS.panic_of(handle) {
+            Some(text) => Failure::coded(code, format!("panic: {text}")),
+            None => Failure::plain(code),
+        })
+}

@@ -10,8 +10,8 @@
 //! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
-//! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
+//! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`driver`] | one device: configuration, open, exchange, statistics, close |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | [`cli`] | the `tickbus` command |

@@ -1,1 +1,167 @@
 //! IEC 61131-3 function blocks, and PLC programs on a clock that is handed in.
+//!
+//! A [`Program`] is a pure function of its own state, the time and the inputs: whoever hosts it
+//! calls [`Program::scan`] at the scan interval, on wall time or on simulation time, and carries
+//! the images. [`program`] finds a built-in program by its name.
+
+use crate::time::Nanos;
+
+mod drum;
+mod mirror;
+
+pub mod blocks;
+pub mod rig;
+
+pub use drum::Drum;
+pub use mirror::Mirror;
+pub use rig::{La1Code, Rig};
+
+/// What a program sees and makes in one scan.
+#[derive(Debug)]
+pub struct Scan<'a> {
+    /// The time of this scan; timers measure with nothing else.
+    pub now: Nanos,
+    /// The peer's data are fresh or unchanged, not stale.
+    pub alive: bool,
+    /// The inputs, `%I`, from byte 0.
+    pub inputs: &'a [u8],
+    /// The outputs, `%Q`, from byte 0; they keep their content between scans.
+    pub outputs: &'a mut [u8],
+}
+
+/// A PLC program.
+pub trait Program: Send {
+    /// The name that [`program`] knows it by.
+    fn name(&self) -> &'static str;
+
+    /// How many bytes of `%I` the program reads; 0 if it takes what there is.
+    fn input_bytes(&self) -> usize;
+
+    /// How many bytes of `%Q` the program writes; 0 if it takes what there is.
+    fn output_bytes(&self) -> usize;
+
+    /// Runs the program once: inputs to outputs. It allocates nothing and never waits.
+    ///
+    /// Images may be longer than the program asks for, and the rest is left alone. Of shorter
+    /// ones, the missing inputs read as 0 and the missing outputs are dropped.
+    fn scan(&mut self, scan: &mut Scan<'_>);
+}
+
+/// The names that [`program`] knows.
+pub const PROGRAMS: [&str; 2] = [Rig::NAME, Mirror::NAME];
+
+/// Why [`program`] gave none.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ProgramError {
+    /// No built-in program has that name.
+    #[error("no PLC program is called \"{name}\"; the built-in programs are {}", list(&PROGRAMS, "and"))]
+    UnknownName {
+        /// The name that was asked for.
+        name: String,
+    },
+    /// The program has no such option.
+    #[error(
+        "the PLC program \"{program}\" has no option \"{option}\"; {}",
+        if known.is_empty() { "it takes none".to_owned() } else { format!("it takes {}", list(known, "and")) }
+    )]
+    UnknownOption {
+        /// The program.
+        program: &'static str,
+        /// The option that was given.
+        option: String,
+        /// The options that it takes.
+        known: &'static [&'static str],
+    },
+    /// The option cannot have that value.
+    #[error(
+        "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; \
+         write {}",
+        list(known, "or")
+    )]
+    BadValue {
+        /// The program.
+        program: &'static str,
+        /// The option.
+        option: &'static str,
+        /// The value that was given.
+        value: String,
+        /// The values that it can have.
+        known: &'static [&'static str],
+    },
+}
+
+/// Writes `"a", "b" or "c"`, with `last` before the last one.
+fn list(names: &[&str], last: &str) -> String {
+    let mut text = String::new();
+    for (index, name) in names.iter().enumerate() {
+        if index > 0 && index + 1 == names.len() {
+            text.push(' ');
+            text.push_str(last);
+            text.push(' ');
+        } else if index > 0 {
+            text.push_str(", ");
+        }
+        text.push('"');
+        text.push_str(name);
+        text.push('"');
+    }
+    text
+}
+
+/// Makes the built-in program called `name`, one of [`PROGRAMS`], with its options as (key, value)
+/// pairs. Where an option is given twice, the last one counts.
+///
+/// # Errors
+///
+/// The name is unknown, the program has no such option, or the option cannot have that value; the
+/// text says which would be right.
+pub fn program(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>, ProgramError> {
+    match name {
+        Rig::NAME => Ok(Box::new(Rig::from_options(options)?)),
+        Mirror::NAME => Ok(Box::new(Mirror::new(options)?)),
+        _ => Err(ProgramError::UnknownName {
+            name: name.to_owned(),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(name: &str, options: &[(&str, &str)]) -> String {
+        let options: Vec<_> = options
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+            .collect();
+        program(name, &options).err().expect("refused").to_string()
+    }
+
+    #[test]
+    fn every_built_in_program_can_be_made_by_its_name() {
+        for name in PROGRAMS {
+            assert_eq!(program(name, &[]).expect("built in").name(), name);
+        }
+    }
+
+    #[test]
+    fn refusals_name_what_would_be_right() {
+        assert_eq!(
+            refusal("rigg", &[]),
+            "no PLC program is called \"rigg\"; the built-in programs are \"rig\" and \"mirror\""
+        );
+        assert_eq!(
+            refusal("mirror", &[("speed", "fast")]),
+            "the PLC program \"mirror\" has no option \"speed\"; it takes none"
+        );
+        assert_eq!(
+            refusal("rig", &[("la1", "msb-first")]),
+            "the PLC program \"rig\" has no option \"la1\"; it takes \"la1_code\""
+        );
+        assert_eq!(
+            refusal("rig", &[("la1_code", "MSB")]),
+            "the option \"la1_code\" of the PLC program \"rig\" cannot be \"MSB\"; write \
+             \"msb-first\" or \"lsb-first\""
+        );
+    }
+}

@@ -1,6 +1,19 @@
 //! The codec plan: how slots become frame bytes and back, compiled once from the signal table.
+//!
+//! Compiling sorts the signals into *runs*, each converted by one loop that was generated for its
+//! type, byte order and scaling. Nothing is decided per signal any more at run time, and encoding
+//! and decoding neither allocate nor wait.
 
-use super::{Area, SignalTable, Slot};
+mod bits;
+mod number;
+mod run;
+mod word;
+
+use std::ops::Range;
+
+use self::number::{Codec, Integer64, Number, Real, Unscaled};
+use self::run::{Gaps, Member, Run};
+use super::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot};
 
 /// What encoding had to bend, as counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,15 +25,57 @@ pub struct Conversions {
 }
 
 /// The way between slots and one frame (one area of one station).
+///
+/// A raw number is (value − offset) / gain where the signal has a scale, the value itself where it
+/// has none; decoding is raw × gain + offset. While encoding,
+///
+/// - integers round half away from zero, and what then lies beyond the type saturates; so do
+///   infinities;
+/// - a REAL beyond ±[`f32::MAX`] and an LREAL beyond ±[`f64::MAX`] saturate there, but an infinite
+///   value stays infinite, as these types have infinities;
+/// - NaN becomes the signal's fail-safe value (zero should that be NaN as well);
+/// - a BOOL is 0 for zero of either sign and 1 for all else but NaN.
+///
+/// Decoding bends nothing: a REAL that is NaN or infinite comes out as it is, a BOOL as 0.0 or 1.0.
+/// An unscaled LWORD, LINT or ULINT passes as the 64 bits that it is, both ways.
 #[derive(Debug)]
-pub struct Plan;
+pub struct Plan {
+    /// How many slots and frame bytes the plan reaches over.
+    slots: usize,
+    bytes: usize,
+    runs: Vec<Box<dyn Run>>,
+    fail_safes: Vec<(usize, Slot)>,
+}
 
 impl Plan {
     /// Compiles the plan for `area` of the station with index `station`.
     ///
-    /// Slot numbers are positions in `table.signals`. Frames must be as long as the station says.
-    pub fn new(_table: &SignalTable, _station: usize, _area: Area) -> Self {
-        Self
+    /// Slot numbers are positions in `table.signals`. Frames must be as long as the station says; a
+    /// longer frame's further bytes stay untouched. Signals that overlap are the checked table's
+    /// business: here it is not defined which of them is encoded.
+    pub fn new(table: &SignalTable, station: usize, area: Area) -> Self {
+        let members: Vec<Member> = (table.signals.iter().enumerate())
+            .filter(|(_, signal)| signal.station == station && signal.area == area)
+            .collect();
+        let station_bytes = table.stations.get(station).map_or(0, |station| match area {
+            Area::Input => station.input_bytes,
+            Area::Output => station.output_bytes,
+        });
+        let ends = members.iter().map(|(_, s)| s.byte + bytes(s.data_type));
+        let bytes = ends
+            .max()
+            .map_or(station_bytes, |end| end.max(station_bytes));
+        let gaps = gaps(&members, bytes);
+        let mut runs = runs(&members);
+        if !gaps.is_empty() {
+            runs.push(Box::new(Gaps(gaps)));
+        }
+        Self {
+            slots: members.last().map_or(0, |(slot, _)| slot + 1),
+            bytes,
+            runs,
+            fail_safes: (members.iter().map(|(slot, s)| (*slot, s.fail_safe))).collect(),
+        }
     }
 
     /// Encodes the area's slots into `frame`. Bytes and bits that no signal covers become zero.
@@ -28,8 +83,13 @@ impl Plan {
     /// # Panics
     ///
     /// When `frame` or `slots` is shorter than the plan was made for.
-    pub fn encode(&self, _slots: &[Slot], _frame: &mut [u8]) -> Conversions {
-        Conversions::default()
+    pub fn encode(&self, slots: &[Slot], frame: &mut [u8]) -> Conversions {
+        self.check(slots.len(), frame.len());
+        let mut conversions = Conversions::default();
+        for run in &self.runs {
+            run.encode(slots, frame, &mut conversions);
+        }
+        conversions
     }
 
     /// Decodes `frame` into the area's slots; other slots stay untouched.
@@ -37,12 +97,150 @@ impl Plan {
     /// # Panics
     ///
     /// When `frame` or `slots` is shorter than the plan was made for.
-    pub fn decode(&self, _frame: &[u8], _slots: &mut [Slot]) {}
+    pub fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
+        self.check(slots.len(), frame.len());
+        for run in &self.runs {
+            run.decode(frame, slots);
+        }
+    }
 
     /// Writes the fail-safe values of the area's signals into their slots.
     ///
     /// # Panics
     ///
     /// When `slots` is shorter than the plan was made for.
-    pub fn fail_safe(&self, _slots: &mut [Slot]) {}
+    pub fn fail_safe(&self, slots: &mut [Slot]) {
+        self.check(slots.len(), self.bytes);
+        for (slot, fail_safe) in &self.fail_safes {
+            slots[*slot] = *fail_safe;
+        }
+    }
+
+    /// The one check of lengths: whatever passes it stays in bounds everywhere below.
+    fn check(&self, slots: usize, bytes: usize) {
+        assert!(
+            slots >= self.slots && bytes >= self.bytes,
+            "the plan needs {} slots and {} frame bytes, but was given {slots} and {bytes}",
+            self.slots,
+            self.bytes,
+        );
+    }
+}
+
+/// What decides which loop converts a signal.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Kind {
+    data_type: DataType,
+    order: ByteOrder,
+    scaled: bool,
+}
+
+impl Kind {
+    /// Types and orders that mean the same bytes are one kind, so that their signals share runs.
+    fn of(signal: &Signal) -> Self {
+        let scaled = signal.scale.is_some();
+        let data_type = match signal.data_type {
+            DataType::Byte => DataType::Usint,
+            DataType::Word => DataType::Uint,
+            DataType::Dword => DataType::Udint,
+            DataType::Lword => DataType::Ulint,
+            DataType::Lint if !scaled => DataType::Ulint,
+            other => other,
+        };
+        let order = match (bytes(data_type), signal.order) {
+            (1, _) | (2, ByteOrder::Cdab) => ByteOrder::Abcd,
+            (2, ByteOrder::Badc) => ByteOrder::Dcba,
+            (_, order) => order,
+        };
+        Self {
+            data_type,
+            order,
+            scaled,
+        }
+    }
+
+    /// The runs of `members`, all of this kind.
+    fn runs(self, members: &[Member]) -> Vec<Box<dyn Run>> {
+        match self.data_type {
+            DataType::Bool => bits::lay_out(members),
+            DataType::Sint => self.number::<i8>(members),
+            DataType::Byte | DataType::Usint => self.number::<u8>(members),
+            DataType::Int => self.number::<i16>(members),
+            DataType::Word | DataType::Uint => self.number::<u16>(members),
+            DataType::Dint => self.number::<i32>(members),
+            DataType::Dword | DataType::Udint => self.number::<u32>(members),
+            DataType::Real => self.number::<f32>(members),
+            DataType::Lreal => self.number::<f64>(members),
+            DataType::Lint if self.scaled => self.number::<i64>(members),
+            DataType::Lword | DataType::Ulint if self.scaled => self.number::<u64>(members),
+            DataType::Lword | DataType::Lint | DataType::Ulint => self.codec::<Integer64>(members),
+        }
+    }
+
+    fn number<N: Number>(self, members: &[Member]) -> Vec<Box<dyn Run>> {
+        if self.scaled {
+            self.codec::<Real<N, Scale>>(members)
+        } else {
+            self.codec::<Real<N, Unscaled>>(members)
+        }
+    }
+
+    fn codec<C: Codec>(self, members: &[Member]) -> Vec<Box<dyn Run>> {
+        match self.order {
+            ByteOrder::Abcd => run::lay_out::<C, word::Abcd>(members),
+            ByteOrder::Cdab => run::lay_out::<C, word::Cdab>(members),
+            ByteOrder::Badc => run::lay_out::<C, word::Badc>(members),
+            ByteOrder::Dcba => run::lay_out::<C, word::Dcba>(members),
+        }
+    }
+}
+
+/// The runs of all signals.
+fn runs(members: &[Member]) -> Vec<Box<dyn Run>> {
+    let mut kinds: Vec<(Kind, Vec<Member>)> = Vec::new();
+    for member in members {
+        let kind = Kind::of(member.1);
+        match kinds.iter_mut().find(|(known, _)| *known == kind) {
+            Some((_, alike)) => alike.push(*member),
+            None => kinds.push((kind, vec![*member])),
+        }
+    }
+    (kinds.iter())
+        .flat_map(|(kind, members)| kind.runs(members))
+        .collect()
+}
+
+/// The bytes of a frame that no signal touches.
+fn gaps(members: &[Member], frame_bytes: usize) -> Vec<Range<usize>> {
+    let mut spans: Vec<Range<usize>> = (members.iter())
+        .map(|(_, signal)| signal.byte..signal.byte + bytes(signal.data_type))
+        .collect();
+    spans.sort_by_key(|span| span.start);
+    let mut gaps = Vec::new();
+    let mut covered = 0;
+    for span in spans {
+        if span.start > covered {
+            gaps.push(covered..span.start);
+        }
+        covered = covered.max(span.end);
+    }
+    if covered < frame_bytes {
+        gaps.push(covered..frame_bytes);
+    }
+    gaps
+}
+
+/// How many bytes of the frame a value touches.
+fn bytes(data_type: DataType) -> usize {
+    match data_type {
+        DataType::Bool | DataType::Byte | DataType::Sint | DataType::Usint => 1,
+        DataType::Word | DataType::Int | DataType::Uint => 2,
+        DataType::Dword | DataType::Dint | DataType::Udint | DataType::Real => 4,
+        DataType::Lword | DataType::Lint | DataType::Ulint | DataType::Lreal => 8,
+    }
+}
+
+/// A slot or byte number as runs keep it: half as wide, so that twice as many fit into the cache.
+fn index(number: usize) -> u32 {
+    u32::try_from(number).expect("signal tables and frames have fewer than 2^32 slots and bytes")
 }

@@ -58,16 +58,22 @@ impl Monotonic {
         }
         let coarse = Arc::new(AtomicI64::new(monotonic_now().0));
         let stop = Stop::new();
-        let keeper = std::thread::Builder::new().name("tickbus-clock".into()).spawn({
-            let (coarse, stop) = (Arc::clone(&coarse), stop.clone());
-            move || {
-                while !stop.is_stopped() {
-                    coarse.store(monotonic_now().0, Ordering::Relaxed);
-                    wait_monotonic(monotonic_now() + COARSE_STEP, &stop);
+        let keeper = std::thread::Builder::new()
+            .name("tickbus-clock".into())
+            .spawn({
+                let (coarse, stop) = (Arc::clone(&coarse), stop.clone());
+                move || {
+                    while !stop.is_stopped() {
+                        coarse.store(monotonic_now().0, Ordering::Relaxed);
+                        wait_monotonic(monotonic_now() + COARSE_STEP, &stop);
+                    }
                 }
-            }
-        })?;
-        let clock = Arc::new(Self { coarse, stop, keeper: Some(keeper) });
+            })?;
+        let clock = Arc::new(Self {
+            coarse,
+            stop,
+            keeper: Some(keeper),
+        });
         *shared = Arc::downgrade(&clock);
         Ok(clock)
     }
@@ -125,7 +131,12 @@ impl Manual {
     /// Sets the clock to `now`; a clock never goes back, so an earlier time changes nothing.
     pub fn set(&self, now: Nanos) {
         self.now.fetch_max(now.0, Ordering::SeqCst);
-        for waiter in self.waiters.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        for waiter in self
+            .waiters
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .iter()
+        {
             if let Some(waiter) = waiter.upgrade() {
                 waiter.nudge();
             }

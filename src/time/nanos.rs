@@ -86,7 +86,9 @@ impl fmt::Display for Nanos {
 
 /// Why a text is not a duration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("not a duration; write a number and a unit, such as \"10ms\" (units: ns, us, ms, s, min, h)")]
+#[error(
+    "not a duration; write a number and a unit, such as \"10ms\" (units: ns, us, ms, s, min, h)"
+)]
 pub struct ParseDurationError;
 
 /// Reads `10ms`, `1.5 s`, `250us`: a non-negative decimal number and a unit.
@@ -95,10 +97,14 @@ impl FromStr for Nanos {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let text = text.trim();
-        let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').ok_or(ParseDurationError)?;
+        let digits = text
+            .find(|c: char| !c.is_ascii_digit() && c != '.')
+            .ok_or(ParseDurationError)?;
         let (number, unit) = text.split_at(digits);
-        let (_, size) =
-            UNITS.iter().find(|(name, _)| *name == unit.trim()).ok_or(ParseDurationError)?;
+        let (_, size) = UNITS
+            .iter()
+            .find(|(name, _)| *name == unit.trim())
+            .ok_or(ParseDurationError)?;
         let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
         if whole.is_empty() || (number.contains('.') && fraction.is_empty()) {
             return Err(ParseDurationError);
@@ -142,7 +148,17 @@ mod tests {
 
     #[test]
     fn what_is_no_duration_is_refused() {
-        for text in ["", "10", "ms", "-1s", "1.s", ".5s", "1.2.3s", "10 parsecs", "9999999999h"] {
+        for text in [
+            "",
+            "10",
+            "ms",
+            "-1s",
+            "1.s",
+            ".5s",
+            "1.2.3s",
+            "10 parsecs",
+            "9999999999h",
+        ] {
             assert_eq!(text.parse::<Nanos>(), Err(ParseDurationError), "{text}");
         }
     }

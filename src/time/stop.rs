@@ -56,9 +56,17 @@ impl Stop {
         while !state.stopped && !std::mem::take(&mut state.wake) {
             state = match remaining() {
                 None => return,
-                Some(None) => self.0.woken.wait(state).unwrap_or_else(PoisonError::into_inner),
+                Some(None) => self
+                    .0
+                    .woken
+                    .wait(state)
+                    .unwrap_or_else(PoisonError::into_inner),
                 Some(Some(span)) => {
-                    self.0.woken.wait_timeout(state, span).unwrap_or_else(PoisonError::into_inner).0
+                    self.0
+                        .woken
+                        .wait_timeout(state, span)
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0
                 }
             };
         }

@@ -1,5 +1,15 @@
-//! Both ends of a bus in one process: by link name, or with a hosted PLC program at the other end.
+//! The loopback: both ends of the line in one process.
+//!
+//! Two drivers meet by the name of a link, one as Device, one as Controller; or a PLC program is
+//! hosted at the other end. It is a real bus in all but the wire: frames of fixed size, a cycle of its
+//! own, pulses confirmed when the other end has taken them.
 
+mod free;
+mod link;
 mod options;
+mod stepped;
 
+pub use free::FreeLoopback;
+pub use link::{End, private_link};
 pub use options::{Mode, Options, Peer};
+pub use stepped::SteppedLoopback;

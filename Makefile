@@ -1,0 +1,31 @@
+# The commands of this project. What they do stands in tools/; this file gives them their names.
+
+.PHONY: help demo test bench lint dist build setup clean
+.DEFAULT_GOAL := help
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+demo: ## build, then watch the PLC program run the rig: three cycles, one jam
+	@exec tools/demo
+
+test: setup ## build and test everything that CI checks
+	@exec tools/test
+
+bench: setup ## measure, and print each figure beside the one asked for
+	@exec tools/bench
+
+lint: setup ## formatting, clippy, documentation, Java warnings, shell scripts
+	@exec tools/lint
+
+dist: setup ## a zip with the DeviceDriver folder and the simulator; needs only a JRE to run
+	@exec tools/dist
+
+build: setup ## the native library, the tickbus command and the jars
+	@exec tools/build
+
+setup: ## check for the tools, and install what lacks on Debian or Ubuntu where allowed
+	@exec tools/setup
+
+clean: ## remove all that was built
+	@exec tools/clean

@@ -1,0 +1,113 @@
+//! The tick in Rust: one exchange of a driver, without the way from Java.
+//!
+//! `rig` is the test rig's 16 bits each way, `reals` a number of REAL signals each way. On a free bus
+//! most exchanges find nothing new, as in a simulation that ticks faster than its bus; on a stepped
+//! one every exchange runs a bus cycle and a scan of the hosted program, on the same thread.
+#![allow(missing_docs, reason = "a bench")]
+
+use std::fmt::Write as _;
+use std::hint::black_box;
+use std::sync::Arc;
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use tickbus::driver::{Config, Driver};
+use tickbus::image::{Frame, triple_buffer};
+use tickbus::signal::Slot;
+use tickbus::time::{Monotonic, Nanos};
+
+fn config(mode: &str, signals: &str) -> Config {
+    let text = format!(
+        "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+         scan = \"1ms\"\ncycle = \"1ms\"\nmode = \"{mode}\"\n{signals}"
+    );
+    Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
+}
+
+fn bits(latch: &str) -> String {
+    let mut text = String::new();
+    for area in ['Q', 'I'] {
+        for bit in 0..16 {
+            let (byte, bit) = (1 - bit / 8, bit % 8);
+            let _ = write!(
+                text,
+                "[[signal]]\nname = \"{area} {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\n{latch}\n"
+            );
+        }
+    }
+    text
+}
+
+fn reals(count: usize) -> String {
+    let mut text = String::new();
+    for area in ['Q', 'I'] {
+        for index in 0..count {
+            let _ = write!(
+                text,
+                "[[signal]]\nname = \"{area} {index}\"\naddress = \"%{area}D{}\"\ntype = \"REAL\"\n",
+                index * 4
+            );
+        }
+    }
+    text
+}
+
+fn exchange(criterion: &mut Criterion) {
+    let clock = Monotonic::shared().expect("a thread");
+    let mut group = criterion.benchmark_group("exchange");
+    let latched = bits("latch = \"rising\"");
+    let tables = [("rig", latched), ("rig unlatched", bits("")), ("1000 reals", reals(1_000))];
+    for (name, signals) in tables {
+        for mode in ["free", "stepped"] {
+            let mut driver =
+                Driver::open(config(mode, &signals), Arc::clone(&clock) as _).expect("opens");
+            let mut slots = driver.initial_slots();
+            let mut time = Nanos::ZERO;
+            group.bench_function(BenchmarkId::new(name, mode), |bencher| {
+                bencher.iter(|| {
+                    time += Nanos::from_millis(1);
+                    // Something changes at every tick.
+                    for slot in &mut slots[16..20] {
+                        *slot = Slot::from_real(1.0 - slot.real().abs().min(1.0));
+                    }
+                    black_box(driver.exchange(time, &mut slots))
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+/// Our triple buffer against the crate of that name: publish and read on one thread.
+fn hand_over(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("hand-over");
+    for size in [64, 512, 4096] {
+        let frame = Frame {
+            bytes: vec![0; size].into(),
+            edges: vec![0; 16].into(),
+            sequence: 0,
+        };
+        let source = vec![1_u8; size];
+        let (mut writer, mut reader) = triple_buffer(&frame);
+        group.bench_function(BenchmarkId::new("own", size), |bencher| {
+            bencher.iter(|| {
+                writer.with_buffer(|frame| frame.bytes.copy_from_slice(black_box(&source)));
+                writer.publish();
+                reader.update();
+                reader.with(|frame| black_box(frame.bytes[0]))
+            });
+        });
+        let (mut input, mut output) = triple_buffer::TripleBuffer::new(&frame).split();
+        group.bench_function(BenchmarkId::new("crate triple_buffer", size), |bencher| {
+            bencher.iter(|| {
+                input.input_buffer_mut().bytes.copy_from_slice(black_box(&source));
+                input.publish();
+                output.update();
+                black_box(output.peek_output_buffer().bytes[0])
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, exchange, hand_over);
+criterion_main!(benches);

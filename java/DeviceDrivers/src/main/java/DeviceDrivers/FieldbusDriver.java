@@ -1,0 +1,118 @@
+package DeviceDrivers;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import controlinterface.Direction;
+import controlinterface.HardwareComponent;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.Map;
+import tickbus.FieldbusException;
+import tickbus.Signal;
+import tickbus.Tickbus;
+
+/**
+ * Connects a simulator to a PLC's fieldbus, as one {@code .cfg} file describes it.
+ *
+ * <p>Its components are the signals in the order of the file; then {@code <name>.edges} for each latched
+ * signal that the PLC writes: how many edges came with this tick; then {@code bus.age} in seconds,
+ * {@code bus.sequence} and {@code bus.status}: 0 fresh, 1 unchanged, 2 stale.
+ *
+ * <p>All calls come from one thread, as the control interface says.
+ */
+public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
+    private static final double NANOS_PER_SECOND = 1e9;
+
+    private final Tickbus bus;
+    private final List<HardwareComponent> components;
+    private final Signal[] latched;
+    private final double[] inputs;
+    private boolean timed;
+    private long simulationNanos;
+
+    /**
+     * Opens the driver that a file describes.
+     *
+     * @param cfg the driver.cfg
+     * @throws FieldbusException as {@link Tickbus#open} says
+     */
+    public FieldbusDriver(Path cfg) {
+        bus = Tickbus.open(cfg);
+        latched = bus.signals().stream().filter(Signal::isLatched).toArray(Signal[]::new);
+        components = describe(bus.signals());
+        inputs = new double[(int) components.stream()
+            .filter(component -> component.direction() == Direction.READ_BY_SIMULATION).count()];
+    }
+
+    private static List<HardwareComponent> describe(List<Signal> signals) {
+        List<HardwareComponent> components = new ArrayList<>();
+        for (Signal signal : signals) {
+            Direction direction = signal.isWritten() ? Direction.WRITTEN_BY_SIMULATION : Direction.READ_BY_SIMULATION;
+            components.add(new HardwareComponent(signal.name(), direction, signal.type(), signal.unit()));
+        }
+        for (Signal signal : signals) {
+            if (signal.isLatched()) {
+                components.add(read(signal.name() + ".edges", "UDINT", ""));
+            }
+        }
+        components.add(read("bus.age", "LREAL", "s"));
+        components.add(read("bus.sequence", "ULINT", ""));
+        components.add(read("bus.status", "INT", ""));
+        return List.copyOf(components);
+    }
+
+    private static HardwareComponent read(String name, String type, String unit) {
+        return new HardwareComponent(name, Direction.READ_BY_SIMULATION, type, unit);
+    }
+
+    /**
+     * One tick, at the time last given by {@link #simulationTime}.
+     *
+     * @throws IllegalArgumentException if there are more or fewer values than components to write
+     * @throws FieldbusException if the fieldbus failed for good, or the driver was left by {@link #exit}
+     */
+    @Override
+    public void updateComponentValues(double[] value) {
+        bus.setAll(value);
+        int status = timed ? bus.exchange(simulationNanos) : bus.exchange();
+        int at = bus.getAll(inputs);
+        for (Signal signal : latched) {
+            inputs[at++] = signal.edges();
+        }
+        inputs[at++] = bus.ageNanos() / NANOS_PER_SECOND;
+        inputs[at++] = bus.sequence();
+        inputs[at] = status;
+        deliverHardwareInputs(inputs);
+    }
+
+    @Override
+    public void simulationTime(long nanos) {
+        timed = true;
+        simulationNanos = nanos;
+    }
+
+    @Override
+    public List<HardwareComponent> components() {
+        return components;
+    }
+
+    @Override
+    public int id() {
+        return bus.id();
+    }
+
+    @Override
+    public String name() {
+        return bus.name();
+    }
+
+    @Override
+    public Map<String, String> statistics() {
+        return bus.statistics();
+    }
+
+    @Override
+    public void exit() {
+        bus.close();
+    }
+}

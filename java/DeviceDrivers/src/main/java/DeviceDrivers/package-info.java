@@ -1,0 +1,2 @@
+/** The drop-in driver: put its jar and one or more {@code .cfg} files into a simulator's DeviceDriver folder. */
+package DeviceDrivers;

@@ -1,0 +1,124 @@
+package DeviceDrivers;
+
+import static org.junit.jupiter.api.Assertions.assertArrayEquals;
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertThrows;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+
+import controlinterface.Direction;
+import controlinterface.HardwareComponent;
+import java.io.IOException;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.io.TempDir;
+import tickbus.FieldbusException;
+import tickbus.Status;
+
+class FieldbusDriverTest {
+    private static final long TICK = 1_000_000;
+
+    @TempDir
+    Path directory;
+
+    private FieldbusDriver open() throws IOException {
+        return new FieldbusDriver(Files.writeString(directory.resolve("rig.cfg"), """
+            [driver]
+            id = 7
+            name = "Mirror"
+
+            [fieldbus]
+            kind = "loopback"
+            program = "mirror"
+            mode = "stepped"
+            scan = "1ms"
+
+            [[signal]]
+            name = "lamp"
+            address = "%QX0.0"
+            latch = "rising"
+
+            [[signal]]
+            name = "button"
+            address = "%IX0.0"
+
+            [[signal]]
+            name = "speed"
+            address = "%QW2"
+            type = "INT"
+            unit = "mm/s"
+
+            [[signal]]
+            name = "measured speed"
+            address = "%IW2"
+            type = "INT"
+            unit = "mm/s"
+            """));
+    }
+
+    @Test
+    void componentsAreSignalsThenEdgesThenTheBus() throws IOException {
+        FieldbusDriver driver = open();
+        assertEquals(7, driver.id());
+        assertEquals("Mirror", driver.name());
+        assertEquals(List.of(
+            new HardwareComponent("lamp", Direction.READ_BY_SIMULATION, "BOOL", ""),
+            new HardwareComponent("button", Direction.WRITTEN_BY_SIMULATION, "BOOL", ""),
+            new HardwareComponent("speed", Direction.READ_BY_SIMULATION, "INT", "mm/s"),
+            new HardwareComponent("measured speed", Direction.WRITTEN_BY_SIMULATION, "INT", "mm/s"),
+            new HardwareComponent("lamp.edges", Direction.READ_BY_SIMULATION, "UDINT", ""),
+            new HardwareComponent("bus.age", Direction.READ_BY_SIMULATION, "LREAL", "s"),
+            new HardwareComponent("bus.sequence", Direction.READ_BY_SIMULATION, "ULINT", ""),
+            new HardwareComponent("bus.status", Direction.READ_BY_SIMULATION, "INT", "")), driver.components());
+        driver.exit();
+        assertEquals(8, driver.components().size());
+    }
+
+    @Test
+    void aTickAnswersWithTheInputsInComponentOrder() throws IOException {
+        FieldbusDriver driver = open();
+        List<double[]> delivered = new ArrayList<>();
+        driver.connect(inputs -> delivered.add(inputs.clone()));
+        double edges = 0;
+        for (int i = 1; i <= 5; i++) {
+            driver.simulationTime(i * TICK);
+            driver.updateComponentValues(new double[] {1, -250});
+            edges += delivered.get(i - 1)[2];
+        }
+        double[] last = delivered.get(4);
+        assertArrayEquals(new double[] {1, -250}, new double[] {last[0], last[1]});
+        assertEquals(1, edges);
+        assertTrue(last[3] >= 0 && last[3] < 1, "age " + last[3]);
+        assertTrue(last[4] > 0, "sequence " + last[4]);
+        assertTrue(last[5] == Status.FRESH.code() || last[5] == Status.UNCHANGED.code(), "status " + last[5]);
+        assertEquals("5", driver.statistics().get("ticks"));
+        driver.exit();
+    }
+
+    @Test
+    void ticksWithoutSimulationTimeAreServed() throws IOException {
+        FieldbusDriver driver = open();
+        driver.updateComponentValues(new double[2]);
+        assertThrows(IllegalArgumentException.class, () -> driver.updateComponentValues(new double[3]));
+        driver.exit();
+    }
+
+    @Test
+    void afterExitTicksAreRefusedAndExitIsNot() throws IOException {
+        FieldbusDriver driver = open();
+        driver.exit();
+        driver.exit();
+        FieldbusException refused = assertThrows(FieldbusException.class, () -> driver.updateComponentValues(new double[2]));
+        assertEquals(Status.CLOSED, refused.status());
+    }
+
+    @Test
+    void aWrongFileIsRefusedWithItsMistakes() throws IOException {
+        Path wrong = Files.writeString(directory.resolve("wrong.cfg"), "[driver]\nid = \"seven\"\n");
+        FieldbusException refused = assertThrows(FieldbusException.class, () -> new FieldbusDriver(wrong));
+        assertEquals(Status.BAD_CONFIG, refused.status());
+        assertTrue(refused.getMessage().contains("wrong.cfg:2:6: "), refused::getMessage);
+    }
+}

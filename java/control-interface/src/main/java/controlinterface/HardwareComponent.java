@@ -1,0 +1,29 @@
+package controlinterface;
+
+import java.util.Objects;
+
+/**
+ * One value that a driver exchanges: a signal of the hardware as the simulator lists and connects it.
+ *
+ * @param name unique among the driver's components, never blank
+ * @param direction who writes the value
+ * @param type the value's type in the driver's own terms, such as {@code BOOL} or {@code INT}
+ * @param unit physical unit, empty if there is none
+ */
+public record HardwareComponent(String name, Direction direction, String type, String unit) {
+    /**
+     * Checks that all parts are there.
+     *
+     * @throws NullPointerException if any part is null
+     * @throws IllegalArgumentException if the name is blank
+     */
+    public HardwareComponent {
+        Objects.requireNonNull(name, "name");
+        Objects.requireNonNull(direction, "direction");
+        Objects.requireNonNull(type, "type");
+        Objects.requireNonNull(unit, "unit");
+        if (name.isBlank()) {
+            throw new IllegalArgumentException("a hardware component needs a name; this one's is blank");
+        }
+    }
+}

@@ -1,0 +1,20 @@
+package tickbus.simulator;
+
+/** A device driver failed: while opening, in a tick, or while closing. */
+public final class DriverFailure extends RuntimeException {
+    private static final long serialVersionUID = 1L;
+
+    /**
+     * Wraps what the driver threw.
+     *
+     * @param what what the driver was doing, and which driver it was
+     * @param cause what it threw; its message is shown
+     */
+    public DriverFailure(String what, Throwable cause) {
+        super(what + ": " + reason(cause), cause);
+    }
+
+    private static String reason(Throwable cause) {
+        return cause.getMessage() == null ? cause.toString() : cause.getMessage();
+    }
+}

@@ -1,0 +1,57 @@
+package tickbus.simulator;
+
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.TimeUnit;
+
+/**
+ * Lets a run end in good order when the JVM is told to end, by Ctrl-C or by a signal:
+ * tells the run, and holds the JVM until the run has closed its drivers.
+ *
+ * <p>The drivers are closed by the thread that ticks them, never by the JVM's shutdown thread, because a
+ * driver must not be closed in the middle of an exchange. If a driver hangs, the JVM ends nevertheless after
+ * a grace time.
+ */
+public final class ShutdownGuard implements AutoCloseable {
+    private static final long GRACE_SECONDS = 5;
+
+    private final CountDownLatch done = new CountDownLatch(1);
+    private final Thread hook;
+    private volatile boolean triggered;
+
+    /** Watches over a run from here on; make it before the drivers are opened. */
+    public ShutdownGuard() {
+        hook = new Thread(this::end, "shutdown guard");
+        Runtime.getRuntime().addShutdownHook(hook);
+    }
+
+    private void end() {
+        triggered = true;
+        try {
+            if (!done.await(GRACE_SECONDS, TimeUnit.SECONDS)) {
+                System.err.println("the drivers were not closed within " + GRACE_SECONDS + " s; ending without them");
+            }
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    /**
+     * Whether the JVM is ending. The run asks before every tick.
+     *
+     * @return true from the moment that it was told to
+     */
+    public boolean triggered() {
+        return triggered;
+    }
+
+    /** The run is over and its drivers are closed. */
+    @Override
+    public void close() {
+        done.countDown();
+        try {
+            Runtime.getRuntime().removeShutdownHook(hook);
+        } catch (IllegalStateException e) {
+            // The JVM is ending already, and the hook runs; it has just been let go.
+        }
+    }
+}

@@ -1,0 +1,260 @@
+package tickbus.simulator;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import controlinterface.Direction;
+import java.nio.file.Path;
+import java.util.List;
+import java.util.function.BooleanSupplier;
+import java.util.function.DoubleSupplier;
+import tickbus.simulator.control.ControlTable;
+import tickbus.simulator.control.ControlTableException;
+import tickbus.simulator.control.Endpoints;
+import tickbus.simulator.text.Durations;
+
+/**
+ * Ticks a machine and its drivers.
+ *
+ * <p>One tick: what the drivers delivered last goes through the control table to the machine, the machine
+ * takes one step, what it shows goes through the control table to the drivers, and each driver exchanges
+ * with its hardware and delivers anew. A tick allocates nothing.
+ *
+ * <p>One thread ticks and closes; {@link #stop} may be called from any.
+ */
+public final class Simulator implements AutoCloseable {
+    /** One driver's place in the tick. */
+    private static final class Seat {
+        final ControlInterfaceDeviceDriver driver;
+        final int firstDestination;
+        final double[] written;
+
+        Seat(ControlInterfaceDeviceDriver driver, int firstDestination, int written) {
+            this.driver = driver;
+            this.firstDestination = firstDestination;
+            this.written = new double[written];
+        }
+    }
+
+    private final DriverSet drivers;
+    private final Machine machine;
+    private final ControlTable table;
+    private final long stepNanos;
+    private final Seat[] seats;
+    private final int machineInputs;
+    private final int machineOutputs;
+    private final int firstMachineInput;
+    private final int firstMachineOutput;
+    private final Pacer pacer;
+    private long ticks;
+    private volatile boolean stopped;
+
+    /**
+     * Connects drivers and machine. The simulator owns the drivers from here on, and closes them if this
+     * fails.
+     *
+     * @param drivers open drivers
+     * @param machine the machine
+     * @param controlTable file that connects them
+     * @param stepNanos step size in nanoseconds, above 0
+     * @param time the clock for real-time mode
+     * @throws ControlTableException if the control table has mistakes
+     * @throws IllegalArgumentException if the step size is not above 0
+     */
+    public Simulator(DriverSet drivers, Machine machine, Path controlTable, long stepNanos, TimeSource time) {
+        this.drivers = drivers;
+        this.machine = machine;
+        this.stepNanos = stepNanos;
+        pacer = new Pacer(time, stepNanos);
+        List<ControlInterfaceDeviceDriver> list = drivers.drivers();
+        try {
+            if (stepNanos <= 0) {
+                throw new IllegalArgumentException(
+                        "the step size is " + Durations.text(stepNanos) + "; it must be above 0");
+            }
+            Endpoints endpoints = new Endpoints(list, machine.inputs(), machine.outputs());
+            table = ControlTable.load(controlTable, endpoints, stepNanos);
+            machineInputs = machine.inputs().size();
+            machineOutputs = machine.outputs().size();
+            firstMachineInput = endpoints.destinationStart(list.size());
+            firstMachineOutput = endpoints.sourceStart(list.size());
+            seats = new Seat[list.size()];
+            for (int i = 0; i < seats.length; i++) {
+                seats[i] = seat(list.get(i), endpoints.sourceStart(i), endpoints.destinationStart(i));
+            }
+        } catch (RuntimeException e) {
+            try {
+                drivers.close();
+            } catch (DriverFailure second) {
+                e.addSuppressed(second);
+            }
+            throw e;
+        }
+    }
+
+    private Seat seat(ControlInterfaceDeviceDriver driver, int firstSource, int firstDestination) {
+        int written = 0;
+        for (var component : driver.components()) {
+            written += component.direction() == Direction.WRITTEN_BY_SIMULATION ? 1 : 0;
+        }
+        int read = driver.components().size() - written;
+        driver.connect(inputs -> {
+            if (inputs.length != read) {
+                throw new IllegalStateException("driver " + driver.id() + " delivered " + inputs.length
+                        + " values; it has " + read + " components that the simulation reads");
+            }
+            table.setSources(firstSource, inputs);
+        });
+        return new Seat(driver, firstDestination, written);
+    }
+
+    /**
+     * One tick.
+     *
+     * @throws DriverFailure if a driver failed; the simulation cannot go on
+     */
+    public void tick() {
+        table.computeBeforeStep();
+        for (int i = 0; i < machineInputs; i++) {
+            machine.input(i, table.destination(firstMachineInput + i));
+        }
+        machine.step(stepNanos);
+        ticks++;
+        for (int i = 0; i < machineOutputs; i++) {
+            table.setSource(firstMachineOutput + i, machine.output(i));
+        }
+        table.computeAfterStep();
+        for (Seat seat : seats) {
+            table.getDestinations(seat.firstDestination, seat.written);
+            try {
+                seat.driver.simulationTime(ticks * stepNanos);
+                seat.driver.updateComponentValues(seat.written);
+            } catch (RuntimeException | LinkageError e) {
+                throw new DriverFailure("driver " + seat.driver.id() + " failed in tick " + ticks, e);
+            }
+        }
+    }
+
+    /**
+     * Ticks until told otherwise: until {@code more} says false, {@link #stop} was called, or the thread is
+     * interrupted.
+     *
+     * @param mode how ticks follow one another
+     * @param more asked before every tick
+     * @throws DriverFailure if a driver failed
+     */
+    public void run(TickMode mode, BooleanSupplier more) {
+        pacer.restart();
+        while (!stopped && !Thread.currentThread().isInterrupted() && more.getAsBoolean()) {
+            if (mode == TickMode.REAL_TIME) {
+                pacer.awaitTick();
+            }
+            tick();
+        }
+    }
+
+    /** Makes {@link #run} return after the present tick; from any thread. */
+    public void stop() {
+        stopped = true;
+    }
+
+    /**
+     * Whether {@link #stop} was called.
+     *
+     * @return true from then on
+     */
+    public boolean stopped() {
+        return stopped;
+    }
+
+    /**
+     * A window on a value.
+     *
+     * @param name {@code <driver id>:<component>}, {@code machine:<variable>} or a variable of the table
+     * @return gives the value as of the last tick
+     * @throws IllegalArgumentException if there is none of that name
+     */
+    public DoubleSupplier probe(String name) {
+        return table.probe(name);
+    }
+
+    /**
+     * Destinations that the control table leaves out.
+     *
+     * @return their names; they stay 0
+     */
+    public List<String> unconnected() {
+        return table.unconnected();
+    }
+
+    /**
+     * The drivers.
+     *
+     * @return in the order of their files' names
+     */
+    public List<ControlInterfaceDeviceDriver> drivers() {
+        return drivers.drivers();
+    }
+
+    /**
+     * The machine.
+     *
+     * @return the one that it was built with
+     */
+    public Machine machine() {
+        return machine;
+    }
+
+    /**
+     * Ticks so far.
+     *
+     * @return 0 or more
+     */
+    public long ticks() {
+        return ticks;
+    }
+
+    /**
+     * Time in the simulation.
+     *
+     * @return nanoseconds at the end of the last tick: ticks times step size
+     */
+    public long simulationNanos() {
+        return ticks * stepNanos;
+    }
+
+    /**
+     * The step size.
+     *
+     * @return nanoseconds
+     */
+    public long stepNanos() {
+        return stepNanos;
+    }
+
+    /**
+     * Ticks that real-time mode started a step or more after their time.
+     *
+     * @return 0 or more
+     */
+    public long lateTicks() {
+        return pacer.lateTicks();
+    }
+
+    /**
+     * Ticks that real-time mode left out because their time had passed in a stall.
+     *
+     * @return 0 or more
+     */
+    public long droppedTicks() {
+        return pacer.droppedTicks();
+    }
+
+    /**
+     * Closes every driver. Further calls do nothing.
+     *
+     * @throws DriverFailure if a driver failed to close; the others are closed all the same
+     */
+    @Override
+    public void close() {
+        drivers.close();
+    }
+}

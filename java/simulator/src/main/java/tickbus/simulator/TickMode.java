@@ -1,0 +1,9 @@
+package tickbus.simulator;
+
+/** How the simulator's ticks follow one another. */
+public enum TickMode {
+    /** As fast as possible: a tick starts when the one before it is done. */
+    BEST_EFFORT,
+    /** In step with the clock on the wall: a tick starts when its time has come. */
+    REAL_TIME
+}

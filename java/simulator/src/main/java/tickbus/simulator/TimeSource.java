@@ -1,0 +1,39 @@
+package tickbus.simulator;
+
+import java.util.concurrent.locks.LockSupport;
+
+/** The clock on the wall, and a way to wait for it; handed in so that tests need not wait. */
+public interface TimeSource {
+    /**
+     * The present time.
+     *
+     * @return nanoseconds since some fixed point, never falling
+     */
+    long nanoTime();
+
+    /**
+     * Waits; may return early.
+     *
+     * @param nanoTime until when
+     */
+    void waitUntil(long nanoTime);
+
+    /**
+     * The machine's own clock.
+     *
+     * @return reads {@link System#nanoTime} and parks the thread
+     */
+    static TimeSource system() {
+        return new TimeSource() {
+            @Override
+            public long nanoTime() {
+                return System.nanoTime();
+            }
+
+            @Override
+            public void waitUntil(long nanoTime) {
+                LockSupport.parkNanos(this, nanoTime - System.nanoTime());
+            }
+        };
+    }
+}

@@ -1,0 +1,25 @@
+package tickbus.simulator;
+
+/** The user's files or folders are not as they must be; the message says how, and what would be right. */
+public final class WrongInput extends RuntimeException {
+    private static final long serialVersionUID = 1L;
+
+    /**
+     * For one mistake or several.
+     *
+     * @param message lines for people
+     */
+    public WrongInput(String message) {
+        super(message);
+    }
+
+    /**
+     * For a mistake that shows as an exception.
+     *
+     * @param message lines for people
+     * @param cause what happened
+     */
+    public WrongInput(String message, Throwable cause) {
+        super(message, cause);
+    }
+}

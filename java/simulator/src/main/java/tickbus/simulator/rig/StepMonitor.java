@@ -1,0 +1,87 @@
+package tickbus.simulator.rig;
+
+/**
+ * Tells the control when a step is done: complete(n) rises when all motion that belongs to command word n has ended.
+ *
+ * <p>It stays on until the command pattern changes or an Acknowledge rises. A fault voids the step: its bit never comes.
+ */
+final class StepMonitor {
+    static final int STEPS = 6;
+
+    /** The command words of the six steps without the lamp, which is no motion. */
+    private static final int[] WORDS = {0x0001, 0x0024, 0x000C, 0x0080, 0x1C34, 0x143C};
+
+    private enum State {
+        WAITING,
+        COMPLETE,
+        OVER
+    }
+
+    private State state = State.OVER;
+    private int pattern;
+    private int step;
+    private long cycles;
+    private boolean lampWrong;
+    private long lampErrors;
+
+    /**
+     * Looks at the command pattern and the drives at the end of a step.
+     *
+     * @param newPattern motion and suction bits of the command word
+     * @param acknowledge Acknowledge rose
+     * @param fault Not OK is on
+     * @param busy some drive is under way, or deaf to a run bit
+     */
+    void look(int newPattern, boolean acknowledge, boolean fault, boolean busy) {
+        if (newPattern != pattern) {
+            pattern = newPattern;
+            step = stepOf(newPattern);
+            state = State.WAITING;
+        } else if (state == State.WAITING && step > 0 && !busy) {
+            state = State.COMPLETE;
+            if (step == STEPS) {
+                cycles++;
+            }
+        } else if (state == State.COMPLETE && acknowledge) {
+            state = State.OVER;
+        }
+        if (fault) {
+            state = State.OVER;
+        }
+    }
+
+    /** Compares the lamp with the commanded motion of lift 2, which it must mirror within a step. */
+    void lamp(boolean lamp, boolean lift2Runs) {
+        boolean wrong = step > 0 && lamp != lift2Runs;
+        if (wrong && !lampWrong) {
+            lampErrors++;
+        }
+        lampWrong = wrong;
+    }
+
+    /** The step whose word stands, 1 to 6, or 0. */
+    int step() {
+        return step;
+    }
+
+    boolean complete(int n) {
+        return state == State.COMPLETE && step == n;
+    }
+
+    long cycles() {
+        return cycles;
+    }
+
+    long lampErrors() {
+        return lampErrors;
+    }
+
+    private static int stepOf(int pattern) {
+        for (int i = 0; i < STEPS; i++) {
+            if (WORDS[i] == pattern) {
+                return i + 1;
+            }
+        }
+        return 0;
+    }
+}

@@ -1,0 +1,2 @@
+/** Small readers and writers of text that the rooms of the simulator share. */
+package tickbus.simulator.text;

@@ -1,0 +1,72 @@
+package tickbus.simulator;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import controlinterface.Direction;
+import controlinterface.HardwareComponent;
+import java.util.ArrayList;
+import java.util.List;
+
+/** A driver with chosen components that remembers what it got and answers with what it is told. */
+public final class FakeDriver extends ControlInterfaceDeviceDriver {
+    private final int id;
+    private final List<HardwareComponent> components = new ArrayList<>();
+    /** Next answer, one value per component read. */
+    public double[] answer;
+    /** What came last. */
+    public final double[] got;
+    /** Simulation time as last told. */
+    public long time = -1;
+    /** Calls of {@link #exit}. */
+    public int exits;
+    /** Thrown by the next tick, if any. */
+    public RuntimeException failTick;
+    /** Thrown by {@link #exit}, if any. */
+    public RuntimeException failExit;
+
+    /** Writes and reads are names of components, all LREAL. */
+    public FakeDriver(int id, List<String> written, List<String> read) {
+        this.id = id;
+        written.forEach(name -> components.add(
+                new HardwareComponent(name, Direction.WRITTEN_BY_SIMULATION, "LREAL", "")));
+        read.forEach(name -> components.add(new HardwareComponent(name, Direction.READ_BY_SIMULATION, "LREAL", "mm")));
+        got = new double[written.size()];
+        answer = new double[read.size()];
+    }
+
+    @Override
+    public void simulationTime(long nanos) {
+        time = nanos;
+    }
+
+    @Override
+    public void updateComponentValues(double[] value) {
+        if (failTick != null) {
+            throw failTick;
+        }
+        System.arraycopy(value, 0, got, 0, value.length);
+        deliverHardwareInputs(answer);
+    }
+
+    @Override
+    public List<HardwareComponent> components() {
+        return components;
+    }
+
+    @Override
+    public int id() {
+        return id;
+    }
+
+    @Override
+    public String name() {
+        return "fake " + id;
+    }
+
+    @Override
+    public void exit() {
+        exits++;
+        if (failExit != null) {
+            throw failExit;
+        }
+    }
+}

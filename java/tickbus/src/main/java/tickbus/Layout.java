@@ -1,0 +1,83 @@
+package tickbus;
+
+import java.nio.ByteBuffer;
+import java.nio.ByteOrder;
+import java.nio.LongBuffer;
+import java.util.ArrayList;
+import java.util.List;
+
+/**
+ * The shared buffer, and the driver's own description of it: filled by the native library, once, while a
+ * driver is being opened. The native library calls the methods by name.
+ *
+ * <p>The buffer is a header of 8-byte words in native byte order, then the slots: one per signal, then one
+ * for the edges of each latched signal that the simulation reads.
+ */
+final class Layout {
+    /** Version of the buffer's layout that this class knows. */
+    static final long VERSION = 1;
+    static final int WORD_VERSION = 0;
+    static final int WORD_SEQUENCE = 2;
+    static final int WORD_AGE = 3;
+    static final int WORD_SIMULATION_TIME = 4;
+    static final int WORD_GRANTED = 5;
+    static final int WORD_SLOT_COUNT = 7;
+    /** The first slot. */
+    static final int SLOTS = 8;
+
+    /** One signal, as the native library describes it. */
+    record Entry(
+        String name, String address, String type, String unit, String station, boolean written, boolean integer,
+        int slot, int edgesSlot) {
+    }
+
+    private final List<Entry> signals = new ArrayList<>();
+    private LongBuffer words;
+    private int id;
+    private String name = "";
+
+    /** Called by the native library: memory for the shared buffer, all zero. */
+    ByteBuffer allocate(int bytes) {
+        ByteBuffer buffer = ByteBuffer.allocateDirect(bytes).order(ByteOrder.nativeOrder());
+        words = buffer.asLongBuffer();
+        return buffer;
+    }
+
+    /** Called by the native library. */
+    void driver(int id, String name) {
+        this.id = id;
+        this.name = name;
+    }
+
+    /** Called by the native library, in slot order. */
+    void signal(String name, String address, String type, String unit, String station, boolean written,
+        boolean integer, int slot, int edgesSlot) {
+        signals.add(new Entry(name, address, type, unit, station, written, integer, slot, edgesSlot));
+    }
+
+    LongBuffer words() {
+        return words;
+    }
+
+    int id() {
+        return id;
+    }
+
+    String name() {
+        return name;
+    }
+
+    List<Entry> signals() {
+        return signals;
+    }
+
+    /** Says what is wrong if the native library is of another version than these classes. */
+    void check() {
+        long version = words.get(WORD_VERSION);
+        if (version != VERSION) {
+            throw new FieldbusException(Status.LIBRARY, "the native library has version " + version
+                + " of the shared buffer, these classes have version " + VERSION
+                + "; use the jar and the native library of one release");
+        }
+    }
+}

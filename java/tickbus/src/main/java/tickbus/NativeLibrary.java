@@ -1,0 +1,193 @@
+package tickbus;
+
+import java.io.IOException;
+import java.io.InputStream;
+import java.net.URISyntaxException;
+import java.nio.file.Files;
+import java.nio.file.InvalidPathException;
+import java.nio.file.Path;
+import java.nio.file.StandardCopyOption;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.Locale;
+
+/**
+ * Finds and loads the native library, once per class loader.
+ *
+ * <p>It looks, in this order, at the file that the system property {@code tickbus.library} names (and then
+ * nowhere else); in the directory that {@code tickbus.native.dir} names; beside the jar; inside the jar.
+ */
+final class NativeLibrary {
+    static final String LIBRARY = "tickbus.library";
+    static final String DIRECTORY = "tickbus.native.dir";
+    static final String COPY = "tickbus.copy";
+
+    private static boolean loaded;
+
+    private final String file = System.mapLibraryName("tickbus");
+    private final String platform = platform(System.getProperty("os.name"), System.getProperty("os.arch"));
+    private final List<String> tried = new ArrayList<>();
+
+    private NativeLibrary() {
+    }
+
+    /** Loads the library unless it is loaded; a failure can be tried again. */
+    static synchronized void load() {
+        if (!loaded) {
+            new NativeLibrary().search();
+            loaded = true;
+        }
+    }
+
+    /** Names of operating system and processor as the jar's folders have them, such as linux-x86_64. */
+    static String platform(String osName, String osArch) {
+        String os = osName.toLowerCase(Locale.ROOT);
+        String system = os.startsWith("windows") ? "windows" : os.startsWith("mac") ? "macos" : os.replace(' ', '-');
+        String processor = switch (osArch.toLowerCase(Locale.ROOT)) {
+            case "amd64", "x86_64", "x64" -> "x86_64";
+            case "aarch64", "arm64" -> "aarch64";
+            default -> osArch;
+        };
+        return system + "-" + processor;
+    }
+
+    private void search() {
+        String library = System.getProperty(LIBRARY);
+        if (library != null) {
+            if (!fromFile("property " + LIBRARY, library)) {
+                tried.add("nowhere else, since " + LIBRARY + " is set");
+                throw failure();
+            }
+            return;
+        }
+        tried.add("property " + LIBRARY + ": not set");
+        if (!fromDirectory() && !besideTheJar() && !insideTheJar()) {
+            throw failure();
+        }
+    }
+
+    private boolean fromDirectory() {
+        String place = "property " + DIRECTORY;
+        String directory = System.getProperty(DIRECTORY);
+        if (directory == null) {
+            tried.add(place + ": not set");
+            return false;
+        }
+        return fromFile(place, directory + java.io.File.separator + file);
+    }
+
+    private boolean besideTheJar() {
+        String place = "beside the jar";
+        try {
+            Path classes = Path.of(NativeLibrary.class.getProtectionDomain().getCodeSource().getLocation().toURI());
+            Path directory = Files.isDirectory(classes) ? classes : classes.getParent();
+            return fromFile(place, directory.resolve(file).toString());
+        } catch (URISyntaxException | RuntimeException e) {
+            // A class loader may give its classes no place, or none that is a file.
+            tried.add(place + ": the classes do not come from a file (" + e + ")");
+            return false;
+        }
+    }
+
+    private boolean insideTheJar() {
+        String resource = "/tickbus/native/" + platform + "/" + file;
+        String place = "inside the jar: " + resource;
+        try (InputStream content = NativeLibrary.class.getResourceAsStream(resource)) {
+            if (content == null) {
+                tried.add(place + ": not there");
+                return false;
+            }
+            return fromCopy(place, content);
+        } catch (IOException e) {
+            tried.add(place + ": cannot be read: " + e);
+            return false;
+        }
+    }
+
+    private boolean fromFile(String place, String name) {
+        Path path;
+        try {
+            path = Path.of(name).toAbsolutePath();
+        } catch (InvalidPathException e) {
+            tried.add(place + ": " + e.getMessage());
+            return false;
+        }
+        if (!Files.isRegularFile(path)) {
+            tried.add(place + ": " + path + ": no such file");
+            return false;
+        }
+        try {
+            System.load(path.toString());
+            return true;
+        } catch (UnsatisfiedLinkError e) {
+            if (!isLoadedElsewhere(e)) {
+                tried.add(place + ": " + path + ": " + e.getMessage());
+                return false;
+            }
+            if (!Boolean.getBoolean(COPY)) {
+                throw new FieldbusException(Status.LIBRARY, path + " is already loaded in another class loader of"
+                    + " this process, and Java allows a native library only one.\n  Load tickbus in a class loader"
+                    + " that both have as a parent, or set -D" + COPY + "=true to give this one a copy of its own;"
+                    + " drivers in different copies do not see each other's loopback links.");
+            }
+        }
+        try (InputStream content = Files.newInputStream(path)) {
+            return fromCopy(place + ": copy of " + path, content);
+        } catch (IOException e) {
+            tried.add(place + ": " + path + " cannot be copied: " + e);
+            return false;
+        }
+    }
+
+    private boolean fromCopy(String place, InputStream content) throws IOException {
+        Path copy = Files.createTempFile("tickbus-", "-" + file);
+        // Where a loaded library cannot be deleted (Windows), the file stays until the JVM ends, or longer.
+        copy.toFile().deleteOnExit();
+        Files.copy(content, copy, StandardCopyOption.REPLACE_EXISTING);
+        try {
+            System.load(copy.toString());
+            return true;
+        } catch (UnsatisfiedLinkError e) {
+            tried.add(place + ": extracted to " + copy + ": " + e.getMessage());
+            return false;
+        } finally {
+            deleteWherePossible(copy);
+        }
+    }
+
+    private static void deleteWherePossible(Path copy) {
+        try {
+            Files.deleteIfExists(copy);
+        } catch (IOException e) {
+            // In use; deleteOnExit has it.
+            return;
+        }
+    }
+
+    private static boolean isLoadedElsewhere(UnsatisfiedLinkError e) {
+        return String.valueOf(e.getMessage()).contains("already loaded in another classloader");
+    }
+
+    private FieldbusException failure() {
+        StringBuilder what = new StringBuilder("the native library ").append(file).append(" for ").append(platform)
+            .append(" cannot be loaded. Looked at, in this order:");
+        for (int i = 0; i < tried.size(); i++) {
+            what.append("\n  ").append(i + 1).append(". ").append(tried.get(i));
+        }
+        if (runsOnMusl()) {
+            what.append("\n  This JVM runs on the C library musl, but the library in the jar is made for glibc;"
+                + " build one on this system.");
+        }
+        what.append("\n  Build it with `cargo build --release` in tickbus, then set -D").append(LIBRARY)
+            .append("=FILE, or put ").append(file).append(" beside the jar.");
+        return new FieldbusException(Status.LIBRARY, what.toString());
+    }
+
+    private static boolean runsOnMusl() {
+        try {
+            return Files.readString(Path.of("/proc/self/maps")).contains("/ld-musl-");
+        } catch (IOException e) {
+            return false;
+        }
+    }
+}

@@ -1,0 +1,420 @@
+package tickbus;
+
+import java.lang.invoke.MethodHandles;
+import java.lang.invoke.VarHandle;
+import java.nio.LongBuffer;
+import java.nio.file.Path;
+import java.util.Collections;
+import java.util.HashMap;
+import java.util.LinkedHashMap;
+import java.util.List;
+import java.util.Map;
+import java.util.Objects;
+
+/**
+ * One open driver: a simulation's end of a PLC's fieldbus.
+ *
+ * <pre>{@code
+ * try (Tickbus bus = Tickbus.open(Path.of("driver.cfg"))) {
+ *     Signal run = bus.signal("LA1 run");
+ *     Signal position = bus.signal("LA1 position");
+ *     while (simulating) {
+ *         position.set(machine.position());
+ *         bus.exchange();
+ *         machine.run(run.getBoolean());
+ *     }
+ * }
+ * }</pre>
+ *
+ * <p><b>Threads.</b> A driver is ticked by one thread at a time; getters and setters of its signals belong to
+ * that thread. It may change, if the old and the new thread synchronise with each other. A call that meets
+ * another thread's call on the same driver throws {@link Status#BUSY} and does nothing, {@link #close}
+ * included. Different drivers are independent of each other.
+ *
+ * <p><b>The tick</b>, {@link #exchange()}, takes no lock, makes no system call, and allocates nothing, in
+ * either language; it never waits for the bus unless driver.cfg says {@code mode = "stepped"}.
+ *
+ * <p>After {@link #close} every method but {@link #close}, {@link #id}, {@link #name} and {@link #toString}
+ * throws {@link FieldbusException} with {@link Status#CLOSED}.
+ */
+public final class Tickbus implements AutoCloseable {
+    private static final VarHandle CLAIMED;
+    /** Events that one native call can bring. */
+    private static final int EVENTS = 64;
+    /** Longs per event: signal, slot, time. */
+    private static final int EVENT_WORDS = 3;
+
+    static {
+        try {
+            CLAIMED = MethodHandles.lookup().findVarHandle(Tickbus.class, "claimed", boolean.class);
+        } catch (ReflectiveOperationException e) {
+            throw new ExceptionInInitializerError(e);
+        }
+    }
+
+    private final long handle;
+    private final int id;
+    private final String name;
+    /** The shared buffer; moved to and from under the claim only, but for reading the header. */
+    private final LongBuffer words;
+    /** This end's copy of the slots: plain array accesses are cheap, and a bulk copy moves them at once. */
+    private final long[] slots;
+    private final List<Signal> signals;
+    private final Map<String, Signal> byName = new HashMap<>();
+    private final Signal[] written;
+    private final Signal[] read;
+    private final int writtenFrom;
+    private final int writtenCount;
+    private final int readFrom;
+    private final int readCount;
+    private long[] events;
+    /** True while a thread is in a call that touches the shared buffer or the native driver. */
+    private boolean claimed;
+    private boolean closed;
+
+    private Tickbus(long handle, Layout layout) {
+        this.handle = handle;
+        this.id = layout.id();
+        this.name = layout.name();
+        this.words = layout.words();
+        this.slots = new long[(int) words.get(Layout.WORD_SLOT_COUNT)];
+        words.get(Layout.SLOTS, slots);
+        this.signals = layout.signals().stream().map(entry -> new Signal(this, slots, entry)).toList();
+        signals.forEach(signal -> byName.put(signal.name(), signal));
+        this.written = signals.stream().filter(Signal::isWritten).toArray(Signal[]::new);
+        this.read = signals.stream().filter(signal -> !signal.isWritten()).toArray(Signal[]::new);
+        this.writtenFrom = written.length == 0 ? 0 : written[0].slot();
+        this.writtenCount = written.length == 0 ? 0 : written[written.length - 1].slot() + 1 - writtenFrom;
+        // The slots of the edges stand behind those of the signals.
+        int readTo = read.length == 0 ? 0 : read[read.length - 1].slot() + 1;
+        this.readFrom = read.length == 0 ? 0 : read[0].slot();
+        this.readCount = (slots.length > signals.size() ? slots.length : readTo) - readFrom;
+    }
+
+    /**
+     * Opens the driver that a configuration file describes, and starts its fieldbus. Returns at once, whether
+     * or not the PLC is there: until it is, {@link #exchange()} answers {@link Status#STALE}.
+     *
+     * @param driverCfg the driver.cfg
+     * @return the open driver, to be closed
+     * @throws FieldbusException {@link Status#BAD_CONFIG} with every mistake at its line and column,
+     *     {@link Status#LIBRARY} with every place where the native library was looked for, and
+     *     {@link Status#BUS_FAILED}, {@link Status#UNSUPPORTED} or {@link Status#TOO_MANY_DRIVERS} with the
+     *     reason
+     */
+    public static Tickbus open(Path driverCfg) {
+        Objects.requireNonNull(driverCfg, "driverCfg");
+        NativeLibrary.load();
+        Layout layout = new Layout();
+        long handle = initializeNative(driverCfg.toString(), layout);
+        try {
+            layout.check();
+            return new Tickbus(handle, layout);
+        } catch (RuntimeException | Error e) {
+            finalizeNative(handle);
+            throw e;
+        }
+    }
+
+    /**
+     * One tick: sends the signals that this end writes, and takes those that it reads.
+     *
+     * <p>In stepped mode the simulation time last given to {@link #exchange(long)} stands.
+     *
+     * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
+     * @throws FieldbusException {@link Status#BUS_FAILED}, {@link Status#BUSY}, {@link Status#CLOSED} or
+     *     {@link Status#INTERNAL}
+     */
+    public int exchange() {
+        claim();
+        int code;
+        try {
+            code = move();
+        } finally {
+            release();
+        }
+        if (code < 0) {
+            throw failure(code);
+        }
+        return code;
+    }
+
+    /**
+     * One tick at a given simulation time, which stepped fieldbuses and recordings need.
+     *
+     * @param simulationNanos nanoseconds since the simulation began, not falling
+     * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
+     * @throws FieldbusException as {@link #exchange()}
+     */
+    public int exchange(long simulationNanos) {
+        claim();
+        int code;
+        try {
+            words.put(Layout.WORD_SIMULATION_TIME, simulationNanos);
+            code = move();
+        } finally {
+            release();
+        }
+        if (code < 0) {
+            throw failure(code);
+        }
+        return code;
+    }
+
+    private int move() {
+        words.put(Layout.SLOTS + writtenFrom, slots, writtenFrom, writtenCount);
+        int code = xChangeData(handle);
+        words.get(Layout.SLOTS + readFrom, slots, readFrom, readCount);
+        return code;
+    }
+
+    /**
+     * Sets all signals that this end writes. Unlike {@link Signal#set} it lets NaN and infinities pass: the
+     * native library sends the signal's fail-safe value for NaN, and counts it.
+     *
+     * @param values one value per signal for which {@link Signal#isWritten}, in the order of {@link #signals}
+     * @throws IllegalArgumentException if there are more or fewer values than such signals
+     */
+    public void setAll(double[] values) {
+        mustBeOpen();
+        if (values.length != written.length) {
+            throw new IllegalArgumentException("driver '" + name + "' has " + written.length
+                + " signals to write, but was given " + values.length + " values");
+        }
+        for (int i = 0; i < written.length; i++) {
+            written[i].put(values[i]);
+        }
+    }
+
+    /**
+     * Gets all signals that this end reads.
+     *
+     * @param into gets one value per signal that is not {@link Signal#isWritten}, in the order of
+     *     {@link #signals}; may be longer
+     * @return how many values that is
+     * @throws IllegalArgumentException if the array is too short
+     */
+    public int getAll(double[] into) {
+        mustBeOpen();
+        if (into.length < read.length) {
+            throw new IllegalArgumentException("driver '" + name + "' has " + read.length
+                + " signals to read, but the array has " + into.length + " places");
+        }
+        for (int i = 0; i < read.length; i++) {
+            into[i] = read[i].value(slots[read[i].slot()]);
+        }
+        return read.length;
+    }
+
+    /**
+     * All signals.
+     *
+     * @return unmodifiable, in the order of driver.cfg
+     */
+    public List<Signal> signals() {
+        mustBeOpen();
+        return signals;
+    }
+
+    /**
+     * A signal by its name.
+     *
+     * @param name as in driver.cfg
+     * @return the signal's handle, always the same one
+     * @throws IllegalArgumentException if there is no such signal; the message has the nearest names
+     */
+    public Signal signal(String name) {
+        mustBeOpen();
+        Signal signal = byName.get(name);
+        if (signal == null) {
+            throw new IllegalArgumentException("driver '" + this.name + "' has no signal '" + name + "'"
+                + NearestNames.hint(name, signals.stream().map(Signal::name).toList()));
+        }
+        return signal;
+    }
+
+    /**
+     * Age of the data at the last exchange; of the worst station where there are several.
+     *
+     * @return nanoseconds; {@link Long#MAX_VALUE} if nothing has arrived yet
+     */
+    public long ageNanos() {
+        return header(Layout.WORD_AGE);
+    }
+
+    /**
+     * How many bus cycles had arrived at the last exchange.
+     *
+     * @return counts from 0
+     */
+    public long sequence() {
+        return header(Layout.WORD_SEQUENCE);
+    }
+
+    /**
+     * Up to which simulation time the last exchange lets the simulation go on.
+     *
+     * @return nanoseconds; the time handed in, on buses that do not keep time
+     */
+    public long grantedNanos() {
+        return header(Layout.WORD_GRANTED);
+    }
+
+    /**
+     * The driver's id.
+     *
+     * @return as driver.cfg says
+     */
+    public int id() {
+        return id;
+    }
+
+    /**
+     * The driver's name, for people.
+     *
+     * @return as driver.cfg says
+     */
+    public String name() {
+        return name;
+    }
+
+    /**
+     * What the driver has counted so far: {@code ticks}, {@code fresh}, {@code stale}, {@code state} and more.
+     * Not for every tick.
+     *
+     * @return unmodifiable, in an order fit for printing
+     * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public Map<String, String> statistics() {
+        claim();
+        String text;
+        try {
+            text = statisticsNative(handle);
+        } finally {
+            release();
+        }
+        Map<String, String> statistics = new LinkedHashMap<>();
+        text.lines().forEach(line -> {
+            int equals = line.indexOf('=');
+            statistics.put(line.substring(0, equals), line.substring(equals + 1));
+        });
+        return Collections.unmodifiableMap(statistics);
+    }
+
+    /**
+     * Hands over the waiting events, oldest first: the writes of the PLC one by one, on buses that have them.
+     *
+     * @param handler called on this thread, for each event
+     * @return how many events there were
+     * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public int pollEvents(EventHandler handler) {
+        Objects.requireNonNull(handler, "handler");
+        int total = 0;
+        int count;
+        do {
+            count = takeEvents();
+            for (int at = 0; at < count * EVENT_WORDS; at += EVENT_WORDS) {
+                Signal signal = signals.get((int) events[at]);
+                handler.event(signal, signal.value(events[at + 1]), events[at + 2]);
+            }
+            total += count;
+        } while (count == EVENTS);
+        return total;
+    }
+
+    private int takeEvents() {
+        claim();
+        try {
+            if (events == null) {
+                events = new long[EVENTS * EVENT_WORDS];
+            }
+            return eventsNative(handle, events);
+        } finally {
+            release();
+        }
+    }
+
+    /**
+     * Ends the connection. Closing twice is no mistake.
+     *
+     * @throws FieldbusException {@link Status#BUSY} if another thread is using the driver; it stays open
+     */
+    @Override
+    public void close() {
+        claim();
+        try {
+            if (!closed) {
+                finalizeNative(handle);
+                closed = true;
+            }
+        } catch (FieldbusException e) {
+            // The native side has given the driver up, unless it was in use.
+            closed = e.status() != Status.BUSY;
+            throw e;
+        } finally {
+            release();
+        }
+    }
+
+    /** Name and id. */
+    @Override
+    public String toString() {
+        return name + " (" + id + ")";
+    }
+
+    void mustBeOpen() {
+        if (closed) {
+            throw new FieldbusException(Status.CLOSED, "'" + name + "': " + Status.CLOSED.text());
+        }
+    }
+
+    private long header(int word) {
+        mustBeOpen();
+        return words.get(word);
+    }
+
+    /**
+     * Takes the shared buffer and the native driver for this thread. The native side has a claim of its own,
+     * against wrong handles; this one keeps a second thread away from the buffer, which comes first.
+     */
+    void claim() {
+        if (!CLAIMED.compareAndSet(this, false, true)) {
+            throw new FieldbusException(Status.BUSY, "'" + name + "': " + Status.BUSY.text());
+        }
+    }
+
+    void release() {
+        CLAIMED.setRelease(this, false);
+    }
+
+    /** What a negative code means, with the driver's own reason where it has one. */
+    private FieldbusException failure(int code) {
+        Status status = Status.of(code);
+        String what = "'" + name + "': " + status.text();
+        try {
+            String reason = statistics().get("reason");
+            return new FieldbusException(status, reason == null || reason.isEmpty() ? what : what + ": " + reason);
+        } catch (FieldbusException e) {
+            return e.code() == code ? e : new FieldbusException(status, what);
+        }
+    }
+
+    /** Opens a driver and describes it to {@code layout}; throws {@link FieldbusException}. */
+    static native long initializeNative(String driverCfg, Layout layout);
+
+    /** The tick; gives a status code and never throws, whatever the handle. */
+    static native int xChangeData(long handle);
+
+    /** Closes a driver; throws {@link FieldbusException}. */
+    static native void finalizeNative(long handle);
+
+    /** Lines of {@code key=value}; throws {@link FieldbusException}. */
+    static native String statisticsNative(long handle);
+
+    /** Moves events into {@code into}, three longs each, and says how many; throws {@link FieldbusException}. */
+    static native int eventsNative(long handle, long[] into);
+
+    /** Does nothing: what a native call costs, the baseline of the benchmarks. */
+    static native int emptyNative();
+}

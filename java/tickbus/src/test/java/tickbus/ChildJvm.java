@@ -1,0 +1,54 @@
+package tickbus;
+
+import java.io.File;
+import java.io.IOException;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+
+/** A JVM of its own, for what would disturb the one that runs the tests. */
+final class ChildJvm {
+    /** How it ended, and all it said. */
+    record Outcome(int exit, String output) {
+    }
+
+    private final List<String> command = new ArrayList<>();
+
+    ChildJvm(Path javaHome) {
+        command.add(javaHome.resolve("bin").resolve("java").toString());
+    }
+
+    /** The JDK that runs the tests. */
+    ChildJvm() {
+        this(Path.of(System.getProperty("java.home")));
+    }
+
+    ChildJvm with(String... arguments) {
+        command.addAll(List.of(arguments));
+        return this;
+    }
+
+    Outcome run() throws IOException, InterruptedException {
+        Process process = new ProcessBuilder(command).redirectErrorStream(true).start();
+        process.getOutputStream().close();
+        String output = new String(process.getInputStream().readAllBytes(), StandardCharsets.UTF_8);
+        return new Outcome(process.waitFor(), output);
+    }
+
+    /** The class path of the tests. */
+    static String classPath() {
+        // Surefire hands over a jar that only names the class path; here it says what that is.
+        return System.getProperty("surefire.test.class.path", System.getProperty("java.class.path"));
+    }
+
+    /** The folder with the classes of this package. */
+    static Path classes(Class<?> among) {
+        for (String entry : classPath().split(File.pathSeparator)) {
+            if (Path.of(entry).resolve(among.getName().replace('.', '/') + ".class").toFile().exists()) {
+                return Path.of(entry);
+            }
+        }
+        throw new IllegalStateException(among + " does not come from a folder of the class path " + classPath());
+    }
+}

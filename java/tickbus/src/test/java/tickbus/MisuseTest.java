@@ -1,0 +1,263 @@
+package tickbus;
+
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertThrows;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+
+import java.io.IOException;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.Random;
+import java.util.concurrent.Callable;
+import java.util.concurrent.CyclicBarrier;
+import java.util.concurrent.ExecutionException;
+import java.util.concurrent.ExecutorService;
+import java.util.concurrent.Executors;
+import java.util.concurrent.Future;
+import org.junit.jupiter.api.BeforeAll;
+import org.junit.jupiter.api.Tag;
+import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.function.Executable;
+import org.junit.jupiter.api.io.TempDir;
+
+/** Calls that nobody should make: each gets an answer, and the JVM lives on. */
+@Tag("native")
+class MisuseTest {
+    @TempDir
+    Path directory;
+
+    @BeforeAll
+    static void load() {
+        NativeLibrary.load();
+    }
+
+    private static FieldbusException assertStatus(Status expected, Executable call) {
+        FieldbusException thrown = assertThrows(FieldbusException.class, call);
+        assertEquals(expected, thrown.status(), thrown::getMessage);
+        return thrown;
+    }
+
+    private Path mirror() {
+        return DriverCfg.mirror(1).signal("in", "%IW0").signal("out", "%QX0.0", "latch = \"rising\"").write(directory);
+    }
+
+    @Test
+    void whatWasNeverOpenedIsNotOpen() {
+        Random random = new Random(4711);
+        for (int i = 0; i < 100_000; i++) {
+            long handle = i < 1000 ? -i : random.nextLong() | Long.MIN_VALUE >>> random.nextInt(8);
+            assertEquals(Status.NOT_OPEN.code(), Tickbus.xChangeData(handle), () -> Long.toHexString(handle));
+        }
+        for (long handle : new long[] {0, 1, -1, 64, 255, Long.MIN_VALUE, Long.MAX_VALUE}) {
+            assertStatus(Status.NOT_OPEN, () -> Tickbus.finalizeNative(handle));
+            assertStatus(Status.NOT_OPEN, () -> Tickbus.statisticsNative(handle));
+            assertStatus(Status.NOT_OPEN, () -> Tickbus.eventsNative(handle, new long[3]));
+        }
+    }
+
+    @Test
+    void whatWasClosedStaysClosed() {
+        Layout layout = new Layout();
+        long handle = Tickbus.initializeNative(mirror().toString(), layout);
+        assertTrue(Tickbus.xChangeData(handle) >= 0);
+        assertEquals(Status.NOT_OPEN.code(), Tickbus.xChangeData(handle + (1L << 40)));
+        Tickbus.finalizeNative(handle);
+        try (Tickbus tenantOfTheSamePlace = Tickbus.open(mirror())) {
+            assertEquals(Status.CLOSED.code(), Tickbus.xChangeData(handle));
+            assertStatus(Status.CLOSED, () -> Tickbus.finalizeNative(handle));
+            assertStatus(Status.CLOSED, () -> Tickbus.statisticsNative(handle));
+            assertStatus(Status.CLOSED, () -> Tickbus.eventsNative(handle, new long[3]));
+            assertTrue(tenantOfTheSamePlace.exchange() >= 0);
+        }
+    }
+
+    @Test
+    void argumentsThatAreNullOrTooShortAreRefused() {
+        assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.initializeNative(null, new Layout()));
+        assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.initializeNative(mirror().toString(), null));
+        assertThrows(NullPointerException.class, () -> Tickbus.open(null));
+        Layout layout = new Layout();
+        long handle = Tickbus.initializeNative(mirror().toString(), layout);
+        try {
+            assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.eventsNative(handle, null));
+            assertEquals(0, Tickbus.eventsNative(handle, new long[0]));
+            assertEquals(0, Tickbus.eventsNative(handle, new long[2]));
+        } finally {
+            Tickbus.finalizeNative(handle);
+        }
+    }
+
+    @Test
+    void afterCloseEveryCallIsRefused() {
+        Tickbus bus = Tickbus.open(mirror());
+        Signal in = bus.signal("in");
+        Signal out = bus.signal("out");
+        bus.close();
+        bus.close();
+        List<Executable> calls = List.of(bus::exchange, () -> bus.exchange(1), bus::signals, () -> bus.signal("in"),
+            bus::ageNanos, bus::sequence, bus::grantedNanos, bus::statistics, () -> bus.pollEvents((s, v, t) -> { }),
+            () -> bus.setAll(new double[1]), () -> bus.getAll(new double[1]), in::get, () -> in.set(1), in::getBoolean,
+            () -> in.setBoolean(true), in::getLong, () -> in.setLong(1), out::edges);
+        for (Executable call : calls) {
+            assertStatus(Status.CLOSED, call);
+        }
+        assertEquals(1, bus.id());
+        assertEquals("Driver 1", bus.name());
+    }
+
+    @Test
+    void aCallThatMeetsAnotherIsBusyAndTheDriverStaysOpen() {
+        try (Tickbus bus = Tickbus.open(mirror())) {
+            bus.claim();
+            try {
+                for (Executable call : List.<Executable>of(bus::exchange, () -> bus.exchange(1), bus::close,
+                    bus::statistics, () -> bus.pollEvents((s, v, t) -> { }))) {
+                    assertStatus(Status.BUSY, call);
+                }
+            } finally {
+                bus.release();
+            }
+            assertTrue(bus.exchange() >= 0);
+        }
+    }
+
+    /** Runs both on a thread each, from one moment on, and waits for their ends. */
+    private static <T> List<T> atOnce(Callable<T> one, Callable<T> other) throws Exception {
+        CyclicBarrier start = new CyclicBarrier(2);
+        ExecutorService threads = Executors.newFixedThreadPool(2);
+        try {
+            List<Future<T>> running = new ArrayList<>();
+            for (Callable<T> work : List.of(one, other)) {
+                running.add(threads.submit(() -> {
+                    start.await();
+                    return work.call();
+                }));
+            }
+            List<T> done = new ArrayList<>();
+            for (Future<T> each : running) {
+                done.add(each.get());
+            }
+            return done;
+        } catch (ExecutionException e) {
+            throw new AssertionError(e.getCause());
+        } finally {
+            threads.shutdownNow();
+        }
+    }
+
+    @Test
+    void twoThreadsInTheNativeExchangeAreServedOrBusy() throws Exception {
+        long handle = Tickbus.initializeNative(mirror().toString(), new Layout());
+        Callable<Integer> exchanges = () -> {
+            int served = 0;
+            for (int i = 0; i < 50_000; i++) {
+                int code = Tickbus.xChangeData(handle);
+                assertTrue(code >= 0 || code == Status.BUSY.code(), "code " + code);
+                served += code >= 0 ? 1 : 0;
+            }
+            return served;
+        };
+        int served = atOnce(exchanges, exchanges).stream().mapToInt(Integer::intValue).sum();
+        assertTrue(Tickbus.statisticsNative(handle).contains("ticks=" + served + "\n"), "served " + served);
+        Tickbus.finalizeNative(handle);
+    }
+
+    /** Makes a call that another thread may get in the way of; false if it did. */
+    private static boolean served(Runnable call) {
+        try {
+            call.run();
+            return true;
+        } catch (FieldbusException e) {
+            assertEquals(Status.BUSY, e.status(), e::getMessage);
+            return false;
+        }
+    }
+
+    @Test
+    void twoThreadsThatTickOneDriverAreServedOrBusy() throws Exception {
+        try (Tickbus bus = Tickbus.open(mirror())) {
+            Callable<Integer> exchanges = () -> {
+                int served = 0;
+                for (int i = 0; i < 50_000; i++) {
+                    served += served(bus::exchange) ? 1 : 0;
+                }
+                return served;
+            };
+            int served = atOnce(exchanges, exchanges).stream().mapToInt(Integer::intValue).sum();
+            assertEquals(String.valueOf(served), bus.statistics().get("ticks"));
+        }
+    }
+
+    @Test
+    void aDriverClosesBetweenTwoExchangesOrNotAtAll() throws Exception {
+        for (int round = 0; round < 50; round++) {
+            Tickbus bus = Tickbus.open(mirror());
+            Callable<Integer> ticking = () -> {
+                int ticks = 0;
+                // Nobody promises that close wins against a thread that never pauses.
+                for (int i = 0; i < 2000; i++) {
+                    try {
+                        bus.exchange();
+                        ticks++;
+                    } catch (FieldbusException e) {
+                        if (e.status() == Status.CLOSED) {
+                            break;
+                        }
+                        assertEquals(Status.BUSY, e.status(), e::getMessage);
+                    }
+                }
+                return ticks;
+            };
+            Callable<Integer> closing = () -> {
+                int refused = 0;
+                while (!served(bus::close)) {
+                    refused++;
+                }
+                return refused;
+            };
+            atOnce(ticking, closing);
+            assertStatus(Status.CLOSED, bus::exchange);
+        }
+    }
+
+    @Test
+    void aWrongDriverCfgIsShownWithEveryMistakeAtItsPlace() throws IOException {
+        Path cfg = Files.writeString(directory.resolve("wrong.cfg"), """
+            [driver]
+            name = "No id"
+
+            [fieldbus]
+            kind = "loopback"
+            program = "mirror"
+
+            [[signal]]
+            name = "too high a bit"
+            address = "%QX1.9"
+
+            [[signal]]
+            name = "not an address"
+            address = "%ZW1"
+            """);
+        FieldbusException wrong = assertStatus(Status.BAD_CONFIG, () -> Tickbus.open(cfg));
+        List<String> places = wrong.getMessage().lines().filter(line -> line.matches(".*wrong\\.cfg:\\d+:\\d+: .+; .+")).toList();
+        assertEquals(3, places.size(), wrong::getMessage);
+    }
+
+    @Test
+    void aMissingFileIsNamed() {
+        Path missing = directory.resolve("missing.cfg");
+        FieldbusException wrong = assertStatus(Status.BAD_CONFIG, () -> Tickbus.open(missing));
+        assertTrue(wrong.getMessage().contains(missing.toString()), wrong::getMessage);
+    }
+
+    @Test
+    void aFailedOpenLeavesThePlaceFree() {
+        Path missing = directory.resolve("missing.cfg");
+        for (int i = 0; i < 200; i++) {
+            assertStatus(Status.BAD_CONFIG, () -> Tickbus.open(missing));
+        }
+        Tickbus.open(mirror()).close();
+    }
+}

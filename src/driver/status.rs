@@ -1,0 +1,68 @@
+//! Status codes, from the table `status.tsv`: build.rs makes the enum, a Java test compares its own.
+
+include!(concat!(env!("OUT_DIR"), "/status.rs"));
+
+impl Code {
+    /// The number that crosses the language border.
+    pub const fn code(self) -> i32 {
+        self as i32
+    }
+
+    /// The code with this number.
+    pub fn from_code(code: i32) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.code() == code)
+    }
+}
+
+impl Code {
+    /// The worse of two: an error over stale, stale over unchanged, unchanged over fresh.
+    #[must_use]
+    pub fn worse(self, other: Self) -> Self {
+        let rank = |code: Self| {
+            if code.code() < 0 {
+                i32::MAX
+            } else {
+                code.code()
+            }
+        };
+        if rank(other) > rank(self) {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+/// `STALE (2): nothing has come …`
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({}): {}", self.name(), self.code(), self.text())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_found_by_number() {
+        for code in Code::ALL {
+            assert_eq!(Code::from_code(code.code()), Some(code));
+            assert!(
+                !code.text().is_empty() && !code.remedy().is_empty(),
+                "{code}"
+            );
+        }
+        assert_eq!(Code::from_code(i32::MIN), None);
+    }
+
+    #[test]
+    fn done_is_zero_and_above() {
+        let done: Vec<&str> = Code::ALL
+            .into_iter()
+            .filter(|code| code.code() >= 0)
+            .map(Code::name)
+            .collect();
+        assert_eq!(done, ["FRESH", "UNCHANGED", "STALE"]);
+    }
+}

@@ -1,0 +1,56 @@
+//! What every bus is.
+
+use crate::time::{Nanos, Stop};
+
+use super::Port;
+
+/// A bus, of one of the two kinds.
+pub enum Bus {
+    /// Owns the one thread of its line.
+    Free(Box<dyn Free>),
+    /// Runs on the tick's own thread.
+    Stepped(Box<dyn Stepped>),
+}
+
+/// A bus that owns the one thread of its line.
+///
+/// It suits slaves and servers, where a telegram asks and the latest image answers, and cyclic
+/// masters, where a deadline sends.
+pub trait Free: Send {
+    /// Serves the line until `stop` says so.
+    ///
+    /// Through `port` it takes the bytes to send when it needs them, hands in whole received frames,
+    /// and says that the peer is alive. It must look at `stop` whenever it would wait, and must wait
+    /// on the port's clock, never on the system's.
+    ///
+    /// # Errors
+    ///
+    /// Why the line cannot be served any more. Supervision calls again after its back-off, so
+    /// everything that a fresh start needs must be made anew here.
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError>;
+}
+
+/// A bus that runs on the tick's own thread and may make the tick wait: for virtual time, and tests.
+pub trait Stepped: Send {
+    /// Makes one bus cycle at simulation time `now`; gives the time up to which the simulation may
+    /// go on without the next one.
+    ///
+    /// # Errors
+    ///
+    /// Why there was no cycle.
+    fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError>;
+}
+
+/// Why a bus cannot go on, apart by whose fault it is.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BusError {
+    /// The line is broken, or was never there; trying again may help.
+    #[error("the link failed: {0}")]
+    Link(String),
+    /// The peer does not keep to the protocol.
+    #[error("the peer broke the protocol: {0}")]
+    Protocol(String),
+    /// The peer understood, and declined.
+    #[error("the peer refused: {0}")]
+    Refused(String),
+}

@@ -1,0 +1,195 @@
+//! A triple buffer: the newest value from one writer to one reader, wait-free on both sides.
+//!
+//! ```text
+//!   writer's buffer        hand-over buffer        reader's buffer
+//!        [ w ]  ──publish──▶   [ h ]   ──update──▶      [ r ]
+//! ```
+//!
+//! The three indices are always a permutation of 0, 1, 2. Publishing swaps w with h, updating swaps
+//! r with h; either is one atomic exchange, so neither side ever waits and no value is ever torn. A
+//! value that was not picked up before the next one is overwritten: readers want the newest.
+//!
+//! A sequence lock would be simpler, but a writer in a tight loop starves its readers.
+#![allow(
+    unsafe_code,
+    reason = "the exchange of indices is what proves exclusive access; the compiler cannot see it"
+)]
+
+use super::sync::{Arc, AtomicU8, Ordering, UnsafeCell};
+
+/// Set in the shared state when the hand-over buffer holds a value that the reader has not seen.
+const FRESH: u8 = 0b100;
+const INDEX: u8 = 0b011;
+
+#[derive(Debug)]
+struct Shared<T> {
+    buffers: [UnsafeCell<T>; 3],
+    /// Index of the hand-over buffer, and [`FRESH`].
+    state: AtomicU8,
+}
+
+// SAFETY: a buffer is accessed only by the side that holds its index. The three indices are a
+// permutation at any time, and an index changes sides only through the exchange on `state`, whose
+// release half orders the accesses before it, and whose acquire half those after it. So a `T` is
+// never accessed by two threads at once, but it is accessed by both in turn: `T: Send` is needed and
+// enough.
+unsafe impl<T: Send> Sync for Shared<T> {}
+
+/// The writing side of a triple buffer.
+#[derive(Debug)]
+pub struct Writer<T> {
+    shared: Arc<Shared<T>>,
+    index: u8,
+}
+
+/// The reading side of a triple buffer.
+#[derive(Debug)]
+pub struct Reader<T> {
+    shared: Arc<Shared<T>>,
+    index: u8,
+}
+
+/// Makes a triple buffer whose three buffers are copies of `initial`.
+///
+/// The reader begins with `initial`, which does not count as fresh.
+pub fn triple_buffer<T: Clone + Send>(initial: &T) -> (Writer<T>, Reader<T>) {
+    let buffers = [(); 3].map(|()| UnsafeCell::new(initial.clone()));
+    let shared = Arc::new(Shared {
+        buffers,
+        state: AtomicU8::new(1),
+    });
+    (
+        Writer {
+            shared: Arc::clone(&shared),
+            index: 0,
+        },
+        Reader { shared, index: 2 },
+    )
+}
+
+impl<T> Shared<T> {
+    fn buffer(&self, index: u8) -> &UnsafeCell<T> {
+        &self.buffers[usize::from(index)]
+    }
+}
+
+impl<T> Writer<T> {
+    /// Lets `write` fill the writer's buffer, which still holds some earlier value.
+    #[inline]
+    pub fn with_buffer<R>(&mut self, write: impl FnOnce(&mut T) -> R) -> R {
+        self.shared.buffer(self.index).with_mut(|buffer| {
+            // SAFETY: the writer holds `self.index`, and `&mut self` lasts as long as the borrow.
+            write(unsafe { &mut *buffer })
+        })
+    }
+
+    /// Hands the writer's buffer over.
+    #[inline]
+    pub fn publish(&mut self) {
+        self.index = self.shared.state.swap(self.index | FRESH, Ordering::AcqRel) & INDEX;
+    }
+}
+
+impl<T> Reader<T> {
+    /// Takes the newest value over, if there is one that was not seen; tells whether there was.
+    #[inline]
+    pub fn update(&mut self) -> bool {
+        // Relaxed is enough to look: what counts is ordered by the exchange.
+        if self.shared.state.load(Ordering::Relaxed) & FRESH == 0 {
+            return false;
+        }
+        self.index = self.shared.state.swap(self.index, Ordering::AcqRel) & INDEX;
+        true
+    }
+
+    /// Lets `read` see the value taken over last.
+    #[inline]
+    pub fn with<R>(&self, read: impl FnOnce(&T) -> R) -> R {
+        self.shared.buffer(self.index).with(|buffer| {
+            // SAFETY: the reader holds `self.index` until the next `update`, which needs `&mut self`.
+            read(unsafe { &*buffer })
+        })
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reader_gets_the_newest_and_only_once() {
+        let (mut writer, mut reader) = triple_buffer(&0);
+        assert!(!reader.update());
+        for value in [1, 2, 3] {
+            writer.with_buffer(|buffer| *buffer = value);
+            writer.publish();
+        }
+        assert!(reader.update());
+        assert_eq!(reader.with(|value| *value), 3);
+        assert!(!reader.update());
+        assert_eq!(reader.with(|value| *value), 3);
+    }
+
+    #[test]
+    fn nothing_is_torn_between_threads() {
+        const LAST: u64 = if cfg!(miri) { 200 } else { 200_000 };
+        let (mut writer, mut reader) = triple_buffer(&[0_u64; 32]);
+        let writing = std::thread::spawn(move || {
+            for value in 1..=LAST {
+                writer.with_buffer(|buffer| buffer.fill(value));
+                writer.publish();
+            }
+        });
+        let mut newest = 0;
+        while newest < LAST {
+            reader.update();
+            reader.with(|value| {
+                assert!(
+                    value.iter().all(|word| *word == value[0]),
+                    "torn: {value:?}"
+                );
+                assert!(
+                    value[0] >= newest,
+                    "went back from {newest} to {}",
+                    value[0]
+                );
+                newest = value[0];
+            });
+        }
+        writing.join().expect("no panic");
+    }
+}
+
+#[cfg(all(test, loom))]
+mod loom_tests {
+    use super::*;
+
+    #[test]
+    fn loom_no_torn_or_stale_value_in_any_interleaving() {
+        loom::model(|| {
+            let (mut writer, mut reader) = triple_buffer(&[0_u8; 2]);
+            let writing = loom::thread::spawn(move || {
+                for value in 1..=3 {
+                    writer.with_buffer(|buffer| *buffer = [value; 2]);
+                    writer.publish();
+                }
+            });
+            let mut newest = 0;
+            for _ in 0..3 {
+                let fresh = reader.update();
+                reader.with(|value| {
+                    assert_eq!(value[0], value[1]);
+                    assert!(if fresh {
+                        value[0] > newest
+                    } else {
+                        value[0] == newest
+                    });
+                    newest = value[0];
+                });
+            }
+            writing.join().unwrap();
+            reader.update();
+            reader.with(|value| assert_eq!(*value, [3; 2]));
+        });
+    }
+}

@@ -1,0 +1,75 @@
+//! One open driver with the buffer it shares with Java: all that the native methods do, without a
+//! JVM in sight.
+
+use crate::driver::Driver;
+use crate::image::Event;
+use crate::time::Nanos;
+
+use super::shared::{Shared, Word};
+
+/// Events handed over in one call at most.
+pub(super) const EVENTS: usize = 64;
+
+/// Words per event: signal, value, time.
+pub(super) const EVENT_WORDS: usize = 3;
+
+/// An open driver and its shared buffer; `K` keeps the buffer's memory alive.
+pub(super) struct Device<K> {
+    driver: Driver,
+    shared: Shared<K>,
+    ticks: u64,
+    events: [Event; EVENTS],
+}
+
+impl<K> Device<K> {
+    pub(super) fn new(driver: Driver, mut shared: Shared<K>) -> Self {
+        shared.slots().copy_from_slice(&driver.initial_slots());
+        Self {
+            driver,
+            shared,
+            ticks: 0,
+            events: [Event::default(); EVENTS],
+        }
+    }
+
+    /// One tick: takes the slots that the simulation wrote, fills those that it reads, and the header.
+    #[inline]
+    pub(super) fn exchange(&mut self) -> i32 {
+        let time = Nanos(self.shared.read(Word::SimulationTime).cast_signed());
+        let done = self.driver.exchange(time, self.shared.slots());
+        self.ticks += 1;
+        self.shared
+            .write(Word::Status, i64::from(done.code.code()).cast_unsigned());
+        self.shared.write(Word::Sequence, done.sequence);
+        self.shared.write(Word::Age, done.age.0.cast_unsigned());
+        self.shared
+            .write(Word::Granted, done.granted.0.cast_unsigned());
+        self.shared.write(Word::Ticks, self.ticks);
+        done.code.code()
+    }
+
+    pub(super) fn statistics(&self) -> String {
+        self.driver.statistics()
+    }
+
+    /// Moves waiting events into `into`, three words each, and says how many.
+    pub(super) fn events(&mut self, into: &mut [i64]) -> usize {
+        let room = (into.len() / EVENT_WORDS).min(EVENTS);
+        let count = self.driver.poll_events(&mut self.events[..room]);
+        for (event, words) in self.events[..count]
+            .iter()
+            .zip(into.chunks_exact_mut(EVENT_WORDS))
+        {
+            words.copy_from_slice(&[
+                i64::from(event.signal),
+                event.value.0.cast_signed(),
+                event.time.0,
+            ]);
+        }
+        count
+    }
+
+    pub(super) fn close(self) {
+        self.driver.close();
+    }
+}

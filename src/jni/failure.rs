@@ -1,0 +1,131 @@
+//! How a failure reaches Java: one exception class, one policy.
+
+use std::any::Any;
+use std::sync::OnceLock;
+
+use jni::errors::{Error, ErrorPolicy};
+use jni::objects::{JClass, JThrowable, JValue};
+use jni::refs::Global;
+use jni::{Env, jni_sig, jni_str};
+
+use crate::driver::{Code, DriverError};
+
+use super::handles::said;
+
+/// Why a native method could not do its work.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Failure {
+    /// A status code, with what happened.
+    #[error("{text}")]
+    Coded { code: i32, text: String },
+    /// A call into the JVM failed; where it threw, the exception is still pending.
+    #[error(transparent)]
+    Jni(#[from] Error),
+}
+
+impl Failure {
+    /// A failure with the meaning and the remedy that the status table gives.
+    pub(super) fn plain(code: Code) -> Self {
+        Self::coded(code, code.text())
+    }
+
+    /// A failure that says what happened; the remedy is the status table's.
+    pub(super) fn coded(code: Code, what: impl std::fmt::Display) -> Self {
+        let text = format!(
+            "{} ({}): {what}\n  {}",
+            code.name(),
+            code.code(),
+            code.remedy()
+        );
+        Self::Coded {
+            code: code.code(),
+            text,
+        }
+    }
+}
+
+impl From<DriverError> for Failure {
+    fn from(error: DriverError) -> Self {
+        Self::coded(error.code(), error)
+    }
+}
+
+/// `tickbus.FieldbusException`.
+///
+/// A global reference keeps its class from being unloaded, and with it the class loader and this
+/// library: no bus thread ever loses the code it runs.
+static EXCEPTION: OnceLock<Global<JClass<'static>>> = OnceLock::new();
+
+/// Finds the exception class; to be called while the library is being loaded, when the JVM looks
+/// classes up in the class loader that loads it.
+pub(super) fn find_exception(env: &mut Env<'_>) -> Result<(), Error> {
+    let class = env.find_class(jni_str!("tickbus/FieldbusException"))?;
+    let class = env.new_global_ref(class)?;
+    // A second load of the same library would find its class here already.
+    let _ = EXCEPTION.set(class);
+    Ok(())
+}
+
+/// Throws `tickbus.FieldbusException`, unless an exception is pending already.
+pub(super) struct ThrowFieldbusException;
+
+impl<T: Default> ErrorPolicy<T, Failure> for ThrowFieldbusException {
+    type Captures<'local: 'native, 'native> = ();
+
+    fn on_error<'local: 'native, 'native>(
+        env: &mut Env<'local>,
+        (): &mut (),
+        failure: Failure,
+    ) -> Result<T, Error> {
+        let failure = match failure {
+            Failure::Jni(Error::NullPtr(what)) => {
+                Failure::coded(Code::BadArgument, format!("null: {what}"))
+            }
+            Failure::Jni(error) => Failure::coded(
+                Code::Internal,
+                format!("a call into the JVM failed: {error}"),
+            ),
+            coded @ Failure::Coded { .. } => coded,
+        };
+        throw(env, &failure)?;
+        Ok(T::default())
+    }
+
+    fn on_panic<'local: 'native, 'native>(
+        env: &mut Env<'local>,
+        (): &mut (),
+        payload: Box<dyn Any + Send>,
+    ) -> Result<T, Error> {
+        throw(
+            env,
+            &Failure::coded(Code::Internal, format!("panic: {}", said(payload))),
+        )?;
+        Ok(T::default())
+    }
+}
+
+fn throw(env: &mut Env<'_>, failure: &Failure) -> Result<(), Error> {
+    if env.exception_check() {
+        return Ok(());
+    }
+    let code = match failure {
+        Failure::Coded { code, .. } => *code,
+        Failure::Jni(_) => Code::Internal.code(),
+    };
+    let class = EXCEPTION
+        .get()
+        .ok_or(Error::NullPtr("FieldbusException, found in JNI_OnLoad"))?;
+    let text = env.new_string(failure.to_string())?;
+    let arguments = [JValue::Int(code), JValue::Object(&text)];
+    let exception = env.new_object(
+        class,
+        jni_sig!((code: jint, message: JString) -> void),
+        &arguments,
+    )?;
+    let exception = env.cast_local::<JThrowable>(exception)?;
+    match env.throw(exception) {
+        // This is how the crate says that the exception is pending now, as it should be.
+        Err(Error::JavaException) => Ok(()),
+        other => other,
+    }
+}

@@ -1,0 +1,363 @@
+//! The table of open drivers: checked ids instead of pointers.
+//!
+//! A handle is an index into a fixed table, and a generation that tells this tenant of the place
+//! from all earlier ones. Whatever number a caller brings, it either names a tenant that is open
+//! now, or gets a status code.
+
+#![allow(
+    unsafe_code,
+    reason = "a claim by one atomic word stands in for a lock, which the tick must not take"
+)]
+
+use std::any::Any;
+use std::cell::UnsafeCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::driver::{Code, panic_text};
+
+/// How many drivers can be open in one process at once.
+pub(super) const PLACES: usize = 64;
+
+/// A handle's low bits are the index, the rest the generation.
+const INDEX_BITS: u32 = 8;
+const _: () = assert!(PLACES <= 1 << INDEX_BITS);
+
+/// A place's word: its generation, and in the low bits one of the states below.
+const STATE_BITS: u32 = 2;
+const STATE: u64 = (1 << STATE_BITS) - 1;
+/// Nobody lives here.
+const FREE: u64 = 0;
+/// A tenant lives here, and nobody uses it at this moment.
+const OPEN: u64 = 1;
+/// One thread has the tenant to itself.
+const CLAIMED: u64 = 2;
+/// The tenant panicked; it waits to be closed.
+const FAILED: u64 = 3;
+
+const fn word(generation: u64, state: u64) -> u64 {
+    generation << STATE_BITS | state
+}
+
+/// One place, on cache lines of its own: drivers that tick on different cores share nothing.
+#[repr(align(128))]
+struct Place<T> {
+    word: AtomicU64,
+    /// Touched only by the thread that moved the word to [`CLAIMED`], until it moves it on.
+    content: UnsafeCell<Content<T>>,
+}
+
+struct Content<T> {
+    tenant: Option<T>,
+    /// The text of the panic that ended in [`FAILED`].
+    panic: String,
+}
+
+/// A table of tenants of type `T`.
+pub(super) struct Handles<T, const N: usize = PLACES> {
+    places: [Place<T>; N],
+}
+
+// SAFETY: the one part that is not Sync by itself is `content`. It is reached through `Claim` alone,
+// which exists only between a successful compare-and-exchange to CLAIMED (acquire) and the store that
+// ends it (release), so one thread at a time has it, and sees all that the one before it did. A tenant
+// may thus be used and dropped by another thread than the one that made it, hence `T: Send`.
+unsafe impl<T: Send, const N: usize> Sync for Handles<T, N> {}
+
+impl<T, const N: usize> Handles<T, N> {
+    pub(super) const fn new() -> Self {
+        let places = [const {
+            Place {
+                word: AtomicU64::new(word(0, FREE)),
+                content: UnsafeCell::new(Content {
+                    tenant: None,
+                    panic: String::new(),
+                }),
+            }
+        }; N];
+        Self { places }
+    }
+
+    /// Takes a place for a tenant that is yet to be made.
+    pub(super) fn reserve(&self) -> Result<Reservation<'_, T>, Code> {
+        for (index, place) in self.places.iter().enumerate() {
+            let found = place.word.load(Ordering::Relaxed);
+            let generation = (found >> STATE_BITS) + 1;
+            if found & STATE == FREE
+                && let Some(claim) = Claim::take(place, found, generation, FREE)
+            {
+                return Ok(Reservation { claim, index });
+            }
+        }
+        Err(Code::TooManyDrivers)
+    }
+
+    /// Has `work` done on the tenant, which no other thread can reach meanwhile.
+    ///
+    /// A panic in `work` marks the tenant as failed; from then on it answers INTERNAL until closed.
+    #[inline]
+    pub(super) fn with<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
+        let mut claim = self.claim(handle, OPEN)?;
+        let Some(tenant) = claim.content().tenant.as_mut() else {
+            return Err(Code::Internal);
+        };
+        match catch_unwind(AssertUnwindSafe(|| work(tenant))) {
+            Ok(done) => Ok(done),
+            Err(payload) => {
+                claim.content().panic = said(payload);
+                claim.end = FAILED;
+                Err(Code::Internal)
+            }
+        }
+    }
+
+    /// Ends a tenancy: `close` gets the tenant, failed or not, and the place is free when it returns
+    /// or panics.
+    pub(super) fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
+        let mut claim = match self.claim(handle, OPEN) {
+            Err(Code::Internal) => self.claim(handle, FAILED)?,
+            other => other?,
+        };
+        claim.end = FREE;
+        claim.content().panic = String::new();
+        claim
+            .content()
+            .tenant
+            .take()
+            .map(close)
+            .ok_or(Code::Internal)
+    }
+
+    /// The text of the panic that this handle's tenant failed with.
+    pub(super) fn panic_of(&self, handle: i64) -> Option<String> {
+        let mut claim = self.claim(handle, FAILED).ok()?;
+        Some(claim.content().panic.clone())
+    }
+
+    #[inline]
+    fn claim(&self, handle: i64, from: u64) -> Result<Claim<'_, T>, Code> {
+        // A negative handle becomes a generation that no place will ever reach.
+        let handle = handle.cast_unsigned();
+        let generation = handle >> INDEX_BITS;
+        let index = usize::try_from(handle & ((1 << INDEX_BITS) - 1)).unwrap_or(usize::MAX);
+        let place = self.places.get(index).ok_or(Code::NotOpen)?;
+        Claim::take(place, word(generation, from), generation, from)
+            .ok_or_else(|| place.refusal(generation))
+    }
+}
+
+impl<T> Place<T> {
+    /// Why a claim by this generation failed.
+    #[cold]
+    fn refusal(&self, generation: u64) -> Code {
+        let found = self.word.load(Ordering::Relaxed);
+        let living = found >> STATE_BITS;
+        if generation == 0 || generation > living {
+            return Code::NotOpen;
+        }
+        match found & STATE {
+            _ if generation < living => Code::Closed,
+            FREE => Code::Closed,
+            FAILED => Code::Internal,
+            // OPEN: whoever had it gave it back between the claim and this look.
+            _ => Code::Busy,
+        }
+    }
+}
+
+/// The sole use of a place; ends when dropped.
+struct Claim<'a, T> {
+    place: &'a Place<T>,
+    generation: u64,
+    /// The state that the place goes to.
+    end: u64,
+}
+
+impl<'a, T> Claim<'a, T> {
+    #[inline]
+    fn take(place: &'a Place<T>, found: u64, generation: u64, end: u64) -> Option<Self> {
+        let claimed = generation << STATE_BITS | CLAIMED;
+        place
+            .word
+            .compare_exchange(found, claimed, Ordering::Acquire, Ordering::Relaxed)
+            .is_ok()
+            // Made only on success: dropping a claim moves the word.
+            .then(|| Self {
+                place,
+                generation,
+                end,
+            })
+    }
+
+    #[inline]
+    fn content(&mut self) -> &mut Content<T> {
+        // SAFETY: this claim moved the word to CLAIMED, which succeeds for one thread at a time and
+        // only from a state in which no claim exists; `&mut self` keeps this thread to one reference.
+        unsafe { &mut *self.place.content.get() }
+    }
+}
+
+impl<T> Drop for Claim<'_, T> {
+    #[inline]
+    fn drop(&mut self) {
+        self.place
+            .word
+            .store(word(self.generation, self.end), Ordering::Release);
+    }
+}
+
+/// A place that waits for its tenant; free again if dropped before.
+pub(super) struct Reservation<'a, T> {
+    claim: Claim<'a, T>,
+    index: usize,
+}
+
+impl<T> Reservation<'_, T> {
+    /// Lets the tenant in and gives its handle, which is positive.
+    pub(super) fn fill(mut self, tenant: T) -> i64 {
+        self.claim.content().tenant = Some(tenant);
+        self.claim.end = OPEN;
+        (self.claim.generation << INDEX_BITS | self.index as u64).cast_signed()
+    }
+}
+
+/// What a panic said.
+pub(super) fn said(payload: Box<dyn Any + Send>) -> String {
+    let text = panic_text(&*payload).to_owned();
+    // Dropping a payload of unknown type could panic again.
+    std::mem::forget(payload);
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+    use std::sync::atomic::AtomicUsize;
+
+    fn open<const N: usize>(handles: &Handles<u32, N>, tenant: u32) -> i64 {
+        handles.reserve().expect("a place is free").fill(tenant)
+    }
+
+    #[test]
+    fn what_was_never_opened_is_not_open() {
+        let handles: Handles<u32, 3> = Handles::new();
+        let real = open(&handles, 7);
+        for handle in [
+            0,
+            1,
+            2,
+            3,
+            255,
+            -1,
+            i64::MIN,
+            i64::MAX,
+            real + 1,
+            real + 256,
+            real | 1 << 62,
+        ] {
+            assert_eq!(
+                handles.with(handle, |_| ()),
+                Err(Code::NotOpen),
+                "{handle:#x}"
+            );
+            assert_eq!(
+                handles.close(handle, |_| ()),
+                Err(Code::NotOpen),
+                "{handle:#x}"
+            );
+        }
+        assert_eq!(handles.with(real, |tenant| *tenant), Ok(7));
+    }
+
+    #[test]
+    fn a_stale_handle_stays_closed_though_its_place_has_a_new_tenant() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let old = open(&handles, 1);
+        assert_eq!(handles.close(old, |tenant| tenant), Ok(1));
+        assert_eq!(handles.with(old, |_| ()), Err(Code::Closed));
+        let new = open(&handles, 2);
+        assert_eq!(handles.with(old, |_| ()), Err(Code::Closed));
+        assert_eq!(handles.close(old, |_| ()), Err(Code::Closed));
+        assert_eq!(handles.with(new, |tenant| *tenant), Ok(2));
+    }
+
+    #[test]
+    fn places_run_out_and_come_back() {
+        let handles: Handles<u32, 2> = Handles::new();
+        let first = open(&handles, 1);
+        open(&handles, 2);
+        assert_eq!(handles.reserve().err(), Some(Code::TooManyDrivers));
+        handles.close(first, drop).expect("it is open");
+        drop(handles.reserve().expect("the place is free again"));
+        open(&handles, 3);
+    }
+
+    #[test]
+    fn a_tenant_in_use_is_busy_and_stays_open() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let answers = handles.with(handle, |_| {
+            (handles.with(handle, |_| ()), handles.close(handle, |_| ()))
+        });
+        assert_eq!(answers, Ok((Err(Code::Busy), Err(Code::Busy))));
+        assert_eq!(handles.with(handle, |tenant| *tenant), Ok(1));
+    }
+
+    #[test]
+    fn a_panic_fails_the_tenant_until_it_is_closed() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let text = "formatted at run time".to_owned();
+        assert_eq!(
+            handles.with(handle, |_| panic!("{text}")),
+            Err::<(), _>(Code::Internal)
+        );
+        assert_eq!(handles.with(handle, |_| ()), Err(Code::Internal));
+        assert_eq!(handles.panic_of(handle), Some(text));
+        assert_eq!(handles.close(handle, |tenant| tenant), Ok(1));
+        assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
+        assert_eq!(handles.panic_of(handle), None);
+    }
+
+    #[test]
+    fn a_panic_while_closing_frees_the_place() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let closing = catch_unwind(AssertUnwindSafe(|| {
+            handles.close(handle, |_| panic!("stuck"))
+        }));
+        assert_eq!(said(closing.expect_err("close panicked")), "stuck");
+        assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
+        open(&handles, 2);
+    }
+
+    #[test]
+    fn two_threads_never_have_the_tenant_at_once() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 0);
+        let (inside, start) = (AtomicUsize::new(0), Barrier::new(2));
+        let rounds = if cfg!(miri) { 200 } else { 100_000 };
+        let work = || {
+            start.wait();
+            let mut done = 0;
+            for _ in 0..rounds {
+                let entered = handles.with(handle, |tenant| {
+                    assert_eq!(inside.fetch_add(1, Ordering::Relaxed), 0);
+                    *tenant += 1;
+                    assert_eq!(inside.fetch_sub(1, Ordering::Relaxed), 1);
+                });
+                match entered {
+                    Ok(()) => done += 1,
+                    Err(refusal) => assert_eq!(refusal, Code::Busy),
+                }
+            }
+            done
+        };
+        let done: u32 = std::thread::scope(|scope| {
+            let other = scope.spawn(work);
+            work() + other.join().expect("no panic")
+        });
+        assert_eq!(handles.with(handle, |tenant| *tenant), Ok(done));
+    }
+}

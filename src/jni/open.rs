@@ -1,0 +1,144 @@
+//! Opening a driver for Java: its signals are described to a `tickbus.Layout`, which gives the
+//! shared buffer.
+
+#![allow(unsafe_code, reason = "the shared buffer is memory that the JVM gives")]
+
+use std::path::Path;
+use std::ptr::NonNull;
+
+use jni::objects::{JByteBuffer, JObject, JValue};
+use jni::refs::Global;
+use jni::{Env, jni_sig, jni_str};
+
+use crate::driver::{Code, Config, Driver};
+use crate::fieldbus::Role;
+use crate::signal::{Area, Signal};
+use crate::time::Monotonic;
+
+use super::device::Device;
+use super::failure::Failure;
+use super::shared::Shared;
+
+/// What keeps the memory of a shared buffer alive.
+pub(super) type Keep = Global<JByteBuffer<'static>>;
+
+/// Opens the driver that the file describes, and describes it to `layout`.
+pub(super) fn open(
+    env: &mut Env<'_>,
+    path: &Path,
+    layout: &JObject<'_>,
+) -> Result<Device<Keep>, Failure> {
+    let config = Config::load(path).map_err(|mistakes| {
+        Failure::coded(
+            Code::BadConfig,
+            format!("driver.cfg cannot be used:\n{mistakes}"),
+        )
+    })?;
+    let clock = Monotonic::shared().map_err(|error| {
+        Failure::coded(Code::Internal, format!("no thread for the clock: {error}"))
+    })?;
+    let driver = Driver::open(config, clock)?;
+    let shared = describe(env, &driver, layout)?;
+    Ok(Device::new(driver, shared))
+}
+
+fn describe(
+    env: &mut Env<'_>,
+    driver: &Driver,
+    layout: &JObject<'_>,
+) -> Result<Shared<Keep>, Failure> {
+    let config = driver.config();
+    let name = env.new_string(&config.name)?;
+    env.call_method(
+        layout,
+        jni_str!("driver"),
+        jni_sig!((id: jint, name: JString) -> void),
+        &[JValue::Int(config.id), JValue::Object(&name)],
+    )?;
+    for (slot, signal) in config.table.signals.iter().enumerate() {
+        let written = match config.role {
+            Role::Device => signal.area == Area::Input,
+            Role::Controller => signal.area == Area::Output,
+        };
+        let station = &config.table.stations[signal.station].name;
+        let edges = driver.slots().edges[slot];
+        // A frame per signal: its local references would add up otherwise.
+        env.with_local_frame(8, |env| {
+            describe_signal(env, layout, signal, station, written, slot, edges)
+        })?;
+    }
+    buffer(env, driver.slots().count, layout)
+}
+
+fn describe_signal(
+    env: &mut Env<'_>,
+    layout: &JObject<'_>,
+    signal: &Signal,
+    station: &str,
+    written: bool,
+    slot: usize,
+    edges: Option<usize>,
+) -> Result<(), Failure> {
+    let name = env.new_string(&signal.name)?;
+    let address = env.new_string(signal.address().to_string())?;
+    let data_type = env.new_string(signal.data_type.name())?;
+    let unit = env.new_string(signal.unit.as_deref().unwrap_or_default())?;
+    let station = env.new_string(station)?;
+    env.call_method(
+        layout,
+        jni_str!("signal"),
+        jni_sig!((
+            name: JString, address: JString, data_type: JString, unit: JString, station: JString,
+            written: jboolean, integer: jboolean, slot: jint, edges: jint
+        ) -> void),
+        &[
+            JValue::Object(&name),
+            JValue::Object(&address),
+            JValue::Object(&data_type),
+            JValue::Object(&unit),
+            JValue::Object(&station),
+            JValue::Bool(written),
+            JValue::Bool(signal.is_integer_slot()),
+            JValue::Int(index(slot)?),
+            JValue::Int(edges.map_or(Ok(-1), index)?),
+        ],
+    )?;
+    Ok(())
+}
+
+/// Java counts bytes and slots with its int.
+fn index(number: usize) -> Result<i32, Failure> {
+    i32::try_from(number).map_err(|_| {
+        Failure::coded(
+            Code::BadConfig,
+            format!("{number} is more than an image can have"),
+        )
+    })
+}
+
+fn buffer(env: &mut Env<'_>, slots: usize, layout: &JObject<'_>) -> Result<Shared<Keep>, Failure> {
+    let bytes = Shared::<Keep>::bytes(slots);
+    let buffer = env
+        .call_method(
+            layout,
+            jni_str!("allocate"),
+            jni_sig!((bytes: jint) -> java.nio.ByteBuffer),
+            &[JValue::Int(index(bytes)?)],
+        )?
+        .l()?;
+    let buffer = env.cast_local::<JByteBuffer>(buffer)?;
+    let unusable = |what| Failure::coded(Code::Internal, format!("the shared buffer {what}"));
+    let capacity = env.get_direct_buffer_capacity(&buffer)?;
+    if capacity < bytes {
+        return Err(unusable(format!("has {capacity} bytes, expected {bytes}")));
+    }
+    let address = env.get_direct_buffer_address(&buffer)?;
+    let address = NonNull::new(address).ok_or_else(|| unusable("has no address".into()))?;
+    let keep = env.new_global_ref(buffer)?;
+    // SAFETY: a direct buffer's address stays the same and valid for its capacity, checked above, as
+    // long as it is reachable, which `keep` sees to; the JVM zeroes it. Only `tickbus.Tickbus` has the
+    // Java end, and touches the slots only in its `exchange`, before and after the native call, while
+    // it holds its own claim; the header's input word likewise.
+    unsafe { Shared::new(address, slots, keep) }
+        .ok_or_else(|| unusable("is not aligned for 8-byte words".into()))
+}

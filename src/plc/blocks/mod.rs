@@ -1,0 +1,16 @@
+//! The function blocks of IEC 61131-3 that programs here are made of.
+//!
+//! A block changes only when it is called, and knows no time but the one that the call hands in.
+//! Times are [`Nanos`](crate::time::Nanos) where the standard says `TIME`.
+
+mod action;
+mod bistable;
+mod edge;
+mod rtc;
+mod timer;
+
+pub use action::{ActionControl, Qualifiers};
+pub use bistable::{Rs, Sr};
+pub use edge::{FTrig, RTrig};
+pub use rtc::Rtc;
+pub use timer::{Tof, Ton, Tp};

@@ -1,0 +1,230 @@
+//! Runs of BOOL signals: whole bytes of them, and the bytes that only some bits of are signals.
+
+use std::ops::Range;
+
+use super::run::{Member, Run};
+use super::{Conversions, index};
+use crate::signal::Slot;
+
+/// Lays out `members`, all BOOL. Every byte that holds one is encoded whole, by one run.
+pub(super) fn lay_out(members: &[Member]) -> Vec<Box<dyn Run>> {
+    let mut members = members.to_vec();
+    members.sort_by_key(|(_, signal)| (signal.byte, signal.bit));
+    let mut octets = Vec::new();
+    let mut partials = Partials::default();
+    for in_byte in members.chunk_by(|a, b| a.1.byte == b.1.byte) {
+        match Octet::of(in_byte) {
+            Some(octet) => octets.push(octet),
+            None => partials.push(in_byte),
+        }
+    }
+    let mut runs: Vec<Box<dyn Run>> = Vec::new();
+    if !octets.is_empty() {
+        runs.push(Box::new(Octets(octets)));
+    }
+    if !partials.bytes.is_empty() {
+        runs.push(Box::new(partials));
+    }
+    runs
+}
+
+/// Bytes whose bits 0 to 7 are eight consecutive slots.
+#[derive(Debug)]
+struct Octets(Vec<Octet>);
+
+#[derive(Debug)]
+struct Octet {
+    slot: u32,
+    byte: u32,
+    fail_safe: u8,
+}
+
+impl Octet {
+    /// Of the members in one byte, by bit.
+    fn of(members: &[Member]) -> Option<Self> {
+        let (slot, first) = members[0];
+        let expected = (slot..).zip(0..8);
+        let found = members.iter().map(|(slot, signal)| (*slot, signal.bit));
+        found.eq(expected).then(|| Self {
+            slot: index(slot),
+            byte: index(first.byte),
+            fail_safe: (members.iter()).fold(0, |byte, (_, signal)| {
+                byte | u8::from(is_high(signal.fail_safe)) << signal.bit
+            }),
+        })
+    }
+}
+
+impl Octets {
+    /// Encodes values of which some are neither 0.0 nor 1.0.
+    #[cold]
+    #[inline(never)]
+    fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+        for octet in &self.0 {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
+                frame[octet.byte as usize] = pack_any(slots, octet.fail_safe, conversions);
+            }
+        }
+    }
+}
+
+impl Run for Octets {
+    fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+        let mut others = 0;
+        for octet in &self.0 {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
+                let (byte, other) = pack(slots);
+                frame[octet.byte as usize] = byte;
+                others |= other;
+            }
+        }
+        if others != 0 {
+            self.encode_any(slots, frame, conversions);
+        }
+    }
+
+    fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
+        for octet in &self.0 {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk_mut() {
+                unpack(frame[octet.byte as usize], slots);
+            }
+        }
+    }
+}
+
+/// Bytes with fewer signals, or with signals in another order.
+#[derive(Debug, Default)]
+struct Partials {
+    bytes: Vec<Partial>,
+    /// The bits of all bytes.
+    bits: Vec<Bit>,
+}
+
+#[derive(Debug)]
+struct Partial {
+    byte: u32,
+    /// Range in [`Partials::bits`].
+    bits: Range<u32>,
+}
+
+#[derive(Debug)]
+struct Bit {
+    slot: u32,
+    bit: u8,
+    fail_safe: bool,
+}
+
+impl Partials {
+    /// Adds the members in one byte.
+    fn push(&mut self, members: &[Member]) {
+        let start = index(self.bits.len());
+        self.bits.extend(members.iter().map(|(slot, signal)| Bit {
+            slot: index(*slot),
+            bit: signal.bit,
+            fail_safe: is_high(signal.fail_safe),
+        }));
+        self.bytes.push(Partial {
+            byte: index(members[0].1.byte),
+            bits: start..index(self.bits.len()),
+        });
+    }
+
+    fn bits_of(&self, partial: &Partial) -> &[Bit] {
+        &self.bits[partial.bits.start as usize..partial.bits.end as usize]
+    }
+}
+
+impl Run for Partials {
+    fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+        for partial in &self.bytes {
+            let mut byte = 0;
+            for bit in self.bits_of(partial) {
+                let high = high(slots[bit.slot as usize], bit.fail_safe, conversions);
+                byte |= u8::from(high) << bit.bit;
+            }
+            frame[partial.byte as usize] = byte;
+        }
+    }
+
+    fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
+        for partial in &self.bytes {
+            let byte = frame[partial.byte as usize];
+            for bit in self.bits_of(partial) {
+                slots[bit.slot as usize] = NIBBLES[usize::from(byte >> bit.bit & 1)][0];
+            }
+        }
+    }
+}
+
+/// Whether a fail-safe value is 1; not when it is NaN.
+fn is_high(slot: Slot) -> bool {
+    high(slot, false, &mut Conversions::default())
+}
+
+/// Whether a BOOL is 1: for every value but zero; for NaN as `fail_safe` says, and that is counted.
+fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
+    let value = slot.real();
+    if value.is_nan() {
+        conversions.not_a_number += 1;
+        fail_safe
+    } else {
+        value != 0.0
+    }
+}
+
+/// Eight slots as one byte, the first slot as bit 0, and zero if the slots are all 0.0 or 1.0; if
+/// they are not, the byte is wrong.
+fn pack(slots: &[Slot; 8]) -> (u8, u64) {
+    // The bits 52 to 61 of 1.0 are all set and no other is, so the bit for place n of the byte can be
+    // cut out of slot n at 52 + n. Two lanes, because every 64-bit processor has registers for two
+    // integers.
+    const ONE: u64 = 1.0_f64.to_bits();
+    const NEIGHBOURS_IN_ONE: u64 = ONE & ONE << 1;
+    let mut cut = [0; 2];
+    let mut set = [0; 2];
+    let mut changes = [0; 2];
+    for place in (0..8).step_by(2) {
+        for lane in 0..2 {
+            let bits = slots[place + lane].0;
+            cut[lane] |= bits & 1 << (52 + place + lane);
+            set[lane] |= bits;
+            changes[lane] |= bits ^ bits << 1;
+        }
+    }
+    let [byte, ..] = ((cut[0] | cut[1]) >> 52).to_le_bytes();
+    let elsewhere = (set[0] | set[1]) & !ONE;
+    let incomplete = (changes[0] | changes[1]) & NEIGHBOURS_IN_ONE;
+    (byte, elsewhere | incomplete)
+}
+
+/// The same for any values; NaN slots take their bit from `fail_safe` and are counted.
+fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
+    (0..8).zip(slots).fold(0, |byte, (bit, slot)| {
+        let fail_safe = fail_safe >> bit & 1 == 1;
+        byte | u8::from(high(*slot, fail_safe, conversions)) << bit
+    })
+}
+
+/// The slots of four bits, the first of bit 0.
+static NIBBLES: [[Slot; 4]; 16] = {
+    let mut nibbles = [[Slot::from_real(0.0); 4]; 16];
+    let mut nibble = 0;
+    while nibble < 16 {
+        let mut bit = 0;
+        while bit < 4 {
+            if nibble >> bit & 1 == 1 {
+                nibbles[nibble][bit] = Slot::from_real(1.0);
+            }
+            bit += 1;
+        }
+        nibble += 1;
+    }
+    nibbles
+};
+
+/// One byte as eight slots, bit 0 as the first.
+fn unpack(byte: u8, slots: &mut [Slot; 8]) {
+    let (low, high) = slots.split_at_mut(4);
+    low.copy_from_slice(&NIBBLES[usize::from(byte & 15)]);
+    high.copy_from_slice(&NIBBLES[usize::from(byte >> 4)]);
+}

@@ -1,0 +1,268 @@
+//! What every bus must do, written once and instantiated per bus by [`conformance!`].
+
+pub mod rig;
+
+use rig::{Bus, CYCLE, End, MAX_AGE, Rig, await_that, config};
+use tickbus::driver::{Code, Config, Driver};
+use tickbus::time::{Manual, Nanos};
+
+pub fn opens_and_exchanges_both_ways(bus: &impl Bus) {
+    let mut rig = Rig::new(bus);
+    rig.connect();
+    rig.controller.set("run", 1.0);
+    rig.controller.set("speed", 1234.0);
+    rig.device.set("position", -4321.0);
+    rig.until("values arrive", |rig| {
+        rig.device.tick();
+        rig.controller.tick();
+        rig.device.get("speed") == 1234.0
+            && rig.device.get("run") == 1.0
+            && rig.controller.get("position") == -4321.0
+    });
+}
+
+/// Two values that are always written together must always arrive together.
+pub fn exchanges_whole_images_only(bus: &impl Bus) {
+    let mut rig = Rig::new(bus);
+    rig.connect();
+    let mut seen = 0.0;
+    let mut value = 0.0;
+    rig.until("500 images have gone by", |rig| {
+        value += 1.0;
+        rig.controller.set("speed", value);
+        rig.controller.set("echo", value);
+        rig.controller.tick();
+        if rig.device.tick().code == Code::Fresh && rig.device.get("speed") >= 0.0 {
+            let (speed, echo) = (rig.device.get("speed"), rig.device.get("echo"));
+            assert_eq!(speed, echo, "a torn image");
+            assert!(speed >= seen, "an image went back from {seen} to {speed}");
+            seen = speed;
+        }
+        seen >= 500.0
+    });
+}
+
+/// Pulses of one tick arrive, whatever the ratio of tick to cycle.
+pub fn keeps_edges_both_ways(bus: &impl Bus) {
+    for ticks_per_cycle in [1, 3, 10] {
+        let mut rig = Rig::new(bus);
+        rig.connect();
+        for pulse in 1..=20 {
+            for level in [1.0, 0.0] {
+                rig.controller.set("run", level);
+                rig.device.set("sensor", level);
+                rig.controller.tick();
+                rig.device.tick();
+            }
+            let (mut run, mut sensor) = (0.0, 0.0);
+            let (mut run_seen, mut sensor_seen) = (false, false);
+            rig.until("the pulse is through and gone", |rig| {
+                for _ in 0..ticks_per_cycle {
+                    rig.device.tick();
+                    rig.controller.tick();
+                    run += rig.device.edges("run");
+                    sensor += rig.controller.edges("sensor");
+                    run_seen |= rig.device.get("run") == 1.0;
+                    sensor_seen |= rig.controller.get("sensor") == 1.0;
+                }
+                run_seen
+                    && sensor_seen
+                    && rig.device.get("run") == 0.0
+                    && rig.controller.get("sensor") == 0.0
+            });
+            assert_eq!(
+                (run, sensor),
+                (1.0, 1.0),
+                "pulse {pulse}, {ticks_per_cycle} ticks a cycle"
+            );
+        }
+    }
+}
+
+pub fn keeps_events_in_order(bus: &impl Bus) {
+    let mut rig = Rig::with(bus, "events = true");
+    rig.connect();
+    let mut events = vec![tickbus::image::Event::default(); 64];
+    rig.device.driver.poll_events(&mut events);
+    for value in [5.0, 6.0, 7.0] {
+        rig.controller.set("speed", value);
+        rig.until("the value arrives", |rig| {
+            rig.controller.tick();
+            rig.device.tick();
+            rig.device.get("speed") == value
+        });
+    }
+    let count = rig.device.driver.poll_events(&mut events);
+    let values: Vec<_> = events[..count]
+        .iter()
+        .map(|event| (event.signal, event.value.real()))
+        .collect();
+    assert_eq!(values, [(1, 5.0), (1, 6.0), (1, 7.0)]);
+    assert_eq!(rig.device.statistic("events_lost"), "0");
+}
+
+/// Nothing from the peer: stale, fail-safe values; and back, by the injected clock alone.
+pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
+    let mut rig = Rig::new(bus);
+    let first = rig.device.tick();
+    assert_eq!(
+        (first.code, first.age),
+        (Code::Stale, Nanos::MAX),
+        "before the first contact"
+    );
+    assert_eq!(
+        rig.device.get("speed"),
+        -1.0,
+        "fail-safe before the first contact"
+    );
+    rig.connect();
+    rig.controller.set("speed", 10.0);
+    rig.until("a value arrives", |rig| {
+        rig.controller.tick();
+        rig.device.tick();
+        rig.device.get("speed") == 10.0
+    });
+
+    let Rig {
+        clock,
+        mut device,
+        controller,
+    } = rig;
+    controller.driver.close();
+    await_that("the device is stale", || {
+        clock.advance(CYCLE);
+        device.tick().code == Code::Stale
+    });
+    assert_eq!(device.get("speed"), -1.0, "fail-safe when stale");
+    assert!(device.tick().age > MAX_AGE);
+
+    let controller = End::open(&config(bus, "controller", ""), &clock);
+    let mut rig = Rig {
+        clock,
+        device,
+        controller,
+    };
+    rig.connect();
+    rig.controller.set("speed", 11.0);
+    rig.until("values arrive again", |rig| {
+        rig.controller.tick();
+        rig.device.tick();
+        rig.device.get("speed") == 11.0
+    });
+}
+
+/// The simulation stops ticking: the PLC gets the fail-safe values, and the true ones afterwards.
+pub fn the_watchdog_bites_when_the_simulation_stops(bus: &impl Bus) {
+    let mut rig = Rig::with(bus, "watchdog = \"50ms\"");
+    rig.connect();
+    rig.device.set("position", 5.0);
+    rig.until("the value arrives", |rig| {
+        rig.device.tick();
+        rig.controller.tick();
+        rig.controller.get("position") == 5.0
+    });
+    rig.until("the fail-safe value arrives", |rig| {
+        rig.controller.tick();
+        rig.controller.get("position") == 77.0
+    });
+    rig.until("the true value arrives again", |rig| {
+        rig.device.tick();
+        rig.controller.tick();
+        rig.controller.get("position") == 5.0
+    });
+}
+
+/// Peers that come and go, again and again.
+pub fn survives_200_peers(bus: &impl Bus) {
+    let clock = Manual::new();
+    let mut device = End::open(&config(bus, "device", ""), &clock);
+    for life in 1..=200 {
+        let mut controller = End::open(&config(bus, "controller", ""), &clock);
+        await_that("the next peer's value arrives", || {
+            clock.advance(CYCLE);
+            controller.set("speed", f64::from(life));
+            controller.tick();
+            device.tick();
+            device.get("speed") == f64::from(life)
+        });
+        controller.driver.close();
+    }
+}
+
+pub fn opens_closes_and_opens_again(bus: &impl Bus) {
+    for _ in 0..3 {
+        let mut rig = Rig::new(bus);
+        rig.connect();
+        rig.controller.driver.close();
+        rig.device.driver.close();
+    }
+}
+
+/// Sizes that differ between the ends are named, and nothing is exchanged.
+pub fn refuses_a_peer_with_another_image(bus: &impl Bus) {
+    let clock = Manual::new();
+    let mut device = End::open(&config(bus, "device", ""), &clock);
+    let longer =
+        config(bus, "controller", "") + "[[signal]]\nname = \"more\"\naddress = \"%QD8\"\n";
+    let mut controller = End::open(&longer, &clock);
+    await_that("one end says what differs", || {
+        clock.advance(CYCLE);
+        let said = |end: &End| {
+            end.statistic("state") == "failed" && end.statistic("reason").contains("bytes")
+        };
+        assert_eq!(device.tick().code, Code::Stale);
+        assert_eq!(controller.tick().code, Code::Stale);
+        said(&device) || said(&controller)
+    });
+}
+
+pub fn keeps_several_instances_apart(bus: &impl Bus, other: &impl Bus) {
+    let (mut one, mut two) = (Rig::new(bus), Rig::new(other));
+    one.connect();
+    two.connect();
+    one.controller.set("speed", 1.0);
+    two.controller.set("speed", 2.0);
+    for (rig, speed) in [(&mut one, 1.0), (&mut two, 2.0)] {
+        rig.until("its own value arrives", |rig| {
+            rig.controller.tick();
+            rig.device.tick();
+            rig.device.get("speed") == speed
+        });
+    }
+}
+
+/// The clock stands still, and yet closing ends every thread.
+pub fn closes_while_its_peer_is_silent(bus: &impl Bus) {
+    let clock = Manual::new();
+    let config = Config::parse("driver.cfg", &config(bus, "device", "")).expect("a right file");
+    Driver::open(config, clock).expect("opens").close();
+}
+
+/// Instantiates the suite: a name, and an expression that makes a bus nobody else uses.
+#[macro_export]
+macro_rules! conformance {
+    ($name:ident, $bus:expr) => {
+        mod $name {
+            $crate::conformance!(@tests $bus;
+                opens_and_exchanges_both_ways exchanges_whole_images_only keeps_edges_both_ways
+                keeps_events_in_order is_stale_without_its_peer_and_recovers
+                the_watchdog_bites_when_the_simulation_stops survives_200_peers
+                opens_closes_and_opens_again refuses_a_peer_with_another_image
+                closes_while_its_peer_is_silent
+            );
+
+            #[test]
+            fn keeps_several_instances_apart() {
+                $crate::conformance::keeps_several_instances_apart(&$bus, &$bus);
+            }
+        }
+    };
+    (@tests $bus:expr; $($test:ident)*) => {
+        $(
+            #[test]
+            fn $test() {
+                $crate::conformance::$test(&$bus);
+            }
+        )*
+    };
+}

@@ -1,0 +1,168 @@
+//! The fixture: a Device and a Controller at two ends of a bus, on one manual clock.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tickbus::driver::{Code, Config, Driver, Exchange};
+use tickbus::signal::Slot;
+use tickbus::time::{Manual, Nanos};
+
+/// The signals that both ends share; `{fieldbus}` is the bus's own table.
+const SIGNALS: &str = r#"
+[[signal]]
+name    = "run"
+address = "%QX0.0"
+latch   = "rising"
+
+[[signal]]
+name      = "speed"
+address   = "%QW2"
+type      = "INT"
+fail_safe = -1
+
+[[signal]]
+name      = "echo"
+address   = "%QW4"
+type      = "INT"
+
+[[signal]]
+name    = "sensor"
+address = "%IX0.0"
+latch   = "rising"
+
+[[signal]]
+name      = "position"
+address   = "%IW2"
+type      = "INT"
+fail_safe = 77
+
+[[signal]]
+name      = "copy"
+address   = "%IW4"
+type      = "INT"
+"#;
+
+/// One open driver, with its slots by name.
+pub struct End {
+    pub driver: Driver,
+    pub slots: Vec<Slot>,
+}
+
+impl End {
+    pub fn open(text: &str, clock: &Arc<Manual>) -> Self {
+        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let driver = Driver::open(config, Arc::clone(clock) as _).expect("opens");
+        let slots = driver.initial_slots();
+        Self { driver, slots }
+    }
+
+    fn index(&self, name: &str) -> usize {
+        let signals = &self.driver.config().table.signals;
+        let found = signals.iter().position(|signal| signal.name == name);
+        found.unwrap_or_else(|| panic!("no signal {name}"))
+    }
+
+    #[track_caller]
+    pub fn set(&mut self, name: &str, value: f64) {
+        let index = self.index(name);
+        self.slots[index] = Slot::from_real(value);
+    }
+
+    #[track_caller]
+    pub fn get(&self, name: &str) -> f64 {
+        self.slots[self.index(name)].real()
+    }
+
+    #[track_caller]
+    pub fn edges(&self, name: &str) -> f64 {
+        let slot = self.driver.slots().edges[self.index(name)].expect("a latched signal read here");
+        self.slots[slot].real()
+    }
+
+    pub fn tick(&mut self) -> Exchange {
+        self.driver.exchange(Nanos::ZERO, &mut self.slots)
+    }
+
+    pub fn statistic(&self, key: &str) -> String {
+        let text = self.driver.statistics();
+        let found = text
+            .lines()
+            .find_map(|line| line.strip_prefix(&format!("{key}=")));
+        found
+            .unwrap_or_else(|| panic!("no {key} in {text}"))
+            .to_owned()
+    }
+}
+
+/// How a bus is written into a driver.cfg, for either role.
+pub trait Bus {
+    /// The `[fieldbus]` table of the end with `role`, without `role` and timing.
+    fn fieldbus(&self, role: &str) -> String;
+}
+
+pub struct Rig {
+    pub clock: Arc<Manual>,
+    pub device: End,
+    pub controller: End,
+}
+
+/// The bus cycle of both ends.
+pub const CYCLE: Nanos = Nanos::from_millis(1);
+/// Data older than this are stale.
+pub const MAX_AGE: Nanos = Nanos::from_millis(300);
+
+pub fn config(bus: &impl Bus, role: &str, extra: &str) -> String {
+    format!(
+        "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
+         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n{extra}\n{SIGNALS}",
+        bus.fieldbus(role),
+    )
+}
+
+impl Rig {
+    pub fn new(bus: &impl Bus) -> Self {
+        Self::with(bus, "")
+    }
+
+    /// With further lines in the `[fieldbus]` table of both ends.
+    pub fn with(bus: &impl Bus, extra: &str) -> Self {
+        let clock = Manual::new();
+        let device = End::open(&config(bus, "device", extra), &clock);
+        let controller = End::open(&config(bus, "controller", extra), &clock);
+        Self {
+            clock,
+            device,
+            controller,
+        }
+    }
+
+    /// Lets cycles pass, ticking both ends, until `done` holds.
+    #[track_caller]
+    pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+        await_that(what, || {
+            self.clock.advance(CYCLE);
+            done(self)
+        });
+    }
+
+    /// Until both ends have fresh data.
+    #[track_caller]
+    pub fn connect(&mut self) {
+        let (mut device, mut controller) = (false, false);
+        self.until("both ends connect", |rig| {
+            device |= rig.device.tick().code == Code::Fresh;
+            controller |= rig.controller.tick().code == Code::Fresh;
+            device && controller
+        });
+    }
+}
+
+/// Looks again and again, giving the bus threads the processor, until `done` holds.
+#[track_caller]
+pub fn await_that(what: &str, mut done: impl FnMut() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(20);
+    while !done() {
+        assert!(Instant::now() < limit, "waited 20 s in vain until {what}");
+        std::thread::yield_now();
+    }
+}

@@ -1,0 +1,33 @@
+//! The native library, looked at as a JVM looks at it: by the names that it exports.
+#![allow(unsafe_code, reason = "a library is loaded")]
+
+use std::path::PathBuf;
+
+use libloading::Library;
+
+/// The cdylib that cargo built for this test, beside or above the test's own program.
+fn cdylib() -> PathBuf {
+    let name = libloading::library_filename("tickbus");
+    let test = std::env::current_exe().expect("a test has a path");
+    let places: Vec<_> = test.ancestors().skip(1).take(2).map(|dir| dir.join(&name)).collect();
+    let found = places.iter().find(|place| place.exists());
+    found.unwrap_or_else(|| panic!("no {} in {places:?}", name.display())).clone()
+}
+
+#[test]
+fn the_native_methods_of_tickbus_are_exported() {
+    // SAFETY: our own library; its initialisers are those of the Rust runtime.
+    let library = unsafe { Library::new(cdylib()) }.expect("loads");
+    for name in [
+        "JNI_OnLoad",
+        "Java_tickbus_Tickbus_initializeNative",
+        "Java_tickbus_Tickbus_xChangeData",
+        "Java_tickbus_Tickbus_finalizeNative",
+        "Java_tickbus_Tickbus_statisticsNative",
+        "Java_tickbus_Tickbus_eventsNative",
+    ] {
+        // SAFETY: the symbol is looked up, and never called.
+        let symbol = unsafe { library.get::<unsafe extern "C" fn()>(name) };
+        assert!(symbol.is_ok(), "{name} is not exported");
+    }
+}

@@ -1,0 +1,124 @@
+//! The loopback: the conformance suite, and what is its own.
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    clippy::float_cmp,
+    reason = "tests; the values are small whole numbers"
+)]
+
+mod conformance;
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use conformance::rig::{Bus, End, Rig, await_that, config};
+use tickbus::driver::Code;
+use tickbus::time::{Manual, Nanos};
+
+/// A link name of its own for every test.
+struct Link(String);
+
+impl Link {
+    fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        Self(format!("test-{}", NEXT.fetch_add(1, Ordering::Relaxed)))
+    }
+}
+
+impl Bus for Link {
+    fn fieldbus(&self, _role: &str) -> String {
+        format!("kind = \"loopback\"\nlink = \"{}\"", self.0)
+    }
+}
+
+conformance!(free, crate::Link::new());
+
+#[test]
+fn a_second_device_on_one_link_is_told_so() {
+    let (link, clock) = (Link::new(), Manual::new());
+    let first = End::open(&config(&link, "device", ""), &clock);
+    await_that("the first is on the link", || {
+        first.statistic("reason").contains("waiting")
+    });
+    let mut second = End::open(&config(&link, "device", ""), &clock);
+    await_that("the second is told", || {
+        second.statistic("reason").contains("already has a device")
+    });
+    assert_eq!(second.tick().code, Code::Stale);
+    first.driver.close();
+    await_that("the second takes the place", || {
+        clock.advance(Nanos::from_millis(1));
+        second.statistic("reason").contains("waiting")
+    });
+}
+
+#[test]
+fn stepped_ends_exchange_on_their_own_ticks() {
+    let mut rig = Rig::with(&Link::new(), "mode = \"stepped\"");
+    assert_eq!(rig.device.tick().code, Code::Stale);
+    rig.controller.set("speed", 3.0);
+    rig.controller.tick();
+    assert_eq!(rig.device.tick().code, Code::Fresh);
+    assert_eq!(rig.device.get("speed"), 3.0);
+    assert_eq!(rig.device.tick().code, Code::Unchanged);
+    rig.device.set("position", 4.0);
+    rig.device.tick();
+    rig.controller.tick();
+    assert_eq!(rig.controller.get("position"), 4.0);
+}
+
+/// A hosted program behind the link, scanned by the tick.
+fn mirror(mode: &str, clock: &std::sync::Arc<Manual>) -> End {
+    let fieldbus = format!(
+        "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"10ms\"\ncycle = \"1ms\"\nmode = \"{mode}\"",
+    );
+    let text = format!(
+        "[driver]\nid = 1\nname = \"mirror\"\n[fieldbus]\n{fieldbus}\n\
+         [[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\nlatch = \"rising\"\n\
+         [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\nlatch = \"rising\"\n",
+    );
+    End::open(&text, clock)
+}
+
+#[test]
+fn a_stepped_program_scans_on_simulation_time() {
+    let mut end = mirror("stepped", &Manual::new());
+    let mut seen = String::new();
+    for tick in 0..30 {
+        // A pulse of one tick, between two scans.
+        end.set("in", if tick == 13 { 1.0 } else { 0.0 });
+        let exchange = end
+            .driver
+            .exchange(Nanos::from_millis(tick), &mut end.slots);
+        assert_eq!(exchange.code, Code::Fresh);
+        assert_eq!(exchange.granted, Nanos::from_millis((tick / 10 + 1) * 10));
+        seen.push(if end.get("out") == 1.0 { '1' } else { '0' });
+    }
+    assert_eq!(
+        seen, "000000000000000000001111111111",
+        "held until a scan has seen it"
+    );
+    assert_eq!(end.statistic("plc.scans"), "3");
+    assert_eq!(end.statistic("plc.rises.in"), "1");
+    assert_eq!(end.statistic("plc.rises.out"), "1");
+}
+
+#[test]
+fn a_free_program_scans_on_the_clock() {
+    let clock = Manual::new();
+    let mut end = mirror("free", &clock);
+    for pulses in 1..=5_u32 {
+        end.set("in", 1.0);
+        end.tick();
+        end.set("in", 0.0);
+        end.tick();
+        let mut edges = 0.0;
+        await_that("the pulse comes back and goes", || {
+            clock.advance(Nanos::from_millis(1));
+            end.tick();
+            edges += end.edges("out");
+            edges > 0.0 && end.get("out") == 0.0
+        });
+        assert_eq!(end.statistic("plc.rises.in"), pulses.to_string());
+        assert_eq!(end.statistic("plc.rises.out"), pulses.to_string());
+    }
+}

@@ -1,0 +1,110 @@
+//! The tick allocates nothing: counted by the allocator of this program.
+#![allow(unsafe_code, reason = "a global allocator that counts")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+use tickbus::driver::{Config, Driver};
+use tickbus::signal::Slot;
+use tickbus::time::{Manual, Nanos};
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: everything is handed on to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller's promises are those of `System`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Every type in both directions, latched bits that move, values that saturate, a NaN.
+fn config(fieldbus: &str) -> Config {
+    use std::fmt::Write as _;
+
+    let mut text = format!("[driver]\nid = 1\nname = \"all\"\n[fieldbus]\n{fieldbus}\n");
+    for (area, latch) in [('Q', "both"), ('I', "rising")] {
+        for bit in 0..16 {
+            let (byte, bit) = (bit / 8, bit % 8);
+            write!(
+                text,
+                "[[signal]]\nname = \"{area} bit {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\nlatch = \"{latch}\"\n"
+            )
+            .expect("a string takes all");
+        }
+        let types =
+            ["BYTE", "SINT", "WORD", "INT", "DWORD", "DINT", "REAL", "LWORD", "LINT", "LREAL"];
+        let sizes = [1, 1, 2, 2, 4, 4, 4, 8, 8, 8];
+        let letters = ['B', 'B', 'W', 'W', 'D', 'D', 'D', 'L', 'L', 'L'];
+        let mut byte = 8;
+        for ((data_type, size), letter) in types.into_iter().zip(sizes).zip(letters) {
+            write!(
+                text,
+                "[[signal]]\nname = \"{area} {data_type}\"\naddress = \"%{area}{letter}{byte}\"\ntype = \"{data_type}\"\n"
+            )
+            .expect("a string takes all");
+            byte += size;
+        }
+    }
+    Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
+}
+
+/// Ticks with moving values; gives the allocations of 10,000 ticks after a warm-up.
+fn allocations(fieldbus: &str) -> u64 {
+    let clock = Manual::new();
+    let mut driver = Driver::open(config(fieldbus), Arc::clone(&clock) as _).expect("opens");
+    let mut slots = driver.initial_slots();
+    let mut before = 0;
+    for tick in 0..11_000_i32 {
+        if tick == 1_000 {
+            before = ALLOCATIONS.get();
+        }
+        for (index, slot) in slots.iter_mut().enumerate().take(52) {
+            let value = if (tick + i32::try_from(index).expect("small")) % 97 == 0 {
+                f64::NAN
+            } else {
+                f64::from(tick) * 1e3
+            };
+            *slot = Slot::from_real(value);
+        }
+        driver.exchange(Nanos::from_millis(tick.into()), &mut slots);
+    }
+    ALLOCATIONS.get() - before
+}
+
+#[test]
+fn a_free_bus() {
+    assert_eq!(allocations("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\""), 0);
+}
+
+#[test]
+fn a_stepped_bus_with_its_program() {
+    let fieldbus = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"\nmode = \"stepped\"";
+    assert_eq!(allocations(fieldbus), 0);
+}
+
+#[test]
+fn a_link_whose_other_end_is_absent() {
+    assert_eq!(allocations("kind = \"loopback\"\nlink = \"nobody\""), 0);
+}
+
+#[test]
+fn the_counter_counts() {
+    let before = ALLOCATIONS.get();
+    drop(std::hint::black_box(Box::new(1)));
+    assert_eq!(ALLOCATIONS.get() - before, 1);
+}

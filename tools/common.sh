@@ -1,0 +1,70 @@
+# shellcheck shell=bash
+# What the scripts of this folder share; they source it.
+
+set -euo pipefail
+
+ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$ROOT"
+
+# A failure of this project's own checks: what happened, and what to do.
+die() {
+    printf '%s: %s\n' "$(basename "$0")" "$*" >&2
+    exit 1
+}
+
+have() {
+    command -v "$1" >/dev/null 2>&1
+}
+
+# at_least 1.88 1.95.0: whether the second version is no older than the first.
+at_least() {
+    [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
+}
+
+# The project's version, as Cargo.toml has it.
+version() {
+    sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1
+}
+
+# Operating system and processor as the Java library names them, such as linux-x86_64.
+platform() {
+    local system processor
+    case "$(uname -s)" in
+        Linux) system=linux ;;
+        Darwin) system=macos ;;
+        MINGW* | MSYS* | CYGWIN*) system=windows ;;
+        *) system=$(uname -s | tr '[:upper:]' '[:lower:]') ;;
+    esac
+    case "$(uname -m)" in
+        x86_64 | amd64) processor=x86_64 ;;
+        aarch64 | arm64) processor=aarch64 ;;
+        *) processor=$(uname -m) ;;
+    esac
+    printf '%s-%s\n' "$system" "$processor"
+}
+
+# The native library's file name on this system.
+native_library() {
+    case "$(platform)" in
+        windows-*) echo tickbus.dll ;;
+        macos-*) echo libtickbus.dylib ;;
+        *) echo libtickbus.so ;;
+    esac
+}
+
+# Maven, without its chatter, on the Java reactor.
+maven() {
+    mvn -q -B -ntp -f java "$@"
+}
+
+# Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver and a driver.cfg) and
+# simulator/ (the simulator and the rig's control table). Needs what tools/build makes.
+assemble() {
+    local folder=$1 release
+    release=$(version)
+    rm -rf "$folder/DeviceDriver" "$folder/simulator"
+    mkdir -p "$folder/DeviceDriver" "$folder/simulator"
+    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$folder/DeviceDriver/"
+    cp java/simulator/rig.table "java/simulator/target/simulator-$release.jar" \
+        "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
+}

@@ -460,6 +460,33 @@ mod tests {
     }
 
     #[test]
+    fn every_hosted_program_can_be_named_with_its_options() {
+        let option = "program_options = { la1_code = \"lsb-first\" }";
+        let with_options = crate::plc::PROGRAMS.map(|name| (name, ""));
+        for (name, option) in with_options.into_iter().chain([("rig", option)]) {
+            let head = HEAD.replace(
+                "link = \"cell\"",
+                &format!("program = \"{name}\"\n{option}"),
+            );
+            let config = Config::parse("test.cfg", &format!("{head}input_bytes = 1\n"))
+                .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+            let Options::Loopback(loopback::Options {
+                peer: Peer::Program { name, options, .. },
+                ..
+            }) = config.bus
+            else {
+                panic!("a hosted program");
+            };
+            assert_eq!(
+                crate::plc::program(&name, &options)
+                    .expect("a program")
+                    .name(),
+                name
+            );
+        }
+    }
+
+    #[test]
     fn latches_hold() {
         let signal = signal("address = \"%IX0.0\"\nlatch = \"falling\"\nhold = \"20ms\"");
         assert_eq!(

@@ -6,7 +6,7 @@
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-demo: setup ## build, then watch the PLC program run the rig: three cycles, one jam
+demo: ## build, then watch the PLC program run the rig: three cycles, one jam
 	@exec tools/demo
 
 test: setup ## build and test everything that CI checks

@@ -56,3 +56,15 @@ native_library() {
 maven() {
     mvn -q -B -ntp -f java "$@"
 }
+
+# Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver and a driver.cfg) and
+# simulator/ (the simulator and the rig's control table). Needs what tools/build makes.
+assemble() {
+    local folder=$1 release
+    release=$(version)
+    rm -rf "$folder/DeviceDriver" "$folder/simulator"
+    mkdir -p "$folder/DeviceDriver" "$folder/simulator"
+    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$folder/DeviceDriver/"
+    cp java/simulator/rig.table "java/simulator/target/simulator-$release.jar" \
+        "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
+}

@@ -55,12 +55,31 @@ impl Octet {
     }
 }
 
-impl Run for Octets {
-    fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+impl Octets {
+    /// Encodes values of which some are neither 0.0 nor 1.0.
+    #[cold]
+    #[inline(never)]
+    fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
         for octet in &self.0 {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                frame[octet.byte as usize] = pack(slots, octet.fail_safe, conversions);
+                frame[octet.byte as usize] = pack_any(slots, octet.fail_safe, conversions);
             }
+        }
+    }
+}
+
+impl Run for Octets {
+    fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+        let mut others = 0;
+        for octet in &self.0 {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
+                let (byte, other) = pack(slots);
+                frame[octet.byte as usize] = byte;
+                others |= other;
+            }
+        }
+        if others != 0 {
+            self.encode_any(slots, frame, conversions);
         }
     }
 
@@ -153,22 +172,13 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0.
-fn pack(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
-    // Nearly always every slot is exactly 0.0 or 1.0. The bits 52 to 61 of 1.0 are all set and no
-    // other is, so the bit for place n of the byte can be cut out of slot n at 52 + n. The two lanes
-    // let the compiler use the registers that every 64-bit processor has for two integers.
+/// Eight slots as one byte, the first slot as bit 0, and zero if the slots are all 0.0 or 1.0; if
+/// they are not, the byte is wrong.
+fn pack(slots: &[Slot; 8]) -> (u8, u64) {
+    // The bits 52 to 61 of 1.0 are all set and no other is, so the bit for place n of the byte can be
+    // cut out of slot n at 52 + n. Two lanes, because every 64-bit processor has registers for two
+    // integers.
     const ONE: u64 = 1.0_f64.to_bits();
-    const CUTS: [u64; 8] = [
-        1 << 52,
-        2 << 52,
-        4 << 52,
-        8 << 52,
-        16 << 52,
-        32 << 52,
-        64 << 52,
-        128 << 52,
-    ];
     const NEIGHBOURS_IN_ONE: u64 = ONE & ONE << 1;
     let mut cut = [0; 2];
     let mut set = [0; 2];
@@ -176,30 +186,23 @@ fn pack(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
     for place in (0..8).step_by(2) {
         for lane in 0..2 {
             let bits = slots[place + lane].0;
-            cut[lane] |= bits & CUTS[place + lane];
+            cut[lane] |= bits & 1 << (52 + place + lane);
             set[lane] |= bits;
             changes[lane] |= bits ^ bits << 1;
         }
     }
-    let nothing_else = (set[0] | set[1]) & !ONE == 0;
-    let all_or_none = (changes[0] | changes[1]) & NEIGHBOURS_IN_ONE == 0;
-    if nothing_else && all_or_none {
-        ((cut[0] | cut[1]) >> 52).to_le_bytes()[0]
-    } else {
-        pack_any(slots, fail_safe, conversions)
-    }
+    let [byte, ..] = ((cut[0] | cut[1]) >> 52).to_le_bytes();
+    let elsewhere = (set[0] | set[1]) & !ONE;
+    let incomplete = (changes[0] | changes[1]) & NEIGHBOURS_IN_ONE;
+    (byte, elsewhere | incomplete)
 }
 
 /// The same for any values; NaN slots take their bit from `fail_safe` and are counted.
-#[cold]
-#[inline(never)]
 fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
-    let mut byte = 0;
-    for (bit, slot) in slots.iter().enumerate() {
+    (0..8).zip(slots).fold(0, |byte, (bit, slot)| {
         let fail_safe = fail_safe >> bit & 1 == 1;
-        byte |= u8::from(high(*slot, fail_safe, conversions)) << bit;
-    }
-    byte
+        byte | u8::from(high(*slot, fail_safe, conversions)) << bit
+    })
 }
 
 /// The slots of four bits, the first of bit 0.

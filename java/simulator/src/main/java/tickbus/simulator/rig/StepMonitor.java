@@ -20,6 +20,10 @@ final class StepMonitor {
     private State state = State.OVER;
     private int pattern;
     private int step;
+
+    /** The step completed last; 0 after a fault, when no cycle is under way. */
+    private int previous;
+
     private long cycles;
     private boolean lampWrong;
     private long lampErrors;
@@ -39,20 +43,27 @@ final class StepMonitor {
             state = State.WAITING;
         } else if (state == State.WAITING && step > 0 && !busy) {
             state = State.COMPLETE;
-            if (step == STEPS) {
+            if (step == STEPS && previous == STEPS - 1) {
                 cycles++;
             }
+            previous = step;
         } else if (state == State.COMPLETE && acknowledge) {
             state = State.OVER;
         }
         if (fault) {
             state = State.OVER;
+            previous = 0;
         }
     }
 
-    /** Compares the lamp with the commanded motion of lift 2, which it must mirror within a step. */
+    /**
+     * Compares the lamp with the commanded motion of lift 2, which it must mirror within a cycle.
+     *
+     * <p>The word of a homing with both cups on is that of step 6, so a step counts only where its turn has come.
+     */
     void lamp(boolean lamp, boolean lift2Runs) {
-        boolean wrong = step > 0 && lamp != lift2Runs;
+        boolean inTurn = step > 0 && (step == previous || step == previous % STEPS + 1);
+        boolean wrong = inTurn && lamp != lift2Runs;
         if (wrong && !lampWrong) {
             lampErrors++;
         }

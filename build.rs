@@ -6,6 +6,9 @@ use std::{env, fs};
 
 const TABLE: &str = "src/driver/status.tsv";
 
+/// What a row has in one of its columns.
+type Column = for<'r> fn(&'r Row<'_>) -> &'r str;
+
 struct Row<'a> {
     code: i32,
     name: &'a str,
@@ -66,8 +69,21 @@ fn row(at: usize, line: &str) -> Row<'_> {
 /// `NOT_OPEN` as `NotOpen`.
 fn variant(name: &str) -> String {
     name.split('_')
-        .map(|word| format!("{}{}", &word[..1], word[1..].to_ascii_lowercase()))
+        .flat_map(|word| [word[..1].to_owned(), word[1..].to_ascii_lowercase()])
         .collect()
+}
+
+/// Text for a doc comment, with names from configuration files marked as code.
+fn marked(text: &str) -> String {
+    let words = text.split(' ').map(|word| {
+        let name = word.trim_end_matches([';', ',', ':']);
+        if name.contains('_') {
+            format!("`{name}`{}", &word[name.len()..])
+        } else {
+            word.to_owned()
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
 }
 
 fn generate(rows: &[Row<'_>]) -> String {
@@ -81,7 +97,7 @@ fn generate(rows: &[Row<'_>]) -> String {
     );
     let mut write = |line: &str| writeln!(text, "{line}").expect("a string takes all");
     for row in rows {
-        write(&format!("    /// {}: {}.", row.name, row.text));
+        write(&format!("    /// `{}`: {}.", row.name, marked(row.text)));
         write(&format!("    {} = {},", variant(row.name), row.code));
     }
     write("}\n\nimpl Code {");
@@ -95,14 +111,14 @@ fn generate(rows: &[Row<'_>]) -> String {
         rows.len(),
         all.join(", ")
     ));
-    let columns: [(&str, &str, fn(&Row<'_>) -> String); 3] = [
+    let columns: [(&str, &str, Column); 3] = [
         (
             "name",
             "Its name, as the Java enum `tickbus.Status` spells it.",
-            |row| row.name.into(),
+            |row| row.name,
         ),
-        ("text", "What it means.", |row| row.text.into()),
-        ("remedy", "What to do about it.", |row| row.remedy.into()),
+        ("text", "What it means.", |row| row.text),
+        ("remedy", "What to do about it.", |row| row.remedy),
     ];
     for (function, doc, field) in columns {
         write(&format!("\n    /// {doc}"));

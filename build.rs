@@ -6,15 +6,15 @@ use std::{env, fs};
 
 const TABLE: &str = "src/driver/status.tsv";
 
+/// What a row has in one of its columns.
+type Column = for<'r> fn(&'r Row<'_>) -> &'r str;
+
 struct Row<'a> {
     code: i32,
     name: &'a str,
     text: &'a str,
     remedy: &'a str,
 }
-
-/// A function of the enum: its name, its documentation, and the field that it gives.
-type Column = (&'static str, &'static str, for<'a> fn(&Row<'a>) -> &'a str);
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -68,10 +68,22 @@ fn row(at: usize, line: &str) -> Row<'_> {
 
 /// `NOT_OPEN` as `NotOpen`.
 fn variant(name: &str) -> String {
-    let words = name.split('_');
-    words
+    name.split('_')
         .flat_map(|word| [word[..1].to_owned(), word[1..].to_ascii_lowercase()])
         .collect()
+}
+
+/// Text for a doc comment, with names from configuration files marked as code.
+fn marked(text: &str) -> String {
+    let words = text.split(' ').map(|word| {
+        let name = word.trim_end_matches([';', ',', ':']);
+        if name.contains('_') {
+            format!("`{name}`{}", &word[name.len()..])
+        } else {
+            word.to_owned()
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
 }
 
 fn generate(rows: &[Row<'_>]) -> String {
@@ -85,7 +97,7 @@ fn generate(rows: &[Row<'_>]) -> String {
     );
     let mut write = |line: &str| writeln!(text, "{line}").expect("a string takes all");
     for row in rows {
-        write(&format!("    /// {}: {}.", row.name, row.text));
+        write(&format!("    /// `{}`: {}.", row.name, marked(row.text)));
         write(&format!("    {} = {},", variant(row.name), row.code));
     }
     write("}\n\nimpl Code {");
@@ -99,7 +111,7 @@ fn generate(rows: &[Row<'_>]) -> String {
         rows.len(),
         all.join(", ")
     ));
-    let columns: [Column; 3] = [
+    let columns: [(&str, &str, Column); 3] = [
         (
             "name",
             "Its name, as the Java enum `tickbus.Status` spells it.",

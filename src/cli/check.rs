@@ -106,28 +106,27 @@ fn role(config: &Config) -> &'static str {
 
 fn bus(options: &Options) -> String {
     let Options::Loopback(loopback::Options { mode, peer, events }) = options;
-    let mut text = options.kind().to_owned();
-    text.push_str(match mode {
-        loopback::Mode::Free => ", free-running",
-        loopback::Mode::Stepped => ", stepped by the simulation",
-    });
+    let mode = match mode {
+        loopback::Mode::Free => "free-running",
+        loopback::Mode::Stepped => "stepped by the simulation",
+    };
+    let mut parts = vec![options.kind().to_owned(), mode.to_owned()];
     match peer {
-        loopback::Peer::Link(name) => text.push_str(&format!(", link \"{name}\"")),
+        loopback::Peer::Link(name) => parts.push(format!("link \"{name}\"")),
         loopback::Peer::Program {
             name,
             options,
             scan,
         } => {
-            text.push_str(&format!(", hosts the PLC program \"{name}\", scan {scan}"));
-            for (key, value) in options {
-                text.push_str(&format!(", {key} {value}"));
-            }
+            parts.push(format!("hosts the PLC program \"{name}\""));
+            parts.push(format!("scan {scan}"));
+            parts.extend(options.iter().map(|(key, value)| format!("{key} {value}")));
         }
     }
     if *events {
-        text.push_str(", with events");
+        parts.push("with events".to_owned());
     }
-    text
+    parts.join(", ")
 }
 
 fn timing(timing: &Timing) -> String {

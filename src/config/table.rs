@@ -52,11 +52,11 @@ impl<'a> Table<'a> {
     /// The value of `key`, if it is there.
     pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
         self.known.push(key);
-        let (_, value) = self.entries.get_key_value(key)?;
+        let node = self.entries.get(key)?;
         Some(Value {
             collector: self.collector,
             key: format!("\"{key}\""),
-            value,
+            node,
         })
     }
 
@@ -79,14 +79,14 @@ impl<'a> Table<'a> {
     /// All keys with their values, whatever they are called.
     pub fn all(&self) -> impl Iterator<Item = (&'a str, Value<'a>)> + use<'a> {
         let collector = self.collector;
-        self.entries.iter().map(move |(key, value)| {
+        self.entries.iter().map(move |(key, node)| {
             let key = key.get_ref().as_ref();
             (
                 key,
                 Value {
                     collector,
                     key: format!("\"{}\"", shown(key)),
-                    value,
+                    node,
                 },
             )
         })
@@ -169,13 +169,13 @@ impl<'a> Table<'a> {
 pub struct Value<'a> {
     collector: &'a Collector<'a>,
     key: String,
-    value: &'a Spanned<DeValue<'a>>,
+    node: &'a Spanned<DeValue<'a>>,
 }
 
 impl<'a> Value<'a> {
     /// Byte offset of its beginning.
     pub fn at(&self) -> usize {
-        self.value.span().start
+        self.node.span().start
     }
 
     /// The line, from 1, where it begins.
@@ -190,17 +190,17 @@ impl<'a> Value<'a> {
 
     /// The value is a boolean.
     pub fn is_boolean(&self) -> bool {
-        matches!(self.value.get_ref(), DeValue::Boolean(_))
+        matches!(self.node.get_ref(), DeValue::Boolean(_))
     }
 
     /// The value is an integer.
     pub fn is_integer(&self) -> bool {
-        matches!(self.value.get_ref(), DeValue::Integer(_))
+        matches!(self.node.get_ref(), DeValue::Integer(_))
     }
 
     /// A number as it is written; empty for everything else.
     pub fn written(&self) -> String {
-        match self.value.get_ref() {
+        match self.node.get_ref() {
             DeValue::Integer(digits) => shown(&digits.to_string()),
             DeValue::Float(digits) => shown(digits.as_str()),
             _ => String::new(),
@@ -209,7 +209,7 @@ impl<'a> Value<'a> {
 
     /// A text.
     pub fn text(&self, right: &str) -> Option<&'a str> {
-        match self.value.get_ref() {
+        match self.node.get_ref() {
             DeValue::String(text) => Some(text),
             _ => self.of_wrong_kind(right),
         }
@@ -248,7 +248,7 @@ impl<'a> Value<'a> {
 
     /// A boolean.
     pub fn boolean(&self) -> Option<bool> {
-        match self.value.get_ref() {
+        match self.node.get_ref() {
             DeValue::Boolean(value) => Some(*value),
             _ => self.of_wrong_kind("write true or false"),
         }
@@ -261,7 +261,7 @@ impl<'a> Value<'a> {
             range.start(),
             range.end()
         );
-        let DeValue::Integer(digits) = self.value.get_ref() else {
+        let DeValue::Integer(digits) = self.node.get_ref() else {
             return self.of_wrong_kind(&right);
         };
         let number = i128::from_str_radix(digits.as_str(), digits.radix()).ok();
@@ -277,7 +277,7 @@ impl<'a> Value<'a> {
 
     /// A finite number, with or without a fraction.
     pub fn number(&self, right: &str) -> Option<f64> {
-        let number = match self.value.get_ref() {
+        let number = match self.node.get_ref() {
             #[expect(clippy::cast_precision_loss, reason = "asked for as a double")]
             DeValue::Integer(digits) => i128::from_str_radix(digits.as_str(), digits.radix())
                 .ok()
@@ -335,7 +335,7 @@ impl<'a> Value<'a> {
 
     /// The elements of a list.
     pub fn list(&self, right: &str) -> Option<Vec<Self>> {
-        match self.value.get_ref() {
+        match self.node.get_ref() {
             DeValue::Array(list) => Some(self.elements(list)),
             _ => self.of_wrong_kind(right),
         }
@@ -343,7 +343,7 @@ impl<'a> Value<'a> {
 
     /// A table, which messages call `title`.
     pub fn table(&self, title: &str, right: &str) -> Option<Table<'a>> {
-        match self.value.get_ref() {
+        match self.node.get_ref() {
             DeValue::Table(entries) => Some(self.as_table(title, entries)),
             _ => self.of_wrong_kind(right),
         }
@@ -352,7 +352,7 @@ impl<'a> Value<'a> {
     /// All tables of a list of tables, which stand in the text under `title`, such as `[[signal]]`.
     pub fn tables(&self, title: &str) -> Vec<Table<'a>> {
         let right = format!("write {title} tables");
-        match self.value.get_ref() {
+        match self.node.get_ref() {
             DeValue::Array(list) => self
                 .elements(list)
                 .iter()
@@ -373,12 +373,12 @@ impl<'a> Value<'a> {
     }
 
     fn elements(&self, list: &'a toml::de::DeArray<'a>) -> Vec<Self> {
-        let element = |(index, value)| {
+        let element = |(index, node)| {
             let key = format!("element {} of {}", index + 1, self.key);
             Self {
                 collector: self.collector,
                 key,
-                value,
+                node,
             }
         };
         list.iter().enumerate().map(element).collect()
@@ -390,7 +390,7 @@ impl<'a> Value<'a> {
     }
 
     fn of_wrong_kind<T>(&self, right: &str) -> Option<T> {
-        let kind = match self.value.get_ref() {
+        let kind = match self.node.get_ref() {
             DeValue::String(_) => "a text",
             DeValue::Integer(_) => "a whole number",
             DeValue::Float(_) => "a number with a fraction",

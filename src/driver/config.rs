@@ -226,13 +226,12 @@ fn read_fieldbus(mut table: Table<'_>) -> FieldbusTable<'_> {
     let role = role
         .and_then(|value| value.choice("roles", &Role::ALL.map(|role| (role.name(), role))))
         .unwrap_or_default();
-    let bus = match kind {
-        Some(kind) => Options::read(&kind, role, table),
-        None => {
-            // Which keys a bus knows cannot be told without its kind; a misspelt one can.
-            table.finish_open();
-            None
-        }
+    let bus = if let Some(kind) = kind {
+        Options::read(&kind, role, table)
+    } else {
+        // Which keys are right cannot be told without the bus kind.
+        table.finish_open();
+        None
     };
     FieldbusTable {
         role,
@@ -461,6 +460,33 @@ mod tests {
     }
 
     #[test]
+    fn every_hosted_program_can_be_named_with_its_options() {
+        let option = "program_options = { la1_code = \"lsb-first\" }";
+        let with_options = crate::plc::PROGRAMS.map(|name| (name, ""));
+        for (name, option) in with_options.into_iter().chain([("rig", option)]) {
+            let head = HEAD.replace(
+                "link = \"cell\"",
+                &format!("program = \"{name}\"\n{option}"),
+            );
+            let config = Config::parse("test.cfg", &format!("{head}input_bytes = 1\n"))
+                .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+            let Options::Loopback(loopback::Options {
+                peer: Peer::Program { name, options, .. },
+                ..
+            }) = config.bus
+            else {
+                panic!("a hosted program");
+            };
+            assert_eq!(
+                crate::plc::program(&name, &options)
+                    .expect("a program")
+                    .name(),
+                name
+            );
+        }
+    }
+
+    #[test]
     fn latches_hold() {
         let signal = signal("address = \"%IX0.0\"\nlatch = \"falling\"\nhold = \"20ms\"");
         assert_eq!(
@@ -489,12 +515,11 @@ mod tests {
 
     #[test]
     fn a_thousand_mistakes_are_told_in_no_time() {
-        let mut text = HEAD.to_owned();
-        for number in 0..1000 {
-            text.push_str(&format!(
-                "[[signal]]\nname = \"S{number}\"\naddress = \"%QX0.0\"\nhold = x\n"
-            ));
-        }
+        let section = |number: i32| {
+            format!("[[signal]]\nname = \"S{number}\"\naddress = \"%QX0.0\"\nhold = x\n")
+        };
+        let sections = (0..1000).map(section);
+        let text: String = std::iter::once(HEAD.to_owned()).chain(sections).collect();
         let mistakes = Config::parse("test.cfg", &text).expect_err("mistakes");
         assert_eq!(mistakes.len(), 1000);
     }

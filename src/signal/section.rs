@@ -40,7 +40,7 @@ impl Section<'_> {
 }
 
 /// Reads one section and reports its mistakes; `None` when it cannot be placed in the image.
-pub fn read<'a>(mut table: Table<'a>, addressing: Addressing) -> Option<Section<'a>> {
+pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>> {
     let name = table.require("name", "give the signal a name of its own");
     let address = table.require("address", "write one such as \"%QX1.0\" or \"%IW4\"");
     let type_ = table.take("type");
@@ -99,7 +99,8 @@ pub fn read<'a>(mut table: Table<'a>, addressing: Addressing) -> Option<Section<
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
     };
-    let hold = hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched));
+    let hold =
+        hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched.is_some()));
     let signal = Signal {
         hold: hold.unwrap_or_default(),
         ..signal
@@ -267,18 +268,13 @@ fn fitting_latch(value: &Value<'_>, latch: Latch, data_type: DataType) -> Option
     Some(latch)
 }
 
-fn fitting_hold(
-    value: &Value<'_>,
-    hold: Nanos,
-    signal: &Signal,
-    latch: Option<Option<Latch>>,
-) -> Option<Nanos> {
+fn fitting_hold(value: &Value<'_>, hold: Nanos, signal: &Signal, latched: bool) -> Option<Nanos> {
     if signal.area == Area::Output {
         value.wrong(
             format!("\"hold\" stands at a {} signal", signal.area),
             "remove it; it lengthens the pulses that the simulation sends, on %I",
         );
-    } else if latch.is_none() {
+    } else if !latched {
         value.wrong(
             "\"hold\" stands without \"latch\"",
             "add latch = \"rising\", or remove \"hold\"",
@@ -319,6 +315,10 @@ fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
         raw_pair.map(|(number, _)| number),
         pair.map(|(number, _)| number),
     );
+    #[expect(
+        clippy::float_cmp,
+        reason = "equal to the last bit is what divides by zero"
+    )]
     let equal = |numbers: [f64; 2]| numbers[0] == numbers[1];
     if equal(raw_numbers) {
         raw.wrong(
@@ -439,11 +439,13 @@ fn fail_safe_bit(value: &Value<'_>) -> Option<Slot> {
             .map(|on| Slot::from_real(f64::from(u8::from(on))));
     }
     let number = value.number(RIGHT)?;
-    if number == 0.0 || number == 1.0 {
-        return Some(Slot::from_real(number.abs()));
+    let fitting = [0.0, 1.0]
+        .into_iter()
+        .find(|bit: &f64| bit.total_cmp(&number).is_eq());
+    if fitting.is_none() {
+        value.wrong(format!("fail_safe {} does not fit", value.written()), RIGHT);
     }
-    value.wrong(format!("fail_safe {} does not fit", value.written()), RIGHT);
-    None
+    fitting.map(Slot::from_real)
 }
 
 /// An unscaled integer, exact to the last bit.

@@ -10,8 +10,11 @@ const SCAN: Nanos = Nanos::from_millis(10);
 /// The longest name of a link, in characters.
 const LINK_LIMIT: usize = 120;
 
-/// The hosted programs, each with its options and their values.
-const PROGRAMS: [(&str, &[(&str, &[&str])]); 2] = [
+/// The options of a program, each with the values that it takes.
+type Choices = &'static [(&'static str, &'static [&'static str])];
+
+/// The hosted programs.
+const PROGRAMS: [(&str, Choices); 2] = [
     ("rig", &[("la1_code", &["msb-first", "lsb-first"])]),
     ("mirror", &[]),
 ];
@@ -140,10 +143,7 @@ fn read_program(
     })
 }
 
-fn read_options(
-    table: &Table<'_>,
-    known: &[(&'static str, &[&'static str])],
-) -> Option<Vec<(String, String)>> {
+fn read_options(table: &Table<'_>, known: Choices) -> Option<Vec<(String, String)>> {
     let mut read = Some(Vec::new());
     for (key, value) in table.all() {
         let Some((_, choices)) = known.iter().find(|(known, _)| *known == key) else {

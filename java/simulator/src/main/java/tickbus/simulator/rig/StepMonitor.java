@@ -43,10 +43,10 @@ final class StepMonitor {
             state = State.WAITING;
         } else if (state == State.WAITING && step > 0 && !busy) {
             state = State.COMPLETE;
-            if (step == STEPS && previous == STEPS - 1) {
+            if (inTurn() && step == STEPS) {
                 cycles++;
             }
-            previous = step;
+            previous = inTurn() ? step : 0;
         } else if (state == State.COMPLETE && acknowledge) {
             state = State.OVER;
         }
@@ -57,13 +57,16 @@ final class StepMonitor {
     }
 
     /**
-     * Compares the lamp with the commanded motion of lift 2, which it must mirror within a cycle.
-     *
-     * <p>The word of a homing with both cups on is that of step 6, so a step counts only where its turn has come.
+     * Whether the present step belongs to a cycle. The word of a homing with both cups on is that of step 6, so a
+     * step counts only where its turn has come.
      */
+    private boolean inTurn() {
+        return step > 0 && (step == previous || step == previous % STEPS + 1);
+    }
+
+    /** Compares the lamp with the commanded motion of lift 2, which it must mirror within a cycle. */
     void lamp(boolean lamp, boolean lift2Runs) {
-        boolean inTurn = step > 0 && (step == previous || step == previous % STEPS + 1);
-        boolean wrong = inTurn && lamp != lift2Runs;
+        boolean wrong = inTurn() && lamp != lift2Runs;
         if (wrong && !lampWrong) {
             lampErrors++;
         }

@@ -1,0 +1,206 @@
+package tickbus.bench;
+
+import DeviceDrivers.FieldbusDriver;
+import java.util.concurrent.TimeUnit;
+import org.openjdk.jmh.annotations.Benchmark;
+import org.openjdk.jmh.annotations.BenchmarkMode;
+import org.openjdk.jmh.annotations.Fork;
+import org.openjdk.jmh.annotations.Measurement;
+import org.openjdk.jmh.annotations.Mode;
+import org.openjdk.jmh.annotations.OutputTimeUnit;
+import org.openjdk.jmh.annotations.Scope;
+import org.openjdk.jmh.annotations.Setup;
+import org.openjdk.jmh.annotations.State;
+import org.openjdk.jmh.annotations.TearDown;
+import org.openjdk.jmh.annotations.Warmup;
+import tickbus.NativeBaseline;
+import tickbus.Signal;
+import tickbus.Tickbus;
+
+/** The rig's tick, 16 bits each way, beside the native call that does nothing. */
+@BenchmarkMode(Mode.AverageTime)
+@OutputTimeUnit(TimeUnit.NANOSECONDS)
+@Fork(value = 3, jvmArgsAppend = "--enable-native-access=ALL-UNNAMED")
+@Warmup(iterations = 5, time = 1)
+@Measurement(iterations = 5, time = 1)
+public class RigTickBench {
+    private static final int BITS = 16;
+
+    /** Made by JMH. */
+    public RigTickBench() {
+    }
+
+    /** The native library, loaded. */
+    @State(Scope.Thread)
+    public static class Library {
+        /** Made by JMH. */
+        public Library() {
+        }
+
+        /** Loads it. */
+        @Setup
+        public void load() {
+            NativeBaseline.load();
+        }
+    }
+
+    /** An open driver with 16 BOOL signals each way. */
+    public abstract static class Bits {
+        private final Signal[] in = new Signal[BITS];
+        private final Signal[] out = new Signal[BITS];
+        private Tickbus bus;
+        private long now;
+        private int pattern;
+
+        /** For the states below. */
+        protected Bits() {
+        }
+
+        /**
+         * When the bus runs.
+         *
+         * @return as driver.cfg says it
+         */
+        protected abstract String mode();
+
+        /** Opens the driver. */
+        @Setup
+        public void open() {
+            bus = Tickbus.open(BenchCfg.bits(mode(), BITS));
+            for (int i = 0; i < BITS; i++) {
+                in[i] = bus.signal("in " + i);
+                out[i] = bus.signal("out " + i);
+            }
+        }
+
+        /** Closes the driver. */
+        @TearDown
+        public void close() {
+            bus.close();
+        }
+
+        int tick() {
+            pattern++;
+            for (int i = 0; i < BITS; i++) {
+                in[i].setBoolean((pattern >> i & 1) != 0);
+            }
+            now += BenchCfg.TICK_NANOS;
+            int result = bus.exchange(now) << BITS;
+            for (int i = 0; i < BITS; i++) {
+                if (out[i].getBoolean()) {
+                    result |= 1 << i;
+                }
+            }
+            return result;
+        }
+    }
+
+    /** Each tick runs a bus cycle and a scan of the mirror PLC, on the tick's thread. */
+    @State(Scope.Thread)
+    public static class Stepped extends Bits {
+        /** Made by JMH. */
+        public Stepped() {
+        }
+
+        @Override
+        protected String mode() {
+            return "stepped";
+        }
+    }
+
+    /** The bus and the PLC run on threads of their own. */
+    @State(Scope.Thread)
+    public static class Free extends Bits {
+        /** Made by JMH. */
+        public Free() {
+        }
+
+        @Override
+        protected String mode() {
+            return "free";
+        }
+    }
+
+    /** The drop-in driver over the free bus. */
+    @State(Scope.Thread)
+    public static class DropIn {
+        private final double[] values = new double[BITS];
+        private double[] inputs;
+        private FieldbusDriver driver;
+        private int pattern;
+
+        /** Made by JMH. */
+        public DropIn() {
+        }
+
+        /** Opens the driver. */
+        @Setup
+        public void open() {
+            driver = new FieldbusDriver(BenchCfg.bits("free", BITS));
+            driver.connect(delivered -> inputs = delivered);
+        }
+
+        /** Closes the driver. */
+        @TearDown
+        public void close() {
+            driver.exit();
+        }
+
+        double tick() {
+            pattern++;
+            for (int i = 0; i < BITS; i++) {
+                values[i] = pattern >> i & 1;
+            }
+            driver.updateComponentValues(values);
+            double sum = 0;
+            for (int i = 0; i < BITS; i++) {
+                sum += inputs[i];
+            }
+            return sum;
+        }
+    }
+
+    /**
+     * The baseline.
+     *
+     * @param library loaded
+     * @return for JMH
+     */
+    @Benchmark
+    public int emptyNativeCall(Library library) {
+        return NativeBaseline.call();
+    }
+
+    /**
+     * Set 16 bits, exchange, get 16 bits; the bus is free-running, so that nearly no tick finds a new frame.
+     *
+     * @param bits the signals
+     * @return for JMH
+     */
+    @Benchmark
+    public int rigTickFree(Free bits) {
+        return bits.tick();
+    }
+
+    /**
+     * The same, and every tick brings a fresh frame: the time holds the bus cycle and the PLC's scan as well.
+     *
+     * @param bits the signals
+     * @return for JMH
+     */
+    @Benchmark
+    public int rigTickFresh(Stepped bits) {
+        return bits.tick();
+    }
+
+    /**
+     * The same through {@code updateComponentValues} and {@code deliverHardwareInputs}.
+     *
+     * @param dropIn the driver
+     * @return for JMH
+     */
+    @Benchmark
+    public double fieldbusDriverTick(DropIn dropIn) {
+        return dropIn.tick();
+    }
+}

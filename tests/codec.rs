@@ -543,7 +543,7 @@ fn value() -> impl Strategy<Value = f64> {
         1 => any::<u64>().prop_map(f64::from_bits),
         1 => any::<u32>().prop_map(|bits| f64::from(f32::from_bits(bits))),
         1 => prop::sample::select(
-            &[f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, f64::MAX, f64::from(f32::MAX).next_up()][..]
+            vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, f64::MAX, f64::from(f32::MAX).next_up()]
         ),
     ]
 }

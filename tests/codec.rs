@@ -398,6 +398,14 @@ fn any_number_but_zero_is_a_high_bool() {
     let plan = Plan::new(&table(signals.collect(), 1), 0, Area::Input);
     assert_eq!(plan.encode(&slots, &mut frame), NOT_A_NUMBER);
     assert_eq!(frame, [0b1111_1110]);
+    for place in 0..8 {
+        for value in [0.5, 0.25, 2_f64.powi(-1022), 1.5, 2.0, -1.0, 5e-324] {
+            let mut slots = [Slot::from_real(0.0); 8];
+            slots[place] = Slot::from_real(value);
+            assert_eq!(plan.encode(&slots, &mut frame), CLEAN);
+            assert_eq!(frame, [1 << place], "{value:e} at bit {place}");
+        }
+    }
     for (value, slot) in values.iter().zip(slots) {
         let (frame, _) = encode_one(signal(DataType::Bool, Area::Input, 0, 0), slot);
         assert_eq!(frame, [u8::from(!value.is_nan() && *value != 0.0)]);

@@ -55,7 +55,11 @@ fn exchange(criterion: &mut Criterion) {
     let clock = Monotonic::shared().expect("a thread");
     let mut group = criterion.benchmark_group("exchange");
     let latched = bits("latch = \"rising\"");
-    let tables = [("rig", latched), ("rig unlatched", bits("")), ("1000 reals", reals(1_000))];
+    let tables = [
+        ("rig", latched),
+        ("rig unlatched", bits("")),
+        ("1000 reals", reals(1_000)),
+    ];
     for (name, signals) in tables {
         for mode in ["free", "stepped"] {
             let mut driver =
@@ -99,7 +103,10 @@ fn hand_over(criterion: &mut Criterion) {
         let (mut input, mut output) = triple_buffer::TripleBuffer::new(&frame).split();
         group.bench_function(BenchmarkId::new("crate triple_buffer", size), |bencher| {
             bencher.iter(|| {
-                input.input_buffer_mut().bytes.copy_from_slice(black_box(&source));
+                input
+                    .input_buffer_mut()
+                    .bytes
+                    .copy_from_slice(black_box(&source));
                 input.publish();
                 output.update();
                 black_box(output.peek_output_buffer().bytes[0])

@@ -9,9 +9,16 @@ use libloading::Library;
 fn cdylib() -> PathBuf {
     let name = libloading::library_filename("tickbus");
     let test = std::env::current_exe().expect("a test has a path");
-    let places: Vec<_> = test.ancestors().skip(1).take(2).map(|dir| dir.join(&name)).collect();
+    let places: Vec<_> = test
+        .ancestors()
+        .skip(1)
+        .take(2)
+        .map(|dir| dir.join(&name))
+        .collect();
     let found = places.iter().find(|place| place.exists());
-    found.unwrap_or_else(|| panic!("no {} in {places:?}", name.display())).clone()
+    found
+        .unwrap_or_else(|| panic!("no {} in {places:?}", name.display()))
+        .clone()
 }
 
 #[test]

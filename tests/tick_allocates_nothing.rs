@@ -46,8 +46,9 @@ fn config(fieldbus: &str) -> Config {
             )
             .expect("a string takes all");
         }
-        let types =
-            ["BYTE", "SINT", "WORD", "INT", "DWORD", "DINT", "REAL", "LWORD", "LINT", "LREAL"];
+        let types = [
+            "BYTE", "SINT", "WORD", "INT", "DWORD", "DINT", "REAL", "LWORD", "LINT", "LREAL",
+        ];
         let sizes = [1, 1, 2, 2, 4, 4, 4, 8, 8, 8];
         let letters = ['B', 'B', 'W', 'W', 'D', 'D', 'D', 'L', 'L', 'L'];
         let mut byte = 8;
@@ -88,7 +89,10 @@ fn allocations(fieldbus: &str) -> u64 {
 
 #[test]
 fn a_free_bus() {
-    assert_eq!(allocations("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\""), 0);
+    assert_eq!(
+        allocations("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\""),
+        0
+    );
 }
 
 #[test]

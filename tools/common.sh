@@ -54,7 +54,7 @@ native_library() {
 
 # Maven, without its chatter, on the Java reactor.
 maven() {
-    mvn -q -B -ntp -f java "$@"
+    mvn -q -B -ntp -Dstyle.color=never -f java "$@"
 }
 
 # Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver and a driver.cfg) and

@@ -145,12 +145,12 @@ fn reals(criterion: &mut Criterion) {
     group.bench_function("plan", |bencher| bencher.iter(|| device.exchange()));
     let mut device = Device::new(1000, Files::Interleaved, None, real);
     group.bench_function("plan, interleaved", |bencher| {
-        bencher.iter(|| device.exchange())
+        bencher.iter(|| device.exchange());
     });
     let mut device = Device::new(1000, Files::AreaByArea, None, real);
     device.slots[500] = Slot::from_real(f64::NAN);
     group.bench_function("plan, one NaN", |bencher| {
-        bencher.iter(|| device.exchange())
+        bencher.iter(|| device.exchange());
     });
     group.finish();
 }

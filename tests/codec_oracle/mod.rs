@@ -99,7 +99,9 @@ fn places(signal: &Signal) -> Vec<(usize, u8)> {
     let pair = if count == 8 { 1 } else { 2 };
     let mut words: Vec<Vec<usize>> = letters.chunks(pair).map(<[usize]>::to_vec).collect();
     if matches!(signal.order, ByteOrder::Badc | ByteOrder::Dcba) {
-        words.iter_mut().for_each(|word| word.reverse());
+        for word in &mut words {
+            word.reverse();
+        }
     }
     if matches!(signal.order, ByteOrder::Cdab | ByteOrder::Dcba) {
         words.reverse();
@@ -280,7 +282,7 @@ fn widened(word: u64) -> f64 {
         (0xFF, _) => 0x7FF << 52 | 1 << 51 | fraction << 29,
         (0, 0) => 0,
         (0, _) => {
-            let leading = u64::from(63 - fraction.leading_zeros());
+            let leading = u64::from(fraction.ilog2());
             let rest = fraction - (1 << leading);
             (leading + 1023 - 149) << 52 | rest << (52 - leading)
         }
@@ -296,7 +298,7 @@ fn integer_as_double(number: i128) -> f64 {
     if magnitude == 0 {
         return 0.0;
     }
-    let leading = 127 - magnitude.leading_zeros();
+    let leading = magnitude.ilog2();
     let fraction = if leading <= 52 {
         (magnitude << (52 - leading)) - (1 << 52)
     } else {
@@ -309,5 +311,5 @@ fn integer_as_double(number: i128) -> f64 {
         floor - (1 << 52) + u128::from(up)
     };
     let fraction = u64::try_from(fraction).expect("at most 2^52");
-    f64::from_bits(sign | ((u64::from(leading) + 1023) << 52) + fraction)
+    f64::from_bits(sign | (((u64::from(leading) + 1023) << 52) + fraction))
 }

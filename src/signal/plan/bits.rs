@@ -110,7 +110,7 @@ struct Partial {
 #[derive(Debug)]
 struct Bit {
     slot: u32,
-    bit: u8,
+    place: u8,
     fail_safe: bool,
 }
 
@@ -120,7 +120,7 @@ impl Partials {
         let start = index(self.bits.len());
         self.bits.extend(members.iter().map(|(slot, signal)| Bit {
             slot: index(*slot),
-            bit: signal.bit,
+            place: signal.bit,
             fail_safe: is_high(signal.fail_safe),
         }));
         self.bytes.push(Partial {
@@ -140,7 +140,7 @@ impl Run for Partials {
             let mut byte = 0;
             for bit in self.bits_of(partial) {
                 let high = high(slots[bit.slot as usize], bit.fail_safe, conversions);
-                byte |= u8::from(high) << bit.bit;
+                byte |= u8::from(high) << bit.place;
             }
             frame[partial.byte as usize] = byte;
         }
@@ -150,7 +150,7 @@ impl Run for Partials {
         for partial in &self.bytes {
             let byte = frame[partial.byte as usize];
             for bit in self.bits_of(partial) {
-                slots[bit.slot as usize] = NIBBLES[usize::from(byte >> bit.bit & 1)][0];
+                slots[bit.slot as usize] = NIBBLES[usize::from(byte >> bit.place & 1)][0];
             }
         }
     }

@@ -11,26 +11,35 @@ package tickbus;
 public final class Signal {
     /** Beyond this, not every whole number is a double. */
     private static final long EXACT = 1L << 53;
+    /** The double 1.0. */
+    private static final long ONE = 0x3FF0_0000_0000_0000L;
 
     private final Tickbus bus;
     private final long[] slots;
     private final Layout.Entry entry;
-    private final int slot;
-    private final boolean written;
     /** Null where the slot holds a double. */
     private final IntegerKind integer;
+    /**
+     * The signal's slot while it can be got, or set, as a double without further ado; else -1. One comparison
+     * thus stands for all checks of the common case.
+     */
+    private int getAt;
+    private int setAt;
+    /** The slot of the edges while they can be got; else -1. */
+    private int edgesAt;
 
     Signal(Tickbus bus, long[] slots, Layout.Entry entry) {
         this.bus = bus;
         this.slots = slots;
         this.entry = entry;
-        this.slot = entry.slot();
-        this.written = entry.written();
-        if (!entry.integer()) {
-            this.integer = null;
-        } else {
+        if (entry.integer()) {
             this.integer = entry.type().equals("LINT") ? IntegerKind.SIGNED : IntegerKind.UNSIGNED;
+        } else {
+            this.integer = null;
         }
+        this.getAt = entry.integer() ? -1 : entry.slot();
+        this.setAt = entry.written() ? getAt : -1;
+        this.edgesAt = entry.edgesSlot();
     }
 
     /**
@@ -40,8 +49,13 @@ public final class Signal {
      *     double
      */
     public double get() {
+        int at = getAt;
+        return at >= 0 ? Double.longBitsToDouble(slots[at]) : getOther();
+    }
+
+    private double getOther() {
         bus.mustBeOpen();
-        return value(slots[slot]);
+        return integer.toDouble(slots[entry.slot()]);
     }
 
     /**
@@ -54,13 +68,21 @@ public final class Signal {
      * @throws IllegalArgumentException if the value is not a finite number
      */
     public void set(double value) {
-        bus.mustBeOpen();
-        mustBeWritten();
+        int at = setAt;
+        if (at >= 0 && Double.isFinite(value)) {
+            slots[at] = Double.doubleToRawLongBits(value);
+        } else {
+            setOther(value);
+        }
+    }
+
+    private void setOther(double value) {
+        mustBeSettable();
         if (!Double.isFinite(value)) {
             throw new IllegalArgumentException(
                 "signal '" + name() + "' cannot be set to " + value + "; a finite number is needed");
         }
-        put(value);
+        slots[entry.slot()] = integer.fromDouble(value);
     }
 
     /**
@@ -69,9 +91,14 @@ public final class Signal {
      * @return false if the value is 0
      */
     public boolean getBoolean() {
+        int at = getAt;
+        // The shift drops the sign, which is all that a negative zero has.
+        return at >= 0 ? slots[at] << 1 != 0 : getOtherBoolean();
+    }
+
+    private boolean getOtherBoolean() {
         bus.mustBeOpen();
-        // Zero has all bits clear in a double, too, but for the sign of a negative zero.
-        return slots[slot] << (integer == null ? 1 : 0) != 0;
+        return slots[entry.slot()] != 0;
     }
 
     /**
@@ -81,12 +108,11 @@ public final class Signal {
      * @throws IllegalStateException if the PLC writes this signal
      */
     public void setBoolean(boolean value) {
-        bus.mustBeOpen();
-        mustBeWritten();
-        if (integer == null) {
-            slots[slot] = value ? 0x3FF0_0000_0000_0000L : 0;
+        int at = setAt;
+        if (at >= 0) {
+            slots[at] = value ? ONE : 0;
         } else {
-            slots[slot] = value ? 1 : 0;
+            setOther(value ? 1 : 0);
         }
     }
 
@@ -98,7 +124,7 @@ public final class Signal {
      */
     public long getLong() {
         bus.mustBeOpen();
-        long bits = slots[slot];
+        long bits = slots[entry.slot()];
         return integer != null ? bits : IntegerKind.SIGNED.fromDouble(Double.longBitsToDouble(bits));
     }
 
@@ -111,17 +137,16 @@ public final class Signal {
      *     unscaled 64-bit integer
      */
     public void setLong(long value) {
-        bus.mustBeOpen();
-        mustBeWritten();
+        mustBeSettable();
         if (integer != null) {
-            slots[slot] = value;
+            slots[entry.slot()] = value;
             return;
         }
         if (value < -EXACT || value > EXACT) {
             throw new IllegalArgumentException("signal '" + name() + "' of type " + type() + " cannot hold " + value
                 + " exactly; only unscaled LWORD, LINT and ULINT signals go beyond 2^53");
         }
-        slots[slot] = Double.doubleToRawLongBits(value);
+        slots[entry.slot()] = Double.doubleToRawLongBits(value);
     }
 
     /**
@@ -131,13 +156,18 @@ public final class Signal {
      * @throws IllegalStateException if the signal is not latched, or the simulation writes it
      */
     public long edges() {
-        bus.mustBeOpen();
-        if (!isLatched()) {
-            throw new IllegalStateException(written
-                ? "signal '" + name() + "' is written by this end; edges are counted of signals that the other end writes"
-                : "signal '" + name() + "' counts no edges; add `latch = \"rising\"` to it in driver.cfg");
+        int at = edgesAt;
+        if (at < 0) {
+            throw noEdges();
         }
-        return (long) Double.longBitsToDouble(slots[entry.edgesSlot()]);
+        return (long) Double.longBitsToDouble(slots[at]);
+    }
+
+    private IllegalStateException noEdges() {
+        bus.mustBeOpen();
+        return new IllegalStateException(isWritten()
+            ? "signal '" + name() + "' is written by this end; edges are counted of signals that the other end writes"
+            : "signal '" + name() + "' counts no edges; add `latch = \"rising\"` to it in driver.cfg");
     }
 
     /**
@@ -191,7 +221,7 @@ public final class Signal {
      * @return false if this end reads it
      */
     public boolean isWritten() {
-        return written;
+        return entry.written();
     }
 
     /**
@@ -214,17 +244,25 @@ public final class Signal {
         return integer == null ? Double.longBitsToDouble(bits) : integer.toDouble(bits);
     }
 
-    /** Sets without a check of direction or value. */
-    void put(double value) {
-        slots[slot] = integer == null ? Double.doubleToRawLongBits(value) : integer.fromDouble(value);
+    /** Null where the slot holds a double. */
+    IntegerKind integer() {
+        return integer;
     }
 
     int slot() {
-        return slot;
+        return entry.slot();
     }
 
-    private void mustBeWritten() {
-        if (!written) {
+    /** Makes all getters and setters refuse. */
+    void close() {
+        getAt = -1;
+        setAt = -1;
+        edgesAt = -1;
+    }
+
+    private void mustBeSettable() {
+        bus.mustBeOpen();
+        if (!isWritten()) {
             throw new IllegalStateException("signal '" + name() + "' at " + address()
                 + " is written by the other end; only signals that this end writes can be set");
         }

@@ -61,8 +61,8 @@ public final class Tickbus implements AutoCloseable {
     private final long[] slots;
     private final List<Signal> signals;
     private final Map<String, Signal> byName = new HashMap<>();
-    private final Signal[] written;
-    private final Signal[] read;
+    private final SignalGroup written;
+    private final SignalGroup read;
     private final int writtenFrom;
     private final int writtenCount;
     private final int readFrom;
@@ -81,14 +81,13 @@ public final class Tickbus implements AutoCloseable {
         words.get(Layout.SLOTS, slots);
         this.signals = layout.signals().stream().map(entry -> new Signal(this, slots, entry)).toList();
         signals.forEach(signal -> byName.put(signal.name(), signal));
-        this.written = signals.stream().filter(Signal::isWritten).toArray(Signal[]::new);
-        this.read = signals.stream().filter(signal -> !signal.isWritten()).toArray(Signal[]::new);
-        this.writtenFrom = written.length == 0 ? 0 : written[0].slot();
-        this.writtenCount = written.length == 0 ? 0 : written[written.length - 1].slot() + 1 - writtenFrom;
-        // The slots of the edges stand behind those of the signals.
-        int readTo = read.length == 0 ? 0 : read[read.length - 1].slot() + 1;
-        this.readFrom = read.length == 0 ? 0 : read[0].slot();
-        this.readCount = (slots.length > signals.size() ? slots.length : readTo) - readFrom;
+        this.written = new SignalGroup(slots, signals.stream().filter(Signal::isWritten).toList());
+        this.read = new SignalGroup(slots, signals.stream().filter(signal -> !signal.isWritten()).toList());
+        this.writtenFrom = written.from();
+        this.writtenCount = written.to() - writtenFrom;
+        this.readFrom = read.from();
+        // The slots of the edges stand behind those of all signals.
+        this.readCount = (slots.length > signals.size() ? slots.length : read.to()) - readFrom;
     }
 
     /**
@@ -177,13 +176,11 @@ public final class Tickbus implements AutoCloseable {
      */
     public void setAll(double[] values) {
         mustBeOpen();
-        if (values.length != written.length) {
-            throw new IllegalArgumentException("driver '" + name + "' has " + written.length
+        if (values.length != written.size()) {
+            throw new IllegalArgumentException("driver '" + name + "' has " + written.size()
                 + " signals to write, but was given " + values.length + " values");
         }
-        for (int i = 0; i < written.length; i++) {
-            written[i].put(values[i]);
-        }
+        written.set(values);
     }
 
     /**
@@ -196,14 +193,12 @@ public final class Tickbus implements AutoCloseable {
      */
     public int getAll(double[] into) {
         mustBeOpen();
-        if (into.length < read.length) {
-            throw new IllegalArgumentException("driver '" + name + "' has " + read.length
+        if (into.length < read.size()) {
+            throw new IllegalArgumentException("driver '" + name + "' has " + read.size()
                 + " signals to read, but the array has " + into.length + " places");
         }
-        for (int i = 0; i < read.length; i++) {
-            into[i] = read[i].value(slots[read[i].slot()]);
-        }
-        return read.length;
+        read.get(into);
+        return read.size();
     }
 
     /**
@@ -346,15 +341,22 @@ public final class Tickbus implements AutoCloseable {
         try {
             if (!closed) {
                 finalizeNative(handle);
-                closed = true;
+                closed();
             }
         } catch (FieldbusException e) {
             // The native side has given the driver up, unless it was in use.
-            closed = e.status() != Status.BUSY;
+            if (e.status() != Status.BUSY) {
+                closed();
+            }
             throw e;
         } finally {
             release();
         }
+    }
+
+    private void closed() {
+        closed = true;
+        signals.forEach(Signal::close);
     }
 
     /** Name and id. */

@@ -52,9 +52,9 @@ native_library() {
     esac
 }
 
-# Maven, without its chatter, on the Java reactor.
+# Maven, without its chatter and its colours, on the Java reactor.
 maven() {
-    mvn -q -B -ntp -Dstyle.color=never -f java "$@"
+    mvn -q -B -ntp -f java "$@" | sed $'s/\033\\[[0-9;]*m//g'
 }
 
 # Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver and a driver.cfg) and

@@ -10,6 +10,7 @@ import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
 import java.util.Objects;
+import java.util.function.Supplier;
 
 /**
  * One open driver: a simulation's end of a PLC's fieldbus.
@@ -26,10 +27,11 @@ import java.util.Objects;
  * }
  * }</pre>
  *
- * <p><b>Threads.</b> A driver is ticked by one thread at a time; getters and setters of its signals belong to
- * that thread. It may change, if the old and the new thread synchronise with each other. A call that meets
- * another thread's call on the same driver throws {@link Status#BUSY} and does nothing, {@link #close}
- * included. Different drivers are independent of each other.
+ * <p><b>Threads.</b> The first thread that exchanges becomes the driver's ticking thread: exchanges, events and the
+ * getters and setters of the signals belong to it. Another thread's exchange throws {@link Status#BUSY} and does
+ * nothing, until the ticking thread has ended or has called {@link #releaseThread}. {@link #statistics} and {@link #close}
+ * can be called by any thread; while an exchange is running they throw {@link Status#BUSY}. Different drivers are
+ * independent of each other.
  *
  * <p><b>The tick</b>, {@link #exchange()}, takes no lock, makes no system call, and allocates nothing, in
  * either language; it never waits for the bus unless driver.cfg says {@code mode = "stepped"}.
@@ -38,15 +40,17 @@ import java.util.Objects;
  * throws {@link FieldbusException} with {@link Status#CLOSED}.
  */
 public final class Tickbus implements AutoCloseable {
-    private static final VarHandle CLAIMED;
+    private static final VarHandle TICKER;
     /** Events that one native call can bring. */
     private static final int EVENTS = 64;
+    /** How often a call that meets a running exchange is tried. */
+    private static final int PATIENCE = 100;
     /** Longs per event: signal, slot, time. */
     private static final int EVENT_WORDS = 3;
 
     static {
         try {
-            CLAIMED = MethodHandles.lookup().findVarHandle(Tickbus.class, "claimed", boolean.class);
+            TICKER = MethodHandles.lookup().findVarHandle(Tickbus.class, "ticker", Thread.class);
         } catch (ReflectiveOperationException e) {
             throw new ExceptionInInitializerError(e);
         }
@@ -55,7 +59,7 @@ public final class Tickbus implements AutoCloseable {
     private final long handle;
     private final int id;
     private final String name;
-    /** The shared buffer; moved to and from under the claim only, but for reading the header. */
+    /** The shared buffer; only the ticking thread touches its slots. */
     private final LongBuffer words;
     /** This end's copy of the slots: plain array accesses are cheap, and a bulk copy moves them at once. */
     private final long[] slots;
@@ -68,9 +72,12 @@ public final class Tickbus implements AutoCloseable {
     private final int readFrom;
     private final int readCount;
     private long[] events;
-    /** True while a thread is in a call that touches the shared buffer or the native driver. */
-    private boolean claimed;
-    private boolean closed;
+    /**
+     * The thread that the slots belong to; null when there is none. A thread that reads its own name here put it
+     * there itself, so that a plain comparison is enough on every tick but a thread's first.
+     */
+    private Thread ticker;
+    private volatile boolean closed;
 
     private Tickbus(long handle, Layout layout) {
         this.handle = handle;
@@ -125,17 +132,8 @@ public final class Tickbus implements AutoCloseable {
      *     {@link Status#INTERNAL}
      */
     public int exchange() {
-        claim();
-        int code;
-        try {
-            code = move();
-        } finally {
-            release();
-        }
-        if (code < 0) {
-            throw failure(code);
-        }
-        return code;
+        mustBeTicker();
+        return move();
     }
 
     /**
@@ -146,23 +144,17 @@ public final class Tickbus implements AutoCloseable {
      * @throws FieldbusException as {@link #exchange()}
      */
     public int exchange(long simulationNanos) {
-        claim();
-        int code;
-        try {
-            words.put(Layout.WORD_SIMULATION_TIME, simulationNanos);
-            code = move();
-        } finally {
-            release();
-        }
-        if (code < 0) {
-            throw failure(code);
-        }
-        return code;
+        mustBeTicker();
+        words.put(Layout.WORD_SIMULATION_TIME, simulationNanos);
+        return move();
     }
 
     private int move() {
         words.put(Layout.SLOTS + writtenFrom, slots, writtenFrom, writtenCount);
         int code = xChangeData(handle);
+        if (code < 0) {
+            throw failure(code);
+        }
         words.get(Layout.SLOTS + readFrom, slots, readFrom, readCount);
         return code;
     }
@@ -281,13 +273,7 @@ public final class Tickbus implements AutoCloseable {
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public Map<String, String> statistics() {
-        claim();
-        String text;
-        try {
-            text = statisticsNative(handle);
-        } finally {
-            release();
-        }
+        String text = whenIdle(() -> statisticsNative(handle));
         Map<String, String> statistics = new LinkedHashMap<>();
         text.lines().forEach(line -> {
             int equals = line.indexOf('=');
@@ -319,39 +305,44 @@ public final class Tickbus implements AutoCloseable {
     }
 
     private int takeEvents() {
-        claim();
-        try {
-            if (events == null) {
-                events = new long[EVENTS * EVENT_WORDS];
-            }
-            return eventsNative(handle, events);
-        } finally {
-            release();
+        mustBeTicker();
+        if (events == null) {
+            events = new long[EVENTS * EVENT_WORDS];
         }
+        return eventsNative(handle, events);
     }
 
     /**
      * Ends the connection. Closing twice is no mistake.
      *
-     * @throws FieldbusException {@link Status#BUSY} if another thread is using the driver; it stays open
+     * @throws FieldbusException {@link Status#BUSY} if another thread is in an exchange; the driver stays open
      */
     @Override
-    public void close() {
-        claim();
+    public synchronized void close() {
+        if (closed) {
+            return;
+        }
         try {
-            if (!closed) {
+            whenIdle(() -> {
                 finalizeNative(handle);
-                closed();
-            }
+                return null;
+            });
         } catch (FieldbusException e) {
             // The native side has given the driver up, unless it was in use.
             if (e.status() != Status.BUSY) {
                 closed();
             }
             throw e;
-        } finally {
-            release();
         }
+        closed();
+    }
+
+    /**
+     * Lets another thread become the ticking thread. To be called by the ticking thread; by any other, it does
+     * nothing.
+     */
+    public void releaseThread() {
+        TICKER.compareAndSet(this, Thread.currentThread(), null);
     }
 
     private void closed() {
@@ -376,18 +367,34 @@ public final class Tickbus implements AutoCloseable {
         return words.get(word);
     }
 
-    /**
-     * Takes the shared buffer and the native driver for this thread. The native side has a claim of its own,
-     * against wrong handles; this one keeps a second thread away from the buffer, which comes first.
-     */
-    void claim() {
-        if (!CLAIMED.compareAndSet(this, false, true)) {
-            throw new FieldbusException(Status.BUSY, "'" + name + "': " + Status.BUSY.text());
+    private void mustBeTicker() {
+        if (ticker != Thread.currentThread()) {
+            becomeTicker();
         }
     }
 
-    void release() {
-        CLAIMED.setRelease(this, false);
+    private void becomeTicker() {
+        mustBeOpen();
+        Thread former = (Thread) TICKER.getVolatile(this);
+        boolean free = former == null || !former.isAlive();
+        if (!free || !TICKER.compareAndSet(this, former, Thread.currentThread())) {
+            throw new FieldbusException(Status.BUSY, "'" + name + "' is ticked by " + (free ? "another thread" : former)
+                + "; tick it from that thread, end that thread, or call releaseThread() there first");
+        }
+    }
+
+    /** Makes a native call that a running exchange of the ticking thread keeps out, most often for less than 1 us. */
+    private static <T> T whenIdle(Supplier<T> call) {
+        for (int attempt = 1;; attempt++) {
+            try {
+                return call.get();
+            } catch (FieldbusException e) {
+                if (e.status() != Status.BUSY || attempt == PATIENCE) {
+                    throw e;
+                }
+                Thread.onSpinWait();
+            }
+        }
     }
 
     /** What a negative code means, with the driver's own reason where it has one. */

@@ -16,6 +16,7 @@ import java.util.concurrent.ExecutionException;
 import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
 import java.util.concurrent.Future;
+import java.util.concurrent.atomic.AtomicReference;
 import org.junit.jupiter.api.BeforeAll;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
@@ -107,19 +108,44 @@ class MisuseTest {
         assertEquals("Driver 1", bus.name());
     }
 
-    @Test
-    void aCallThatMeetsAnotherIsBusyAndTheDriverStaysOpen() {
-        try (Tickbus bus = Tickbus.open(mirror())) {
-            bus.claim();
+    /** Runs a call on a thread of its own, to that thread's end. */
+    private static void elsewhere(Executable call) throws Exception {
+        AtomicReference<Throwable> thrown = new AtomicReference<>();
+        Thread thread = new Thread(() -> {
             try {
-                for (Executable call : List.<Executable>of(bus::exchange, () -> bus.exchange(1), bus::close,
-                    bus::statistics, () -> bus.pollEvents((s, v, t) -> { }))) {
-                    assertStatus(Status.BUSY, call);
-                }
-            } finally {
-                bus.release();
+                call.execute();
+            } catch (Throwable e) {
+                thrown.set(e);
             }
+        }, "elsewhere");
+        thread.start();
+        thread.join();
+        if (thrown.get() != null) {
+            throw new AssertionError(thrown.get());
+        }
+    }
+
+    @Test
+    void theTickBelongsToOneThreadUntilItLetsGo() throws Exception {
+        try (Tickbus bus = Tickbus.open(mirror())) {
+            String owner = Thread.currentThread().getName();
             assertTrue(bus.exchange() >= 0);
+            elsewhere(() -> {
+                for (Executable call : List.<Executable>of(bus::exchange, () -> bus.exchange(1),
+                    () -> bus.pollEvents((s, v, t) -> { }))) {
+                    FieldbusException busy = assertThrows(FieldbusException.class, call);
+                    assertEquals(Status.BUSY, busy.status());
+                    assertTrue(busy.getMessage().contains(owner), busy.getMessage());
+                }
+                bus.releaseThread();
+                assertStatus(Status.BUSY, bus::exchange);
+                assertEquals("1", bus.statistics().get("ticks"), "anybody may look");
+            });
+            bus.releaseThread();
+            elsewhere(() -> assertTrue(bus.exchange() >= 0));
+            assertTrue(bus.exchange() >= 0, "that thread has ended");
+            elsewhere(bus::close);
+            assertStatus(Status.CLOSED, bus::exchange);
         }
     }
 

@@ -4,7 +4,7 @@
 
 use crate::fieldbus::{LinkState, Role};
 use crate::image::{Arrival, TickStation};
-use crate::signal::{Area, Plan, SignalTable, Slot};
+use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
 use crate::time::Nanos;
 
 use super::open::Line;
@@ -69,8 +69,10 @@ impl Station {
     fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
         let encode = &self.encode;
         let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
-        counters.saturated += u64::from(bent.saturated);
-        counters.not_a_number += u64::from(bent.not_a_number);
+        if bent != Conversions::default() {
+            counters.saturated += u64::from(bent.saturated);
+            counters.not_a_number += u64::from(bent.not_a_number);
+        }
     }
 
     fn receive(
@@ -127,7 +129,7 @@ impl Driver {
             self.slots.count
         );
         let now = match &self.line {
-            Line::Free(_) => self.clock.coarse(),
+            Line::Free(_) => self.time.now(),
             Line::Stepped { .. } => simulation_time,
         };
         self.counters.ticks += 1;

@@ -7,7 +7,7 @@ use crate::fieldbus::{Bus, ChangeEvents, LinkState, LinkStatus, Options, Port, R
 use crate::image::{Consumer, Directions, Event, image, latched_bits};
 use crate::plc;
 use crate::signal::{Area, Plan, SignalTable, Slot};
-use crate::time::{Clock, Nanos};
+use crate::time::{Clock, CoarseTime, Nanos};
 
 use super::exchange::{Station, areas};
 use super::host::{HostThread, SteppedHost, Tally};
@@ -24,7 +24,7 @@ pub struct Driver {
     pub(super) slots: SlotMap,
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
-    pub(super) clock: Arc<dyn Clock>,
+    pub(super) time: CoarseTime,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
@@ -204,7 +204,7 @@ impl Driver {
             slots: SlotMap::new(&config.table, config.role),
             stations,
             line,
-            clock,
+            time: clock.coarse(),
             max_age: config.timing.max_age,
             status,
             counters: Counters::default(),

@@ -73,9 +73,19 @@ impl EdgeCounter {
         }
     }
 
-    /// Counts the edges from the levels seen last to those in `bytes`.
+    /// Counts the edges from the levels seen last to those in `bytes`, and writes the counters into
+    /// `edges`, which belong to the same frame.
     #[inline]
-    pub fn observe(&mut self, bytes: &[u8]) {
+    pub fn count(&mut self, bytes: &[u8], edges: &mut [u32]) {
+        // Frames without latched signals are common, and have nothing to count or copy.
+        if !self.bits.is_empty() {
+            self.observe(bytes);
+            edges.copy_from_slice(&self.counts);
+        }
+    }
+
+    /// Counts the edges from the levels seen last to those in `bytes`.
+    fn observe(&mut self, bytes: &[u8]) {
         for (&(byte, mask), last) in self.masks.iter().zip(&mut self.last) {
             let changed = (bytes[byte] ^ *last) & mask;
             if changed != 0 {
@@ -86,8 +96,8 @@ impl EdgeCounter {
     }
 
     /// The counters, one per latched bit.
-    #[inline]
-    pub fn counts(&self) -> &[u32] {
+    #[cfg(test)]
+    fn counts(&self) -> &[u32] {
         &self.counts
     }
 }
@@ -161,6 +171,12 @@ impl PulseShaper {
     /// The latched bits that it looks after.
     pub fn bits(&self) -> &[LatchedBit] {
         &self.bits
+    }
+
+    /// Whether a level is forced or held, or an edge waits, so that the same frame needs shaping again.
+    #[inline]
+    pub fn is_busy(&self) -> bool {
+        self.busy
     }
 
     /// Whether the levels of a frame with the counters `edges` need shaping; if not, they

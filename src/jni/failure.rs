@@ -1,12 +1,12 @@
 //! How a failure reaches Java: one exception class, one policy.
 
 use std::any::Any;
-use std::sync::OnceLock;
 
 use jni::errors::{Error, ErrorPolicy};
 use jni::objects::{JClass, JThrowable, JValue};
 use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
+use once_cell::sync::OnceCell;
 
 use crate::driver::{Code, DriverError};
 
@@ -54,16 +54,17 @@ impl From<DriverError> for Failure {
 ///
 /// A global reference keeps its class from being unloaded, and with it the class loader and this
 /// library: no bus thread ever loses the code it runs.
-static EXCEPTION: OnceLock<Global<JClass<'static>>> = OnceLock::new();
+static EXCEPTION: OnceCell<Global<JClass<'static>>> = OnceCell::new();
 
 /// Finds the exception class; to be called while the library is being loaded, when the JVM looks
 /// classes up in the class loader that loads it.
 pub(super) fn find_exception(env: &mut Env<'_>) -> Result<(), Error> {
-    let class = env.find_class(jni_str!("tickbus/FieldbusException"))?;
-    let class = env.new_global_ref(class)?;
-    // A second load of the same library would find its class here already.
-    let _ = EXCEPTION.set(class);
-    Ok(())
+    let find = || {
+        let class = env.find_class(jni_str!("tickbus/FieldbusException"))?;
+        env.new_global_ref(class)
+    };
+    // A library that is loaded again finds its class here already.
+    EXCEPTION.get_or_try_init(find).map(|_| ())
 }
 
 /// Throws `tickbus.FieldbusException`, unless an exception is pending already.

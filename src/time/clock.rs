@@ -2,11 +2,9 @@
 
 use std::fmt;
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
 use std::thread::JoinHandle;
 use std::time::Instant;
-
-use once_cell::sync::Lazy;
 
 use super::stop::Shared;
 use super::{Nanos, Stop};
@@ -16,13 +14,25 @@ pub trait Clock: Send + Sync + fmt::Debug {
     /// The time now.
     fn now(&self) -> Nanos;
 
-    /// The time as it was a few milliseconds ago at most, without a call into the system.
+    /// The time as it was a few milliseconds ago at most, to be read without a call into the system.
     ///
     /// This is what the tick path reads.
-    fn coarse(&self) -> Nanos;
+    fn coarse(&self) -> CoarseTime;
 
     /// Waits until `deadline`, or until `stop` is stopped or woken, whichever is first.
     fn wait_until(&self, deadline: Nanos, stop: &Stop);
+}
+
+/// The time of a clock, kept in memory by the clock.
+#[derive(Clone, Debug)]
+pub struct CoarseTime(Arc<AtomicI64>);
+
+impl CoarseTime {
+    /// The time now, or a few milliseconds ago.
+    #[inline]
+    pub fn now(&self) -> Nanos {
+        Nanos(self.0.load(Ordering::Relaxed))
+    }
 }
 
 /// How far [`Monotonic::coarse`] may lag.
@@ -38,7 +48,7 @@ pub struct Monotonic {
     keeper: Option<JoinHandle<()>>,
 }
 
-static EPOCH: Lazy<Instant> = Lazy::new(Instant::now);
+static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 fn monotonic_now() -> Nanos {
     Nanos(i64::try_from(EPOCH.elapsed().as_nanos()).unwrap_or(i64::MAX))
@@ -101,8 +111,8 @@ impl Clock for Monotonic {
         monotonic_now()
     }
 
-    fn coarse(&self) -> Nanos {
-        Nanos(self.coarse.load(Ordering::Relaxed))
+    fn coarse(&self) -> CoarseTime {
+        CoarseTime(Arc::clone(&self.coarse))
     }
 
     fn wait_until(&self, deadline: Nanos, stop: &Stop) {
@@ -113,7 +123,7 @@ impl Clock for Monotonic {
 /// A clock that stands still until it is told to advance: for tests, and for simulation time.
 #[derive(Debug, Default)]
 pub struct Manual {
-    now: AtomicI64,
+    now: Arc<AtomicI64>,
     waiters: Mutex<Vec<Weak<Shared>>>,
 }
 
@@ -149,8 +159,8 @@ impl Clock for Manual {
         Nanos(self.now.load(Ordering::SeqCst))
     }
 
-    fn coarse(&self) -> Nanos {
-        Nanos(self.now.load(Ordering::Relaxed))
+    fn coarse(&self) -> CoarseTime {
+        CoarseTime(Arc::clone(&self.now))
     }
 
     fn wait_until(&self, deadline: Nanos, stop: &Stop) {

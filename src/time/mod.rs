@@ -8,6 +8,6 @@ mod clock;
 mod nanos;
 mod stop;
 
-pub use clock::{Clock, Manual, Monotonic};
+pub use clock::{Clock, CoarseTime, Manual, Monotonic};
 pub use nanos::{Nanos, ParseDurationError};
 pub use stop::Stop;

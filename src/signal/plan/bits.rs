@@ -56,7 +56,7 @@ impl Octet {
 }
 
 impl Octets {
-    /// Encodes values of which some are neither 0.0 nor 1.0.
+    /// Encodes values of which some may be NaN.
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
@@ -70,15 +70,15 @@ impl Octets {
 
 impl Run for Octets {
     fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        let mut others = 0;
+        let mut perhaps_nan = false;
         for octet in &self.0 {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                let (byte, other) = pack(slots);
+                let (byte, nan) = pack(slots);
                 frame[octet.byte as usize] = byte;
-                others |= other;
+                perhaps_nan |= nan;
             }
         }
-        if others != 0 {
+        if perhaps_nan {
             self.encode_any(slots, frame, conversions);
         }
     }
@@ -172,32 +172,22 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0, and zero if the slots are all 0.0 or 1.0; if
-/// they are not, the byte is wrong.
-fn pack(slots: &[Slot; 8]) -> (u8, u64) {
-    // The bits 52 to 61 of 1.0 are all set and no other is, so the bit for place n of the byte can be
-    // cut out of slot n at 52 + n. Two lanes, because every 64-bit processor has registers for two
-    // integers.
-    const ONE: u64 = 1.0_f64.to_bits();
-    const NEIGHBOURS_IN_ONE: u64 = ONE & ONE << 1;
-    let mut cut = [0; 2];
-    let mut set = [0; 2];
-    let mut changes = [0; 2];
-    for place in (0..8).step_by(2) {
-        for lane in 0..2 {
-            let bits = slots[place + lane].0;
-            cut[lane] |= bits & 1 << (52 + place + lane);
-            set[lane] |= bits;
-            changes[lane] |= bits ^ bits << 1;
-        }
+/// Eight slots as one byte, the first slot as bit 0, and whether any of them may be NaN; if one is, the
+/// byte is wrong.
+#[inline]
+fn pack(slots: &[Slot; 8]) -> (u8, bool) {
+    // A NaN has all bits of its exponent set; in zeros and ones together some are never set.
+    const EXPONENT: u64 = f64::INFINITY.to_bits();
+    let (mut byte, mut set) = (0, 0);
+    for (place, slot) in slots.iter().enumerate() {
+        // The shift drops the sign, so that both zeros are 0.
+        byte |= u8::from(slot.0 << 1 != 0) << place;
+        set |= slot.0;
     }
-    let [byte, ..] = ((cut[0] | cut[1]) >> 52).to_le_bytes();
-    let elsewhere = (set[0] | set[1]) & !ONE;
-    let incomplete = (changes[0] | changes[1]) & NEIGHBOURS_IN_ONE;
-    (byte, elsewhere | incomplete)
+    (byte, set & EXPONENT == EXPONENT)
 }
 
-/// The same for any values; NaN slots take their bit from `fail_safe` and are counted.
+/// The same with a look at each value; NaN slots take their bit from `fail_safe` and are counted.
 fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
     (0..8).zip(slots).fold(0, |byte, (bit, slot)| {
         let fail_safe = fail_safe >> bit & 1 == 1;

@@ -140,31 +140,28 @@ impl Driver {
             Line::Free(_) => Ok(simulation_time),
             Line::Stepped { bus, port } => bus.exchange(simulation_time, port),
         };
-        let mut worst = Exchange {
-            code: Code::Fresh,
-            sequence: 0,
-            age: Nanos::ZERO,
-            granted: now,
-        };
+        let (mut code, mut sequence, mut age) = (Code::Fresh, 0, Nanos::ZERO);
         for station in &mut self.stations {
             let arrival = station.receive(now, self.max_age, slots, &self.slots);
-            worst.sequence += arrival.sequence;
-            worst.age = worst.age.max(arrival.age);
-            let code = match arrival {
+            sequence += arrival.sequence;
+            age = age.max(arrival.age);
+            code = code.worse(match arrival {
                 _ if station.stale => Code::Stale,
                 Arrival { fresh: true, .. } => Code::Fresh,
                 Arrival { .. } => Code::Unchanged,
-            };
-            worst.code = worst.code.worse(code);
+            });
         }
-        match granted {
-            Ok(granted) => worst.granted = granted,
-            Err(error) => {
-                self.status.enter(LinkState::Failed, &error.to_string());
-                worst.code = Code::BusFailed;
-            }
+        let granted = granted.unwrap_or_else(|error| {
+            self.status.enter(LinkState::Failed, &error.to_string());
+            code = Code::BusFailed;
+            now
+        });
+        self.counters.count(code);
+        Exchange {
+            code,
+            sequence,
+            age,
+            granted,
         }
-        self.counters.count(worst.code);
-        worst
     }
 }

@@ -39,6 +39,8 @@ pub struct TickStation {
     tx: Writer<Frame>,
     tx_edges: EdgeCounter,
     tx_sequence: u64,
+    /// The bytes handed over last: most ticks change nothing, and need no hand-over.
+    published: Box<[u8]>,
     rx: Reader<Frame>,
     rx_shaper: PulseShaper,
     shaped: Box<[u8]>,
@@ -108,6 +110,7 @@ pub fn station(directions: Directions) -> (TickStation, BusStation) {
         tx: tx_writer,
         tx_edges: EdgeCounter::new(tx_latched.clone(), &tx_fail_safe),
         tx_sequence: 0,
+        published: tx_fail_safe.clone(),
         rx: rx_reader,
         rx_shaper: PulseShaper::new(rx_latched.clone(), &rx_fail_safe),
         shaped: rx_fail_safe.clone(),
@@ -138,18 +141,26 @@ fn age(now: Nanos, then: i64) -> Nanos {
 }
 
 impl TickStation {
-    /// Lets `encode` write the whole tx frame, counts its edges and hands it to the bus.
+    /// Lets `encode` write the whole tx frame; if that changed it, counts its edges and hands it to the
+    /// bus.
     #[inline]
     pub fn write<R>(&mut self, now: Nanos, encode: impl FnOnce(&mut [u8]) -> R) -> R {
         let (edges, sequence) = (&mut self.tx_edges, self.tx_sequence + 1);
-        let result = self.tx.with_buffer(|frame| {
+        let published = &mut self.published;
+        let (changed, result) = self.tx.with_buffer(|frame| {
             let result = encode(&mut frame.bytes);
-            edges.count(&frame.bytes, &mut frame.edges);
-            frame.sequence = sequence;
-            result
+            let changed = frame.bytes != *published;
+            if changed {
+                published.copy_from_slice(&frame.bytes);
+                edges.count(&frame.bytes, &mut frame.edges);
+                frame.sequence = sequence;
+            }
+            (changed, result)
         });
-        self.tx_sequence = sequence;
-        self.tx.publish();
+        if changed {
+            self.tx_sequence = sequence;
+            self.tx.publish();
+        }
         self.beside.tick_alive.store(now.0, Ordering::Relaxed);
         result
     }

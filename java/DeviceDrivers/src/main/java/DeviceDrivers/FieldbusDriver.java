@@ -21,7 +21,7 @@ import tickbus.Tickbus;
  * <p>All calls come from one thread, as the control interface says.
  */
 public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
-    private static final double NANOS_PER_SECOND = 1e9;
+    private static final double SECONDS_PER_NANO = 1e-9;
 
     private final Tickbus bus;
     private final List<HardwareComponent> components;
@@ -79,7 +79,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
         for (Signal signal : latched) {
             inputs[at++] = signal.edges();
         }
-        inputs[at++] = bus.ageNanos() / NANOS_PER_SECOND;
+        inputs[at++] = bus.ageNanos() * SECONDS_PER_NANO;
         inputs[at++] = bus.sequence();
         inputs[at] = status;
         deliverHardwareInputs(inputs);

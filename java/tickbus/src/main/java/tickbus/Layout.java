@@ -2,6 +2,7 @@ package tickbus;
 
 import java.nio.ByteBuffer;
 import java.nio.ByteOrder;
+import java.nio.DoubleBuffer;
 import java.nio.LongBuffer;
 import java.util.ArrayList;
 import java.util.List;
@@ -33,6 +34,7 @@ final class Layout {
 
     private final List<Entry> signals = new ArrayList<>();
     private LongBuffer words;
+    private DoubleBuffer doubles;
     private int id;
     private String name = "";
 
@@ -40,6 +42,7 @@ final class Layout {
     ByteBuffer allocate(int bytes) {
         ByteBuffer buffer = ByteBuffer.allocateDirect(bytes).order(ByteOrder.nativeOrder());
         words = buffer.asLongBuffer();
+        doubles = buffer.asDoubleBuffer();
         return buffer;
     }
 
@@ -57,6 +60,20 @@ final class Layout {
 
     LongBuffer words() {
         return words;
+    }
+
+    /** The slots as the bits that they are. */
+    LongBuffer slots() {
+        return words.slice(SLOTS, slotCount());
+    }
+
+    /** The same slots as doubles, which they are but for unscaled 64-bit integers. */
+    DoubleBuffer doubles() {
+        return doubles.slice(SLOTS, slotCount());
+    }
+
+    private int slotCount() {
+        return (int) words.get(WORD_SLOT_COUNT);
     }
 
     int id() {

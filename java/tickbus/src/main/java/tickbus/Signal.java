@@ -1,5 +1,7 @@
 package tickbus;
 
+import java.nio.LongBuffer;
+
 /**
  * A handle on one signal of an open driver.
  *
@@ -15,7 +17,7 @@ public final class Signal {
     private static final long ONE = 0x3FF0_0000_0000_0000L;
 
     private final Tickbus bus;
-    private final long[] slots;
+    private final LongBuffer slots;
     private final Layout.Entry entry;
     /** Null where the slot holds a double. */
     private final IntegerKind integer;
@@ -28,7 +30,7 @@ public final class Signal {
     /** The slot of the edges while they can be got; else -1. */
     private int edgesAt;
 
-    Signal(Tickbus bus, long[] slots, Layout.Entry entry) {
+    Signal(Tickbus bus, LongBuffer slots, Layout.Entry entry) {
         this.bus = bus;
         this.slots = slots;
         this.entry = entry;
@@ -50,12 +52,12 @@ public final class Signal {
      */
     public double get() {
         int at = getAt;
-        return at >= 0 ? Double.longBitsToDouble(slots[at]) : getOther();
+        return at >= 0 ? Double.longBitsToDouble(slots.get(at)) : getOther();
     }
 
     private double getOther() {
         bus.mustBeOpen();
-        return integer.toDouble(slots[entry.slot()]);
+        return integer.toDouble(slots.get(entry.slot()));
     }
 
     /**
@@ -70,7 +72,7 @@ public final class Signal {
     public void set(double value) {
         int at = setAt;
         if (at >= 0 && Double.isFinite(value)) {
-            slots[at] = Double.doubleToRawLongBits(value);
+            slots.put(at, Double.doubleToRawLongBits(value));
         } else {
             setOther(value);
         }
@@ -82,7 +84,7 @@ public final class Signal {
             throw new IllegalArgumentException(
                 "signal '" + name() + "' cannot be set to " + value + "; a finite number is needed");
         }
-        slots[entry.slot()] = integer.fromDouble(value);
+        slots.put(entry.slot(), integer.fromDouble(value));
     }
 
     /**
@@ -93,12 +95,12 @@ public final class Signal {
     public boolean getBoolean() {
         int at = getAt;
         // The shift drops the sign, which is all that a negative zero has.
-        return at >= 0 ? slots[at] << 1 != 0 : getOtherBoolean();
+        return at >= 0 ? slots.get(at) << 1 != 0 : getOtherBoolean();
     }
 
     private boolean getOtherBoolean() {
         bus.mustBeOpen();
-        return slots[entry.slot()] != 0;
+        return slots.get(entry.slot()) != 0;
     }
 
     /**
@@ -110,7 +112,7 @@ public final class Signal {
     public void setBoolean(boolean value) {
         int at = setAt;
         if (at >= 0) {
-            slots[at] = value ? ONE : 0;
+            slots.put(at, value ? ONE : 0);
         } else {
             setOther(value ? 1 : 0);
         }
@@ -124,7 +126,7 @@ public final class Signal {
      */
     public long getLong() {
         bus.mustBeOpen();
-        long bits = slots[entry.slot()];
+        long bits = slots.get(entry.slot());
         return integer != null ? bits : IntegerKind.SIGNED.fromDouble(Double.longBitsToDouble(bits));
     }
 
@@ -139,14 +141,14 @@ public final class Signal {
     public void setLong(long value) {
         mustBeSettable();
         if (integer != null) {
-            slots[entry.slot()] = value;
+            slots.put(entry.slot(), value);
             return;
         }
         if (value < -EXACT || value > EXACT) {
             throw new IllegalArgumentException("signal '" + name() + "' of type " + type() + " cannot hold " + value
                 + " exactly; only unscaled LWORD, LINT and ULINT signals go beyond 2^53");
         }
-        slots[entry.slot()] = Double.doubleToRawLongBits(value);
+        slots.put(entry.slot(), Double.doubleToRawLongBits(value));
     }
 
     /**
@@ -160,7 +162,7 @@ public final class Signal {
         if (at < 0) {
             throw noEdges();
         }
-        return (long) Double.longBitsToDouble(slots[at]);
+        return (long) Double.longBitsToDouble(slots.get(at));
     }
 
     private IllegalStateException noEdges() {

@@ -61,16 +61,10 @@ public final class Tickbus implements AutoCloseable {
     private final String name;
     /** The shared buffer; only the ticking thread touches its slots. */
     private final LongBuffer words;
-    /** This end's copy of the slots: plain array accesses are cheap, and a bulk copy moves them at once. */
-    private final long[] slots;
     private final List<Signal> signals;
     private final Map<String, Signal> byName = new HashMap<>();
     private final SignalGroup written;
     private final SignalGroup read;
-    private final int writtenFrom;
-    private final int writtenCount;
-    private final int readFrom;
-    private final int readCount;
     private long[] events;
     /**
      * The thread that the slots belong to; null when there is none. A thread that reads its own name here put it
@@ -84,17 +78,11 @@ public final class Tickbus implements AutoCloseable {
         this.id = layout.id();
         this.name = layout.name();
         this.words = layout.words();
-        this.slots = new long[(int) words.get(Layout.WORD_SLOT_COUNT)];
-        words.get(Layout.SLOTS, slots);
+        LongBuffer slots = layout.slots();
         this.signals = layout.signals().stream().map(entry -> new Signal(this, slots, entry)).toList();
         signals.forEach(signal -> byName.put(signal.name(), signal));
-        this.written = new SignalGroup(slots, signals.stream().filter(Signal::isWritten).toList());
-        this.read = new SignalGroup(slots, signals.stream().filter(signal -> !signal.isWritten()).toList());
-        this.writtenFrom = written.from();
-        this.writtenCount = written.to() - writtenFrom;
-        this.readFrom = read.from();
-        // The slots of the edges stand behind those of all signals.
-        this.readCount = (slots.length > signals.size() ? slots.length : read.to()) - readFrom;
+        this.written = new SignalGroup(layout, signals.stream().filter(Signal::isWritten).toList());
+        this.read = new SignalGroup(layout, signals.stream().filter(signal -> !signal.isWritten()).toList());
     }
 
     /**
@@ -150,12 +138,10 @@ public final class Tickbus implements AutoCloseable {
     }
 
     private int move() {
-        words.put(Layout.SLOTS + writtenFrom, slots, writtenFrom, writtenCount);
         int code = xChangeData(handle);
         if (code < 0) {
             throw failure(code);
         }
-        words.get(Layout.SLOTS + readFrom, slots, readFrom, readCount);
         return code;
     }
 

@@ -48,6 +48,8 @@ public class RigTickBench {
     public abstract static class Bits {
         private final Signal[] in = new Signal[BITS];
         private final Signal[] out = new Signal[BITS];
+        private final double[] values = new double[BITS];
+        private final double[] inputs = new double[BITS];
         private Tickbus bus;
         private long now;
         private int pattern;
@@ -79,13 +81,28 @@ public class RigTickBench {
             bus.close();
         }
 
+        int exchange() {
+            now += BenchCfg.TICK_NANOS;
+            return bus.exchange(now);
+        }
+
+        double tickByArray() {
+            // Two of sixteen bits change at every tick.
+            int at = pattern++ & BITS - 1;
+            values[at] = 1 - values[at];
+            values[at ^ 1] = 1 - values[at ^ 1];
+            bus.setAll(values);
+            int status = exchange();
+            bus.getAll(inputs);
+            return status + inputs[at];
+        }
+
         int tick() {
             pattern++;
             for (int i = 0; i < BITS; i++) {
                 in[i].setBoolean((pattern >> i & 1) != 0);
             }
-            now += BenchCfg.TICK_NANOS;
-            int result = bus.exchange(now) << BITS;
+            int result = exchange() << BITS;
             for (int i = 0; i < BITS; i++) {
                 if (out[i].getBoolean()) {
                     result |= 1 << i;
@@ -169,6 +186,28 @@ public class RigTickBench {
     @Benchmark
     public int emptyNativeCall(Library library) {
         return NativeBaseline.call();
+    }
+
+    /**
+     * The exchange alone.
+     *
+     * @param bits the signals
+     * @return for JMH
+     */
+    @Benchmark
+    public int exchangeFree(Free bits) {
+        return bits.exchange();
+    }
+
+    /**
+     * Set 16 bits from an array, exchange, get 16 bits into an array.
+     *
+     * @param bits the signals
+     * @return for JMH
+     */
+    @Benchmark
+    public double rigTickArrays(Free bits) {
+        return bits.tickByArray();
     }
 
     /**

@@ -1,6 +1,9 @@
 //! Runs of BOOL signals: whole bytes of them, and the bytes that only some bits of are signals.
 
+use std::array;
 use std::ops::Range;
+
+use wide::{CmpNe, f64x4};
 
 use super::run::{Member, Run};
 use super::{Conversions, index};
@@ -56,7 +59,7 @@ impl Octet {
 }
 
 impl Octets {
-    /// Encodes values of which some may be NaN.
+    /// Encodes values of which some are NaN.
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
@@ -70,15 +73,15 @@ impl Octets {
 
 impl Run for Octets {
     fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        let mut perhaps_nan = false;
+        let mut any_nan = false;
         for octet in &self.0 {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
                 let (byte, nan) = pack(slots);
                 frame[octet.byte as usize] = byte;
-                perhaps_nan |= nan;
+                any_nan |= nan;
             }
         }
-        if perhaps_nan {
+        if any_nan {
             self.encode_any(slots, frame, conversions);
         }
     }
@@ -172,19 +175,14 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0, and whether any of them may be NaN; if one is, the
+/// Eight slots as one byte, the first slot as bit 0, and whether any of them is NaN; if one is, the
 /// byte is wrong.
 #[inline]
 fn pack(slots: &[Slot; 8]) -> (u8, bool) {
-    // A NaN has all bits of its exponent set; in zeros and ones together some are never set.
-    const EXPONENT: u64 = f64::INFINITY.to_bits();
-    let (mut byte, mut set) = (0, 0);
-    for (place, slot) in slots.iter().enumerate() {
-        // The shift drops the sign, so that both zeros are 0.
-        byte |= u8::from(slot.0 << 1 != 0) << place;
-        set |= slot.0;
-    }
-    (byte, set & EXPONENT == EXPONENT)
+    let [low, high] = [0, 4].map(|first| f64x4::new(array::from_fn(|i| slots[first + i].real())));
+    let [low_bits, high_bits] = [low, high].map(|four| four.cmp_ne(f64x4::ZERO).move_mask());
+    let [byte, ..] = (low_bits | high_bits << 4).to_le_bytes();
+    (byte, (low.is_nan() | high.is_nan()).any())
 }
 
 /// The same with a look at each value; NaN slots take their bit from `fail_safe` and are counted.

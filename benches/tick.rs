@@ -109,7 +109,7 @@ fn hand_over(criterion: &mut Criterion) {
                     .copy_from_slice(black_box(&source));
                 input.publish();
                 output.update();
-                black_box(output.peek_output_buffer().bytes[0])
+                black_box(output.output_buffer().bytes[0])
             });
         });
     }

@@ -25,6 +25,8 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
     pub(super) time: CoarseTime,
+    #[expect(dead_code, reason = "the coarse time stands still without its clock")]
+    clock: Arc<dyn Clock>,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
@@ -205,6 +207,7 @@ impl Driver {
             stations,
             line,
             time: clock.coarse(),
+            clock,
             max_age: config.timing.max_age,
             status,
             counters: Counters::default(),

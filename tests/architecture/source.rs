@@ -55,10 +55,11 @@ fn measure(rest: &str, first: char) -> (usize, Kind) {
     if prefix <= 2 && rest[prefix..].starts_with('"') && !rest[..prefix].contains('r') {
         return (prefix + quoted(&rest[prefix..], '"'), Kind::Literal);
     }
-    if prefix <= 2 && rest[..prefix].ends_with('r') {
-        if let Some(length) = raw_string(&rest[prefix..]) {
-            return (prefix + length, Kind::Literal);
-        }
+    if prefix <= 2
+        && rest[..prefix].ends_with('r')
+        && let Some(length) = raw_string(&rest[prefix..])
+    {
+        return (prefix + length, Kind::Literal);
     }
     if let Some(quote) = rest.strip_prefix('b').unwrap_or(rest).strip_prefix('\'') {
         let before = rest.len() - quote.len() - 1;

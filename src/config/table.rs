@@ -207,6 +207,11 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// The text, if it is one; anything else is no mistake here.
+    pub fn as_text(&self) -> Option<&'a str> {
+        self.node.get_ref().as_str()
+    }
+
     /// A text.
     pub fn text(&self, right: &str) -> Option<&'a str> {
         match self.node.get_ref() {

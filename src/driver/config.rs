@@ -150,6 +150,7 @@ fn read(path: &Path, mut root: Table<'_>) -> Option<Config> {
         root.finish();
         return None;
     }
+    layout::check_twins(&signals);
     let sections: Vec<_> = signals
         .into_iter()
         .filter_map(|table| section::read(table, addressing))

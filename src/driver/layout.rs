@@ -193,34 +193,41 @@ fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -
     found
 }
 
-/// No name twice, and none that an edge count has.
-fn check_names(sections: &[Section<'_>]) {
-    let mut first: HashMap<&str, &Section<'_>> = HashMap::new();
-    for section in sections {
-        let Some(name) = &section.name else { continue };
-        match first.entry(&section.signal.name) {
-            Entry::Vacant(free) => {
-                free.insert(section);
-            }
-            Entry::Occupied(taken) => name.wrong(
+/// No name twice, whatever else is wrong with the signals.
+pub(super) fn check_twins(tables: &[Table<'_>]) {
+    let mut first: HashMap<&str, Value<'_>> = HashMap::new();
+    for table in tables {
+        let Some((_, value)) = table.all().find(|(key, _)| *key == "name") else {
+            continue;
+        };
+        match value.as_text().map(|name| (name, first.entry(name))) {
+            Some((name, Entry::Occupied(taken))) if !name.is_empty() => value.wrong(
                 format!(
                     "the name \"{}\" is that of the signal on line {}",
-                    shown(&section.signal.name),
-                    line_of(taken.get()),
+                    shown(name),
+                    taken.get().line(),
                 ),
                 "give each signal a name of its own",
             ),
+            Some((_, Entry::Vacant(free))) => {
+                free.insert(value);
+            }
+            _ => {}
         }
     }
+}
+
+/// No name that an edge count has.
+fn check_names(sections: &[Section<'_>]) {
+    let latched: HashMap<&str, &Section<'_>> = sections
+        .iter()
+        .filter(|section| section.signal.latch.is_some())
+        .map(|section| (section.signal.name.as_str(), section))
+        .collect();
     for section in sections {
-        let counted = section
-            .signal
-            .name
-            .strip_suffix(".edges")
-            .and_then(|name| first.get(name));
-        if let (Some(name), Some(counted)) = (&section.name, counted)
-            && counted.signal.latch.is_some()
-        {
+        let counted = section.signal.name.strip_suffix(".edges");
+        let counted = counted.and_then(|name| latched.get(name));
+        if let (Some(name), Some(counted)) = (&section.name, counted) {
             name.wrong(
                 format!(
                     "the name \"{}\" is that of the edge count of the latched signal on line {}",

@@ -54,7 +54,7 @@ native_library() {
 
 # Maven, without its chatter and its colours, on the Java reactor.
 maven() {
-    mvn -q -B -ntp -f java "$@" | sed $'s/\033\\[[0-9;]*m//g'
+    mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
 }
 
 # Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver and a driver.cfg) and

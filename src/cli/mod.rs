@@ -1,6 +1,6 @@
 //! The `tickbus` command.
 //!
-//! One file for each subcommand: its arguments, and `run`, which answers with an [`Outcome`].
+//! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
 
 mod check;
 

@@ -66,6 +66,26 @@ fn stepped_ends_exchange_on_their_own_ticks() {
     assert_eq!(rig.controller.get("position"), 4.0);
 }
 
+#[test]
+fn what_a_former_peer_left_is_not_news_to_the_next() {
+    let (link, clock) = (Link::new(), Manual::new());
+    let open = |role| End::open(&config(&link, role, "mode = \"stepped\""), &clock);
+    let (mut device, mut controller) = (open("device"), open("controller"));
+    for _ in 0..2 {
+        device.tick();
+        controller.tick();
+    }
+    device.set("position", 4.0);
+    device.tick();
+    controller.driver.close();
+    device.tick();
+    let mut next = open("controller");
+    assert_eq!(next.tick().code, Code::Stale, "the device has not ticked");
+    device.tick();
+    assert_eq!(next.tick().code, Code::Fresh);
+    assert_eq!(next.get("position"), 4.0);
+}
+
 /// A hosted program behind the link, scanned by the tick.
 fn mirror(mode: &str, clock: &std::sync::Arc<Manual>) -> End {
     let fieldbus = format!(

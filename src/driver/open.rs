@@ -242,7 +242,7 @@ impl Driver {
 
         let cycles: u64 = self.stations.iter().map(Station::cycles).sum();
         let mut text = self.counters.to_string();
-        let (state, reason) = (self.status.state().name(), self.status.reason());
+        let (state, reason) = (self.status.state().name(), one_line(&self.status.reason()));
         let lost = self.events.lost();
         // Writing to a string cannot fail.
         let _ = write!(
@@ -253,7 +253,7 @@ impl Driver {
             Some(Program::Thread(host)) => {
                 host.tally().write(&mut text);
                 if let Some(fault) = host.fault() {
-                    let _ = writeln!(text, "plc.fault={fault}");
+                    let _ = writeln!(text, "plc.fault={}", one_line(&fault));
                 }
             }
             Some(Program::Stepped(tally)) => tally.write(&mut text),
@@ -281,6 +281,11 @@ impl Driver {
         drop(self);
         status.enter(LinkState::Closed, "closed");
     }
+}
+
+/// A text with its line breaks as spaces: the text of a panic often has some.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn open_loopback(
@@ -356,4 +361,32 @@ fn check_fit(config: &Config, program: &dyn plc::Program) -> Result<(), String> 
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Manual;
+
+    #[test]
+    fn statistics_have_one_line_per_key_whatever_the_reason_says() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\n\
+                    link = \"statistics\"\nmode = \"stepped\"\n\
+                    [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n";
+        let config = Config::parse("driver.cfg", text).expect("a right driver.cfg");
+        let driver = Driver::open(config, Manual::new()).expect("opens");
+        driver.status.enter(
+            LinkState::Failed,
+            "assertion `left == right` failed\n  left: 1\n right: 2",
+        );
+        let statistics = driver.statistics();
+        assert!(
+            statistics.contains("\nreason=assertion `left == right` failed left: 1 right: 2\n"),
+            "{statistics}"
+        );
+        assert!(
+            statistics.lines().all(|line| line.contains('=')),
+            "{statistics}"
+        );
+    }
 }

@@ -203,6 +203,13 @@ impl PulseShaper {
         }
     }
 
+    /// Takes note that the receiver is about to see `bytes` instead of any frame: no edge that waits
+    /// is shown by them.
+    pub fn pass_instead(&mut self, bytes: &[u8]) {
+        self.next_shown.copy_from_slice(&self.shown);
+        self.pass(bytes);
+    }
+
     /// Shapes `bytes`, a copy of the frame's, whose counters are `edges`, for an exchange at `now`.
     pub fn shape(&mut self, edges: &[u32], now: Nanos, bytes: &mut [u8]) {
         self.counts.copy_from_slice(edges);

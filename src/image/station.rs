@@ -235,7 +235,7 @@ impl BusStation {
     pub fn outgoing(&mut self, now: Nanos, watchdog: Option<Nanos>) -> &[u8] {
         self.tx.update();
         if watchdog.is_some_and(|limit| self.tick_age(now) > limit) {
-            self.tx_shaper.pass(&self.tx_fail_safe);
+            self.tx_shaper.pass_instead(&self.tx_fail_safe);
             return &self.tx_fail_safe;
         }
         let (shaper, outgoing) = (&mut self.tx_shaper, &mut self.outgoing);
@@ -401,6 +401,22 @@ mod tests {
         assert_eq!(bus.outgoing(Nanos(11), watchdog), [0x80]);
         tick.write(Nanos(12), |bytes| bytes[0] = 2);
         assert_eq!(bus.outgoing(Nanos(13), watchdog), [2]);
+    }
+
+    #[test]
+    fn a_pulse_that_fail_safe_bytes_overtook_is_sent_after_them() {
+        let (mut tick, mut bus) = one_latched_byte();
+        let watchdog = Some(Nanos(10));
+        for level in [0, 1, 0] {
+            tick.write(Nanos(0), |bytes| bytes[0] = level);
+        }
+        assert_eq!(bus.outgoing(Nanos(1), watchdog), [1], "shown, not sent");
+        assert_eq!(bus.outgoing(Nanos(20), watchdog), [0x80]);
+        bus.sent();
+        tick.write(Nanos(21), |bytes| bytes[0] = 0);
+        assert_eq!(bus.outgoing(Nanos(22), watchdog), [1]);
+        bus.sent();
+        assert_eq!(bus.outgoing(Nanos(23), watchdog), [0]);
     }
 
     #[test]

@@ -136,9 +136,9 @@ fn buffer(env: &mut Env<'_>, slots: usize, layout: &JObject<'_>) -> Result<Share
     let address = NonNull::new(address).ok_or_else(|| unusable("has no address".into()))?;
     let keep = env.new_global_ref(buffer)?;
     // SAFETY: a direct buffer's address stays the same and valid for its capacity, checked above, as
-    // long as it is reachable, which `keep` sees to; the JVM zeroes it. Only `tickbus.Tickbus` has the
-    // Java end, and touches the slots only in its `exchange`, before and after the native call, while
-    // it holds its own claim; the header's input word likewise.
+    // long as it is reachable, which `keep` sees to; the JVM zeroes it. Only the package `tickbus`
+    // has the Java end. Its signals move slots outside the native call, on the one thread that ticks
+    // the driver, as its documentation demands; no slot is ever an address, index or length.
     unsafe { Shared::new(address, slots, keep) }
         .ok_or_else(|| unusable("is not aligned for 8-byte words".into()))
 }

@@ -82,7 +82,8 @@ impl<K> Shared<K> {
     pub(super) fn slots(&mut self) -> &mut [Slot] {
         // SAFETY: `new` was promised HEADER + slots words, aligned and initialised, that live as long
         // as `self`; a `Slot` is a transparent u64. Java moves slots only before and after the
-        // exchange that borrows them, on the thread that makes the call (class `tickbus.Tickbus`).
+        // exchange that borrows them, on the thread that makes the call: classes `tickbus.Signal` and
+        // `tickbus.Tickbus` demand that of their callers.
         unsafe {
             std::slice::from_raw_parts_mut(self.words.add(HEADER).as_ptr().cast(), self.slots)
         }

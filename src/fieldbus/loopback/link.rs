@@ -130,6 +130,9 @@ impl End {
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
         if !theirs.attached {
+            // What the former other end did not take is old news to the next one.
+            line.lanes[lane(self.role)].waiting = false;
+            self.sent = false;
             drop(line);
             port.enter(LinkState::Opening, "waiting for the other end of the link");
             return;

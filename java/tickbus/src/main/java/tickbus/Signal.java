@@ -6,7 +6,7 @@ import java.nio.LongBuffer;
  * A handle on one signal of an open driver.
  *
  * <p>Get it once by {@link Tickbus#signal(String)} and keep it; getters and setters neither allocate nor
- * look anything up. They work on this side's copy of the process image: what is set goes to the PLC with the
+ * look anything up. They work on the memory shared with the driver: what is set goes to the PLC with the
  * next {@link Tickbus#exchange()}, what is got came with the last one. They belong to the thread that ticks
  * the driver, and throw {@link FieldbusException} with {@link Status#CLOSED} once it is closed.
  */

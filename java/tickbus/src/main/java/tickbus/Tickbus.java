@@ -262,7 +262,8 @@ public final class Tickbus implements AutoCloseable {
         String text = whenIdle(() -> statisticsNative(handle));
         Map<String, String> statistics = new LinkedHashMap<>();
         text.lines().forEach(line -> {
-            int equals = line.indexOf('=');
+            // A count has the name of its signal in its key, and that may have a '=' of its own.
+            int equals = line.startsWith("plc.rises.") ? line.lastIndexOf('=') : line.indexOf('=');
             statistics.put(line.substring(0, equals), line.substring(equals + 1));
         });
         return Collections.unmodifiableMap(statistics);

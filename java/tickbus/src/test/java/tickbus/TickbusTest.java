@@ -269,6 +269,13 @@ class TickbusTest {
     }
 
     @Test
+    void aSignalWithAnEqualsSignIsCountedUnderItsName() {
+        try (Tickbus bus = DriverCfg.mirror(1).signal("a=b", "%IX0.0").open(directory)) {
+            assertEquals("0", bus.statistics().get("plc.rises.a=b"));
+        }
+    }
+
+    @Test
     void driversOpenAndCloseAgainAndAgain() {
         Path cfg = DriverCfg.link(1, DriverCfg.freshLink(), "device").signal("in", "%IX0.0").write(directory);
         for (int i = 0; i < 100; i++) {

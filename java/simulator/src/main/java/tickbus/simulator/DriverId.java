@@ -15,6 +15,8 @@ import java.util.regex.Pattern;
  * allowed, a comment behind it allowed) below a line {@code [driver]} and above the next table header.
  */
 final class DriverId {
+    /** Some editors begin a file in UTF-8 with it. */
+    private static final String BYTE_ORDER_MARK = "\uFEFF";
     private static final Pattern TABLE = Pattern.compile("\\s*\\[+\\s*([^\\]]*?)\\s*\\]+\\s*(#.*)?");
     private static final Pattern ID = Pattern.compile("\\s*(?:id|\"id\"|'id')\\s*=\\s*([+-]?\\d[\\d_]*)\\s*(#.*)?");
 
@@ -32,6 +34,9 @@ final class DriverId {
             text = Files.readString(cfg);
         } catch (IOException e) {
             throw new WrongInput(cfg + ": cannot be read as text in UTF-8: " + e, e);
+        }
+        if (text.startsWith(BYTE_ORDER_MARK)) {
+            text = text.substring(BYTE_ORDER_MARK.length());
         }
         boolean inDriver = false;
         for (String line : text.split("\\R")) {

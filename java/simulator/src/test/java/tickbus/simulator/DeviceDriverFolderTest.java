@@ -87,6 +87,13 @@ class DeviceDriverFolderTest {
         assertEquals("", log());
     }
 
+    @Test
+    void aCfgOfAnotherSystemsEditorHasItsId() throws IOException {
+        DriverJar.write(work, folder.resolve("driver.jar"), "drivers.Good", "drivers.Good");
+        cfg("a.cfg", "\uFEFF[driver]\r\nid = 7\r\n");
+        assertEquals(Set.of(7), DeviceDriverFolder.scan(folder).configurations().keySet());
+    }
+
     @ParameterizedTest
     @CsvSource({"'', there is no id", "'id = 5', there is no id", "'[driver]\nid = \"5\"', there is no id",
         "'[driver]\n[fieldbus]\nid = 5', there is no id", "'[driver]\nid = 5000000000', does not fit into 32 bits"})

@@ -2,14 +2,13 @@
 //!
 //! Nothing here allocates, locks or calls the system, unless the bus is a stepped one.
 
-use crate::fieldbus::{LinkState, Role};
-use crate::image::{Arrival, TickStation};
-use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
+use crate::fieldbus::LinkState;
+use crate::image::Arrival;
+use crate::signal::Slot;
 use crate::time::Nanos;
 
 use super::open::Line;
-use super::statistics::Counters;
-use super::{Code, Driver, SlotMap};
+use super::{Code, Driver};
 
 /// What an exchange found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,96 +22,6 @@ pub struct Exchange {
     /// Up to when the simulation may go on without the next exchange; the simulation's own time on
     /// buses that do not step it.
     pub granted: Nanos,
-}
-
-/// One station of an open driver, as the tick sees it.
-#[derive(Debug)]
-pub(super) struct Station {
-    tick: TickStation,
-    encode: Plan,
-    decode: Plan,
-    rx_fail_safe: Box<[u8]>,
-    /// Whether the slots hold fail-safe values.
-    stale: bool,
-}
-
-/// The areas that a role writes and reads.
-pub(super) fn areas(role: Role) -> (Area, Area) {
-    match role {
-        Role::Device => (Area::Input, Area::Output),
-        Role::Controller => (Area::Output, Area::Input),
-    }
-}
-
-impl Station {
-    pub(super) fn new(
-        tick: TickStation,
-        table: &SignalTable,
-        index: usize,
-        (tx, rx): (Area, Area),
-        rx_fail_safe: Box<[u8]>,
-    ) -> Self {
-        let (encode, decode) = (Plan::new(table, index, tx), Plan::new(table, index, rx));
-        Self {
-            tick,
-            encode,
-            decode,
-            rx_fail_safe,
-            stale: true,
-        }
-    }
-
-    pub(super) fn cycles(&self) -> u64 {
-        self.tick.cycles()
-    }
-
-    fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
-        let encode = &self.encode;
-        let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
-        if bent != Conversions::default() {
-            counters.saturated += u64::from(bent.saturated);
-            counters.not_a_number += u64::from(bent.not_a_number);
-        }
-    }
-
-    fn receive(
-        &mut self,
-        now: Nanos,
-        max_age: Nanos,
-        slots: &mut [Slot],
-        map: &SlotMap,
-    ) -> Arrival {
-        let decode = &self.decode;
-        let arrival = self.tick.read(now, &mut Receiver { decode, slots, map });
-        let stale = arrival.age > max_age;
-        if stale && (arrival.changed || !self.stale) {
-            self.decode.fail_safe(slots);
-            self.tick.shown_instead(&self.rx_fail_safe);
-        }
-        self.stale = stale;
-        arrival
-    }
-}
-
-/// Puts what a station received into the slots.
-struct Receiver<'a> {
-    decode: &'a Plan,
-    slots: &'a mut [Slot],
-    map: &'a SlotMap,
-}
-
-impl crate::image::Receiver for Receiver<'_> {
-    #[inline]
-    fn levels(&mut self, bytes: &[u8]) {
-        self.decode.decode(bytes, self.slots);
-    }
-
-    #[inline]
-    fn edges(&mut self, signal: usize, count: u32) {
-        if let Some(slot) = self.map.edges[signal] {
-            self.slots[slot] = Slot::from_real(f64::from(count));
-        }
-    }
 }
 
 impl Driver {

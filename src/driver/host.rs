@@ -14,7 +14,7 @@ use crate::signal::{Area, DataType, SignalTable};
 use crate::time::{Clock, Nanos, Stop};
 
 use super::Config;
-use super::open::directions;
+use super::frames::directions;
 use super::supervise::{BusThread, panic_text};
 
 /// What the hosted program has seen and made, for comparison with the other end.

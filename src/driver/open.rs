@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
 use crate::fieldbus::{Bus, ChangeEvents, LinkState, LinkStatus, Options, Port, Role, Stepped};
-use crate::image::{Consumer, Directions, Event, image, latched_bits};
+use crate::image::{Consumer, Event, image};
 use crate::plc;
-use crate::signal::{Area, Plan, SignalTable, Slot};
+use crate::signal::Slot;
 use crate::time::{Clock, CoarseTime, Nanos};
 
-use super::exchange::{Station, areas};
+use super::frames::{areas, directions};
 use super::host::{HostThread, SteppedHost, Tally};
+use super::station::Station;
 use super::supervise::BusThread;
-use super::{Code, Config, Counters};
+use super::{Code, Config, Counters, SlotMap};
 
 /// The bus cycle of a loopback whose driver.cfg names none.
 const LOOPBACK_CYCLE: Nanos = Nanos::from_millis(1);
@@ -59,34 +60,6 @@ enum Program {
     Stepped(Arc<Tally>),
 }
 
-/// Where each value stands among the slots that an exchange works on.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct SlotMap {
-    /// Slots in all: one per signal in the order of the table, then one per latched signal that
-    /// this end reads.
-    pub count: usize,
-    /// Per signal, the slot that counts its edges since the last exchange, as a double.
-    pub edges: Vec<Option<usize>>,
-}
-
-impl SlotMap {
-    fn new(table: &SignalTable, role: Role) -> Self {
-        let (_, rx) = areas(role);
-        let mut count = table.signals.len();
-        let edges = table
-            .signals
-            .iter()
-            .map(|signal| {
-                (signal.area == rx && signal.latch.is_some()).then(|| {
-                    count += 1;
-                    count - 1
-                })
-            })
-            .collect();
-        Self { count, edges }
-    }
-}
-
 /// Why a driver cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum DriverError {
@@ -116,37 +89,6 @@ impl DriverError {
             Self::Program { .. } | Self::Config(_) => Code::BadConfig,
         }
     }
-}
-
-/// Size in bytes of a station's area.
-fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
-    match area {
-        Area::Input => table.stations[station].input_bytes,
-        Area::Output => table.stations[station].output_bytes,
-    }
-}
-
-/// The frame that holds the fail-safe value of every signal.
-fn fail_safe_frame(table: &SignalTable, station: usize, area: Area) -> Box<[u8]> {
-    let plan = Plan::new(table, station, area);
-    let mut slots = vec![Slot::default(); table.signals.len()];
-    let mut frame = vec![0; area_bytes(table, station, area)];
-    plan.fail_safe(&mut slots);
-    plan.encode(&slots, &mut frame);
-    frame.into()
-}
-
-/// What the image of the end with `role` is made of, per station.
-pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<Directions> {
-    let (tx, rx) = areas(role);
-    (0..table.stations.len())
-        .map(|station| Directions {
-            tx_fail_safe: fail_safe_frame(table, station, tx),
-            tx_latched: latched_bits(table, station, tx),
-            rx_fail_safe: fail_safe_frame(table, station, rx),
-            rx_latched: latched_bits(table, station, rx),
-        })
-        .collect()
 }
 
 impl Driver {

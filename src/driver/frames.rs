@@ -1,0 +1,44 @@
+//! The frames of each end: which area it writes and reads, and what stands there at rest.
+
+use crate::fieldbus::Role;
+use crate::image::{Directions, latched_bits};
+use crate::signal::{Area, Plan, SignalTable, Slot};
+
+/// The areas that a role writes and reads.
+pub(super) fn areas(role: Role) -> (Area, Area) {
+    match role {
+        Role::Device => (Area::Input, Area::Output),
+        Role::Controller => (Area::Output, Area::Input),
+    }
+}
+
+/// Size in bytes of a station's area.
+fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
+    match area {
+        Area::Input => table.stations[station].input_bytes,
+        Area::Output => table.stations[station].output_bytes,
+    }
+}
+
+/// The frame that holds the fail-safe value of every signal.
+fn fail_safe_frame(table: &SignalTable, station: usize, area: Area) -> Box<[u8]> {
+    let plan = Plan::new(table, station, area);
+    let mut slots = vec![Slot::default(); table.signals.len()];
+    let mut frame = vec![0; area_bytes(table, station, area)];
+    plan.fail_safe(&mut slots);
+    plan.encode(&slots, &mut frame);
+    frame.into()
+}
+
+/// What the image of the end with `role` is made of, per station.
+pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<Directions> {
+    let (tx, rx) = areas(role);
+    (0..table.stations.len())
+        .map(|station| Directions {
+            tx_fail_safe: fail_safe_frame(table, station, tx),
+            tx_latched: latched_bits(table, station, tx),
+            rx_fail_safe: fail_safe_frame(table, station, rx),
+            rx_latched: latched_bits(table, station, rx),
+        })
+        .collect()
+}

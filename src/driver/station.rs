@@ -1,0 +1,88 @@
+//! One station of an open driver, as the tick sees it.
+
+use super::{Counters, SlotMap};
+use crate::image::{Arrival, TickStation};
+use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
+use crate::time::Nanos;
+
+/// One station of an open driver, as the tick sees it.
+#[derive(Debug)]
+pub(super) struct Station {
+    tick: TickStation,
+    encode: Plan,
+    decode: Plan,
+    rx_fail_safe: Box<[u8]>,
+    /// Whether the slots hold fail-safe values.
+    pub(super) stale: bool,
+}
+
+impl Station {
+    pub(super) fn new(
+        tick: TickStation,
+        table: &SignalTable,
+        index: usize,
+        (tx, rx): (Area, Area),
+        rx_fail_safe: Box<[u8]>,
+    ) -> Self {
+        let (encode, decode) = (Plan::new(table, index, tx), Plan::new(table, index, rx));
+        Self {
+            tick,
+            encode,
+            decode,
+            rx_fail_safe,
+            stale: true,
+        }
+    }
+
+    pub(super) fn cycles(&self) -> u64 {
+        self.tick.cycles()
+    }
+
+    pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
+        let encode = &self.encode;
+        let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
+        if bent != Conversions::default() {
+            counters.saturated += u64::from(bent.saturated);
+            counters.not_a_number += u64::from(bent.not_a_number);
+        }
+    }
+
+    pub(super) fn receive(
+        &mut self,
+        now: Nanos,
+        max_age: Nanos,
+        slots: &mut [Slot],
+        map: &SlotMap,
+    ) -> Arrival {
+        let decode = &self.decode;
+        let arrival = self.tick.read(now, &mut Receiver { decode, slots, map });
+        let stale = arrival.age > max_age;
+        if stale && (arrival.changed || !self.stale) {
+            self.decode.fail_safe(slots);
+            self.tick.shown_instead(&self.rx_fail_safe);
+        }
+        self.stale = stale;
+        arrival
+    }
+}
+
+/// Puts what a station received into the slots.
+struct Receiver<'a> {
+    decode: &'a Plan,
+    slots: &'a mut [Slot],
+    map: &'a SlotMap,
+}
+
+impl crate::image::Receiver for Receiver<'_> {
+    #[inline]
+    fn levels(&mut self, bytes: &[u8]) {
+        self.decode.decode(bytes, self.slots);
+    }
+
+    #[inline]
+    fn edges(&mut self, signal: usize, count: u32) {
+        if let Some(slot) = self.map.edges[signal] {
+            self.slots[slot] = Slot::from_real(f64::from(count));
+        }
+    }
+}

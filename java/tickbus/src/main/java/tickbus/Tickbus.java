@@ -30,8 +30,8 @@ import java.util.function.Supplier;
  * <p><b>Threads.</b> The first thread that exchanges becomes the driver's ticking thread: exchanges, events and the
  * getters and setters of the signals belong to it. Another thread's exchange throws {@link Status#BUSY} and does
  * nothing, until the ticking thread has ended or has called {@link #releaseThread}. {@link #statistics} and {@link #close}
- * can be called by any thread; while an exchange is running they throw {@link Status#BUSY}. Different drivers are
- * independent of each other.
+ * can be called by any thread; while an exchange is running they throw {@link Status#BUSY}, and an
+ * exchange that meets one of them waits for its end. Different drivers are independent of each other.
  *
  * <p><b>The tick</b>, {@link #exchange()}, takes no lock, makes no system call, and allocates nothing, in
  * either language; it never waits for the bus unless driver.cfg says {@code mode = "stepped"}.
@@ -139,6 +139,19 @@ public final class Tickbus implements AutoCloseable {
 
     private int move() {
         int code = xChangeData(handle);
+        return code >= 0 ? code : moveAfter(code);
+    }
+
+    /**
+     * Goes on where {@link #statistics} or {@link #close} of another thread was in the way: the one ends within
+     * microseconds, the other in {@link Status#CLOSED}.
+     */
+    private int moveAfter(int refusal) {
+        int code = refusal;
+        while (code == Status.BUSY.code()) {
+            Thread.onSpinWait();
+            code = xChangeData(handle);
+        }
         if (code < 0) {
             throw failure(code);
         }

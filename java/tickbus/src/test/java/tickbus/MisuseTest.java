@@ -16,6 +16,7 @@ import java.util.concurrent.ExecutionException;
 import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
 import java.util.concurrent.Future;
+import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.atomic.AtomicReference;
 import org.junit.jupiter.api.BeforeAll;
 import org.junit.jupiter.api.Tag;
@@ -213,6 +214,32 @@ class MisuseTest {
             };
             int served = atOnce(exchanges, exchanges).stream().mapToInt(Integer::intValue).sum();
             assertEquals(String.valueOf(served), bus.statistics().get("ticks"));
+        }
+    }
+
+    @Test
+    void aThreadThatReadsStatisticsDisturbsNoTick() throws Exception {
+        try (Tickbus bus = Tickbus.open(mirror())) {
+            AtomicBoolean ticked = new AtomicBoolean();
+            Callable<Integer> ticks = () -> {
+                try {
+                    for (int i = 0; i < 20_000; i++) {
+                        assertTrue(bus.exchange() >= 0);
+                    }
+                    return 0;
+                } finally {
+                    ticked.set(true);
+                }
+            };
+            Callable<Integer> looks = () -> {
+                int seen = 0;
+                while (!ticked.get()) {
+                    seen += served(bus::statistics) ? 1 : 0;
+                }
+                return seen;
+            };
+            atOnce(ticks, looks);
+            assertEquals("20000", bus.statistics().get("ticks"));
         }
     }
 

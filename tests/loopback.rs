@@ -142,3 +142,17 @@ fn a_free_program_scans_on_the_clock() {
         assert_eq!(end.statistic("plc.rises.out"), pulses.to_string());
     }
 }
+
+#[test]
+fn a_jump_of_simulation_time_is_refused_and_the_next_tick_goes_on() {
+    let mut end = mirror("stepped", &Manual::new());
+    end.tick();
+    let jumped = end.driver.exchange(Nanos::MAX, &mut end.slots);
+    assert_eq!(jumped.code, Code::BusFailed);
+    assert!(end.statistic("reason").contains("simulation time jumped"));
+    let mut end = mirror("stepped", &Manual::new());
+    end.tick();
+    end.driver.exchange(Nanos::from_secs(2_000), &mut end.slots);
+    let after = end.driver.exchange(Nanos::from_secs(2_001), &mut end.slots);
+    assert_eq!(after.code, Code::Fresh);
+}

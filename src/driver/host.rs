@@ -248,6 +248,10 @@ fn scan_until_stopped(cpu: &mut Cpu, interval: Nanos, clock: &dyn Clock, stop: &
     }
 }
 
+/// The most scans that one exchange makes up for: 1,000 s of scans every 10 ms. A longer step is a wrong
+/// time, and would keep the tick for as long as it takes to scan through it.
+const MOST_SCANS: i64 = 100_000;
+
 /// A hosted program that is scanned by the tick, on simulation time.
 pub(super) struct SteppedHost {
     cpu: Cpu,
@@ -300,6 +304,13 @@ impl Stepped for SteppedHost {
         port.enter(LinkState::Running, "the hosted program is there");
         carry(port, &mut self.port, now, &mut self.wire);
         let mut due = self.due.unwrap_or(now);
+        if due + self.interval.times(MOST_SCANS) < now {
+            self.due = Some(now);
+            return Err(BusError::Refused(format!(
+                "simulation time jumped from {due} to {now}, over more than {MOST_SCANS} scans of the \
+                 hosted program; hand in the nanoseconds since the simulation began, tick by tick",
+            )));
+        }
         while due <= now {
             self.cpu.scan(due);
             due += self.interval;

@@ -63,20 +63,10 @@ fn serve(
     let mut attempt = 0;
     while !stop.is_stopped() {
         status.enter(LinkState::Opening, "opening the line");
-        match catch_unwind(AssertUnwindSafe(|| bus.run(port, stop))) {
-            Ok(Ok(())) => {}
-            Ok(Err(error)) => {
-                if status.state() == LinkState::Running {
-                    attempt = 0;
-                }
-                let pause = reconnect[attempt.min(reconnect.len() - 1)];
-                attempt += 1;
-                status.enter(
-                    LinkState::Failed,
-                    &format!("{error}; next attempt in {pause}"),
-                );
-                clock.wait_until(clock.now() + pause, stop);
-            }
+        let ended = match catch_unwind(AssertUnwindSafe(|| bus.run(port, stop))) {
+            Ok(Ok(())) if stop.is_stopped() => break,
+            Ok(Ok(())) => "the bus ended by itself".to_owned(),
+            Ok(Err(error)) => error.to_string(),
             Err(panic) => {
                 let text = panic_text(&*panic);
                 status.enter(
@@ -87,7 +77,17 @@ fn serve(
                 );
                 return;
             }
+        };
+        if status.state() == LinkState::Running {
+            attempt = 0;
         }
+        let pause = reconnect[attempt.min(reconnect.len() - 1)];
+        attempt += 1;
+        status.enter(
+            LinkState::Failed,
+            &format!("{ended}; next attempt in {pause}"),
+        );
+        clock.wait_until(clock.now() + pause, stop);
     }
     status.enter(LinkState::Closed, "closed");
 }

@@ -32,6 +32,12 @@ impl Nanos {
         Self(secs.saturating_mul(1_000_000_000))
     }
 
+    /// The span, `count` times over.
+    #[must_use]
+    pub const fn times(self, count: i64) -> Self {
+        Self(self.0.saturating_mul(count))
+    }
+
     /// The span as a [`std::time::Duration`]; a negative span is zero.
     pub fn to_duration(self) -> std::time::Duration {
         std::time::Duration::from_nanos(u64::try_from(self.0).unwrap_or(0))

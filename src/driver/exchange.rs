@@ -30,7 +30,7 @@ impl Driver {
     ///
     /// # Panics
     ///
-    /// When there are fewer slots than [`SlotMap::count`].
+    /// When there are fewer slots than [`SlotMap::count`](super::SlotMap::count).
     pub fn exchange(&mut self, simulation_time: Nanos, slots: &mut [Slot]) -> Exchange {
         assert!(
             slots.len() >= self.slots.count,

@@ -19,6 +19,7 @@ use std::ffi::c_void;
 use std::panic::catch_unwind;
 use std::path::Path;
 
+use env_logger::Env as LogEnv;
 use jni::objects::{JClass, JLongArray, JObject, JString};
 use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jclass, jint, jlong};
 use jni::vm::JavaVM;
@@ -33,6 +34,9 @@ use handles::Handles;
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
 
+/// What is logged to stderr: the variable that says it, and what holds without it.
+const LOG: (&str, &str) = ("TICKBUS_LOG", "warn");
+
 /// Called by the JVM when it loads the library.
 ///
 /// # Safety
@@ -41,6 +45,8 @@ static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
 #[unsafe(no_mangle)]
 unsafe extern "system" fn JNI_OnLoad(vm: *mut jni::sys::JavaVM, _reserved: *mut c_void) -> jint {
     let found = catch_unwind(|| {
+        // A host that has a logger of its own in this process keeps it.
+        let _ = env_logger::Builder::from_env(LogEnv::new().filter_or(LOG.0, LOG.1)).try_init();
         // SAFETY: the caller's promise.
         unsafe { JavaVM::from_raw(vm) }.attach_current_thread(failure::find_exception)
     });

@@ -61,7 +61,9 @@ impl Plan {
             Area::Input => station.input_bytes,
             Area::Output => station.output_bytes,
         });
-        let ends = members.iter().map(|(_, s)| s.byte + bytes(s.data_type));
+        let ends = members
+            .iter()
+            .map(|(_, s)| s.byte + s.data_type.size_bytes());
         let bytes = ends
             .max()
             .map_or(station_bytes, |end| end.max(station_bytes));
@@ -147,7 +149,7 @@ impl Kind {
             DataType::Lint if !scaled => DataType::Ulint,
             other => other,
         };
-        let order = match (bytes(data_type), signal.order) {
+        let order = match (data_type.size_bytes(), signal.order) {
             (1, _) | (2, ByteOrder::Cdab) => ByteOrder::Abcd,
             (2, ByteOrder::Badc) => ByteOrder::Dcba,
             (_, order) => order,
@@ -213,7 +215,7 @@ fn runs(members: &[Member]) -> Vec<Box<dyn Run>> {
 /// The bytes of a frame that no signal touches.
 fn gaps(members: &[Member], frame_bytes: usize) -> Vec<Range<usize>> {
     let mut spans: Vec<Range<usize>> = (members.iter())
-        .map(|(_, signal)| signal.byte..signal.byte + bytes(signal.data_type))
+        .map(|(_, signal)| signal.byte..signal.byte + signal.data_type.size_bytes())
         .collect();
     spans.sort_by_key(|span| span.start);
     let mut gaps = Vec::new();
@@ -228,16 +230,6 @@ fn gaps(members: &[Member], frame_bytes: usize) -> Vec<Range<usize>> {
         gaps.push(covered..frame_bytes);
     }
     gaps
-}
-
-/// How many bytes of the frame a value touches.
-fn bytes(data_type: DataType) -> usize {
-    match data_type {
-        DataType::Bool | DataType::Byte | DataType::Sint | DataType::Usint => 1,
-        DataType::Word | DataType::Int | DataType::Uint => 2,
-        DataType::Dword | DataType::Dint | DataType::Udint | DataType::Real => 4,
-        DataType::Lword | DataType::Lint | DataType::Ulint | DataType::Lreal => 8,
-    }
 }
 
 /// A slot or byte number as runs keep it: half as wide, so that twice as many fit into the cache.

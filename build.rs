@@ -17,6 +17,7 @@ struct Row<'a> {
 }
 
 fn main() {
+    find_compiler();
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed={TABLE}");
     let table = fs::read_to_string(TABLE).unwrap_or_else(|error| panic!("{TABLE}: {error}"));
@@ -40,6 +41,15 @@ fn main() {
     let out = env::var_os("OUT_DIR").expect("cargo sets OUT_DIR");
     let out = Path::new(&out).join("status.rs");
     fs::write(&out, generate(&rows)).unwrap_or_else(|error| panic!("{}: {error}", out.display()));
+}
+
+/// The tests of the plug-in bus build plug-ins in C; `no_cc` leaves them out.
+fn find_compiler() {
+    println!("cargo::rustc-check-cfg=cfg(no_cc)");
+    let answer = std::process::Command::new("cc").arg("--version").output();
+    if !answer.is_ok_and(|answer| answer.status.success()) {
+        println!("cargo::rustc-cfg=no_cc");
+    }
 }
 
 fn row(at: usize, line: &str) -> Row<'_> {

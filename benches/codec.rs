@@ -63,6 +63,7 @@ impl Device {
             latch: None,
             hold: Nanos::default(),
             fail_safe: Slot::default(),
+            dead_band: 0.0,
         };
         let signals: Vec<Signal> = match files {
             Files::AreaByArea => [Area::Input, Area::Output]

@@ -15,6 +15,23 @@ use tickbus::image::{Frame, triple_buffer};
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
 
+/// Faults of the rig's first bits, and of the line, as sections of a driver.cfg; none of them hides the bus.
+const FAULTS: &str = "
+[[fault]]
+kind   = \"invert\"
+signal = \"I 0.0\"
+[[fault]]
+kind   = \"noise\"
+signal = \"Q 0.0\"
+chance = 0.1
+[[fault]]
+kind = \"delay\"
+by   = \"5ms\"
+[[fault]]
+kind   = \"drop\"
+chance = 0.1
+";
+
 fn config(mode: &str, signals: &str) -> Config {
     let text = format!(
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
@@ -55,7 +72,11 @@ fn exchange(criterion: &mut Criterion) {
     let clock = Monotonic::shared().expect("a thread");
     let mut group = criterion.benchmark_group("exchange");
     let latched = bits("latch = \"rising\"");
+    // Faults that wait, and faults that are active.
+    let wait = FAULTS.replace("[[fault]]", "[[fault]]\nat = \"1000h\"");
     let tables = [
+        ("rig, faults waiting", format!("{latched}{wait}")),
+        ("rig, faults active", format!("{latched}{FAULTS}")),
         ("rig", latched),
         ("rig unlatched", bits("")),
         ("1000 reals", reals(1_000)),

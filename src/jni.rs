@@ -19,13 +19,13 @@ use std::ffi::c_void;
 use std::panic::catch_unwind;
 use std::path::Path;
 
-use env_logger::Env as LogEnv;
 use jni::objects::{JClass, JLongArray, JObject, JString};
-use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jclass, jint, jlong};
+use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jboolean, jclass, jint, jlong};
 use jni::vm::JavaVM;
 use jni::{Env, EnvUnowned};
 
 use crate::driver::Code;
+use crate::report::page_beside;
 
 use device::{Device, EVENT_WORDS, EVENTS};
 use failure::{Failure, ThrowFieldbusException};
@@ -33,9 +33,6 @@ use handles::Handles;
 
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
-
-/// What is logged to stderr: the variable that says it, and what holds without it.
-const LOG: (&str, &str) = ("TICKBUS_LOG", "warn");
 
 /// Called by the JVM when it loads the library.
 ///
@@ -45,8 +42,7 @@ const LOG: (&str, &str) = ("TICKBUS_LOG", "warn");
 #[unsafe(no_mangle)]
 unsafe extern "system" fn JNI_OnLoad(vm: *mut jni::sys::JavaVM, _reserved: *mut c_void) -> jint {
     let found = catch_unwind(|| {
-        // A host that has a logger of its own in this process keeps it.
-        let _ = env_logger::Builder::from_env(LogEnv::new().filter_or(LOG.0, LOG.1)).try_init();
+        crate::os::log_to_stderr(log::LevelFilter::Warn);
         // SAFETY: the caller's promise.
         unsafe { JavaVM::from_raw(vm) }.attach_current_thread(failure::find_exception)
     });
@@ -57,15 +53,16 @@ unsafe extern "system" fn JNI_OnLoad(vm: *mut jni::sys::JavaVM, _reserved: *mut 
     }
 }
 
-/// `static native long initializeNative(String driverCfg, Layout layout)`
+/// `static native long initializeNative(String driverCfg, String tables, Layout layout)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_initializeNative<'local>(
     mut env: EnvUnowned<'local>,
     _class: JClass<'local>,
     driver_cfg: JString<'local>,
+    tables: JString<'local>,
     layout: JObject<'local>,
 ) -> jlong {
-    env.with_env(|env| initialize(env, &driver_cfg, &layout))
+    env.with_env(|env| initialize(env, &driver_cfg, &tables, &layout))
         .resolve::<ThrowFieldbusException>()
 }
 
@@ -119,6 +116,61 @@ extern "system" fn Java_tickbus_Tickbus_eventsNative<'local>(
         .resolve::<ThrowFieldbusException>()
 }
 
+/// `static native int injectNative(long handle, String fault)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_injectNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+    fault: JString<'local>,
+) -> jint {
+    env.with_env(|env| inject(env, handle, &fault))
+        .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native boolean endFaultNative(long handle, int id)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_endFaultNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+    id: jint,
+) -> jboolean {
+    env.with_env(|_| {
+        let id = u32::try_from(id).unwrap_or_default();
+        with(handle, |device| device.end_fault(id))
+    })
+    .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native String faultsNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_faultsNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) -> JString<'local> {
+    env.with_env(|env| {
+        let text = with(handle, |device| device.faults())?;
+        Ok(env.new_string(text)?)
+    })
+    .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native String reportNative(String recording, String title, String statistics, String text)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_reportNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    recording: JString<'local>,
+    title: JString<'local>,
+    statistics: JString<'local>,
+    text: JString<'local>,
+) -> JString<'local> {
+    env.with_env(|env| report(env, [&recording, &title, &statistics, &text]))
+        .resolve::<ThrowFieldbusException>()
+}
+
 /// `static native int emptyNative()`: what crossing the border costs, the baseline of the benchmarks.
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_emptyNative(
@@ -131,6 +183,7 @@ extern "system" fn Java_tickbus_Tickbus_emptyNative(
 fn initialize(
     env: &mut Env<'_>,
     driver_cfg: &JString<'_>,
+    tables: &JString<'_>,
     layout: &JObject<'_>,
 ) -> Result<jlong, Failure> {
     let place = DRIVERS.reserve().map_err(|code| {
@@ -140,7 +193,12 @@ fn initialize(
         )
     })?;
     let path = driver_cfg.try_to_string(env)?;
-    let device = open::open(env, Path::new(&path), layout)?;
+    let tables = if tables.is_null() {
+        String::new()
+    } else {
+        tables.try_to_string(env)?
+    };
+    let device = open::open(env, Path::new(&path), &tables, layout)?;
     Ok(place.fill(device))
 }
 
@@ -150,6 +208,32 @@ fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jin
     let count = with(handle, |device| device.events(&mut words[..room]))?;
     into.set_region(env, 0, &words[..count * EVENT_WORDS])?;
     Ok(jint::try_from(count).unwrap_or(jint::MAX))
+}
+
+fn inject(env: &mut Env<'_>, handle: jlong, fault: &JString<'_>) -> Result<jint, Failure> {
+    let text = fault.try_to_string(env)?;
+    let id = with(handle, |device| device.inject(&text))?.map_err(|mistakes| {
+        Failure::coded(
+            Code::BadArgument,
+            format!("the fault cannot be injected:\n{mistakes}"),
+        )
+    })?;
+    Ok(jint::try_from(id).unwrap_or(jint::MAX))
+}
+
+fn report<'local>(
+    env: &mut Env<'local>,
+    [recording, title, statistics, text]: [&JString<'_>; 4],
+) -> Result<JString<'local>, Failure> {
+    let recording = recording.try_to_string(env)?;
+    let (title, statistics) = (title.try_to_string(env)?, statistics.try_to_string(env)?);
+    let text = text.try_to_string(env)?;
+    let (heading, text) = text.split_once('\n').unwrap_or((&text, ""));
+    let texts = [(heading.to_owned(), text.to_owned())];
+    let texts = if text.is_empty() { &[] } else { &texts[..] };
+    let page = page_beside(Path::new(&recording), &title, Some(&statistics), texts)
+        .map_err(|error| Failure::coded(Code::BadArgument, error))?;
+    Ok(env.new_string(page.to_string_lossy())?)
 }
 
 /// Work on a driver, with the text of its panic where it has failed.

@@ -7,12 +7,17 @@
 //! | room | what lives there |
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
+//! | [`os`] | what only the operating system can do: waiting for sockets, and time |
 //! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
+//! | [`faults`] | wrong values and troubles of the line, when they are asked for |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
+//! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
+//! | [`report`] | one HTML page about one run |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`driver`] | one device: configuration, open, exchange, statistics, close |
+//! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | [`cli`] | the `tickbus` command |
 //!
@@ -22,9 +27,14 @@
 pub mod cli;
 pub mod config;
 pub mod driver;
+pub mod faults;
 pub mod fieldbus;
 pub mod image;
 mod jni;
+pub mod os;
 pub mod plc;
+pub mod record;
+pub mod report;
 pub mod signal;
+pub mod testing;
 pub mod time;

@@ -124,17 +124,19 @@ fn the_rig_is_right() {
 }
 
 #[test]
-fn a_full_table_prints_as_its_golden_file() {
+fn a_right_file_prints_as_its_golden_file() {
     let directory = repository().join("tests/right");
-    let printed = check(&directory, "everything.cfg").stdout;
-    let golden = directory.join("everything.txt");
-    if std::env::var_os("BLESS").is_some() {
-        fs::write(&golden, &printed).expect("the file is written");
+    for name in ["everything", "socket"] {
+        let printed = check(&directory, format!("{name}.cfg")).stdout;
+        let golden = directory.join(format!("{name}.txt"));
+        if std::env::var_os("BLESS").is_some() {
+            fs::write(&golden, &printed).expect("the file is written");
+        }
+        assert_eq!(
+            String::from_utf8_lossy(&printed),
+            fs::read_to_string(golden).unwrap()
+        );
     }
-    assert_eq!(
-        String::from_utf8_lossy(&printed),
-        fs::read_to_string(golden).unwrap()
-    );
 }
 
 #[test]

@@ -32,6 +32,10 @@ fn the_native_methods_of_tickbus_are_exported() {
         "Java_tickbus_Tickbus_finalizeNative",
         "Java_tickbus_Tickbus_statisticsNative",
         "Java_tickbus_Tickbus_eventsNative",
+        "Java_tickbus_Tickbus_injectNative",
+        "Java_tickbus_Tickbus_endFaultNative",
+        "Java_tickbus_Tickbus_faultsNative",
+        "Java_tickbus_Tickbus_reportNative",
     ] {
         // SAFETY: the symbol is looked up, and never called.
         let symbol = unsafe { library.get::<unsafe extern "C" fn()>(name) };

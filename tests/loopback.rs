@@ -8,9 +8,10 @@
 
 mod conformance;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use conformance::rig::{Bus, End, Rig, await_that, config};
+use conformance::rig::{Bus, End, Liar, Rig, await_that, config};
 use tickbus::driver::Code;
 use tickbus::time::{Manual, Nanos};
 
@@ -28,9 +29,69 @@ impl Bus for Link {
     fn fieldbus(&self, _role: &str) -> String {
         format!("kind = \"loopback\"\nlink = \"{}\"", self.0)
     }
+
+    /// A controller whose image has another size.
+    fn liar(&self, clock: &Arc<Manual>) -> Liar {
+        let longer = "[[signal]]\nname = \"more\"\naddress = \"%QD8\"\n";
+        let controller = End::open(&(config(self, "controller", "") + longer), clock);
+        await_that("it is on the link", || {
+            controller.statistic("reason").contains("waiting")
+        });
+        Liar {
+            _peer: Box::new(controller),
+            cause: "refused",
+            words: "this end sends and receives [(6, 6)] bytes per station, the other end expects [(6, 12)]",
+        }
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            ("kind = \"loopback\"", "program = \"rig\""),
+            ("kind = \"loopback\"\nlink = \"\"", "name the link"),
+            ("kind = \"loopback\"\nlnik = \"a\"", "link"),
+            (
+                "kind = \"loopback\"\nlink = \"a\"\nmode = \"fast\"",
+                "modes are free, stepped",
+            ),
+            (
+                "kind = \"loopback\"\nprogram = \"rig\"",
+                "complete the signal table",
+            ),
+        ]
+    }
 }
 
 conformance!(free, crate::Link::new());
+
+/// A link with faults that never begin.
+struct Spared(Link);
+
+impl Bus for Spared {
+    fn fieldbus(&self, role: &str) -> String {
+        self.0.fieldbus(role)
+    }
+
+    fn liar(&self, clock: &Arc<Manual>) -> Liar {
+        self.0.liar(clock)
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        self.0.wrong()
+    }
+
+    fn faults(&self) -> &'static str {
+        "[[fault]]\nkind = \"link-down\"\nat = \"1000h\"\n\
+         [[fault]]\nkind = \"delay\"\nby = \"1s\"\nat = \"1000h\"\n\
+         [[fault]]\nkind = \"slow-answers\"\nby = \"1s\"\nat = \"1000h\"\n\
+         [[fault]]\nkind = \"drop\"\nchance = 1\nat = \"1000h\"\n\
+         [[fault]]\nkind = \"stuck\"\nsignal = \"speed\"\nvalue = 9\nat = \"1000h\"\n"
+    }
+}
+
+conformance!(
+    with_faults_that_never_begin,
+    crate::Spared(crate::Link::new())
+);
 
 #[test]
 fn a_second_device_on_one_link_is_told_so() {
@@ -87,7 +148,7 @@ fn what_a_former_peer_left_is_not_news_to_the_next() {
 }
 
 /// A hosted program behind the link, scanned by the tick.
-fn mirror(mode: &str, clock: &std::sync::Arc<Manual>) -> End {
+fn mirror(mode: &str, clock: &Arc<Manual>) -> End {
     let fieldbus = format!(
         "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"10ms\"\ncycle = \"1ms\"\nmode = \"{mode}\"",
     );

@@ -33,7 +33,7 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Every type in both directions, latched bits that move, values that saturate, a NaN.
-fn config(fieldbus: &str) -> Config {
+fn config(fieldbus: &str, faults: &str) -> Config {
     use std::fmt::Write as _;
 
     let mut text = format!("[driver]\nid = 1\nname = \"all\"\n[fieldbus]\n{fieldbus}\n");
@@ -61,13 +61,30 @@ fn config(fieldbus: &str) -> Config {
             byte += size;
         }
     }
+    text += faults;
     Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
 }
 
+/// Every fault of a signal in both directions, and every trouble of the line, beginning and ending.
+const FAULTS: &str = "
+[[fault]]\nkind = \"stuck\"\nsignal = \"I bit 0.0\"\n
+[[fault]]\nkind = \"invert\"\nsignal = \"Q bit 0.1\"\n
+[[fault]]\nkind = \"invert\"\nsignal = \"Q LWORD\"\n
+[[fault]]\nkind = \"offset\"\nsignal = \"I LINT\"\nby = 7\n
+[[fault]]\nkind = \"noise\"\nsignal = \"I LREAL\"\namplitude = 0.5\n
+[[fault]]\nkind = \"noise\"\nsignal = \"Q bit 1.0\"\nchance = 0.5\n
+[[fault]]\nkind = \"stuck\"\nsignal = \"Q INT\"\nwhen = \"I REAL > 0\"\nticks = 3\ntimes = 1000000\n
+[[fault]]\nkind = \"drop\"\nchance = 0.2\n
+[[fault]]\nkind = \"duplicate\"\nchance = 0.2\n
+[[fault]]\nkind = \"delay\"\nby = \"20ms\"\n
+[[fault]]\nkind = \"slow-answers\"\nby = \"30ms\"\n
+";
+
 /// Ticks with moving values; gives the allocations of 10,000 ticks after a warm-up.
-fn allocations(fieldbus: &str) -> u64 {
+fn allocations(fieldbus: &str, faults: &str) -> u64 {
     let clock = Manual::new();
-    let mut driver = Driver::open(config(fieldbus), Arc::clone(&clock) as _).expect("opens");
+    let mut driver =
+        Driver::open(config(fieldbus, faults), Arc::clone(&clock) as _).expect("opens");
     let mut slots = driver.initial_slots();
     let mut before = 0;
     for tick in 0..11_000_i32 {
@@ -87,23 +104,52 @@ fn allocations(fieldbus: &str) -> u64 {
     ALLOCATIONS.get() - before
 }
 
+const FREE: &str = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"";
+const STEPPED: &str =
+    "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"\nmode = \"stepped\"";
+
 #[test]
 fn a_free_bus() {
-    assert_eq!(
-        allocations("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\""),
-        0
-    );
+    assert_eq!(allocations(FREE, ""), 0);
 }
 
 #[test]
 fn a_stepped_bus_with_its_program() {
-    let fieldbus = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"\nmode = \"stepped\"";
-    assert_eq!(allocations(fieldbus), 0);
+    assert_eq!(allocations(STEPPED, ""), 0);
+}
+
+#[test]
+fn a_free_bus_with_faults() {
+    assert_eq!(allocations(FREE, FAULTS), 0);
+}
+
+#[test]
+fn a_stepped_bus_with_faults() {
+    assert_eq!(allocations(STEPPED, FAULTS), 0);
 }
 
 #[test]
 fn a_link_whose_other_end_is_absent() {
-    assert_eq!(allocations("kind = \"loopback\"\nlink = \"nobody\""), 0);
+    assert_eq!(allocations("kind = \"loopback\"\nlink = \"nobody\"", ""), 0);
+}
+
+/// On a bus where the ring is never full, on one where it always is, and on one that waits for room.
+#[test]
+fn a_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let link = "kind = \"loopback\"\nlink = \"recorded\"";
+    let program = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"\nmode = \"stepped\"";
+    for (number, (fieldbus, ring)) in [(link, 16_384), (link, 4), (program, 64)]
+        .into_iter()
+        .enumerate()
+    {
+        for format in ["vcd", "csv"] {
+            let file = folder.path().join(format!("{number}.{format}"));
+            let file = file.display();
+            let record = format!("[record]\nfile = '{file}'\nring = {ring}");
+            assert_eq!(allocations(&format!("{fieldbus}\n{record}"), ""), 0);
+        }
+    }
 }
 
 #[test]

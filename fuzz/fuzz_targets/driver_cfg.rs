@@ -7,12 +7,16 @@ use std::collections::HashSet;
 use libfuzzer_sys::fuzz_target;
 use tickbus::config::Mistakes;
 use tickbus::driver::Config;
+use tickbus::faults::{Effect, LIMIT};
 use tickbus::signal::{Area, DataType};
 use tickbus::time::Nanos;
 
 fuzz_target!(|text: &str| {
     match Config::parse("fuzz.cfg", text) {
-        Ok(config) => check_config(&config),
+        Ok(config) => {
+            check_config(&config);
+            check_faults(&config);
+        }
         Err(mistakes) => check_mistakes(&mistakes, text),
     }
 });
@@ -64,6 +68,19 @@ fn check_config(config: &Config) {
     }
     for signal in table.signals.iter().filter(|signal| signal.latch.is_some()) {
         assert!(!names.contains(&format!("{}.edges", signal.name)));
+    }
+}
+
+/// What the faults' layers take for granted, without a check of their own.
+fn check_faults(config: &Config) {
+    assert!(config.faults.len() <= LIMIT);
+    for fault in &config.faults {
+        assert!(!fault.name.is_empty() && !fault.name.contains(char::is_control));
+        assert!(fault.times > 0);
+        if let Effect::Signal(signal, _) = fault.effect {
+            assert!(signal < config.table.signals.len());
+        }
+        assert!(!fault.what(&config.table).contains(char::is_control));
     }
 }
 

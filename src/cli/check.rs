@@ -6,9 +6,11 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use super::Outcome;
-use crate::config::short_number;
+use crate::config::{short_number, shown};
 use crate::driver::{Config, Timing};
-use crate::fieldbus::{Options, loopback};
+use crate::fieldbus::socket::{self, Sending, TcpRole};
+use crate::fieldbus::{Options, loopback, plugin};
+use crate::record;
 use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
 use crate::time::Nanos;
 
@@ -51,6 +53,9 @@ fn report(config: &Config) -> String {
     line("role", role(config));
     line("bus", &bus(&config.bus));
     line("timing", &timing(&config.timing));
+    if let Some(record) = &config.record {
+        line("record", &recording(record));
+    }
     for station in stations {
         let name = if station.name.is_empty() {
             ""
@@ -69,6 +74,19 @@ fn report(config: &Config) -> String {
                 "station"
             },
             &format!("{name}{sizes}"),
+        );
+    }
+    for fault in &config.faults {
+        let when = format!("{} {}", fault.begin, fault.lasts);
+        line(
+            "fault",
+            &format!(
+                "\"{}\" ({}) {}: {}",
+                fault.name,
+                fault.kind(),
+                when.trim_end(),
+                fault.what(&config.table)
+            ),
         );
     }
     out.push('\n');
@@ -105,28 +123,68 @@ fn role(config: &Config) -> &'static str {
 }
 
 fn bus(options: &Options) -> String {
-    let Options::Loopback(loopback::Options { mode, peer, events }) = options;
-    let mode = match mode {
+    let mut parts = vec![options.kind().to_owned()];
+    match options {
+        Options::Loopback(options) => parts.extend(loopback(options)),
+        Options::Socket(options) => parts.extend(socket(options)),
+        Options::Plugin(options) => parts.extend(plugin(options)),
+    }
+    if options.events() {
+        parts.push("with events".to_owned());
+    }
+    parts.join(", ")
+}
+
+fn socket(options: &socket::Options) -> Vec<String> {
+    let address = &options.address;
+    let mut parts = vec![
+        match options.tcp {
+            TcpRole::Listen => format!("listens on {address}"),
+            TcpRole::Connect => format!("connects to {address}"),
+        },
+        match options.sending {
+            Sending::Cyclic => "sends every cycle".to_owned(),
+            Sending::OnChange => "sends on change".to_owned(),
+            Sending::Reply => "replies to each record".to_owned(),
+        },
+    ];
+    if options.min_interval > Nanos::ZERO {
+        parts.push(format!("at most every {}", options.min_interval));
+    }
+    parts
+}
+
+fn loopback(options: &loopback::Options) -> Vec<String> {
+    let mode = match options.mode {
         loopback::Mode::Free => "free-running",
         loopback::Mode::Stepped => "stepped by the simulation",
     };
-    let mut parts = vec![options.kind().to_owned(), mode.to_owned()];
-    match peer {
+    let mut parts = vec![mode.to_owned()];
+    match &options.peer {
         loopback::Peer::Link(name) => parts.push(format!("link \"{name}\"")),
+        loopback::Peer::Replay(file) => parts.push(format!("replays \"{}\"", file.display())),
         loopback::Peer::Program {
             name,
             options,
             scan,
         } => {
             parts.push(format!("hosts the PLC program \"{name}\""));
-            parts.push(format!("scan {scan}"));
+            parts.push(scan.map_or("scan as compiled".to_owned(), |scan| format!("scan {scan}")));
             parts.extend(options.iter().map(|(key, value)| format!("{key} {value}")));
         }
     }
-    if *events {
-        parts.push("with events".to_owned());
+    parts
+}
+
+fn plugin(options: &plugin::Options) -> Vec<String> {
+    let mut parts = vec![format!("library {}", options.library.display())];
+    if options.isolated {
+        parts.push("in a helper process".to_owned());
     }
-    parts.join(", ")
+    parts.extend(options.timeout.map(|timeout| format!("timeout {timeout}")));
+    let given = options.options.iter();
+    parts.extend(given.map(|(key, value)| format!("{} {}", shown(key), shown(value))));
+    parts
 }
 
 fn timing(timing: &Timing) -> String {
@@ -146,6 +204,19 @@ fn timing(timing: &Timing) -> String {
     )
 }
 
+fn recording(options: &record::Options) -> String {
+    let ring = options.ring.map(|ticks| format!(", ring of {ticks} ticks"));
+    let when = match options.when {
+        record::When::Always => "",
+        record::When::Never => ", switched off",
+    };
+    format!(
+        "\"{}\"{}{when}",
+        options.file.display(),
+        ring.unwrap_or_default()
+    )
+}
+
 fn size(station: &Station, area: Area) -> String {
     let bytes = station.bytes(area);
     format!(
@@ -154,7 +225,7 @@ fn size(station: &Station, area: Area) -> String {
     )
 }
 
-const HEADINGS: [&str; 11] = [
+const HEADINGS: [&str; 12] = [
     "station",
     "address",
     "in word",
@@ -164,6 +235,7 @@ const HEADINGS: [&str; 11] = [
     "latch",
     "scale",
     "unit",
+    "dead band",
     "fail-safe",
     "name",
 ];
@@ -196,6 +268,7 @@ fn row(
         latch(signal),
         signal.scale.map(scale).unwrap_or_default(),
         signal.unit.clone().unwrap_or_default(),
+        dead_band(signal),
         fail_safe(signal),
         signal.name.clone(),
     ]
@@ -256,6 +329,14 @@ fn scale(scale: Scale) -> String {
     } else {
         let sign = if scale.offset < 0.0 { '−' } else { '+' };
         format!("{gain} {sign} {}", short_number(scale.offset.abs()))
+    }
+}
+
+fn dead_band(signal: &Signal) -> String {
+    if signal.dead_band == 0.0 {
+        String::new()
+    } else {
+        short_number(signal.dead_band)
     }
 }
 

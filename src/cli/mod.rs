@@ -3,6 +3,13 @@
 //! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
 
 mod check;
+mod host;
+mod mirror;
+mod plc;
+#[cfg(unix)]
+mod plugin_helper;
+mod report;
+mod test;
 
 use std::process::ExitCode;
 
@@ -19,15 +26,27 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Check(check::Arguments),
+    Mirror(mirror::Arguments),
+    Plc(plc::Arguments),
+    Report(report::Arguments),
+    Test(test::Arguments),
+    /// Call a plug-in for the process that starts this; not for people.
+    #[cfg(unix)]
+    #[command(hide = true)]
+    PluginHelper,
 }
 
-/// How a command ended, as its exit code tells. Code 2 is wrong usage, which clap reports.
+/// How a command ended, as its exit code tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
     /// 0: done.
     Done,
     /// 1: the input was wrong.
     WrongInput,
+    /// 2: the command line was wrong. Most of that clap reports.
+    Usage,
+    /// 3: the bus or the peer failed.
+    BusFailed,
 }
 
 impl From<Outcome> for ExitCode {
@@ -35,14 +54,25 @@ impl From<Outcome> for ExitCode {
         Self::from(match outcome {
             Outcome::Done => 0,
             Outcome::WrongInput => 1,
+            Outcome::Usage => 2,
+            Outcome::BusFailed => 3,
         })
     }
 }
 
 /// Runs the command with the arguments of the process.
 pub fn main() -> ExitCode {
-    match Arguments::parse().command {
+    let arguments = Arguments::parse();
+    // What happens to the line is told on stdout.
+    crate::os::log_to_stderr(log::LevelFilter::Error);
+    match arguments.command {
         Command::Check(arguments) => check::run(&arguments),
+        Command::Mirror(arguments) => mirror::run(&arguments),
+        Command::Plc(arguments) => plc::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
+        Command::Test(arguments) => test::run(&arguments),
+        #[cfg(unix)]
+        Command::PluginHelper => plugin_helper::run(),
     }
     .into()
 }

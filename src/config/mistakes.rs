@@ -123,6 +123,13 @@ impl<'t> Collector<'t> {
         self.line_starts.partition_point(|start| *start <= at)
     }
 
+    /// Line and column, both from 1, of byte offset `at`.
+    pub fn place(&self, at: usize) -> (usize, usize) {
+        let line = self.line(at);
+        let before = &self.text[self.line_starts[line - 1]..at.min(self.text.len())];
+        (line, before.chars().count() + 1)
+    }
+
     /// Notes that the line of byte offset `at` has a syntax error and is left out.
     pub(super) fn break_line(&mut self, at: usize) {
         self.broken_lines.insert(self.line(at));

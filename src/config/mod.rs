@@ -14,5 +14,5 @@ mod table;
 pub use mistakes::{Collector, Mistake, Mistakes, shown};
 pub use nearest::{did_you_mean, nearest};
 pub use number::short_number;
-pub use source::read_text;
+pub use source::{load_text, read_text};
 pub use table::{Table, Value};

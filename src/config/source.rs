@@ -1,17 +1,60 @@
 //! Reading TOML text: every syntax error once, and a tree of what can still be read.
 
 use std::borrow::Cow;
+use std::io::ErrorKind;
+use std::path::Path;
 
 use toml::de::DeTable;
 
 use super::syntax::{Kind, faults, line_around};
-use super::{Collector, Table};
+use super::{Collector, Mistakes, Table};
 
 /// Texts longer than this are no configuration.
 const LONGEST: usize = 16 << 20;
 
 /// How often a text is repaired before the rest of it is left unread.
 const ROUNDS: usize = 40;
+
+/// The text of the file at `path`.
+///
+/// # Errors
+///
+/// When the file cannot be read or is no text.
+pub fn load_text(path: &Path) -> Result<String, Mistakes> {
+    let file = path.display().to_string();
+    let refused = |what: String, right: &str| Mistakes::of_file(&file, what, right);
+    if path.is_dir() {
+        let right = "name the configuration file in it, such as driver.cfg";
+        return Err(refused("this is a directory".to_owned(), right));
+    }
+    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => refused(
+            "there is no such file".to_owned(),
+            "check the path and the name",
+        ),
+        ErrorKind::PermissionDenied => refused(
+            "this file may not be read".to_owned(),
+            "check its permissions",
+        ),
+        _ => refused(
+            format!("this file cannot be read: {error}"),
+            "check the path and the disk",
+        ),
+    })?;
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let bytes = error.into_bytes();
+        // What precedes the odd byte is enough to say where it stands.
+        let before = String::from_utf8_lossy(&bytes[..at]);
+        let collector = Collector::new(&file, &before);
+        collector.report(
+            at,
+            format!("the byte 0x{:02X} is no UTF-8 text", bytes[at]),
+            "save the file as UTF-8",
+        );
+        collector.finish().expect("one mistake was reported")
+    })
+}
 
 /// Reads `text` and hands its root table to `read`.
 ///

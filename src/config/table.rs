@@ -183,6 +183,11 @@ impl<'a> Value<'a> {
         self.collector.line(self.at())
     }
 
+    /// Line and column, both from 1, where it begins.
+    pub fn place(&self) -> (usize, usize) {
+        self.collector.place(self.at())
+    }
+
     /// Takes down a mistake at this value.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.collector.report(self.at(), what, right);
@@ -191,6 +196,11 @@ impl<'a> Value<'a> {
     /// The value is a boolean.
     pub fn is_boolean(&self) -> bool {
         matches!(self.node.get_ref(), DeValue::Boolean(_))
+    }
+
+    /// The value is a table.
+    pub fn is_table(&self) -> bool {
+        matches!(self.node.get_ref(), DeValue::Table(_))
     }
 
     /// The value is an integer.

@@ -1,11 +1,12 @@
 //! The driver.cfg of one driver, read whole.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::layout;
-use crate::config::{Collector, Mistakes, Table, Value, read_text};
+use crate::config::{Collector, Mistakes, Table, Value, load_text, read_text};
+use crate::faults::{self, Fault};
 use crate::fieldbus::{Options, Role};
+use crate::record;
 use crate::signal::{Addressing, SignalTable, Station, section};
 use crate::time::Nanos;
 
@@ -25,6 +26,9 @@ const LEAST_MAX_AGE: Nanos = Nanos::from_millis(250);
 /// The longest name of a driver, in characters.
 const NAME_LIMIT: usize = 120;
 
+/// The longest path of a file, in characters.
+const PATH_LIMIT: usize = 1000;
+
 /// The most waits in `reconnect`.
 const RECONNECT_LIMIT: usize = 100;
 
@@ -39,12 +43,30 @@ pub struct Config {
     pub name: String,
     /// Which end of the bus it is.
     pub role: Role,
+    /// What the numbers of the addresses in the file count; those in `table` count bytes.
+    pub addressing: Addressing,
     /// Its stations and signals.
     pub table: SignalTable,
     /// Cycle times and time-outs.
     pub timing: Timing,
     /// What the bus itself needs to know.
     pub bus: Options,
+    /// Faults to inject at this end.
+    pub faults: Vec<Fault>,
+    /// The file that has more of them; [`load`](Self::load) reads it.
+    pub fault_file: Option<PathBuf>,
+    /// What is recorded, if anything is.
+    pub record: Option<record::Options>,
+}
+
+/// What a command line says about the end that its process is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Which end it is. A file that states no role serves both.
+    pub role: Role,
+    /// Whether another address will take the place of the file's; see
+    /// [`Options::set_address`].
+    pub moved: bool,
 }
 
 /// Cycle times and time-outs of a driver.
@@ -62,48 +84,50 @@ pub struct Timing {
 }
 
 impl Config {
+    /// The folder that relative paths in the driver.cfg begin at.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
     /// Reads the driver.cfg at `path`.
     ///
     /// # Errors
     ///
     /// When the file cannot be read or is no text, or with every mistake that it has.
     pub fn load(path: &Path) -> Result<Self, Mistakes> {
+        Self::load_as(path, None)
+    }
+
+    /// Reads the driver.cfg at `path` for a process of its own, with what its command line `asked` for.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`](Self::load); the file states the other role; or its bus never leaves the process.
+    pub fn load_as(path: &Path, asked: Option<Asked>) -> Result<Self, Mistakes> {
+        let text = load_text(path)?;
+        let mut config = Self::parse_as(&path.display().to_string(), &text, asked)?;
+        if let Some(file) = config.fault_file.take() {
+            config.add_faults(&file)?;
+        }
+        Ok(config)
+    }
+
+    /// Adds the faults that the file at `path` describes.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read, or with every mistake that it has.
+    pub fn add_faults(&mut self, path: &Path) -> Result<(), Mistakes> {
+        let text = load_text(path)?;
         let file = path.display().to_string();
-        let refused = |what: String, right: &str| Mistakes::of_file(&file, what, right);
-        if path.is_dir() {
-            let right = "name the configuration file in it, such as driver.cfg";
-            return Err(refused("this is a directory".to_owned(), right));
+        let more = faults::read_file(&file, &text, &self.table)?;
+        if self.faults.len() + more.len() > faults::LIMIT {
+            let what = format!("there are {} faults", self.faults.len() + more.len());
+            let right = format!("a driver has at most {}", faults::LIMIT);
+            return Err(Mistakes::of_file(&file, what, right));
         }
-        let bytes = std::fs::read(path).map_err(|error| match error.kind() {
-            ErrorKind::NotFound => refused(
-                "there is no such file".to_owned(),
-                "check the path and the name",
-            ),
-            ErrorKind::PermissionDenied => refused(
-                "this file may not be read".to_owned(),
-                "check its permissions",
-            ),
-            _ => refused(
-                format!("this file cannot be read: {error}"),
-                "check the path and the disk",
-            ),
-        })?;
-        match String::from_utf8(bytes) {
-            Ok(text) => Self::parse(&file, &text),
-            Err(error) => {
-                let at = error.utf8_error().valid_up_to();
-                let bytes = error.into_bytes();
-                // What precedes the odd byte is enough to say where it stands.
-                let before = String::from_utf8_lossy(&bytes[..at]);
-                let collector = Collector::new(&file, &before);
-                collector.report(
-                    at,
-                    format!("the byte 0x{:02X} is no UTF-8 text", bytes[at]),
-                    "save the file as UTF-8",
-                );
-                Err(collector.finish().expect("one mistake was reported"))
-            }
-        }
+        self.faults.extend(more);
+        Ok(())
     }
 
     /// Reads the text of a driver.cfg; `file_name` is what its mistakes call it.
@@ -112,9 +136,18 @@ impl Config {
     ///
     /// With every mistake in the text.
     pub fn parse(file_name: &str, text: &str) -> Result<Self, Mistakes> {
+        Self::parse_as(file_name, text, None)
+    }
+
+    /// The same with what a command line `asked` for; see [`load_as`](Self::load_as).
+    ///
+    /// # Errors
+    ///
+    /// With every mistake in the text.
+    pub fn parse_as(file_name: &str, text: &str, asked: Option<Asked>) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file_name, text);
         let config = read_text(&mut collector, text, |root| {
-            read(Path::new(file_name), root)
+            read(Path::new(file_name), root, asked)
         });
         match collector.finish() {
             Some(mistakes) => Err(mistakes),
@@ -123,11 +156,13 @@ impl Config {
     }
 }
 
-fn read(path: &Path, mut root: Table<'_>) -> Option<Config> {
+fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config> {
     let driver = root.require("driver", "write a [driver] table with id and name");
     let fieldbus = root.require("fieldbus", "write a [fieldbus] table with the kind of bus");
     let stations = root.take("station");
     let signals = root.take("signal");
+    let faults = root.take("fault");
+    let record = root.take("record");
 
     let driver = driver
         .and_then(|value| value.table("[driver]", "write a [driver] table"))
@@ -137,7 +172,13 @@ fn read(path: &Path, mut root: Table<'_>) -> Option<Config> {
         .map_or(Addressing::Bytes, |driver| driver.addressing);
     let fieldbus = fieldbus
         .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
-        .map(read_fieldbus);
+        .map(|table| read_fieldbus(table, asked));
+    let replayed = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
+    let replayed = replayed.and_then(Options::replayed);
+    let record = record.map(|value| {
+        let table = value.table("[record]", "write a [record] table")?;
+        record::Options::read(table, replayed)
+    });
     let declared = stations.map(|value| value.tables("[[station]]"));
     let signals = signals
         .map(|value| value.tables("[[signal]]"))
@@ -171,16 +212,34 @@ fn read(path: &Path, mut root: Table<'_>) -> Option<Config> {
         );
     }
     root.finish();
+    let faults = faults
+        .map(|value| faults::read_sections(value.tables("[[fault]]"), table.as_ref()))
+        .unwrap_or_default();
 
     let (driver, fieldbus) = (driver?, fieldbus?);
+    // A file that serves both ends has the faults of the machine's end: injected at both, they would
+    // happen twice.
+    let (faults, fault_file) = if fieldbus.is_for_both && fieldbus.role == Role::Controller {
+        (Vec::new(), None)
+    } else {
+        let beside = path.parent().unwrap_or(Path::new(""));
+        (faults, driver.faults.map(|file| beside.join(file)))
+    };
     Some(Config {
         path: path.to_owned(),
         id: driver.id?,
         name: driver.name?,
         role: fieldbus.role,
+        addressing,
         table: table?,
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
+        faults,
+        fault_file,
+        record: match record {
+            Some(record) => Some(record?),
+            None => None,
+        },
     })
 }
 
@@ -188,6 +247,7 @@ struct DriverTable {
     id: Option<i32>,
     name: Option<String>,
     addressing: Addressing,
+    faults: Option<String>,
 }
 
 fn read_driver(mut table: Table<'_>) -> DriverTable {
@@ -197,6 +257,7 @@ fn read_driver(mut table: Table<'_>) -> DriverTable {
     );
     let name = table.require("name", "give the driver a name for people");
     let addressing = table.take("addressing");
+    let faults = table.take("faults");
     table.finish();
     let choices = [("bytes", Addressing::Bytes), ("iec", Addressing::Elements)];
     DriverTable {
@@ -209,26 +270,57 @@ fn read_driver(mut table: Table<'_>) -> DriverTable {
         addressing: addressing
             .and_then(|value| value.choice("ways of addressing", &choices))
             .unwrap_or_default(),
+        faults: faults
+            .and_then(|value| {
+                let right = "name a file that has [[fault]] sections, such as \"faults.toml\"";
+                value.label(PATH_LIMIT, right)
+            })
+            .map(str::to_owned),
     }
 }
 
 struct FieldbusTable<'a> {
     role: Role,
+    /// Whether the file states no role and serves both ends.
+    is_for_both: bool,
     timing: Option<Timing>,
     sizes: layout::Sizes<'a>,
     bus: Option<Options>,
 }
 
-fn read_fieldbus(mut table: Table<'_>) -> FieldbusTable<'_> {
+fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_> {
     let kind = table.require("kind", "write the kind of bus, such as kind = \"loopback\"");
     let role = table.take("role");
     let timing = read_timing(&mut table);
     let sizes = layout::Sizes::take(&mut table);
-    let role = role
-        .and_then(|value| value.choice("roles", &Role::ALL.map(|role| (role.name(), role))))
-        .unwrap_or_default();
+    let roles = Role::ALL.map(|role| (role.name(), role));
+    let stated = role
+        .as_ref()
+        .and_then(|value| value.choice("roles", &roles));
+    if let (Some(value), Some(stated), Some(asked)) = (&role, stated, asked)
+        && stated != asked.role
+    {
+        value.wrong(
+            format!("this command is the {} of the line", asked.role.name()),
+            "remove \"role\", so that the file serves both ends, or give the command a file of its own",
+        );
+    }
+    let role = stated.or(asked.map(|asked| asked.role)).unwrap_or_default();
     let bus = if let Some(kind) = kind {
-        Options::read(&kind, role, table)
+        let moved = asked.is_some_and(|asked| asked.moved);
+        let bus = Options::read(&kind, role, moved, table);
+        if let (Some(bus), Some(_)) = (&bus, asked)
+            && bus.is_in_process()
+        {
+            kind.wrong(
+                format!(
+                    "both ends of the bus \"{}\" live in one process",
+                    bus.kind()
+                ),
+                "use a bus between processes, such as kind = \"socket\"",
+            );
+        }
+        bus
     } else {
         // Which keys are right cannot be told without the bus kind.
         table.finish_open();
@@ -236,6 +328,7 @@ fn read_fieldbus(mut table: Table<'_>) -> FieldbusTable<'_> {
     };
     FieldbusTable {
         role,
+        is_for_both: stated.is_none(),
         timing,
         sizes,
         bus,
@@ -290,7 +383,8 @@ fn read_reconnect(value: &Value<'_>) -> Option<Vec<Nanos>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fieldbus::loopback::{self, Mode, Peer};
+    use crate::fieldbus::loopback::{self, Peer};
+    use crate::fieldbus::socket::TcpRole;
     use crate::signal::{Area, ByteOrder, DataType, Latch, Signal, Slot};
 
     const HEAD: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\n\
@@ -307,8 +401,13 @@ mod tests {
     }
 
     fn rig() -> Config {
+        rig_as(Role::Device)
+    }
+
+    fn rig_as(role: Role) -> Config {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("driver.cfg");
-        Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+        let asked = Asked { role, moved: false };
+        Config::load_as(&path, Some(asked)).unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }
 
     /// The rig's words as its builders counted them: each bit of the WORD, and its signal.
@@ -391,20 +490,33 @@ mod tests {
         assert_eq!(config.timing.cycle, Some(Nanos::from_millis(2)));
         assert_eq!(config.timing.max_age, Nanos::from_millis(250));
         assert_eq!(config.timing.watchdog, None);
-        let program = Peer::Program {
-            name: "rig".to_owned(),
-            options: Vec::new(),
-            scan: Nanos::from_millis(10),
+        let Options::Socket(bus) = &config.bus else {
+            panic!("a socket");
         };
-        let bus = loopback::Options {
-            mode: Mode::Free,
-            peer: program,
-            events: false,
-        };
-        assert_eq!(config.bus, Options::Loopback(bus));
+        assert_eq!(bus.address.to_string(), "127.0.0.1:20030");
+        assert_eq!(bus.tcp, TcpRole::Listen);
+        for cup in ["SC1", "SC2"] {
+            let signal = &config.table.signals[config.table.position(cup).expect(cup)];
+            assert_eq!(
+                signal.fail_safe,
+                Slot::from_real(1.0),
+                "{cup} must not let go"
+            );
+        }
         let position = &config.table.signals[config.table.position("LA1 position").unwrap()];
         let scale = position.scale.expect("a scale");
         assert!((scale.value(27_648.0) - 250.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_rig_s_file_serves_its_plc_as_well() {
+        let (device, controller) = (rig(), rig_as(Role::Controller));
+        assert_eq!(controller.table, device.table);
+        let Options::Socket(bus) = &controller.bus else {
+            panic!("a socket");
+        };
+        assert_eq!(bus.address.to_string(), "127.0.0.1:20030");
+        assert_eq!(bus.tcp, TcpRole::Connect);
     }
 
     #[test]

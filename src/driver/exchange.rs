@@ -7,7 +7,9 @@ use crate::image::Arrival;
 use crate::signal::Slot;
 use crate::time::Nanos;
 
+use super::faults::moment;
 use super::open::Line;
+use super::statistics::Samples;
 use super::{Code, Driver};
 
 /// What an exchange found.
@@ -37,35 +39,66 @@ impl Driver {
             "the exchange needs all {} slots",
             self.slots.count
         );
-        let now = match &self.line {
-            Line::Free(_) => self.time.now(),
-            Line::Stepped { .. } => simulation_time,
+        let (now, begun) = match &self.line {
+            Line::Free(_) => (
+                self.time.now(),
+                Samples::begin(self.counters.ticks, &*self.clock),
+            ),
+            // Simulation time stands still during an exchange.
+            Line::Stepped { time, .. } => {
+                time.set(simulation_time);
+                (simulation_time, None)
+            }
         };
         self.counters.ticks += 1;
+        if self.counters.ticks == 1 {
+            self.first = (simulation_time, now);
+        }
+        if let Some(faults) = &mut self.faults {
+            let tick = self.counters.ticks;
+            faults.begin_tick(moment(self.first, simulation_time, now, tick), slots);
+            faults.sending(slots);
+        }
         for station in &mut self.stations {
             station.send(now, slots, &mut self.counters);
         }
+        if let Some(faults) = &mut self.faults {
+            faults.sent(slots);
+        }
         let granted = match &mut self.line {
             Line::Free(_) => Ok(simulation_time),
-            Line::Stepped { bus, port } => bus.exchange(simulation_time, port),
+            Line::Stepped { bus, port, .. } => bus.exchange(simulation_time, port),
         };
         let (mut code, mut sequence, mut age) = (Code::Fresh, 0, Nanos::ZERO);
         for station in &mut self.stations {
             let arrival = station.receive(now, self.max_age, slots, &self.slots);
             sequence += arrival.sequence;
             age = age.max(arrival.age);
-            code = code.worse(match arrival {
+            station.status = match arrival {
                 _ if station.stale => Code::Stale,
                 Arrival { fresh: true, .. } => Code::Fresh,
                 Arrival { .. } => Code::Unchanged,
-            });
+            };
+            code = code.worse(station.status);
+        }
+        if let Some(faults) = &mut self.faults {
+            faults.received(slots);
         }
         let granted = granted.unwrap_or_else(|error| {
-            self.status.enter(LinkState::Failed, &error.to_string());
+            let (state, cause, reason) = (LinkState::Failed, (&error).into(), error.to_string());
+            self.status.enter(now, state, cause, &reason);
             code = Code::BusFailed;
             now
         });
         self.counters.count(code);
+        if let Some(recorder) = &mut self.recorder {
+            let stations = self.stations.iter().map(|station| station.status.code());
+            let (tick, status) = (self.counters.ticks, code.code());
+            recorder.record(tick, simulation_time, status, stations, slots);
+        }
+        if let Some(begun) = begun {
+            self.samples.end(begun, age, &*self.clock);
+        }
         Exchange {
             code,
             sequence,

@@ -4,16 +4,8 @@ use crate::fieldbus::Role;
 use crate::image::{Directions, latched_bits};
 use crate::signal::{Area, Plan, SignalTable, Slot};
 
-/// The areas that a role writes and reads.
-pub(super) fn areas(role: Role) -> (Area, Area) {
-    match role {
-        Role::Device => (Area::Input, Area::Output),
-        Role::Controller => (Area::Output, Area::Input),
-    }
-}
-
 /// Size in bytes of a station's area.
-fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
+pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
     match area {
         Area::Input => table.stations[station].input_bytes,
         Area::Output => table.stations[station].output_bytes,
@@ -32,7 +24,7 @@ fn fail_safe_frame(table: &SignalTable, station: usize, area: Area) -> Box<[u8]>
 
 /// What the image of the end with `role` is made of, per station.
 pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<Directions> {
-    let (tx, rx) = areas(role);
+    let (tx, rx) = role.areas();
     (0..table.stations.len())
         .map(|station| Directions {
             tx_fail_safe: fail_safe_frame(table, station, tx),

@@ -1,19 +1,25 @@
 //! One device: configuration, open, exchange, supervision, statistics, close.
 
+mod bus;
 mod config;
 mod exchange;
+mod faults;
 mod frames;
 mod host;
 mod layout;
 mod open;
+mod overlay;
+mod replay;
 mod slots;
 mod station;
 mod statistics;
 mod status;
 mod supervise;
+mod tape;
 
-pub use config::{Config, Timing};
+pub use config::{Asked, Config, Timing};
 pub use exchange::Exchange;
+pub use host::Host;
 pub use open::{Driver, DriverError};
 pub use slots::SlotMap;
 pub use statistics::Counters;

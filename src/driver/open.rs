@@ -2,21 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
-use crate::fieldbus::{Bus, ChangeEvents, LinkState, LinkStatus, Options, Port, Role, Stepped};
+use crate::faults::{Board, Faults};
+use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Stepped};
 use crate::image::{Consumer, Event, image};
 use crate::plc;
+use crate::record::{Columns, Recorder, When};
 use crate::signal::Slot;
-use crate::time::{Clock, CoarseTime, Nanos};
+use crate::time::{Clock, CoarseTime, Manual, Nanos};
 
-use super::frames::{areas, directions};
-use super::host::{HostThread, SteppedHost, Tally};
+use super::bus::{self, Program};
+use super::frames::directions;
 use super::station::Station;
+use super::statistics::Samples;
 use super::supervise::BusThread;
 use super::{Code, Config, Counters, SlotMap};
-
-/// The bus cycle of a loopback whose driver.cfg names none.
-const LOOPBACK_CYCLE: Nanos = Nanos::from_millis(1);
 
 /// An open driver: one device, or one controller, on its bus.
 #[derive(Debug)]
@@ -26,13 +25,19 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
     pub(super) time: CoarseTime,
-    #[expect(dead_code, reason = "the coarse time stands still without its clock")]
-    clock: Arc<dyn Clock>,
+    pub(super) clock: Arc<dyn Clock>,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
+    pub(super) samples: Samples,
+    /// Simulation time and the clock's at the first exchange.
+    pub(super) first: (Nanos, Nanos),
+    /// Faults to inject; none for most drivers.
+    pub(super) faults: Option<Box<Faults>>,
+    pub(super) board: Arc<Board>,
     events: Consumer,
     program: Option<Program>,
+    pub(super) recorder: Option<Recorder>,
 }
 
 /// Where the bus runs.
@@ -40,8 +45,12 @@ pub(super) enum Line {
     /// On a thread of its own; dropping it ends that.
     #[expect(dead_code, reason = "kept for its drop")]
     Free(BusThread),
-    /// On the tick.
-    Stepped { bus: Box<dyn Stepped>, port: Port },
+    /// On the tick, with simulation time as its time.
+    Stepped {
+        bus: Box<dyn Stepped>,
+        port: Port,
+        time: Arc<Manual>,
+    },
 }
 
 impl std::fmt::Debug for Line {
@@ -51,13 +60,6 @@ impl std::fmt::Debug for Line {
             Self::Stepped { .. } => "Stepped",
         })
     }
-}
-
-/// The PLC program hosted at the other end.
-#[derive(Debug)]
-enum Program {
-    Thread(HostThread),
-    Stepped(Arc<Tally>),
 }
 
 /// Why a driver cannot be opened.
@@ -82,6 +84,11 @@ pub enum DriverError {
 }
 
 impl DriverError {
+    /// Whether the driver.cfg is to blame, and not the system.
+    pub fn is_wrong_input(&self) -> bool {
+        self.code() == Code::BadConfig
+    }
+
     /// The status code for it.
     pub fn code(&self) -> Code {
         match self {
@@ -99,14 +106,19 @@ impl Driver {
     ///
     /// The hosted program and the signal table do not fit, or the system refused a thread.
     pub fn open(config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
-        let (tx, rx) = areas(config.role);
+        let (tx, rx) = config.role.areas();
         let directions = directions(&config.table, config.role);
-        let fail_safe: Vec<_> = directions
-            .iter()
-            .map(|one| one.rx_fail_safe.clone())
-            .collect();
         let (tick, bus_end) = image(directions);
-        let status = LinkStatus::new(&config.name);
+        let status = LinkStatus::new(&config.name, config.timing.max_age);
+        let (bus, program) = bus::open(&config, &clock)?;
+        let slots = SlotMap::new(&config.table, config.role);
+        // On a stepped bus the tick may wait, so that no tick of it is dropped.
+        let recorder = recorder(&config, &slots, matches!(bus, Bus::Stepped(_)))?;
+        let simulation_time = Manual::new();
+        let clock = match &bus {
+            Bus::Free(_) => clock,
+            Bus::Stepped(_) => Arc::clone(&simulation_time) as _,
+        };
         let watchdog = config.timing.watchdog;
         let mut port = Port::new(
             bus_end,
@@ -115,8 +127,9 @@ impl Driver {
             watchdog,
             status.clone(),
         );
-        let Options::Loopback(options) = &config.bus;
-        if options.events {
+        let board = Arc::<Board>::default();
+        port.suffer_from(Arc::clone(&board));
+        if config.bus.events() {
             let stations = 0..config.table.stations.len();
             port.watch_changes(
                 stations
@@ -124,7 +137,6 @@ impl Driver {
                     .collect(),
             );
         }
-        let (bus, program) = open_loopback(&config, options, &port, &clock)?;
         let line = match bus {
             Bus::Free(bus) => {
                 let reconnect = config.timing.reconnect.clone();
@@ -136,16 +148,20 @@ impl Driver {
                     &config.name,
                 )?)
             }
-            Bus::Stepped(bus) => Line::Stepped { bus, port },
+            Bus::Stepped(bus) => Line::Stepped {
+                bus,
+                port,
+                time: simulation_time,
+            },
         };
-        let stations = tick.stations.into_iter().zip(fail_safe).enumerate();
+        let stations = tick.stations.into_iter().enumerate();
         let stations = stations
-            .map(|(index, (tick, fail_safe))| {
-                Station::new(tick, &config.table, index, (tx, rx), fail_safe)
-            })
+            .map(|(index, tick)| Station::new(tick, &config.table, index, (tx, rx)))
             .collect();
-        Ok(Self {
-            slots: SlotMap::new(&config.table, config.role),
+        let list = config.faults.clone();
+        let mut driver = Self {
+            slots,
+            recorder,
             stations,
             line,
             time: clock.coarse(),
@@ -153,10 +169,18 @@ impl Driver {
             max_age: config.timing.max_age,
             status,
             counters: Counters::default(),
+            samples: Samples::default(),
+            first: (Nanos::ZERO, Nanos::ZERO),
+            faults: None,
+            board,
             events: tick.events,
             program,
             config,
-        })
+        };
+        for fault in &list {
+            driver.inject(fault).map_err(DriverError::Config)?;
+        }
+        Ok(driver)
     }
 
     /// What the driver was opened with.
@@ -178,30 +202,41 @@ impl Driver {
         slots
     }
 
+    /// How the line is doing.
+    pub fn link(&self) -> Link {
+        self.observe();
+        self.status.link()
+    }
+
     /// What was counted, and how the line is doing, as one `key=value` per line.
     pub fn statistics(&self) -> String {
         use std::fmt::Write as _;
 
         let cycles: u64 = self.stations.iter().map(Station::cycles).sum();
         let mut text = self.counters.to_string();
-        let (state, reason) = (self.status.state().name(), one_line(&self.status.reason()));
         let lost = self.events.lost();
         // Writing to a string cannot fail.
-        let _ = write!(
-            text,
-            "bus_cycles={cycles}\nevents_lost={lost}\nstate={state}\nreason={reason}\n"
-        );
-        match &self.program {
-            Some(Program::Thread(host)) => {
-                host.tally().write(&mut text);
-                if let Some(fault) = host.fault() {
-                    let _ = writeln!(text, "plc.fault={}", one_line(&fault));
-                }
-            }
-            Some(Program::Stepped(tally)) => tally.write(&mut text),
-            None => {}
+        let _ = write!(text, "bus_cycles={cycles}\nevents_lost={lost}\n");
+        self.observe();
+        self.status.write(self.clock.now(), &mut text);
+        self.samples.write(&mut text);
+        self.board.tell(self.status.driver());
+        self.board.write(&mut text);
+        if let Some(program) = &self.program {
+            program.write(&mut text);
+        }
+        if let Some(recorder) = &self.recorder {
+            recorder.tally().write(&mut text);
         }
         text
+    }
+
+    /// Looks at the line from outside, where the bus may be unable to.
+    fn observe(&self) {
+        let now = self.clock.now();
+        let ages = self.stations.iter().map(|station| station.peer_age(now));
+        self.status.observe(now, ages.max().unwrap_or_default());
+        self.status.observe_call(now);
     }
 
     /// Takes the oldest events, as many as fit; gives how many it took.
@@ -217,118 +252,37 @@ impl Driver {
         taken
     }
 
-    /// Closes the driver: stops its threads and waits for their end.
+    /// Closes the driver: stops its threads and waits for their end. Its last statistics go to the log.
     pub fn close(self) {
-        let status = self.status.clone();
+        self.board.tell(self.status.driver());
+        if log::log_enabled!(log::Level::Info) {
+            let statistics = self.statistics().replace('\n', " ");
+            log::info!("driver \"{}\" closes: {statistics}", self.config.name);
+        }
+        let (status, clock) = (self.status.clone(), Arc::clone(&self.clock));
         drop(self);
-        status.enter(LinkState::Closed, "closed");
+        let now = clock.now();
+        status.enter(now, LinkState::Closed, Cause::Closed, "closed");
     }
 }
 
-/// A text with its line breaks as spaces: the text of a panic often has some.
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn open_loopback(
+/// Starts what `config` wants recorded.
+pub(super) fn recorder(
     config: &Config,
-    options: &loopback::Options,
-    port: &Port,
-    clock: &Arc<dyn Clock>,
-) -> Result<(Bus, Option<Program>), DriverError> {
-    let cycle = config.timing.cycle.unwrap_or(LOOPBACK_CYCLE);
-    let max_age = config.timing.max_age;
-    let (name, program_options, scan) = match (&options.peer, options.mode) {
-        (Peer::Link(name), Mode::Free) => {
-            return Ok((Bus::Free(Box::new(FreeLoopback::named(name, cycle))), None));
-        }
-        (Peer::Link(name), Mode::Stepped) => {
-            return Ok((Bus::Stepped(Box::new(SteppedLoopback::named(name))), None));
-        }
-        (
-            Peer::Program {
-                name,
-                options,
-                scan,
-            },
-            _,
-        ) => (name, options, *scan),
+    slots: &SlotMap,
+    lossless: bool,
+) -> Result<Option<Recorder>, DriverError> {
+    let wanted = config.record.as_ref();
+    let Some(options) = wanted.filter(|options| options.when == When::Always) else {
+        return Ok(None);
     };
-    let file = || config.path.display().to_string();
-    let program = plc::program(name, program_options).map_err(|source| DriverError::Program {
-        file: file(),
-        source,
-    })?;
-    check_fit(config, &*program)
-        .map_err(|what| DriverError::Config(format!("{}: {what}", file())))?;
-    let clock = Arc::clone(clock);
-    if options.mode == Mode::Stepped {
-        let (host, tally) = SteppedHost::new(program, &config.table, max_age, scan, clock);
-        return Ok((Bus::Stepped(Box::new(host)), Some(Program::Stepped(tally))));
-    }
-    let (device, controller) = private_link(&[port.sizes(0)]);
-    let bus = |end| FreeLoopback::over(end, cycle);
-    let host = HostThread::start(program, config, bus(controller), scan, clock)?;
-    Ok((
-        Bus::Free(Box::new(bus(device))),
-        Some(Program::Thread(host)),
-    ))
-}
-
-/// Whether the program finds the image that it needs.
-fn check_fit(config: &Config, program: &dyn plc::Program) -> Result<(), String> {
-    let name = program.name();
-    let [station] = &config.table.stations[..] else {
-        return Err(format!(
-            "the PLC program \"{name}\" serves one station, but this driver has {}; use one \
-             driver.cfg per station",
-            config.table.stations.len()
-        ));
-    };
-    if config.role != Role::Device {
-        return Err(format!(
-            "the PLC program \"{name}\" is the controller of its link, so this driver must have \
-             role = \"device\""
-        ));
-    }
-    for (area, has, needs) in [
-        ("%I", station.input_bytes, program.input_bytes()),
-        ("%Q", station.output_bytes, program.output_bytes()),
-    ] {
-        if has < needs {
-            return Err(format!(
-                "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \
-                 this driver cover {has}; complete the signal table"
-            ));
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::time::Manual;
-
-    #[test]
-    fn statistics_have_one_line_per_key_whatever_the_reason_says() {
-        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\n\
-                    link = \"statistics\"\nmode = \"stepped\"\n\
-                    [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n";
-        let config = Config::parse("driver.cfg", text).expect("a right driver.cfg");
-        let driver = Driver::open(config, Manual::new()).expect("opens");
-        driver.status.enter(
-            LinkState::Failed,
-            "assertion `left == right` failed\n  left: 1\n right: 2",
-        );
-        let statistics = driver.statistics();
-        assert!(
-            statistics.contains("\nreason=assertion `left == right` failed left: 1 right: 2\n"),
-            "{statistics}"
-        );
-        assert!(
-            statistics.lines().all(|line| line.contains('=')),
-            "{statistics}"
-        );
-    }
+    let columns = Columns::new(
+        &config.name,
+        config.role.name(),
+        &config.table,
+        &slots.edges,
+    );
+    Recorder::start(options, config.folder(), columns, lossless)
+        .map(Some)
+        .map_err(DriverError::Config)
 }

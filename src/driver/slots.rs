@@ -1,6 +1,5 @@
 //! Where values stand among the slots of an exchange.
 
-use super::frames::areas;
 use crate::fieldbus::Role;
 use crate::signal::SignalTable;
 
@@ -16,7 +15,7 @@ pub struct SlotMap {
 
 impl SlotMap {
     pub(super) fn new(table: &SignalTable, role: Role) -> Self {
-        let (_, rx) = areas(role);
+        let (_, rx) = role.areas();
         let mut count = table.signals.len();
         let edges = table
             .signals

@@ -1,6 +1,6 @@
 //! One station of an open driver, as the tick sees it.
 
-use super::{Counters, SlotMap};
+use super::{Code, Counters, SlotMap};
 use crate::image::{Arrival, TickStation};
 use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
 use crate::time::Nanos;
@@ -11,9 +11,10 @@ pub(super) struct Station {
     tick: TickStation,
     encode: Plan,
     decode: Plan,
-    rx_fail_safe: Box<[u8]>,
     /// Whether the slots hold fail-safe values.
     pub(super) stale: bool,
+    /// What the last exchange found here.
+    pub(super) status: Code,
 }
 
 impl Station {
@@ -22,20 +23,23 @@ impl Station {
         table: &SignalTable,
         index: usize,
         (tx, rx): (Area, Area),
-        rx_fail_safe: Box<[u8]>,
     ) -> Self {
         let (encode, decode) = (Plan::new(table, index, tx), Plan::new(table, index, rx));
         Self {
             tick,
             encode,
             decode,
-            rx_fail_safe,
             stale: true,
+            status: Code::Stale,
         }
     }
 
     pub(super) fn cycles(&self) -> u64 {
         self.tick.cycles()
+    }
+
+    pub(super) fn peer_age(&self, now: Nanos) -> Nanos {
+        self.tick.peer_age(now)
     }
 
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
@@ -59,7 +63,7 @@ impl Station {
         let stale = arrival.age > max_age;
         if stale && (arrival.changed || !self.stale) {
             self.decode.fail_safe(slots);
-            self.tick.shown_instead(&self.rx_fail_safe);
+            self.tick.shown_instead();
         }
         self.stale = stale;
         arrival

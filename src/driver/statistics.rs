@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::Code;
+use crate::time::{Clock, Nanos, Spans};
 
 /// Counters of the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,5 +56,40 @@ impl fmt::Display for Counters {
             f,
             "failed={failed}\nsaturated={saturated}\nnot_a_number={not_a_number}"
         )
+    }
+}
+
+/// One tick in so many is timed: looking at the clock twice takes as long as a small exchange.
+const SAMPLED: u64 = 32;
+
+/// Distributions over the ticks, from samples.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Samples {
+    /// How long an exchange takes.
+    exchange: Spans,
+    /// How old the data are that it delivers.
+    age: Spans,
+}
+
+impl Samples {
+    /// When the exchange begins, if this tick is one of the sample.
+    #[inline]
+    pub(super) fn begin(tick: u64, clock: &dyn Clock) -> Option<Nanos> {
+        tick.is_multiple_of(SAMPLED).then(|| clock.now())
+    }
+
+    /// Takes the sample of the exchange that was `begun`, and delivered data of `age` by the coarse
+    /// clock; `Nanos::MAX` where there never were any.
+    pub(super) fn end(&mut self, begun: Nanos, age: Nanos, clock: &dyn Clock) {
+        self.exchange.record(clock.now() - begun);
+        if age != Nanos::MAX {
+            self.age.record(age);
+        }
+    }
+
+    /// Appends both, one `key=value` a line.
+    pub(super) fn write(&self, text: &mut String) {
+        self.exchange.write("exchange", text);
+        self.age.write("age", text);
     }
 }

@@ -28,6 +28,12 @@ pub trait Free: Send {
     /// Why the line cannot be served any more. Supervision calls again after its back-off, so
     /// everything that a fresh start needs must be made anew here.
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError>;
+
+    /// How long closing waits for [`run`](Self::run) to end, in real time. After that its thread is left
+    /// behind.
+    fn close_timeout(&self) -> Nanos {
+        Nanos::from_secs(2)
+    }
 }
 
 /// A bus that runs on the tick's own thread and may make the tick wait: for virtual time, and tests.
@@ -47,10 +53,13 @@ pub enum BusError {
     /// The line is broken, or was never there; trying again may help.
     #[error("the link failed: {0}")]
     Link(String),
+    /// The peer ended the connection in good order.
+    #[error("the peer left: {0}")]
+    Left(String),
     /// The peer does not keep to the protocol.
-    #[error("the peer broke the protocol: {0}")]
+    #[error("the protocol was broken: {0}")]
     Protocol(String),
     /// The peer understood, and declined.
-    #[error("the peer refused: {0}")]
+    #[error("refused: {0}")]
     Refused(String),
 }

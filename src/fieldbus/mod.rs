@@ -2,14 +2,21 @@
 
 mod bus;
 mod changes;
+mod dead_band;
+mod link;
 mod options;
 mod port;
 mod role;
+mod troubles;
 
 pub mod loopback;
+pub mod plugin;
+pub mod socket;
 
 pub use bus::{Bus, BusError, Free, Stepped};
 pub use changes::ChangeEvents;
+pub use dead_band::DeadBands;
+pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use options::{KINDS, Options};
-pub use port::{LinkState, LinkStatus, Port};
+pub use port::{CallWatch, Port};
 pub use role::Role;

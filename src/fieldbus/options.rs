@@ -1,6 +1,8 @@
 //! The `[fieldbus]` table: which bus, and what it needs to know.
 
-use super::{Role, loopback};
+use std::path::Path;
+
+use super::{Role, loopback, plugin, socket};
 use crate::config::{Table, Value, did_you_mean, shown};
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
@@ -23,13 +25,17 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 1] = ["loopback"];
+const BUILT: [&str; 3] = ["loopback", "socket", "plugin"];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Options {
     /// `kind = "loopback"`: both ends in one process.
     Loopback(loopback::Options),
+    /// `kind = "socket"`: records of fixed size over TCP.
+    Socket(socket::Options),
+    /// `kind = "plugin"`: a vendor's shared library.
+    Plugin(plugin::Options),
 }
 
 impl Options {
@@ -37,19 +43,67 @@ impl Options {
     pub const fn kind(&self) -> &'static str {
         match self {
             Self::Loopback(_) => "loopback",
+            Self::Socket(_) => "socket",
+            Self::Plugin(_) => "plugin",
         }
     }
 
-    /// Reads the keys of the bus kind that `kind` names, and reports their mistakes.
+    /// Whether every change that the peer makes is reported as an event, beside the image.
+    pub const fn events(&self) -> bool {
+        match self {
+            Self::Loopback(options) => options.events,
+            Self::Socket(options) => options.events,
+            Self::Plugin(options) => options.events,
+        }
+    }
+
+    /// The recording that stands in for the peer, as the driver.cfg names it.
+    pub fn replayed(&self) -> Option<&Path> {
+        match self {
+            Self::Loopback(loopback::Options {
+                peer: loopback::Peer::Replay(file),
+                ..
+            }) => Some(file),
+            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => None,
+        }
+    }
+
+    /// Whether both ends of the bus are in one process.
+    pub const fn is_in_process(&self) -> bool {
+        match self {
+            Self::Loopback(_) => true,
+            Self::Socket(_) | Self::Plugin(_) => false,
+        }
+    }
+
+    /// Takes another address than the driver.cfg names, from a command line.
+    ///
+    /// # Errors
+    ///
+    /// The bus has no address, or the text is none.
+    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
+        match self {
+            Self::Loopback(_) | Self::Plugin(_) => Err(format!(
+                "the bus \"{}\" has no address; remove \"{address}\" from the command",
+                self.kind()
+            )),
+            Self::Socket(options) => options.set_address(address),
+        }
+    }
+
+    /// Reads the keys of the bus kind that `kind` names, and reports their mistakes. `moved` says that another
+    /// address will take the place of the one that is read.
     ///
     /// The table is finished: what is left in it is unknown, unless the bus kind is.
-    pub fn read(kind: &Value<'_>, role: Role, table: Table<'_>) -> Option<Self> {
+    pub fn read(kind: &Value<'_>, role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
         let known = kind.text(&format!(
             "write the kind of bus in quotes, such as \"{}\"",
             KINDS[0]
         ));
         match known {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
+            Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
+            Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
             other => {
                 table.finish_open();
                 report_kind(kind, other?);

@@ -1,102 +1,13 @@
 //! What a bus sees of its driver.
 
-use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
+use crate::faults::{Board, Fate};
 use crate::image::{BusEnd, Event};
 use crate::time::{Clock, Nanos};
 
-use super::{ChangeEvents, Role};
-
-/// How a line is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LinkState {
-    /// Not open.
-    Closed,
-    /// Trying to reach the peer, or waiting for it.
-    Opening,
-    /// The peer is there.
-    Running,
-    /// The line broke; it is tried again after a pause.
-    Failed,
-}
-
-const STATES: [LinkState; 4] = [
-    LinkState::Closed,
-    LinkState::Opening,
-    LinkState::Running,
-    LinkState::Failed,
-];
-
-impl LinkState {
-    /// The state's name, in lower case.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Closed => "closed",
-            Self::Opening => "opening",
-            Self::Running => "running",
-            Self::Failed => "failed",
-        }
-    }
-}
-
-/// The state of a line, with its reason in words, as bus and driver share it.
-#[derive(Clone, Debug)]
-pub struct LinkStatus(Arc<Shared>);
-
-#[derive(Debug)]
-struct Shared {
-    driver: String,
-    state: AtomicU8,
-    reason: Mutex<String>,
-}
-
-impl LinkStatus {
-    /// The state of the line of the driver called `driver`, which is closed so far.
-    pub fn new(driver: &str) -> Self {
-        let (state, reason) = (AtomicU8::new(0), Mutex::new("not opened yet".to_owned()));
-        Self(Arc::new(Shared {
-            driver: driver.to_owned(),
-            state,
-            reason,
-        }))
-    }
-
-    /// The state, without a lock.
-    pub fn state(&self) -> LinkState {
-        STATES[usize::from(self.0.state.load(Ordering::Relaxed)) % STATES.len()]
-    }
-
-    /// Why it is so, in words.
-    pub fn reason(&self) -> String {
-        self.0
-            .reason
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
-    }
-
-    /// Enters a state; entering the present one with the same reason does nothing.
-    pub fn enter(&self, state: LinkState, reason: &str) {
-        let mut known = self.0.reason.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.state() == state && *known == reason {
-            return;
-        }
-        let level = if state == LinkState::Failed {
-            log::Level::Warn
-        } else {
-            log::Level::Info
-        };
-        log::log!(
-            level,
-            "driver \"{}\" is {}: {reason}",
-            self.0.driver,
-            state.name()
-        );
-        reason.clone_into(&mut known);
-        self.0.state.store(state as u8, Ordering::Relaxed);
-    }
-}
+use super::troubles::Troubles;
+use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, Role};
 
 /// A bus's access to the image, the clock and the state of its driver.
 #[derive(Debug)]
@@ -107,6 +18,9 @@ pub struct Port {
     watchdog: Option<Nanos>,
     changes: Vec<ChangeEvents>,
     status: LinkStatus,
+    /// When the first station's last frame arrived, while the line is running.
+    last_cycle: Option<Nanos>,
+    troubles: Troubles,
 }
 
 impl Port {
@@ -127,7 +41,14 @@ impl Port {
             watchdog,
             changes: Vec::new(),
             status,
+            last_cycle: None,
+            troubles: Troubles::default(),
         }
+    }
+
+    /// Lets the line suffer from the faults on `board`.
+    pub fn suffer_from(&mut self, board: Arc<Board>) {
+        self.troubles = Troubles::of(board);
     }
 
     /// Reports every change between received frames as an event; one watcher per station.
@@ -157,15 +78,61 @@ impl Port {
         (station.tx_len(), station.rx_len())
     }
 
+    /// Whether an injected fault holds the line down: nothing is to be sent or taken at `now`.
+    ///
+    /// A bus that does not ask sends what it sent before, and what it hands in is lost.
+    pub fn is_down(&mut self, now: Nanos) -> bool {
+        self.attend(now);
+        self.troubles.wires().is_some_and(|wires| wires.is_down())
+    }
+
+    /// Whether frames go out in the cycle at `now`. To be asked once a cycle, before
+    /// [`outgoing`](Self::outgoing): an injected fault may swallow them, and what was to be sent is lost.
+    pub fn sends(&mut self, now: Nanos) -> bool {
+        if self.is_down(now) {
+            return false;
+        }
+        if !self.troubles.decides_to_lose_a_cycle() {
+            return true;
+        }
+        for station in 0..self.stations() {
+            self.outgoing(station, now);
+            self.sent(station);
+        }
+        false
+    }
+
     /// The bytes that a station sends at `now`: latest values, no edge lost, fail-safe when the
     /// simulation has stopped. Follow with [`sent`](Self::sent) once the peer has them.
     pub fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
-        self.image.stations[station].outgoing(now, self.watchdog)
+        if station == 0 {
+            self.observe(now);
+        }
+        let image = &mut self.image.stations[station];
+        let Some(wires) = self.troubles.wires() else {
+            return image.outgoing(now, self.watchdog);
+        };
+        let repeats = wires.repeats(station);
+        if wires.is_cut(station) {
+            return wires.frozen(station);
+        }
+        if !repeats && wires.takes(station, now, image.outgoing(now, self.watchdog)) {
+            image.sent();
+        }
+        wires.outgoing(station)
     }
 
-    /// The peer has what [`outgoing`](Self::outgoing) gave last.
+    /// The peer has what [`outgoing`](Self::outgoing) gave last, or will get it unless the line breaks: for a
+    /// stream that is when the system has taken the whole of it. What is under way when a line breaks is lost,
+    /// pulses too.
     pub fn sent(&mut self, station: usize) {
-        self.image.stations[station].sent();
+        if self
+            .troubles
+            .wires()
+            .is_none_or(|wires| wires.sent(station))
+        {
+            self.image.stations[station].sent();
+        }
     }
 
     /// Hands in a whole frame that arrived at `now`.
@@ -174,6 +141,25 @@ impl Port {
     ///
     /// When the frame has not the station's size.
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
+        self.attend(now);
+        let times = match self.troubles.wires() {
+            None => 1,
+            Some(wires) => match wires.arrives(station, now, bytes) {
+                Fate::Lost | Fate::Held => 0,
+                Fate::Passes(times) => times,
+            },
+        };
+        for _ in 0..times {
+            self.hand_in(station, now, bytes);
+        }
+    }
+
+    fn hand_in(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
+        if station == 0
+            && let Some(last) = self.last_cycle.replace(now)
+        {
+            self.status.cycle(now - last);
+        }
         self.image.stations[station].received(now, bytes);
         if let Some(changes) = self.changes.get_mut(station) {
             changes.observe(now, bytes, &mut self.image.events);
@@ -182,16 +168,147 @@ impl Port {
 
     /// Says that the peer was alive at `now`.
     pub fn touch(&mut self, station: usize, now: Nanos) {
-        self.image.stations[station].touch(now);
+        let wires = self.troubles.wires();
+        // Who is late must not seem alive by what has not come yet.
+        if wires.is_none_or(|wires| !wires.is_cut(station) && !wires.holds_back(station)) {
+            self.image.stations[station].touch(now);
+        }
+    }
+
+    /// When the port itself has something to do next, for which [`observe`](Self::observe) is to be called;
+    /// [`Nanos::MAX`] if nothing.
+    pub fn due(&self) -> Nanos {
+        self.troubles.due()
+    }
+
+    /// Looks after the injected faults: takes over new ones, and hands in what was held back long enough.
+    /// Costs one look at a number while there are none.
+    #[inline]
+    fn attend(&mut self, now: Nanos) {
+        if self.troubles.are_there() {
+            self.attend_to_troubles(now);
+        }
+    }
+
+    #[cold]
+    fn attend_to_troubles(&mut self, now: Nanos) {
+        self.troubles.look(now, &self.image, &self.status);
+        for station in 0..self.stations() {
+            // Taken out while frames are handed in, and put back.
+            let mut frame = self.troubles.take_frame(station);
+            while self.troubles.release(station, now, &mut frame) {
+                self.hand_in(station, now, &frame);
+            }
+            self.troubles.put_frame(station, frame);
+        }
     }
 
     /// Reports a write of the peer, for buses whose every write matters.
     pub fn event(&mut self, event: Event) {
+        if self.troubles.wires().is_some_and(|wires| wires.is_down()) {
+            return;
+        }
         self.image.events.push(event);
     }
 
-    /// Tells how the line is doing.
-    pub fn enter(&self, state: LinkState, reason: &str) {
-        self.status.enter(state, reason);
+    /// The limit of age: what is older is stale.
+    pub fn max_age(&self) -> Nanos {
+        self.status.max_age()
+    }
+
+    /// How long ago the station that has been silent longest was heard of; [`Nanos::MAX`] for never.
+    pub fn silence(&self, now: Nanos) -> Nanos {
+        let ages = self.image.stations.iter();
+        ages.map(|station| station.peer_age(now))
+            .max()
+            .unwrap_or_default()
+    }
+
+    /// Looks whether the line has become stale, or is so no more. [`outgoing`](Self::outgoing) does it, too;
+    /// this is for buses that have nothing to send for long.
+    pub fn observe(&mut self, now: Nanos) {
+        self.attend(now);
+        self.status.observe(now, self.silence(now));
+    }
+
+    /// The line is on its way, or waits for its peer.
+    pub fn opening(&mut self, reason: &str) {
+        self.last_cycle = None;
+        self.enter(LinkState::Opening, Cause::Waiting, reason);
+    }
+
+    /// The peer was lost for `error`, and the bus goes on without a pause, as `next` says.
+    pub fn lost(&mut self, error: &BusError, next: &str) {
+        self.last_cycle = None;
+        let reason = format!("{error}; {next}");
+        self.enter(LinkState::Opening, error.into(), &reason);
+    }
+
+    /// The peer is there. Whether it also says anything is looked after by the port: a line that is silent
+    /// for too long becomes stale by itself.
+    pub fn running(&mut self, reason: &str) {
+        self.enter(LinkState::Running, Cause::Running, reason);
+    }
+
+    fn enter(&mut self, state: LinkState, cause: Cause, reason: &str) {
+        let now = self.clock.now();
+        let said = (state, cause, reason);
+        if self.troubles.hides(now, said, &self.status) {
+            return;
+        }
+        if state == LinkState::Running {
+            self.status.running(now, reason);
+        } else {
+            self.status.enter(now, state, cause, reason);
+        }
+    }
+
+    /// Notes a fact for the statistics, such as the address that was bound.
+    pub fn tell(&self, key: &'static str, fact: &str) {
+        self.status.tell(key, fact);
+    }
+
+    /// Counts something for the statistics; keys are `<kind of bus>.<what>`.
+    pub fn count(&self, key: &'static str) {
+        self.status.count(key);
+    }
+
+    /// What another thread needs to look after the [calls](Self::calling) of this one.
+    pub fn call_watch(&self) -> CallWatch {
+        CallWatch {
+            status: self.status.clone(),
+            clock: Arc::clone(&self.clock),
+        }
+    }
+
+    /// Makes a call into a library that may not return, and lets the statistics tell when it lasts for longer
+    /// than `limit`.
+    pub fn calling<R>(&self, what: &Arc<str>, limit: Nanos, call: impl FnOnce() -> R) -> R {
+        /// Ends the call, however it ends: one that panics has not hung.
+        struct Ends<'a>(&'a Port);
+
+        impl Drop for Ends<'_> {
+            fn drop(&mut self) {
+                self.0.status.call_ends(self.0.clock.now());
+            }
+        }
+
+        self.status.call_begins(self.clock.now(), what, limit);
+        let _ends = Ends(self);
+        call()
+    }
+}
+
+/// Looks after the calls into a library that a bus thread makes, from another thread.
+#[derive(Clone, Debug)]
+pub struct CallWatch {
+    status: LinkStatus,
+    clock: Arc<dyn Clock>,
+}
+
+impl CallWatch {
+    /// Lets the line be stale, and the log say so, when a call lasts longer than it may.
+    pub fn look(&self) {
+        self.status.observe_call(self.clock.now());
     }
 }

@@ -1,5 +1,7 @@
 //! Which end of the line a driver is.
 
+use crate::signal::Area;
+
 /// Which end of the line a driver is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Role {
@@ -13,6 +15,14 @@ pub enum Role {
 impl Role {
     /// Both of them.
     pub const ALL: [Self; 2] = [Self::Device, Self::Controller];
+
+    /// The areas that it writes and reads.
+    pub const fn areas(self) -> (Area, Area) {
+        match self {
+            Self::Device => (Area::Input, Area::Output),
+            Self::Controller => (Area::Output, Area::Input),
+        }
+    }
 
     /// Its name in a driver.cfg: `device` or `controller`.
     pub const fn name(self) -> &'static str {

@@ -17,7 +17,7 @@
 mod edges;
 mod ring;
 mod station;
-mod sync;
+pub(crate) mod sync;
 mod triple;
 
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};

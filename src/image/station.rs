@@ -213,12 +213,18 @@ impl TickStation {
         })
     }
 
-    /// Takes note that the simulation sees `bytes` (fail-safe values) instead of the frame, so that
+    /// Takes note that the simulation sees other levels (fail-safe values) than the frame's, so that
     /// the next [`read`](Self::read) shows the frame again.
-    pub fn shown_instead(&mut self, bytes: &[u8]) {
-        self.rx_shaper.pass(bytes);
-        self.rx_shaper.confirm();
+    ///
+    /// The shaper goes on from what the peer showed last: a level that is on by its fail-safe value,
+    /// and that the peer switches on when it is back, must not drop in between to show that edge.
+    pub fn shown_instead(&mut self) {
         self.forced = true;
+    }
+
+    /// Time since the peer was heard of last; [`Nanos::MAX`] before the first time.
+    pub fn peer_age(&self, now: Nanos) -> Nanos {
+        age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
 
     /// Whole bus cycles received so far.
@@ -260,6 +266,11 @@ impl BusStation {
         age(now, self.beside.tick_alive.load(Ordering::Relaxed))
     }
 
+    /// Time since the peer was heard of last; [`Nanos::MAX`] before the first time.
+    pub fn peer_age(&self, now: Nanos) -> Nanos {
+        age(now, self.beside.peer_alive.load(Ordering::Relaxed))
+    }
+
     /// A whole bus cycle has arrived: counts its edges and hands it to the tick.
     ///
     /// # Panics
@@ -287,6 +298,16 @@ impl BusStation {
     /// The peer is alive, though it sent no new data.
     pub fn touch(&mut self, now: Nanos) {
         self.beside.peer_alive.store(now.0, Ordering::Relaxed);
+    }
+
+    /// The bytes that went out, or were about to, last.
+    pub fn last_outgoing(&self) -> &[u8] {
+        &self.outgoing
+    }
+
+    /// The latched bits of the frames that go out from here.
+    pub fn tx_latched(&self) -> &[LatchedBit] {
+        self.tx_shaper.bits()
     }
 
     /// Size of the frames that arrive here, in bytes.
@@ -417,6 +438,19 @@ mod tests {
         assert_eq!(bus.outgoing(Nanos(22), watchdog), [1]);
         bus.sent();
         assert_eq!(bus.outgoing(Nanos(23), watchdog), [0]);
+    }
+
+    #[test]
+    fn a_level_that_is_on_by_its_fail_safe_value_does_not_drop_when_the_peer_switches_it_on() {
+        let (mut tick, mut bus) = one_latched_byte();
+        bus.received(Nanos(0), &[0]);
+        read(&mut tick, 0);
+        // The peer is silent, and the simulation sees the bit on instead.
+        tick.shown_instead();
+        bus.received(Nanos(90), &[1]);
+        let (_, shown, edges) = read(&mut tick, 90);
+        assert_eq!((shown, edges), (Some(1), vec![(7, 1)]));
+        assert_eq!(read(&mut tick, 91).1, Some(1), "and stays");
     }
 
     #[test]

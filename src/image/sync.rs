@@ -1,13 +1,13 @@
 //! The atomics of the hand-over, switchable to loom's.
 
 #[cfg(not(loom))]
-pub(super) use std::sync::{
+pub(crate) use std::sync::{
     Arc,
     atomic::{AtomicU8, AtomicU64, AtomicUsize, Ordering},
 };
 
 #[cfg(loom)]
-pub(super) use loom::sync::{
+pub(crate) use loom::sync::{
     Arc,
     atomic::{AtomicU8, AtomicU64, AtomicUsize, Ordering},
 };

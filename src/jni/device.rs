@@ -1,7 +1,11 @@
 //! One open driver with the buffer it shares with Java: all that the native methods do, without a
 //! JVM in sight.
 
+use std::fmt::Write as _;
+
+use crate::config::Mistakes;
 use crate::driver::Driver;
+use crate::faults::Injected;
 use crate::image::Event;
 use crate::time::Nanos;
 
@@ -50,6 +54,40 @@ impl<K> Device<K> {
 
     pub(super) fn statistics(&self) -> String {
         self.driver.statistics()
+    }
+
+    /// Injects a fault and gives its number, or every mistake in its text.
+    pub(super) fn inject(&mut self, text: &str) -> Result<u32, Mistakes> {
+        self.driver.inject_text(text)
+    }
+
+    /// Ends a fault; false if there is none with this number.
+    pub(super) fn end_fault(&mut self, id: u32) -> bool {
+        self.driver.end_fault(id)
+    }
+
+    /// The injected faults, a line each: number, state, how often begun, kind, name, what it does; with tabs
+    /// between them.
+    pub(super) fn faults(&self) -> String {
+        let mut text = String::new();
+        for fault in self.driver.injected_faults() {
+            let Injected {
+                id,
+                phase,
+                begun,
+                kind,
+                name,
+                what,
+                ..
+            } = fault;
+            // Writing to a string cannot fail; names have no control characters.
+            let _ = writeln!(
+                text,
+                "{id}\t{}\t{begun}\t{kind}\t{name}\t{what}",
+                phase.name()
+            );
+        }
+        text
     }
 
     /// Moves waiting events into `into`, three words each, and says how many.

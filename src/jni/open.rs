@@ -22,13 +22,18 @@ use super::shared::Shared;
 /// What keeps the memory of a shared buffer alive.
 pub(super) type Keep = Global<JByteBuffer<'static>>;
 
-/// Opens the driver that the file describes, and describes it to `layout`.
+/// What mistakes in the tables that Java hands in are called by.
+const TABLES: &str = "tables instead of driver.cfg's";
+
+/// Opens the driver that the file describes, with `tables` instead of its own, and describes it to `layout`.
 pub(super) fn open(
     env: &mut Env<'_>,
     path: &Path,
+    tables: &str,
     layout: &JObject<'_>,
 ) -> Result<Device<Keep>, Failure> {
-    let config = Config::load(path).map_err(|mistakes| {
+    let config = Config::load(path).and_then(|config| config.overlaid(TABLES, tables));
+    let config = config.map_err(|mistakes| {
         Failure::coded(
             Code::BadConfig,
             format!("driver.cfg cannot be used:\n{mistakes}"),

@@ -30,7 +30,7 @@ impl Mirror {
 }
 
 impl Program for Mirror {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         Self::NAME
     }
 
@@ -57,6 +57,7 @@ mod tests {
         Mirror.scan(&mut Scan {
             now: Nanos::ZERO,
             alive: true,
+            cycle: 0,
             inputs,
             outputs: &mut outputs,
         });

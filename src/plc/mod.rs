@@ -2,18 +2,26 @@
 //!
 //! A [`Program`] is a pure function of its own state, the time and the inputs: whoever hosts it
 //! calls [`Program::scan`] at the scan interval, on wall time or on simulation time, and carries
-//! the images. [`program`] finds a built-in program by its name.
+//! the images. [`program`] finds a built-in program by its name, or one of the user's own by its path.
 
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::signal::{Addressing, SignalTable};
 use crate::time::Nanos;
 
 mod drum;
+mod hosted;
 mod mirror;
+mod reaction;
 
 pub mod blocks;
 pub mod rig;
 
 pub use drum::Drum;
+pub use hosted::Hosted;
 pub use mirror::Mirror;
+pub use reaction::Reaction;
 pub use rig::{La1Code, Rig};
 
 /// What a program sees and makes in one scan.
@@ -23,16 +31,36 @@ pub struct Scan<'a> {
     pub now: Nanos,
     /// The peer's data are fresh or unchanged, not stale.
     pub alive: bool,
+    /// Whole bus cycles that have arrived so far.
+    pub cycle: u64,
     /// The inputs, `%I`, from byte 0.
     pub inputs: &'a [u8],
     /// The outputs, `%Q`, from byte 0; they keep their content between scans.
     pub outputs: &'a mut [u8],
 }
 
+/// The scan interval of a program that asks for none.
+pub const INTERVAL: Nanos = Nanos::from_millis(10);
+
 /// A PLC program.
 pub trait Program: Send {
-    /// The name that [`program`] knows it by.
-    fn name(&self) -> &'static str;
+    /// What [`program`] knows it by: its name, or the path of its file.
+    fn name(&self) -> &str;
+
+    /// The scan interval that it asks for. Positive.
+    fn interval(&self) -> Nanos {
+        INTERVAL
+    }
+
+    /// Hears, before the first scan, how the image is laid out that it will work on.
+    ///
+    /// # Errors
+    ///
+    /// The program cannot work on that image.
+    fn fit(&mut self, table: &SignalTable, addressing: Addressing) -> Result<(), ProgramError> {
+        let _ = (table, addressing);
+        Ok(())
+    }
 
     /// How many bytes of `%I` the program reads; 0 if it takes what there is.
     fn input_bytes(&self) -> usize;
@@ -45,10 +73,30 @@ pub trait Program: Send {
     /// Images may be longer than the program asks for, and the rest is left alone. Of shorter
     /// ones, the missing inputs read as 0 and the missing outputs are dropped.
     fn scan(&mut self, scan: &mut Scan<'_>);
+
+    /// What the program has to tell beside its outputs, to be asked for at any time while it runs.
+    fn report(&self) -> Option<Arc<dyn Report>> {
+        None
+    }
+}
+
+/// What a program has to tell beside its outputs, shared with whoever hosts it.
+pub trait Report: Send + Sync + std::fmt::Debug {
+    /// Appends it, one `key=value` a line.
+    fn write(&self, text: &mut String);
+
+    /// The same for people, as the program's last word.
+    fn summary(&self) -> String;
+
+    /// Whether the program has done all that it was asked to.
+    fn is_done(&self) -> bool;
+
+    /// What went wrong, once it [is done](Self::is_done).
+    fn failure(&self) -> Option<String>;
 }
 
 /// The names that [`program`] knows.
-pub const PROGRAMS: [&str; 2] = [Rig::NAME, Mirror::NAME];
+pub const PROGRAMS: [&str; 3] = [Rig::NAME, Mirror::NAME, Reaction::NAME];
 
 /// Why [`program`] gave none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -88,6 +136,30 @@ pub enum ProgramError {
         /// The values that it can have.
         known: &'static [&'static str],
     },
+    /// A program of the user's own cannot be used.
+    #[error("the PLC program \"{program}\" {what}; {right}")]
+    Hosted {
+        /// The path of its file.
+        program: String,
+        /// What is wrong with it.
+        what: String,
+        /// What would be right.
+        right: String,
+    },
+    /// The option is no value of its kind.
+    #[error(
+        "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; {right}"
+    )]
+    Malformed {
+        /// The program.
+        program: &'static str,
+        /// The option.
+        option: &'static str,
+        /// The value that was given.
+        value: String,
+        /// What would be right.
+        right: String,
+    },
 }
 
 /// Writes `"a", "b" or "c"`, with `last` before the last one.
@@ -108,21 +180,66 @@ fn list(names: &[&str], last: &str) -> String {
     text
 }
 
-/// Makes the built-in program called `name`, one of [`PROGRAMS`], with its options as (key, value)
-/// pairs. Where an option is given twice, the last one counts.
+/// Makes the program called `name`, with its options as (key, value) pairs. Where an option is given
+/// twice, the last one counts.
+///
+/// The name is one of [`PROGRAMS`], or the path of a [`Hosted`] program: then it has a `/` in it or ends
+/// in `.so`, `.dll` or `.dylib`.
 ///
 /// # Errors
 ///
 /// The name is unknown, the program has no such option, or the option cannot have that value; the
 /// text says which would be right.
 pub fn program(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>, ProgramError> {
+    program_beside(Path::new(""), name, options)
+}
+
+/// The same, with paths that count from `folder`.
+///
+/// # Errors
+///
+/// As for [`program`].
+pub fn program_beside(
+    folder: &Path,
+    name: &str,
+    options: &[(String, String)],
+) -> Result<Box<dyn Program>, ProgramError> {
     match name {
+        _ if Hosted::is_path(name) => Ok(Box::new(Hosted::load(&folder.join(name), options)?)),
         Rig::NAME => Ok(Box::new(Rig::from_options(options)?)),
         Mirror::NAME => Ok(Box::new(Mirror::new(options)?)),
+        Reaction::NAME => Ok(Box::new(Reaction::from_options(options)?)),
         _ => Err(ProgramError::UnknownName {
             name: name.to_owned(),
         }),
     }
+}
+
+/// Whether there can be a program called `name` that takes `options`, without loading anything.
+///
+/// # Errors
+///
+/// As for [`program`].
+pub fn check(name: &str, options: &[(String, String)]) -> Result<(), ProgramError> {
+    if Hosted::is_path(name) {
+        Hosted::check_options(name, options)
+    } else {
+        program(name, options).map(drop)
+    }
+}
+
+/// The scan interval for `program`: the one that a user has stated, else its own.
+pub fn interval(program: &dyn Program, stated: Option<Nanos>) -> Nanos {
+    let own = program.interval();
+    let interval = stated.unwrap_or(own);
+    if interval != own && Hosted::is_path(program.name()) {
+        log::warn!(
+            "the PLC program \"{}\" was compiled for a scan every {own} and gets one every {interval}: its \
+             timers are right all the same, but its tasks run at other intervals than they state",
+            program.name()
+        );
+    }
+    interval
 }
 
 #[cfg(test)]
@@ -148,7 +265,8 @@ mod tests {
     fn refusals_name_what_would_be_right() {
         assert_eq!(
             refusal("rigg", &[]),
-            "no PLC program is called \"rigg\"; the built-in programs are \"rig\" and \"mirror\""
+            "no PLC program is called \"rigg\"; the built-in programs are \"rig\", \"mirror\" \
+             and \"reaction\""
         );
         assert_eq!(
             refusal("mirror", &[("speed", "fast")]),

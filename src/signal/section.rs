@@ -50,6 +50,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let latch = table.take("latch");
     let hold = table.take("hold");
     let fail_safe = table.take("fail_safe");
+    let dead_band = table.take("dead_band");
     let station = table.take("station");
     let whole = table.is_whole();
     table.finish();
@@ -64,6 +65,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let latched = latch.as_ref().map(latch_of);
     let held = hold.as_ref().map(Value::duration);
     let ordered = order.as_ref().map(order_of);
+    let band = dead_band.as_ref().map(dead_band_of);
     if place.is_none() || matches!(stated, Some(None)) {
         check_shapes(scale.as_ref(), fail_safe.as_ref(), station.as_ref());
     }
@@ -98,6 +100,9 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         latch: latch.and_then(|value| fitting_latch(&value, latched.flatten()?, data_type)),
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
+        dead_band: dead_band
+            .and_then(|value| fitting_dead_band(&value, band.flatten()?, data_type))
+            .unwrap_or_default(),
     };
     let hold =
         hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched.is_some()));
@@ -113,7 +118,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let fail_safe = match (fail_safe, scaled) {
         // A fail-safe value cannot be judged by a scale that is wrong.
         (_, Some(None)) => None,
-        (Some(value), _) => fail_safe_of(&value, &signal),
+        (Some(value), _) => slot_of(&value, &signal, "fail_safe"),
         (None, _) => Some(at_rest(&signal)),
     };
     let signal = Signal {
@@ -285,6 +290,30 @@ fn fitting_hold(value: &Value<'_>, hold: Nanos, signal: &Signal, latched: bool) 
     None
 }
 
+fn dead_band_of(value: &Value<'_>) -> Option<f64> {
+    const RIGHT: &str = "write how far the value may move without being sent, such as 0.5";
+    let number = value.number(RIGHT)?;
+    if number < 0.0 {
+        value.wrong(
+            format!("\"dead_band\" is {}, less than nothing", value.written()),
+            RIGHT,
+        );
+        return None;
+    }
+    Some(number)
+}
+
+fn fitting_dead_band(value: &Value<'_>, band: f64, data_type: DataType) -> Option<f64> {
+    if data_type == DataType::Bool {
+        value.wrong(
+            "a BOOL has no dead band",
+            "remove \"dead_band\"; every change of a BOOL counts",
+        );
+        return None;
+    }
+    Some(band)
+}
+
 fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     const SHAPE: &str = "write scale = { raw = [0, 27648], value = [0.0, 250.0] }";
     if data_type == DataType::Bool {
@@ -389,9 +418,10 @@ fn at_rest(signal: &Signal) -> Slot {
         .map_or_else(Slot::default, |scale| Slot::from_real(scale.offset))
 }
 
-fn fail_safe_of(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
+/// A value of `signal`, in its unit, as its slot holds it; messages call the value `key`.
+pub fn slot_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
     if signal.data_type == DataType::Bool {
-        return fail_safe_bit(value);
+        return bit_of(value, key);
     }
     if value.is_boolean() {
         value.wrong(
@@ -401,7 +431,7 @@ fn fail_safe_of(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
         return None;
     }
     if signal.scale.is_none() && signal.data_type.is_integer() {
-        return fail_safe_integer(value, signal);
+        return integer_of(value, signal, key);
     }
     let (least, greatest) = raw_limits(signal.data_type);
     let number = value.number("write a number")?;
@@ -415,23 +445,38 @@ fn fail_safe_of(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
     if (least..=greatest).contains(&rounded) {
         return Some(Slot::from_real(number));
     }
-    let right = match signal.scale {
-        None => raw_range(signal.data_type),
-        Some(scale) => {
-            let ends = [scale.value(least), scale.value(greatest)];
-            let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-            let (low, high) = (short_number(low), short_number(high));
-            format!(
-                "{} with this scale goes from {low} to {high}",
-                signal.data_type
-            )
-        }
-    };
-    value.wrong(format!("fail_safe {} does not fit", value.written()), right);
+    value.wrong(
+        format!("{key} {} does not fit", value.written()),
+        value_range(signal),
+    );
     None
 }
 
-fn fail_safe_bit(value: &Value<'_>) -> Option<Slot> {
+/// The least and the greatest value of `signal`, in its unit.
+pub fn value_limits(signal: &Signal) -> (f64, f64) {
+    let (least, greatest) = raw_limits(signal.data_type);
+    let Some(scale) = signal.scale else {
+        return (least, greatest);
+    };
+    let ends = [scale.value(least), scale.value(greatest)];
+    (ends[0].min(ends[1]), ends[0].max(ends[1]))
+}
+
+/// What values `signal` takes, in words.
+pub fn value_range(signal: &Signal) -> String {
+    if signal.scale.is_none() {
+        return raw_range(signal.data_type);
+    }
+    let (low, high) = value_limits(signal);
+    format!(
+        "{} with this scale goes from {} to {}",
+        signal.data_type,
+        short_number(low),
+        short_number(high)
+    )
+}
+
+fn bit_of(value: &Value<'_>, key: &str) -> Option<Slot> {
     const RIGHT: &str = "a BOOL takes true or false";
     if value.is_boolean() {
         return value
@@ -443,13 +488,13 @@ fn fail_safe_bit(value: &Value<'_>) -> Option<Slot> {
         .into_iter()
         .find(|bit: &f64| bit.total_cmp(&number).is_eq());
     if fitting.is_none() {
-        value.wrong(format!("fail_safe {} does not fit", value.written()), RIGHT);
+        value.wrong(format!("{key} {} does not fit", value.written()), RIGHT);
     }
     fitting.map(Slot::from_real)
 }
 
 /// An unscaled integer, exact to the last bit.
-fn fail_safe_integer(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
+fn integer_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
     let range = signal.data_type.range()?;
     let number = if value.is_integer() {
         value.whole(range)?
@@ -457,7 +502,7 @@ fn fail_safe_integer(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
         let number = value.number("write a whole number")?;
         if number.fract() != 0.0 {
             value.wrong(
-                format!("fail_safe {} has a fraction", value.written()),
+                format!("{key} {} has a fraction", value.written()),
                 format!("write a whole number; {}", raw_range(signal.data_type)),
             );
             return None;
@@ -467,7 +512,7 @@ fn fail_safe_integer(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
         let whole = number as i128;
         if !range.contains(&whole) {
             value.wrong(
-                format!("fail_safe {} does not fit", value.written()),
+                format!("{key} {} does not fit", value.written()),
                 raw_range(signal.data_type),
             );
             return None;

@@ -43,6 +43,9 @@ pub struct Signal {
     /// What stands here when the data are stale (`%Q`) or the simulation has stopped (`%I`), in
     /// engineering units; the same kind of slot as the signal's own.
     pub fail_safe: Slot,
+    /// By how much the value may move, in engineering units, without being news to a bus that sends
+    /// on change; zero where every change is. Never negative, and zero on a BOOL.
+    pub dead_band: f64,
 }
 
 impl Signal {

@@ -2,9 +2,9 @@
 
 use std::fmt;
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::stop::Shared;
 use super::{Nanos, Stop};
@@ -21,6 +21,12 @@ pub trait Clock: Send + Sync + fmt::Debug {
 
     /// Waits until `deadline`, or until `stop` is stopped or woken, whichever is first.
     fn wait_until(&self, deadline: Nanos, stop: &Stop);
+
+    /// Lets `sleep` wait in the operating system, for a thread that waits for more than the time.
+    ///
+    /// `sleep` gets the longest that it may wait; `None` means until the [waker](Stop::set_waker) of
+    /// `stop` wakes it. It may end early; who waits looks at the clock again.
+    fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>));
 }
 
 /// The time of a clock, kept in memory by the clock.
@@ -118,13 +124,24 @@ impl Clock for Monotonic {
     fn wait_until(&self, deadline: Nanos, stop: &Stop) {
         wait_monotonic(deadline, stop);
     }
+
+    fn wait_with(&self, deadline: Nanos, _stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
+        sleep((deadline != Nanos::MAX).then(|| (deadline - monotonic_now()).to_duration()));
+    }
 }
 
 /// A clock that stands still until it is told to advance: for tests, and for simulation time.
 #[derive(Debug, Default)]
 pub struct Manual {
     now: Arc<AtomicI64>,
-    waiters: Mutex<Vec<Weak<Shared>>>,
+    waiters: Mutex<Vec<Waiter>>,
+}
+
+/// A thread that waits on a manual clock.
+#[derive(Debug)]
+struct Waiter {
+    deadline: Nanos,
+    stop: Weak<Shared>,
 }
 
 impl Manual {
@@ -141,16 +158,30 @@ impl Manual {
     /// Sets the clock to `now`; a clock never goes back, so an earlier time changes nothing.
     pub fn set(&self, now: Nanos) {
         self.now.fetch_max(now.0, Ordering::SeqCst);
-        for waiter in self
-            .waiters
+        let now = self.now();
+        // Collected first: a waker may take its time, and threads come and go meanwhile.
+        let due: Vec<_> = self
             .lock()
-            .unwrap_or_else(PoisonError::into_inner)
             .iter()
-        {
-            if let Some(waiter) = waiter.upgrade() {
-                waiter.nudge();
-            }
+            .filter(|waiter| waiter.deadline <= now)
+            .filter_map(|waiter| waiter.stop.upgrade())
+            .collect();
+        for waiter in due {
+            waiter.nudge();
         }
+    }
+
+    /// Whether at least `threads` threads wait on this clock, and none of them has reached its deadline:
+    /// then all that was due by now has been done.
+    pub fn is_settled(&self, threads: usize) -> bool {
+        let waiters = self.lock();
+        let now = self.now();
+        waiters.len() >= threads && waiters.iter().all(|waiter| waiter.deadline > now)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Waiter>> {
+        // A list of numbers and tokens is whole between any two of its changes.
+        self.waiters.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -164,13 +195,29 @@ impl Clock for Manual {
     }
 
     fn wait_until(&self, deadline: Nanos, stop: &Stop) {
+        self.wait_listed(deadline, stop, || {
+            stop.wait_while(|| (self.now() < deadline).then_some(None));
+        });
+    }
+
+    fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
+        self.wait_listed(deadline, stop, || {
+            sleep((deadline <= self.now()).then_some(Duration::ZERO));
+        });
+    }
+}
+
+impl Manual {
+    /// Waits as a thread that the clock knows of. It is on the list before it looks at the time, so no
+    /// advance is missed.
+    fn wait_listed(&self, deadline: Nanos, stop: &Stop, wait: impl FnOnce()) {
         let me = stop.downgrade();
-        {
-            let mut waiters = self.waiters.lock().unwrap_or_else(PoisonError::into_inner);
-            waiters.retain(|waiter| waiter.strong_count() > 0 && !waiter.ptr_eq(&me));
-            waiters.push(me);
-        }
-        stop.wait_while(|| (self.now() < deadline).then_some(None));
+        self.lock().push(Waiter {
+            deadline,
+            stop: me.clone(),
+        });
+        wait();
+        self.lock().retain(|waiter| !waiter.stop.ptr_eq(&me));
     }
 }
 

@@ -6,8 +6,12 @@
 
 mod clock;
 mod nanos;
+mod pace;
+mod spans;
 mod stop;
 
 pub use clock::{Clock, CoarseTime, Manual, Monotonic};
 pub use nanos::{Nanos, ParseDurationError};
-pub use stop::Stop;
+pub use pace::Pace;
+pub use spans::Spans;
+pub use stop::{Stop, Waker};

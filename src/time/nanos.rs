@@ -38,6 +38,27 @@ impl Nanos {
         Self(self.0.saturating_mul(count))
     }
 
+    /// The span in microseconds.
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "for people; exact up to 104 days"
+    )]
+    pub const fn as_micros(self) -> f64 {
+        self.0 as f64 / 1e3
+    }
+
+    /// The span to three digits or so, for messages: whole milliseconds from 10 ms on, whole
+    /// microseconds from 10 us on.
+    #[must_use]
+    pub const fn rounded(self) -> Self {
+        let unit = match self.0.unsigned_abs() {
+            0..10_000 => 1,
+            10_000..10_000_000 => 1_000,
+            _ => 1_000_000,
+        };
+        Self(self.0 / unit * unit)
+    }
+
     /// The span as a [`std::time::Duration`]; a negative span is zero.
     pub fn to_duration(self) -> std::time::Duration {
         std::time::Duration::from_nanos(u64::try_from(self.0).unwrap_or(0))

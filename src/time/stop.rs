@@ -1,7 +1,11 @@
 //! The token that ends a thread's work, and wakes it for that.
 
+use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::Duration;
+
+/// What wakes a thread that waits in the operating system.
+pub type Waker = Arc<dyn Fn() + Send + Sync>;
 
 /// Says "stop" to a thread, and wakes it when it waits.
 ///
@@ -16,11 +20,21 @@ pub(super) struct Shared {
     woken: Condvar,
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct State {
     stopped: bool,
     /// Set by [`Stop::wake`], taken by the next wait: a wake that comes before the wait counts.
     wake: bool,
+    waker: Option<Waker>,
+}
+
+impl fmt::Debug for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("State")
+            .field("stopped", &self.stopped)
+            .field("wake", &self.wake)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Stop {
@@ -32,7 +46,7 @@ impl Stop {
     /// Stops, for good, and wakes whoever waits.
     pub fn stop(&self) {
         self.0.lock().stopped = true;
-        self.0.woken.notify_all();
+        self.0.rouse();
     }
 
     /// Whether [`stop`](Self::stop) was called.
@@ -43,7 +57,21 @@ impl Stop {
     /// Ends the present or the next wait of the thread, without stopping it.
     pub fn wake(&self) {
         self.0.lock().wake = true;
-        self.0.woken.notify_all();
+        self.0.rouse();
+    }
+
+    /// Has `waker` called by whatever would end a wait, for a thread that waits in the operating system
+    /// and not here; `None` ends that.
+    ///
+    /// The waker is called from any thread and must not block.
+    pub fn set_waker(&self, waker: Option<Waker>) {
+        self.0.lock().waker = waker;
+    }
+
+    /// Whether the present wait is over: stopped, or woken. A wake counts once.
+    pub fn is_roused(&self) -> bool {
+        let mut state = self.0.lock();
+        state.stopped || std::mem::take(&mut state.wake)
     }
 
     pub(super) fn downgrade(&self) -> Weak<Shared> {
@@ -81,7 +109,18 @@ impl Shared {
 
     /// Makes a waiting thread look at its deadline again.
     pub(super) fn nudge(&self) {
+        // Taken and left, so that the nudge does not fall between a thread's look at its deadline and
+        // its wait.
         drop(self.lock());
+        self.rouse();
+    }
+
+    fn rouse(&self) {
         self.woken.notify_all();
+        // Called without the lock: a waker may look at the token.
+        let waker = self.lock().waker.clone();
+        if let Some(waker) = waker {
+            waker();
+        }
     }
 }

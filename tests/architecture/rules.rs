@@ -5,12 +5,17 @@ use super::source::{Token, root_paths, texts, tokens};
 /// The rooms, each on a level; a room uses only rooms on the levels before its own.
 pub(crate) const LEVELS: &[&[&str]] = &[
     &["time"],
+    &["os"],
     &["config"],
     &["signal"],
+    &["faults"],
     &["image"],
+    &["record"],
+    &["report"],
     &["plc"],
     &["fieldbus"],
     &["driver"],
+    &["testing"],
     &["jni", "cli"],
 ];
 
@@ -21,6 +26,8 @@ const UNSAFE_HOMES: &[&str] = &[
     "src/os.rs",
     "src/os/",
     "src/image/triple.rs",
+    "src/plc/hosted/table.rs",
+    "src/fieldbus/plugin/library.rs",
 ];
 
 /// Where the system's clocks may be read.

@@ -1,9 +1,14 @@
 //! What every bus must do, written once and instantiated per bus by [`conformance!`].
 
+pub mod resources;
 pub mod rig;
 
-use rig::{Bus, CYCLE, End, MAX_AGE, Rig, await_that, config};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use resources::Resources;
+use rig::{Bus, End, MAX_AGE, Rig, await_that, config, pass};
 use tickbus::driver::{Code, Config, Driver};
+use tickbus::fieldbus::{Cause, LinkState};
 use tickbus::time::{Manual, Nanos};
 
 pub fn opens_and_exchanges_both_ways(bus: &impl Bus) {
@@ -42,9 +47,10 @@ pub fn exchanges_whole_images_only(bus: &impl Bus) {
     });
 }
 
-/// Pulses of one tick arrive, whatever the ratio of tick to cycle.
+/// Pulses of one tick arrive, whatever the ratio of tick to cycle: several ticks in a cycle, or several cycles
+/// in a tick.
 pub fn keeps_edges_both_ways(bus: &impl Bus) {
-    for ticks_per_cycle in [1, 3, 10] {
+    for (ticks, cycles) in [(1, 1), (3, 1), (10, 1), (1, 3), (1, 10)] {
         let mut rig = Rig::new(bus);
         rig.connect();
         for pulse in 1..=20 {
@@ -57,7 +63,11 @@ pub fn keeps_edges_both_ways(bus: &impl Bus) {
             let (mut run, mut sensor) = (0.0, 0.0);
             let (mut run_seen, mut sensor_seen) = (false, false);
             rig.until("the pulse is through and gone", |rig| {
-                for _ in 0..ticks_per_cycle {
+                // One cycle has passed already.
+                for _ in 1..cycles {
+                    pass(&rig.clock, 2);
+                }
+                for _ in 0..ticks {
                     rig.device.tick();
                     rig.controller.tick();
                     run += rig.device.edges("run");
@@ -73,7 +83,7 @@ pub fn keeps_edges_both_ways(bus: &impl Bus) {
             assert_eq!(
                 (run, sensor),
                 (1.0, 1.0),
-                "pulse {pulse}, {ticks_per_cycle} ticks a cycle"
+                "pulse {pulse}, {ticks} ticks in {cycles} cycles"
             );
         }
     }
@@ -103,18 +113,26 @@ pub fn keeps_events_in_order(bus: &impl Bus) {
 
 /// Nothing from the peer: stale, fail-safe values; and back, by the injected clock alone.
 pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
-    let mut rig = Rig::new(bus);
-    let first = rig.device.tick();
+    let clock = Manual::new();
+    let mut device = End::open(&config(bus, "device", ""), &clock);
+    let first = device.tick();
     assert_eq!(
         (first.code, first.age),
         (Code::Stale, Nanos::MAX),
         "before the first contact"
     );
     assert_eq!(
-        rig.device.get("speed"),
+        device.get("speed"),
         -1.0,
         "fail-safe before the first contact"
     );
+    assert_ne!(device.link().state, LinkState::Running);
+    let controller = End::open(&config(bus, "controller", ""), &clock);
+    let mut rig = Rig {
+        clock,
+        device,
+        controller,
+    };
     rig.connect();
     rig.controller.set("speed", 10.0);
     rig.until("a value arrives", |rig| {
@@ -122,6 +140,11 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
         rig.device.tick();
         rig.device.get("speed") == 10.0
     });
+    let link = rig.device.link();
+    assert_eq!(
+        (link.state, link.cause),
+        (LinkState::Running, Cause::Running)
+    );
 
     let Rig {
         clock,
@@ -130,11 +153,17 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     } = rig;
     controller.driver.close();
     await_that("the device is stale", || {
-        clock.advance(CYCLE);
+        pass(&clock, 1);
         device.tick().code == Code::Stale
     });
     assert_eq!(device.get("speed"), -1.0, "fail-safe when stale");
     assert!(device.tick().age > MAX_AGE);
+    await_that("the line says so, and why", || {
+        pass(&clock, 1);
+        device.tick();
+        let link = device.link();
+        link.state != LinkState::Running && link.cause != Cause::Running && !link.reason.is_empty()
+    });
 
     let controller = End::open(&config(bus, "controller", ""), &clock);
     let mut rig = Rig {
@@ -149,6 +178,31 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
         rig.device.tick();
         rig.device.get("speed") == 11.0
     });
+    assert_eq!(rig.device.link().state, LinkState::Running);
+    assert_eq!(rig.device.statistic("link.running"), "2");
+}
+
+/// The peer breaks the rules: the line says what it did, nothing of it is believed, and an honest peer is
+/// served afterwards.
+pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
+    let clock = Manual::new();
+    let liar = bus.liar(&clock);
+    let mut device = End::open(&config(bus, "device", ""), &clock);
+    await_that("the device says what its peer did", || {
+        pass(&clock, 1);
+        device.tick();
+        let link = device.link();
+        assert_eq!(device.get("speed"), -1.0, "nothing was believed");
+        link.cause.name() == liar.cause && link.reason.contains(liar.words)
+    });
+    drop(liar);
+    let controller = End::open(&config(bus, "controller", ""), &clock);
+    let mut rig = Rig {
+        clock,
+        device,
+        controller,
+    };
+    rig.connect();
 }
 
 /// The simulation stops ticking: the PLC gets the fail-safe values, and the true ones afterwards.
@@ -172,20 +226,95 @@ pub fn the_watchdog_bites_when_the_simulation_stops(bus: &impl Bus) {
     });
 }
 
-/// Peers that come and go, again and again.
-pub fn survives_200_peers(bus: &impl Bus) {
+/// Peers that die and return, again and again: each is served, and nothing piles up.
+///
+/// Resources are counted, so this runs in a process of its own: `test` is the calling test's name.
+pub fn survives_200_peers(bus: &impl Bus, test: &str) {
+    const LIVES: u32 = 200;
+    const WARM_UP: u32 = 20;
+    if !resources::alone(test) {
+        return;
+    }
     let clock = Manual::new();
     let mut device = End::open(&config(bus, "device", ""), &clock);
-    for life in 1..=200 {
+    let mut before = None;
+    for life in 1..=WARM_UP + LIVES {
         let mut controller = End::open(&config(bus, "controller", ""), &clock);
         await_that("the next peer's value arrives", || {
-            clock.advance(CYCLE);
+            pass(&clock, 2);
             controller.set("speed", f64::from(life));
             controller.tick();
             device.tick();
             device.get("speed") == f64::from(life)
         });
         controller.driver.close();
+        if life == WARM_UP || life == WARM_UP + LIVES {
+            await_that("the device has noticed", || {
+                pass(&clock, 1);
+                device.tick();
+                device.link().state != LinkState::Running
+            });
+        }
+        if life == WARM_UP {
+            before = Some(Resources::settled(|| pass(&clock, 1)));
+        }
+    }
+    let after = Resources::settled(|| pass(&clock, 1));
+    println!("before {before:?}, after {after:?}");
+    assert_eq!(before, Some(after), "something piles up");
+}
+
+/// Closing waits for no deadline and no peer, in the midst of the traffic.
+pub fn closes_while_busy(bus: &impl Bus) {
+    for first in ["device", "controller"] {
+        let mut rig = Rig::new(bus);
+        rig.connect();
+        let Rig {
+            clock,
+            device,
+            controller,
+        } = rig;
+        let (closing, mut staying) = if first == "device" {
+            (device, controller)
+        } else {
+            (controller, device)
+        };
+        let over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !over.load(Ordering::Relaxed) {
+                    pass(&clock, 2);
+                }
+            });
+            scope.spawn(|| {
+                closing.driver.close();
+                over.store(true, Ordering::Relaxed);
+            });
+            while !over.load(Ordering::Relaxed) {
+                staying.tick();
+            }
+        });
+    }
+}
+
+/// Mistakes in the bus's own table are told at their line, with what would be right.
+pub fn refuses_bad_configuration(bus: &impl Bus) {
+    let wrong = bus.wrong();
+    assert!(!wrong.is_empty());
+    for (table, word) in wrong {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\n{table}\n\
+             [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
+        );
+        let told = match Config::parse("driver.cfg", &text) {
+            Err(mistakes) => mistakes.to_string(),
+            Ok(config) => match Driver::open(config, Manual::new()) {
+                Ok(_) => panic!("nothing was wrong with {table}"),
+                Err(error) => error.to_string(),
+            },
+        };
+        let shaped = told.starts_with("driver.cfg:") && told.contains("; ");
+        assert!(shaped && told.contains(word), "{table}\n{told}");
     }
 }
 
@@ -196,24 +325,6 @@ pub fn opens_closes_and_opens_again(bus: &impl Bus) {
         rig.controller.driver.close();
         rig.device.driver.close();
     }
-}
-
-/// Sizes that differ between the ends are named, and nothing is exchanged.
-pub fn refuses_a_peer_with_another_image(bus: &impl Bus) {
-    let clock = Manual::new();
-    let mut device = End::open(&config(bus, "device", ""), &clock);
-    let longer =
-        config(bus, "controller", "") + "[[signal]]\nname = \"more\"\naddress = \"%QD8\"\n";
-    let mut controller = End::open(&longer, &clock);
-    await_that("one end says what differs", || {
-        clock.advance(CYCLE);
-        let said = |end: &End| {
-            end.statistic("state") == "failed" && end.statistic("reason").contains("bytes")
-        };
-        assert_eq!(device.tick().code, Code::Stale);
-        assert_eq!(controller.tick().code, Code::Stale);
-        said(&device) || said(&controller)
-    });
 }
 
 pub fn keeps_several_instances_apart(bus: &impl Bus, other: &impl Bus) {
@@ -246,14 +357,20 @@ macro_rules! conformance {
             $crate::conformance!(@tests $bus;
                 opens_and_exchanges_both_ways exchanges_whole_images_only keeps_edges_both_ways
                 keeps_events_in_order is_stale_without_its_peer_and_recovers
-                the_watchdog_bites_when_the_simulation_stops survives_200_peers
-                opens_closes_and_opens_again refuses_a_peer_with_another_image
-                closes_while_its_peer_is_silent
+                the_watchdog_bites_when_the_simulation_stops sees_through_a_peer_that_lies
+                opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
+                refuses_bad_configuration
             );
 
             #[test]
             fn keeps_several_instances_apart() {
                 $crate::conformance::keeps_several_instances_apart(&$bus, &$bus);
+            }
+
+            #[test]
+            fn survives_200_peers() {
+                let test = concat!(module_path!(), "::survives_200_peers");
+                $crate::conformance::survives_200_peers(&$bus, test);
             }
         }
     };

@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tickbus::driver::{Code, Config, Driver, Exchange};
+use tickbus::fieldbus::Link;
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
 
 /// The signals that both ends share; `{fieldbus}` is the bus's own table.
-const SIGNALS: &str = r#"
+pub const SIGNALS: &str = r#"
 [[signal]]
 name    = "run"
 address = "%QX0.0"
@@ -83,6 +84,7 @@ impl End {
         self.driver.exchange(Nanos::ZERO, &mut self.slots)
     }
 
+    #[track_caller]
     pub fn statistic(&self, key: &str) -> String {
         let text = self.driver.statistics();
         let found = text
@@ -92,12 +94,36 @@ impl End {
             .unwrap_or_else(|| panic!("no {key} in {text}"))
             .to_owned()
     }
+
+    /// State, cause and reason of the line.
+    pub fn link(&self) -> Link {
+        self.driver.link()
+    }
 }
 
-/// How a bus is written into a driver.cfg, for either role.
+/// A bus as the suite needs to know it.
 pub trait Bus {
     /// The `[fieldbus]` table of the end with `role`, without `role` and timing.
     fn fieldbus(&self, role: &str) -> String;
+
+    /// Starts a peer of a Device that is about to open, which does not keep to the protocol.
+    fn liar(&self, clock: &Arc<Manual>) -> Liar;
+
+    /// `[fieldbus]` tables that are wrong, each with a word of the complaint.
+    fn wrong(&self) -> Vec<(&'static str, &'static str)>;
+
+    /// `[[fault]]` sections of both ends.
+    fn faults(&self) -> &'static str {
+        ""
+    }
+}
+
+/// A peer that lies; dropping it ends it.
+pub struct Liar {
+    pub _peer: Box<dyn std::any::Any>,
+    /// What the Device says to it: the cause, and words of the reason.
+    pub cause: &'static str,
+    pub words: &'static str,
 }
 
 pub struct Rig {
@@ -114,8 +140,9 @@ pub const MAX_AGE: Nanos = Nanos::from_millis(300);
 pub fn config(bus: &impl Bus, role: &str, extra: &str) -> String {
     format!(
         "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n{extra}\n{SIGNALS}",
+         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n{extra}\n{SIGNALS}{}",
         bus.fieldbus(role),
+        bus.faults(),
     )
 }
 
@@ -136,11 +163,11 @@ impl Rig {
         }
     }
 
-    /// Lets cycles pass, ticking both ends, until `done` holds.
+    /// Lets cycles pass until `done` holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
         await_that(what, || {
-            self.clock.advance(CYCLE);
+            pass(&self.clock, 2);
             done(self)
         });
     }
@@ -154,6 +181,16 @@ impl Rig {
             controller |= rig.controller.tick().code == Code::Fresh;
             device && controller
         });
+    }
+}
+
+/// Lets one bus cycle pass, for `ends` ends that have a bus thread each: none is left behind by the clock,
+/// unless it waits for something else.
+pub fn pass(clock: &Manual, ends: usize) {
+    clock.advance(CYCLE);
+    let limit = Instant::now() + Duration::from_millis(20);
+    while !clock.is_settled(ends) && Instant::now() < limit {
+        std::thread::yield_now();
     }
 }
 

@@ -1,7 +1,7 @@
 //! The loopback as a bus with a thread and a cycle of its own.
 
 use crate::fieldbus::{BusError, Free, Port};
-use crate::time::{Nanos, Stop};
+use crate::time::{Nanos, Pace, Stop};
 
 use super::link::End;
 
@@ -51,16 +51,15 @@ impl Free for FreeLoopback {
 
 /// Exchanges frames every `cycle`, on deadlines that do not drift.
 fn serve(end: &mut End, cycle: Nanos, port: &mut Port, stop: &Stop) {
-    let mut deadline = port.clock().now();
+    port.opening("waiting for the other end of the link");
+    let mut pace = Pace::new(port.clock().now(), cycle);
     while !stop.is_stopped() {
         let now = port.clock().now();
-        end.cycle(now, port);
-        // After a stall the missed cycles are left out: a burst would carry old news.
-        deadline = if deadline + cycle > now {
-            deadline + cycle
+        if pace.take(now) {
+            end.cycle(now, port);
         } else {
-            now + cycle
-        };
-        port.clock().wait_until(deadline, stop);
+            port.observe(now);
+        }
+        port.clock().wait_until(pace.due().min(port.due()), stop);
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-use crate::fieldbus::{BusError, LinkState, Port, Role};
+use crate::fieldbus::{BusError, Port, Role};
 use crate::time::Nanos;
 
 /// The links that have a name, for as long as one of their ends lives.
@@ -48,6 +48,8 @@ pub struct End {
     role: Role,
     /// Whether this end has sent anything that the other end may have taken.
     sent: bool,
+    /// Whether the other end has been there.
+    met: bool,
 }
 
 /// Makes a link that has no name, and both its ends: that of the Device and that of the Controller.
@@ -119,6 +121,7 @@ impl End {
             line: Arc::clone(line),
             role,
             sent: false,
+            met: false,
         })
     }
 
@@ -127,6 +130,9 @@ impl End {
     /// Frames that the other end has not taken yet are overwritten, since the newest counts; their
     /// pulses are not confirmed before it has taken a frame that shows them.
     pub fn cycle(&mut self, now: Nanos, port: &mut Port) {
+        if port.is_down(now) {
+            return;
+        }
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
         if !theirs.attached {
@@ -134,7 +140,10 @@ impl End {
             line.lanes[lane(self.role)].waiting = false;
             self.sent = false;
             drop(line);
-            port.enter(LinkState::Opening, "waiting for the other end of the link");
+            if std::mem::take(&mut self.met) {
+                let left = BusError::Left("the other end of the link was closed".to_owned());
+                port.lost(&left, "waiting for the next");
+            }
             return;
         }
         if std::mem::take(&mut theirs.waiting) {
@@ -143,17 +152,20 @@ impl End {
             }
         }
         let mine = &mut line.lanes[lane(self.role)];
-        let taken = self.sent && !mine.waiting;
-        for (station, frame) in mine.frames.iter_mut().enumerate() {
-            if taken {
-                port.sent(station);
-            }
-            frame.copy_from_slice(port.outgoing(station, now));
+        if self.sent && !mine.waiting {
+            (0..mine.frames.len()).for_each(|station| port.sent(station));
+            self.sent = false;
         }
-        mine.waiting = true;
+        if port.sends(now) {
+            for (station, frame) in mine.frames.iter_mut().enumerate() {
+                frame.copy_from_slice(port.outgoing(station, now));
+            }
+            mine.waiting = true;
+            self.sent = true;
+        }
         drop(line);
-        self.sent = true;
-        port.enter(LinkState::Running, "the other end is there");
+        self.met = true;
+        port.running("the other end is there");
     }
 }
 

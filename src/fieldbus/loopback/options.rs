@@ -1,23 +1,15 @@
 //! What a driver.cfg says to the loopback bus.
 
+use std::path::{Path, PathBuf};
+
 use crate::config::{Table, Value, did_you_mean, shown};
 use crate::fieldbus::Role;
+use crate::plc;
+use crate::record;
 use crate::time::Nanos;
-
-/// The scan interval of a hosted program that states none.
-const SCAN: Nanos = Nanos::from_millis(10);
 
 /// The longest name of a link, in characters.
 const LINK_LIMIT: usize = 120;
-
-/// The options of a program, each with the values that it takes.
-type Choices = &'static [(&'static str, &'static [&'static str])];
-
-/// The hosted programs.
-const PROGRAMS: [(&str, Choices); 2] = [
-    ("rig", &[("la1_code", &["msb-first", "lsb-first"])]),
-    ("mirror", &[]),
-];
 
 /// When the bus runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -29,6 +21,11 @@ pub enum Mode {
     Stepped,
 }
 
+impl Mode {
+    /// Each mode by its name in a driver.cfg.
+    pub const NAMES: [(&str, Self); 2] = [("free", Self::Free), ("stepped", Self::Stepped)];
+}
+
 /// Who is at the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Peer {
@@ -36,13 +33,16 @@ pub enum Peer {
     Link(String),
     /// A PLC program hosted in this process.
     Program {
-        /// Its name.
+        /// Its name, or its path, which counts from the folder of the driver.cfg.
         name: String,
         /// Its options, as pairs of key and value.
         options: Vec<(String, String)>,
-        /// Its scan interval. Positive.
-        scan: Nanos,
+        /// Its scan interval; none leaves it to the program. Positive.
+        scan: Option<Nanos>,
     },
+    /// The recording in this file, relative to the folder of the driver.cfg: what its peer sent drives this
+    /// end.
+    Replay(PathBuf),
 }
 
 /// What a driver.cfg says to the loopback bus.
@@ -57,54 +57,102 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `mode`, `events`, and `link` or `program` with `program_options` and `scan`.
+    /// Reads `mode`, `events`, and `link`, `replay`, or `program` with `program_options` and `scan`.
     pub(in crate::fieldbus) fn read(role: Role, mut table: Table<'_>) -> Option<Self> {
         let mode = table.take("mode");
         let events = table.take("events");
         let link = table.take("link");
         let program = table.take("program");
+        let replay = table.take("replay");
         let program_options = table.take("program_options");
         let scan = table.take("scan");
         table.require_one_of(
-            &["program", "link"],
-            "add program = \"rig\" to host a PLC program at the other end, or link = \"name\" to \
-             meet the driver that names the same link",
+            &["program", "link", "replay"],
+            "add program = \"rig\" to host a PLC program at the other end, link = \"name\" to \
+             meet the driver that names the same link, or replay = \"run.vcd\" to replay a recording",
         );
         let whole = table.is_whole();
         table.finish();
 
-        let modes = [("free", Mode::Free), ("stepped", Mode::Stepped)];
-        let mode = mode.map_or(Some(Mode::Free), |value| value.choice("modes", &modes));
+        let stated = mode
+            .as_ref()
+            .map(|value| value.choice("modes", &Mode::NAMES));
+        if let (Some(mode), Some(Some(Mode::Free)), true) = (&mode, stated, replay.is_some()) {
+            mode.wrong(
+                "a recording is replayed tick by tick, on simulation time",
+                "write mode = \"stepped\", or leave \"mode\" out",
+            );
+        }
+        // A recording knows no other mode.
+        let mode = stated.unwrap_or(Some(if replay.is_some() {
+            Mode::Stepped
+        } else {
+            Mode::Free
+        }));
         let events = events.map_or(Some(false), |value| value.boolean());
-        let peer = match (link, program) {
-            (Some(link), Some(_)) => {
-                link.wrong(
-                    "the loopback has both a \"link\" and a \"program\" at its other end",
+        if program.is_none() {
+            for (key, value) in [("program_options", &program_options), ("scan", &scan)] {
+                if let (Some(value), true) = (value, whole) {
+                    value.wrong(
+                        format!("\"{key}\" stands without \"program\""),
+                        "remove it, or add program = \"rig\"",
+                    );
+                }
+            }
+        }
+        let peers = [("link", &link), ("program", &program), ("replay", &replay)];
+        let peers: Vec<_> = peers
+            .into_iter()
+            .filter_map(|(key, value)| Some((key, value.as_ref()?)))
+            .collect();
+        let peer = match peers[..] {
+            [(first, value), (second, _), ..] => {
+                value.wrong(
+                    format!(
+                        "the loopback has both a \"{first}\" and a \"{second}\" at its other end"
+                    ),
                     "keep one of them",
                 );
                 None
             }
-            (_, Some(program)) => read_program(&program, program_options, scan.as_ref(), role),
-            (link, None) => {
-                for (key, value) in [("program_options", &program_options), ("scan", &scan)] {
-                    if let (Some(value), true) = (value, whole) {
-                        value.wrong(
-                            format!("\"{key}\" stands without \"program\""),
-                            "remove it, or add program = \"rig\"",
-                        );
-                    }
-                }
+            [("program", program)] => read_program(program, program_options, scan.as_ref(), role),
+            [("replay", replay)] => record::file_of(replay).map(|(file, _)| Peer::Replay(file)),
+            [(_, link)] => {
                 let name = "name the link; the driver at the other end names the same";
-                link?
-                    .label(LINK_LIMIT, name)
+                link.label(LINK_LIMIT, name)
                     .map(|link| Peer::Link(link.to_owned()))
             }
+            [] => None,
         };
         Some(Self {
             mode: mode?,
             peer: peer?,
             events: events?,
         })
+    }
+}
+
+impl Peer {
+    /// Reads a hosted program with its options and its scan interval, for a machine at this end.
+    pub fn hosted(
+        program: &Value<'_>,
+        options: Option<Value<'_>>,
+        scan: Option<&Value<'_>>,
+    ) -> Option<Self> {
+        read_program(program, options, scan, Role::Device)
+    }
+
+    /// The same for whoever wrote it down in `folder`, and not in that of the driver.cfg: the path of a
+    /// program of the user's own counts from there.
+    #[must_use]
+    pub fn seen_from(mut self, folder: &Path) -> Self {
+        if let Self::Program { name, .. } = &mut self
+            && plc::Hosted::is_path(name)
+            && let Ok(path) = std::path::absolute(folder.join(&*name))
+        {
+            *name = path.to_string_lossy().into_owned();
+        }
+        self
     }
 }
 
@@ -120,51 +168,61 @@ fn read_program(
             "remove role = \"controller\", or use \"link\"",
         );
     }
-    let scan = scan.map_or(Some(SCAN), Value::duration);
     let text = program.text("write the name of a program in quotes, such as \"rig\"");
-    let known = text.and_then(|name| PROGRAMS.iter().find(|(known, _)| *known == name));
+    let known = text.filter(|name| plc::PROGRAMS.contains(name) || plc::Hosted::is_path(name));
+    let scan = match scan {
+        Some(scan) => scan.duration().map(Some),
+        // A program of the user's own has it compiled in.
+        None if known.is_some_and(plc::Hosted::is_path) => Some(None),
+        None => Some(Some(plc::INTERVAL)),
+    };
     if let (Some(name), None) = (text, known) {
         program.wrong(
             format!("there is no program \"{}\"", shown(name)),
-            did_you_mean(name, "programs", &PROGRAMS.map(|(name, _)| name)),
+            did_you_mean(name, "programs", &plc::PROGRAMS),
         );
     }
-    let options = match (options, known) {
-        (None, _) => Some(Vec::new()),
-        (Some(value), known) => value
+    let options = match options {
+        None => Some(Vec::new()),
+        Some(value) => value
             .table("program_options", "write them as { option = \"value\" }")
-            .and_then(|table| read_options(&table, known.map(|(_, options)| *options)?)),
+            .and_then(|table| read_options(&table, known?)),
     };
-    let (name, _) = known?;
     Some(Peer::Program {
-        name: (*name).to_owned(),
+        name: known?.to_owned(),
         options: options?,
         scan: scan?,
     })
 }
 
-fn read_options(table: &Table<'_>, known: Choices) -> Option<Vec<(String, String)>> {
+/// The options of the program called `name`, each tried on the program itself.
+fn read_options(table: &Table<'_>, name: &str) -> Option<Vec<(String, String)>> {
     let mut read = Some(Vec::new());
     for (key, value) in table.all() {
-        let Some((_, choices)) = known.iter().find(|(known, _)| *known == key) else {
-            let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-            value.wrong(
-                format!("the program has no option \"{}\"", shown(key)),
-                if names.is_empty() {
-                    "remove it".to_owned()
-                } else {
-                    did_you_mean(key, "its options", &names)
-                },
-            );
-            read = None;
-            continue;
+        // Numbers need no quotes.
+        let text = value
+            .as_text()
+            .map_or_else(|| value.written(), str::to_owned);
+        let text = if text.is_empty() {
+            value
+                .text("write the option's value in quotes")
+                .map(str::to_owned)
+        } else {
+            Some(text)
         };
-        let choices: Vec<(&str, &str)> = choices.iter().map(|choice| (*choice, *choice)).collect();
-        match (
-            value.choice(&format!("values of {key}"), &choices),
-            &mut read,
-        ) {
-            (Some(chosen), Some(read)) => read.push((key.to_owned(), chosen.to_owned())),
+        let option = text.map(|text| (key.to_owned(), text));
+        let made = option
+            .as_ref()
+            .map(|option| plc::check(name, std::slice::from_ref(option)));
+        if let Some(Err(error)) = &made {
+            let error = error.to_string();
+            let (what, right) = error
+                .split_once("; ")
+                .unwrap_or((&error, "see the program's options"));
+            value.wrong(what, right);
+        }
+        match (option, made, &mut read) {
+            (Some(option), Some(Ok(())), Some(read)) => read.push(option),
             _ => read = None,
         }
     }

@@ -27,7 +27,10 @@ impl Stepped for SteppedLoopback {
     fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
         let end = match &mut self.end {
             Some(end) => end,
-            none => none.insert(End::join(&self.name, port)?),
+            none => {
+                port.opening("waiting for the other end of the link");
+                none.insert(End::join(&self.name, port)?)
+            }
         };
         end.cycle(now, port);
         Ok(now)

@@ -1,8 +1,16 @@
 //! Homing: lifts down, suction off, wheels to their index zero. Homing, recovering and finalising
 //! all do this, the first two after acknowledging a fault.
+//!
+//! The first two also fetch down what may hang in the sleeve over lift 1. No sensor tells whether a
+//! cycle was broken off between handing a bottle over and taking the other one back, and a program
+//! that has just been switched on remembers nothing; but step 2 must find that sleeve empty. The
+//! stroke is harmless in every other case: while a bottle stands in the pocket under lift 1, nothing
+//! has been handed over, and it goes up into an empty sleeve and comes down again.
 
 use super::image::Inputs;
-use super::image::command::{ACKNOWLEDGE, IM1_JOG, IM2_JOG, LA1_CODE, LA1_RUN, LA2_RUN};
+use super::image::command::{
+    ACKNOWLEDGE, IM1_JOG, IM2_JOG, LA1_CODE, LA1_RUN, LA2_RUN, SC1, SUCTION,
+};
 use crate::plc::blocks::Ton;
 use crate::time::Nanos;
 
@@ -14,9 +22,14 @@ const CLEAR_LIMIT: Nanos = Nanos::from_secs(2);
 const LIFTS_LIMIT: Nanos = Nanos::from_secs(10);
 /// How long the wheels may take to their zero.
 const WHEELS_LIMIT: Nanos = Nanos::from_secs(10);
+/// How long lift 1 may take up to the sleeve, or down again.
+const FETCH_LIMIT: Nanos = Nanos::from_secs(5);
 /// How long switches must show before they are believed. A lift reaches the mechanical stop, and a
 /// wheel comes to rest, only after its switch has come on.
 const SETTLE: Nanos = Nanos::from_millis(300);
+/// The same for a wheel that was jogged, before anything goes through it: it stops somewhere inside its
+/// homing window, and its drive creeps from there onto the index position.
+const CREEP: Nanos = Nanos::from_millis(1_500);
 /// How long the suction cups take to let go, and a wheel that was indexing to come to rest.
 const LET_GO: Nanos = Nanos::from_secs(1);
 
@@ -36,6 +49,10 @@ enum Step {
     LetGo,
     /// The wheels turn to their zero.
     Wheels,
+    /// Lift 1 goes up to the sleeve, with suction.
+    Fetch,
+    /// Lift 1 comes down with what it found.
+    Bring,
     /// All is home.
     Done,
     /// It could not be done.
@@ -44,10 +61,15 @@ enum Step {
 
 /// The homing sequence.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a coil of its own")]
 pub(super) struct Homing {
     step: Step,
     /// This homing has acknowledged a fault, so the lift drives have lost their reference.
     unreferenced: bool,
+    /// It ends with fetching down what hangs in the sleeve over lift 1.
+    fetches: bool,
+    /// A wheel was off its homing sensor.
+    jogged: bool,
     lower_1: bool,
     lower_2: bool,
     pulse: Ton,
@@ -57,17 +79,22 @@ pub(super) struct Homing {
     let_go: Ton,
     wheels: Ton,
     centred: Ton,
+    fetch: Ton,
+    bring: Ton,
+    brought: Ton,
 }
 
 impl Homing {
-    /// Begins anew, with an Acknowledge pulse or without.
-    pub(super) fn begin(&mut self, acknowledge: bool, not_ok: bool) {
+    /// Begins anew, with an Acknowledge pulse or without; `fetches` when a cycle may follow.
+    pub(super) fn begin(&mut self, acknowledge: bool, not_ok: bool, fetches: bool) {
         self.step = if acknowledge {
             Step::Acknowledge
         } else {
             Step::Lifts
         };
         self.unreferenced = acknowledge && not_ok;
+        self.fetches = fetches;
+        self.jogged = false;
         self.lower_1 = false;
         self.lower_2 = false;
     }
@@ -91,8 +118,18 @@ impl Homing {
             .call(now, step == Step::Lifts && inputs.at_bottom(), SETTLE);
         self.let_go.call(now, step == Step::LetGo, LET_GO);
         self.wheels.call(now, step == Step::Wheels, WHEELS_LIMIT);
+        self.jogged |= step == Step::Wheels && !centred;
+        let settle = if self.jogged && self.fetches {
+            CREEP
+        } else {
+            SETTLE
+        };
         self.centred
-            .call(now, step == Step::Wheels && centred, SETTLE);
+            .call(now, step == Step::Wheels && centred, settle);
+        self.fetch.call(now, step == Step::Fetch, FETCH_LIMIT);
+        self.bring.call(now, step == Step::Bring, FETCH_LIMIT);
+        self.brought
+            .call(now, step == Step::Bring && inputs.la1_bottom(), SETTLE);
 
         self.step = match step {
             Step::Acknowledge if self.pulse.q => Step::Clear,
@@ -107,11 +144,16 @@ impl Homing {
             }
             Step::Lifts if self.landed.q => Step::LetGo,
             Step::Lifts if self.lifts.q => Step::Failed,
-            Step::LetGo if inputs.not_ok() => Step::Failed,
+            Step::LetGo | Step::Fetch | Step::Bring if inputs.not_ok() => Step::Failed,
             Step::LetGo if self.let_go.q => Step::Wheels,
             Step::Wheels if inputs.not_ok() || !inputs.at_bottom() => Step::Failed,
+            Step::Wheels if self.centred.q && self.fetches => Step::Fetch,
             Step::Wheels if self.centred.q => Step::Done,
             Step::Wheels if self.wheels.q => Step::Failed,
+            Step::Fetch if inputs.fetched() => Step::Bring,
+            Step::Fetch if self.fetch.q => Step::Failed,
+            Step::Bring if self.brought.q => Step::Done,
+            Step::Bring if self.bring.q => Step::Failed,
             other => other,
         };
 
@@ -134,6 +176,12 @@ impl Homing {
         if self.lower_2 {
             word |= LA2_RUN;
         }
+        match self.step {
+            // The word of step 2, so the machine tells by that step's bit when it is done.
+            Step::Fetch => word |= LA1_RUN,
+            Step::Bring => word |= LA1_RUN | LA1_CODE,
+            _ => {}
+        }
         if self.step == Step::Wheels && inputs.at_bottom() {
             if !inputs.home_1() {
                 word |= IM1_JOG;
@@ -145,9 +193,14 @@ impl Homing {
         word
     }
 
-    /// The lifts are down, so the suction cups need not hold any more.
-    pub(super) fn lets_go(&self) -> bool {
-        matches!(self.step, Step::LetGo | Step::Wheels | Step::Done)
+    /// The suction cups that hold, where those in `held` held so far: until the lifts are down, they
+    /// go on.
+    pub(super) fn suction(&self, held: u16) -> u16 {
+        match self.step {
+            Step::LetGo | Step::Wheels | Step::Done => 0,
+            Step::Fetch | Step::Bring => SC1,
+            _ => held & SUCTION,
+        }
     }
 
     /// All is home.

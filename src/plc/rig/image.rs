@@ -44,6 +44,7 @@ pub(super) mod command {
 
 /// Bits of the status word, `%IW0`; bits 0 to 5 are "step 1 complete" to "step 6 complete".
 mod status {
+    pub(super) const STEP_2: u16 = 1 << 1;
     pub(super) const PACKAGE_1: u16 = 1 << 11;
     pub(super) const PACKAGE_2: u16 = 1 << 12;
     pub(super) const HOME_1: u16 = 1 << 13;
@@ -140,6 +141,11 @@ impl Inputs {
         self.panel & button::LA2_BOTTOM != 0
     }
 
+    /// Lift 1 is up at the sleeve: the word of step 2 is complete, whatever it was commanded for.
+    pub(super) fn fetched(self) -> bool {
+        self.status & status::STEP_2 != 0
+    }
+
     /// Both lifts are on their bottom switches.
     pub(super) fn at_bottom(self) -> bool {
         self.la1_bottom() && self.la2_bottom()
@@ -191,7 +197,8 @@ mod tests {
 
     #[test]
     fn every_input_has_its_own_bit() {
-        let all: [(Read, usize, u8); 10] = [
+        let all: [(Read, usize, u8); 11] = [
+            (Inputs::fetched, 1, 1),
             (Inputs::package_1, 0, 3),
             (Inputs::package_2, 0, 4),
             (Inputs::home_1, 0, 5),

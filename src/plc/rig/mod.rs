@@ -23,7 +23,12 @@
 //! | wait for the machine to clear its fault | Not OK is off | 2 s have passed |
 //! | lower each lift that is not at its bottom switch | both switches have been on for 300 ms | 10 s have passed; Not OK, once a fault was acknowledged |
 //! | suction off | 1 s has passed | Not OK |
-//! | jog each wheel while its homing sensor is off | both sensors have been on for 300 ms | 10 s have passed; Not OK; a lift off its switch |
+//! | jog each wheel while its homing sensor is off | both sensors have been on for 300 ms; for 1.5 s, if one was off and lift 1 goes through the wheels next | 10 s have passed; Not OK; a lift off its switch |
+//! | lift 1 up with suction (home and recover) | "step 2 complete" is on: it is the word of step 2 | 5 s have passed; Not OK |
+//! | lift 1 down with suction | its switch has been on for 300 ms | 5 s have passed; Not OK |
+//!
+//! The last two fetch down what may hang in the sleeve over lift 1, where step 2 of the next cycle
+//! must find none: a cycle may have been broken off while it was there.
 //!
 //! Not OK while the lifts go down, where this homing has acknowledged nothing yet, leads back to the
 //! Acknowledge pulse once: a drive that still has its reference refuses to pass its bottom stop.
@@ -33,7 +38,9 @@
 //! per scan.
 //!
 //! The outputs are made afresh in each scan. What a suction cup holds it goes on holding through
-//! abort and initialise, until the lifts are down. The logic is kept to Booleans, timers, edges and
+//! abort and initialise, until the lifts are down. A program that was just switched on knows nothing
+//! of the machine, so it takes it that both cups hold something. (The rig's `driver.cfg` says the same
+//! for the time without a program: the fail-safe value of a cup is on.) The logic is kept to Booleans, timers, edges and
 //! cases, so that it can be written again in Structured Text and compared scan by scan.
 
 use self::cycle::Cycle;
@@ -152,7 +159,7 @@ impl Rig {
             buttons: Buttons::default(),
             memory: Memory::default(),
             cycles: 0,
-            suction: 0,
+            suction: SUCTION,
             cycle: Cycle::new(),
             homing: Homing::default(),
             jam: JamGuard::default(),
@@ -223,16 +230,16 @@ impl Rig {
         self.homing.stop();
         match phase {
             Phase::Initialise | Phase::Ready => {}
-            Phase::Home => self.homing.begin(not_ok, not_ok),
+            Phase::Home => self.homing.begin(not_ok, not_ok, true),
             Phase::Run => self.memory.running = true,
             Phase::Abort => self.memory.fault = true,
             Phase::Recover => {
                 self.memory.fault = false;
-                self.homing.begin(true, not_ok);
+                self.homing.begin(true, not_ok, true);
             }
             Phase::Finalise => {
                 self.memory.running = false;
-                self.homing.begin(false, not_ok);
+                self.homing.begin(false, not_ok, false);
             }
             Phase::Parked => self.memory.stop = false,
         }
@@ -244,7 +251,7 @@ impl Rig {
         self.suction = match self.phase {
             Phase::Run => self.cycle.command() & SUCTION,
             Phase::Ready | Phase::Parked => 0,
-            phase if phase.homes() && self.homing.lets_go() => 0,
+            phase if phase.homes() => self.homing.suction(self.suction),
             _ => self.suction,
         };
         let motion = match self.phase {
@@ -306,7 +313,7 @@ impl Rig {
 }
 
 impl Program for Rig {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         Self::NAME
     }
 

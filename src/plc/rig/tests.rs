@@ -1,5 +1,6 @@
 //! The program against a small plant.
 
+mod bottles;
 mod cell;
 mod plant;
 mod random;
@@ -23,17 +24,19 @@ fn homing_lowers_the_lifts_then_turns_the_wheels_then_is_ready() {
     cell.scans(50);
     assert_eq!(
         (cell.seen.phase, cell.seen.word),
-        (0, 0),
-        "waits for the machine"
+        (0, SUCTION),
+        "waits for the machine, and drops nothing"
     );
     cell.alive = true;
     cell.scans(2);
-    assert_eq!(cell.seen.word, 0x041C, "LA1 − big, LA2 down");
+    assert_eq!(cell.seen.word, 0x041C | SUCTION, "LA1 − big, LA2 down");
     cell.until("the jog", |cell| cell.seen.word == 0x0102);
     assert!(
         cell.plant.la1.position == 0 && cell.plant.la2.position == 0,
         "down to the stop"
     );
+    cell.until("lift 1 up, as in step 2", |cell| cell.seen.word == WORDS[1]);
+    cell.until("lift 1 down, with suction", |cell| cell.seen.word == 0x003C);
     cell.until_phase(READY);
     assert_eq!(cell.phases, [0, 1, 2]);
     assert_eq!((cell.plant.im1.angle, cell.plant.im2.angle), (0, 0));
@@ -42,11 +45,45 @@ fn homing_lowers_the_lifts_then_turns_the_wheels_then_is_ready() {
 }
 
 #[test]
+fn homing_gives_up_on_a_lift_that_does_not_come_to_the_sleeve_or_back() {
+    let mut cell = Cell::new(La1Code::MsbFirst);
+    cell.plant.mute = true;
+    cell.until("the stroke", |cell| cell.seen.word == WORDS[1]);
+    cell.scans(500);
+    assert_eq!(cell.seen.phase, 1);
+    cell.scan();
+    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, SC1));
+
+    cell.plant.mute = false;
+    cell.press(RESET);
+    cell.until("the stroke", |cell| cell.seen.word == WORDS[1]);
+    cell.until("the way down", |cell| cell.seen.word == 0x003C);
+    cell.plant.la1.jammed = true;
+    cell.plant.sees_jams = false;
+    cell.scans(500);
+    assert_eq!(cell.seen.phase, RECOVER);
+    cell.scan();
+    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, SC1));
+
+    cell.plant.la1.jammed = false;
+    cell.press(RESET);
+    cell.until("the stroke", |cell| cell.seen.word == WORDS[1]);
+    cell.plant.not_ok = true;
+    cell.scan();
+    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, SC1));
+    cell.press(RESET);
+    cell.until_phase(READY);
+}
+
+#[test]
 fn homing_acknowledges_a_fault_first() {
     let mut cell = Cell::new(La1Code::MsbFirst);
     cell.plant.not_ok = true;
     cell.scan();
-    assert_eq!((cell.seen.phase, cell.seen.word), (1, ACKNOWLEDGE));
+    assert_eq!(
+        (cell.seen.phase, cell.seen.word),
+        (1, ACKNOWLEDGE | SUCTION)
+    );
     cell.until_phase(READY);
     assert_eq!(cell.phases, [0, 1, 2]);
 }
@@ -57,7 +94,7 @@ fn a_referenced_lift_in_mid_path_comes_home_by_a_second_acknowledge() {
     cell.plant.la1.referenced = true;
     cell.scan();
     assert_eq!(cell.seen.word & ACKNOWLEDGE, 0);
-    cell.until("the pulse", |cell| cell.seen.word == ACKNOWLEDGE);
+    cell.until("the pulse", |cell| cell.seen.word == ACKNOWLEDGE | SUCTION);
     cell.until_phase(READY);
     assert_eq!(cell.phases, [0, 1, 2]);
 }
@@ -69,7 +106,7 @@ fn a_lift_that_fails_again_after_the_acknowledge_aborts_the_homing() {
     cell.until("the lifts", |cell| cell.seen.word & 0x0404 != 0);
     cell.plant.not_ok = true;
     cell.scan();
-    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, 0));
+    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, SUCTION));
 }
 
 #[test]
@@ -263,7 +300,7 @@ fn homing_gives_up_on_a_stuck_lift_and_on_a_blind_sensor() {
     cell.scans(1001);
     assert_eq!(cell.seen.phase, 1);
     cell.scan();
-    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, 0));
+    assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, SUCTION));
 
     cell.plant.la1.jammed = false;
     cell.plant.im2.blind = true;
@@ -323,6 +360,81 @@ fn after_a_lost_link_a_run_goes_on_by_itself() {
         flicker(&mut cell);
         cell.until("the cycle", |cell| cell.seen.cycles == 1);
         assert_eq!(cell.phases, [1, 3], "step {step}");
+    }
+}
+
+/// Switches the program off after `ran` scans of its second cycle and on again after `off` scans: the
+/// machine goes on by the last word until the data are stale, and holds by fail-safe values from then
+/// on. Then the operator presses Start, and the cell runs on.
+#[track_caller]
+fn power_cut(ran: usize, off: usize) {
+    let mut cell = Cell::ready();
+    cell.press(START);
+    cell.until("the second cycle", |cell| cell.seen.cycles == 1);
+    cell.scans(ran);
+    assert!(!cell.plant.not_ok);
+    cell.power_cut(off);
+    cell.until_phase(READY);
+    cell.press(START);
+    cell.until("two more cycles", |cell| cell.seen.cycles == 2);
+    assert_eq!(cell.phases, [0, 1, 2, 3], "after {ran} scans, {off} off");
+    assert_eq!(
+        cell.plant.bottles.broken, None,
+        "after {ran} scans, {off} off"
+    );
+    cell.press(STOP);
+    cell.until_phase(PARKED);
+    assert_eq!(
+        cell.plant.bottles.broken, None,
+        "after {ran} scans, {off} off"
+    );
+}
+
+#[test]
+fn a_power_cut_at_any_moment_drops_nothing_and_leaves_no_sleeve_full() {
+    let mut cell = Cell::ready();
+    cell.press(START);
+    cell.until("the second cycle", |cell| cell.seen.cycles == 1);
+    let mut scans = 0;
+    cell.until("the third cycle", |cell| cell.seen.cycles == 2);
+    while cell.seen.cycles == 2 {
+        cell.scan();
+        scans += 1;
+    }
+    assert!(scans > 200, "a cycle takes {scans} scans");
+    for ran in (0..scans).step_by(3) {
+        // Back before anybody noticed, just as it is noticed, and long after.
+        for off in [5, 25, 150] {
+            power_cut(ran, off);
+        }
+    }
+}
+
+#[test]
+fn a_second_power_cut_in_the_homing_drops_nothing_either() {
+    for ran in (0..700).step_by(10) {
+        let mut cell = Cell::in_step(4);
+        cell.scans(20);
+        cell.power_cut(100);
+        cell.scans(ran);
+        cell.power_cut(100);
+        cell.until_phase(READY);
+        cell.press(START);
+        cell.until("a cycle", |cell| cell.seen.cycles == 1);
+        assert_eq!(cell.plant.bottles.broken, None, "after {ran} scans");
+    }
+}
+
+#[test]
+fn after_a_lost_link_no_sleeve_is_full_either() {
+    for ran in (0..1_300).step_by(7) {
+        let mut cell = Cell::ready();
+        cell.press(START);
+        cell.scans(ran);
+        flicker(&mut cell);
+        let cycles = cell.seen.cycles + 1;
+        cell.until("the cycle", |cell| cell.seen.cycles == cycles);
+        assert_eq!(cell.plant.bottles.broken, None, "after {ran} scans");
     }
 }
 

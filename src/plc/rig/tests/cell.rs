@@ -5,7 +5,7 @@ use crate::plc::rig::image::command::{
     IM1_INDEX, IM1_JOG, IM2_INDEX, IM2_JOG, LA1_RUN, LA2_RUN, SC1, SC2,
 };
 use crate::plc::rig::{La1Code, Rig};
-use crate::plc::{Program, Scan};
+use crate::plc::{Hosted, Program, Scan};
 use crate::time::Nanos;
 
 pub(super) const START: u8 = 1;
@@ -17,6 +17,12 @@ pub(super) const RUN: u8 = 3;
 pub(super) const ABORT: u8 = 4;
 pub(super) const RECOVER: u8 = 5;
 pub(super) const PARKED: u8 = 7;
+
+/// What the machine gets while no data come, by the rig's `driver.cfg`.
+const FAIL_SAFE: u16 = SC1 | SC2;
+
+/// Data older than this, in scans, are stale.
+const STALE_SCANS: usize = 25;
 
 const SCANS_PER_SECOND: usize = 100;
 
@@ -90,10 +96,23 @@ impl Seen {
     }
 }
 
+/// Names a file with the rig's program from `plc/rig/rig.st`, compiled. Then every test of the rig has it run
+/// beside the built-in one, and all outputs must be equal in every scan; `tools/test` does that.
+const COMPILED: &str = "TICKBUS_RIG_PROGRAM";
+
+/// The compiled program, if one was named.
+fn twin(la1_code: La1Code) -> Option<Hosted> {
+    let file = std::env::var_os(COMPILED).filter(|_| la1_code == La1Code::MsbFirst)?;
+    let alive = ("alive".to_owned(), "%IX3.0".to_owned());
+    let twin = Hosted::load(file.as_ref(), &[alive]);
+    Some(twin.unwrap_or_else(|error| panic!("{COMPILED}: {error}")))
+}
+
 /// The program, the plant, and all that was seen of them.
 #[derive(Debug)]
 pub(super) struct Cell {
     pub(super) rig: Rig,
+    twin: Option<Hosted>,
     pub(super) plant: Plant,
     pub(super) alive: bool,
     pub(super) buttons: u8,
@@ -111,6 +130,7 @@ impl Cell {
         plant.lsb_first = la1_code == La1Code::LsbFirst;
         Self {
             rig: Rig::new(la1_code),
+            twin: twin(la1_code),
             plant,
             alive: true,
             buttons: 0,
@@ -141,19 +161,51 @@ impl Cell {
     pub(super) fn scan(&mut self) {
         let image = self.plant.image();
         self.scan_inputs([image[0], image[1], image[2] | self.buttons]);
-        // Without the link, the machine sees the fail-safe word.
-        self.plant.step(if self.alive { self.seen.word } else { 0 });
+        self.plant.step(if self.alive {
+            self.seen.word
+        } else {
+            FAIL_SAFE
+        });
+    }
+
+    /// Switches the program off for some scans, and a new one on, which remembers nothing. Until its
+    /// data are stale, the machine goes on by the last word.
+    pub(super) fn power_cut(&mut self, off: usize) {
+        for scan in 0..off {
+            let stale = scan >= STALE_SCANS;
+            self.plant
+                .step(if stale { FAIL_SAFE } else { self.seen.word });
+        }
+        self.rig = Rig::new(La1Code::MsbFirst);
+        self.twin = twin(La1Code::MsbFirst);
+        self.outputs = [0; 8];
+        self.now += Nanos::from_millis(10).times(i64::try_from(off).expect("some scans"));
+        self.words.clear();
+        self.phases = vec![0];
     }
 
     /// One scan with inputs from anywhere; the plant stays as it is.
     pub(super) fn scan_inputs(&mut self, inputs: [u8; 3]) {
         let bytes = [inputs[0], inputs[1], inputs[2], 0, 0, 0, 0, 0];
-        self.rig.scan(&mut Scan {
-            now: self.now,
-            alive: self.alive,
-            inputs: &bytes,
-            outputs: &mut self.outputs,
-        });
+        let mut twins_outputs = self.outputs;
+        let scan = |program: &mut dyn Program, outputs: &mut [u8]| {
+            program.scan(&mut Scan {
+                now: self.now,
+                alive: self.alive,
+                cycle: 0,
+                inputs: &bytes,
+                outputs,
+            });
+        };
+        scan(&mut self.rig, &mut self.outputs);
+        if let Some(twin) = &mut self.twin {
+            scan(twin, &mut twins_outputs);
+            let [seen, made] = [twins_outputs, self.outputs].map(Seen::of);
+            assert_eq!(
+                seen, made,
+                "Structured Text and built-in, inputs {bytes:x?}"
+            );
+        }
         self.now += Nanos::from_millis(10);
         self.seen = Seen::of(self.outputs);
         self.seen.check(&bytes);

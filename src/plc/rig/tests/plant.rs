@@ -1,17 +1,19 @@
 //! A small machine that does what the rig's program says, enough to test the program with.
 //!
 //! It knows the rules that matter to the program: moves start on edges, unreferenced lifts only
-//! make reference runs, faults are latched. It is called once per scan of 10 ms.
+//! make reference runs, faults are latched, bottles are where they were put. It is called once per
+//! scan of 10 ms.
 
+use super::bottles::Bottles;
 use crate::plc::rig::image::command::{
     ACKNOWLEDGE, IM1_INDEX, IM1_JOG, IM2_INDEX, IM2_JOG, LA1_CODE, LA1_CODE_HIGH, LA1_CODE_LOW,
-    LA1_RUN, LA2_RUN, LA2_UP,
+    LA1_RUN, LA2_RUN, LA2_UP, SC1, SC2,
 };
 
 /// The words of the cycle, by the protocol.
 pub(super) const WORDS: [u16; 6] = [0x0001, 0x0024, 0x000C, 0x0080, 0x3C34, 0x343C];
 
-const BIG: i32 = 200_000;
+pub(super) const BIG: i32 = 200_000;
 const SMALL: i32 = 20_000;
 const STROKE_2: i32 = 150_000;
 const BOTTOM: i32 = 500;
@@ -119,6 +121,10 @@ impl Wheel {
         }
     }
 
+    pub(super) fn turning(&self) -> bool {
+        self.left > 0
+    }
+
     fn in_window(&self) -> bool {
         self.angle <= 50 || self.angle >= 3550
     }
@@ -146,6 +152,7 @@ pub(super) struct Plant {
     pub(super) mute: bool,
     /// The code of lift 1 comes LSB first.
     pub(super) lsb_first: bool,
+    pub(super) bottles: Bottles,
     blocked: u32,
     complete: u16,
     word: u16,
@@ -163,6 +170,7 @@ impl Plant {
             sees_jams: true,
             mute: false,
             lsb_first: false,
+            bottles: Bottles::default(),
             blocked: 0,
             complete: 0,
             word: 0,
@@ -191,6 +199,8 @@ impl Plant {
         } else {
             (LA1_CODE_LOW, LA1_CODE_HIGH)
         };
+        self.bottles
+            .suck([&self.la1, &self.la2], [on(SC1), on(SC2)]);
         let big_or_small = match word & LA1_CODE {
             0 => BIG,
             LA1_CODE => -BIG,
@@ -207,6 +217,8 @@ impl Plant {
         self.not_ok |= on(IM1_INDEX | IM1_JOG | IM2_JOG) && !all_down;
         self.im1.step(on(IM1_INDEX), on(IM1_JOG), 900);
         self.im2.step(on(IM2_INDEX), on(IM2_JOG), 1800);
+        self.bottles
+            .follow([&self.la1, &self.la2], [&self.im1, &self.im2]);
 
         let pushed = (self.la1.jammed && on(LA1_RUN)) || (self.la2.jammed && on(LA2_RUN));
         self.blocked = if pushed { self.blocked + 1 } else { 0 };

@@ -1,0 +1,70 @@
+//! Any bytes as a recording: the first byte chooses between VCD and CSV, and whether the signals are known.
+//!
+//! Nothing may panic, ticks come in order, and the memory of a reader does not grow with what it has read.
+
+#![no_main]
+
+use std::io::Cursor;
+
+use libfuzzer_sys::fuzz_target;
+use tickbus::record::{Format, Recording, Tick};
+use tickbus::signal::{Area, ByteOrder, DataType, Signal, SignalTable, Slot, Station};
+use tickbus::time::Nanos;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((choice, bytes)) = data.split_first() else {
+        return;
+    };
+    let format = [Format::Vcd, Format::Csv][usize::from(choice & 1)];
+    let table = table();
+    let table = (choice & 2 != 0).then_some(&table);
+    let from = Box::new(Cursor::new(bytes.to_vec()));
+    let mut recording = match Recording::read("run", format, from, table) {
+        Ok(recording) => recording,
+        Err(error) => {
+            assert!(error.to_string().starts_with("run"));
+            return;
+        }
+    };
+    let mut tick = Tick::new(recording.columns());
+    let columns = recording.columns().columns.len();
+    let (mut number, mut time) = (0, Nanos(i64::MIN));
+    while let Ok(true) = recording.next(&mut tick) {
+        assert!(tick.number > number && tick.time >= time);
+        assert_eq!(tick.values.len(), columns);
+        (number, time) = (tick.number, tick.time);
+    }
+    let _ = recording.ending();
+});
+
+/// The signals of the seeds.
+fn table() -> SignalTable {
+    let signal = |name: &str, data_type: DataType, byte| Signal {
+        name: name.to_owned(),
+        station: 0,
+        area: Area::Output,
+        byte,
+        bit: 0,
+        data_type,
+        order: ByteOrder::Abcd,
+        scale: None,
+        unit: None,
+        latch: None,
+        dead_band: 0.0,
+        hold: Nanos::ZERO,
+        fail_safe: Slot::default(),
+    };
+    SignalTable {
+        stations: vec![Station {
+            name: String::new(),
+            input_bytes: 0,
+            output_bytes: 32,
+        }],
+        signals: vec![
+            signal("run", DataType::Bool, 0),
+            signal("speed", DataType::Real, 4),
+            signal("count", DataType::Lint, 8),
+            signal("word", DataType::Lword, 16),
+        ],
+    }
+}

@@ -1,0 +1,249 @@
+//! What `tickbus plc` and `tickbus mirror` share: a PLC program at one end of a bus, until told to stop.
+
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Outcome;
+use crate::driver::{Asked, Config, Host};
+use crate::faults::{Injected, Phase};
+use crate::fieldbus::{Link, LinkState, Role};
+use crate::plc::Program;
+use crate::record;
+use crate::time::{Clock, Monotonic, Nanos, Stop};
+
+/// How often the command looks after its line.
+const LOOK: Nanos = Nanos::from_millis(20);
+
+/// Arguments that both commands have.
+#[derive(Debug, clap::Args)]
+pub(super) struct Hosting {
+    /// Use this address instead of the one in FILE.
+    #[arg(long, value_name = "HOST:PORT")]
+    address: Option<String>,
+
+    /// Inject the faults of this file, its `[[fault]]` sections.
+    #[arg(long, value_name = "FILE")]
+    faults: Option<std::path::PathBuf>,
+
+    /// Stop after this time; without it, on Ctrl-C.
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    duration: Option<Nanos>,
+
+    /// Record every scan to this file: a name ending in .vcd or .csv.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+
+    /// Print statistics at the end, and every INTERVAL if one is given (--stats=1s).
+    #[arg(long, value_name = "INTERVAL", num_args = 0..=1, require_equals = false,
+        default_missing_value = "", value_parser = stats)]
+    stats: Option<Stats>,
+}
+
+/// When statistics are printed.
+#[derive(Clone, Copy, Debug)]
+enum Stats {
+    AtEnd,
+    Every(Nanos),
+}
+
+fn stats(text: &str) -> Result<Stats, String> {
+    if text.is_empty() {
+        return Ok(Stats::AtEnd);
+    }
+    span(text).map(Stats::Every)
+}
+
+/// A duration on the command line.
+pub(super) fn span(text: &str) -> Result<Nanos, String> {
+    match text.parse() {
+        Ok(Nanos::ZERO) => Err("this is no time at all; write a longer one".to_owned()),
+        Ok(span) => Ok(span),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// What a command hosts.
+pub(super) struct Job<'a> {
+    /// What its lines begin with.
+    pub(super) title: &'a str,
+    pub(super) file: &'a Path,
+    pub(super) role: Role,
+    pub(super) program: Box<dyn Program>,
+    pub(super) interval: Nanos,
+}
+
+/// Reads the driver.cfg, hosts the program, and tells on stdout how it goes.
+pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
+    let title = job.title;
+    let asked = Asked {
+        role: job.role,
+        moved: arguments.address.is_some(),
+    };
+    let mut config = match Config::load_as(job.file, Some(asked)) {
+        Ok(config) => config,
+        Err(mistakes) => {
+            eprintln!("{mistakes}\n{title}: failed mistakes={}", mistakes.len());
+            return Outcome::WrongInput;
+        }
+    };
+    if let Some(address) = &arguments.address
+        && let Err(error) = config.bus.set_address(address)
+    {
+        eprintln!("--address: {error}");
+        return Outcome::WrongInput;
+    }
+    if let Some(file) = &arguments.faults
+        && let Err(mistakes) = config.add_faults(file)
+    {
+        eprintln!("{mistakes}\n{title}: failed mistakes={}", mistakes.len());
+        return Outcome::WrongInput;
+    }
+    // The [record] table is the simulation's, which may run at the other end of the same line.
+    config.record = match arguments.record.as_deref().map(recording).transpose() {
+        Ok(record) => record,
+        Err(error) => {
+            eprintln!("--record: {error}");
+            return Outcome::WrongInput;
+        }
+    };
+    let stop = Stop::new();
+    if let Err(error) = ctrlc::set_handler({
+        let stop = stop.clone();
+        move || stop.stop()
+    }) {
+        eprintln!("{title}: Ctrl-C cannot be caught: {error}");
+        return Outcome::BusFailed;
+    }
+    let report = job.program.report();
+    let clock = match Monotonic::shared() {
+        Ok(clock) => clock,
+        Err(error) => {
+            eprintln!("{title}: the system refused a thread for the clock: {error}");
+            return Outcome::BusFailed;
+        }
+    };
+    let host = match Host::open(&config, job.program, job.interval, Arc::clone(&clock) as _) {
+        Ok(host) => host,
+        Err(error) => {
+            eprintln!("{title}: {error}");
+            return if error.is_wrong_input() {
+                Outcome::WrongInput
+            } else {
+                Outcome::BusFailed
+            };
+        }
+    };
+    let is_done = || report.as_ref().is_some_and(|report| report.is_done());
+    // A reader that has gone away (`| head`) is no reason to stop the line.
+    let told = watch(title, &host, arguments, &*clock, &stop, &is_done);
+    let statistics = host.statistics();
+    let (scans, stale) = host.scans();
+    let fault = host.fault();
+    host.close();
+    let failure = fault.or_else(|| report.as_ref().and_then(|report| report.failure()));
+    if told.is_ok() {
+        let mut out = io::stdout().lock();
+        if arguments.stats.is_some() {
+            let _ = writeln!(out, "{statistics}");
+        }
+        if let Some(report) = &report {
+            let _ = write!(out, "{}", report.summary());
+        }
+        let _ = match &failure {
+            None => writeln!(out, "{title}: ok scans={scans} stale={stale}"),
+            Some(failure) => writeln!(out, "{title}: failed reason={failure}"),
+        };
+    }
+    if failure.is_some() {
+        Outcome::BusFailed
+    } else {
+        Outcome::Done
+    }
+}
+
+/// What the command line wants recorded: relative to the present folder, not to that of the driver.cfg.
+fn recording(file: &Path) -> Result<record::Options, String> {
+    let path = std::path::absolute(file)
+        .map_err(|error| format!("\"{}\" is no path: {error}", file.display()))?;
+    record::Options::to(&path)
+}
+
+/// Tells every change of the line and the statistics when they are due, until stopped or done.
+fn watch(
+    title: &str,
+    host: &Host,
+    arguments: &Hosting,
+    clock: &dyn Clock,
+    stop: &Stop,
+    is_done: &dyn Fn() -> bool,
+) -> io::Result<()> {
+    let begun = clock.now();
+    let end = arguments.duration.map_or(Nanos::MAX, |span| begun + span);
+    let every = match arguments.stats {
+        Some(Stats::Every(every)) => every,
+        _ => Nanos::MAX,
+    };
+    let mut next_stats = begun + every;
+    let mut told: Option<Link> = None;
+    let mut faults = ToldFaults::default();
+    let mut result = Ok(());
+    while !stop.is_stopped() && !is_done() && host.fault().is_none() {
+        let now = clock.now();
+        if now >= end {
+            break;
+        }
+        let link = host.link();
+        let mut text = String::new();
+        if is_news(told.as_ref(), &link) {
+            text = format!("{title}: {}: {}\n", link.state.name(), link.reason);
+            told = Some(link);
+        }
+        faults.tell(title, host.injected_faults(), &mut text);
+        if now >= next_stats {
+            text += &host.statistics();
+            text.push('\n');
+            next_stats = next_stats.max(now - every) + every;
+        }
+        if result.is_ok() && !text.is_empty() {
+            let mut out = io::stdout().lock();
+            result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        }
+        clock.wait_until((now + LOOK).min(end).min(next_stats), stop);
+    }
+    result
+}
+
+/// What was told of injected faults: how often each had begun, and where it stood.
+#[derive(Debug, Default)]
+struct ToldFaults(Vec<(u64, Phase)>);
+
+impl ToldFaults {
+    /// Tells every fault that has begun or ended since the last time.
+    fn tell(&mut self, title: &str, faults: Vec<Injected>, text: &mut String) {
+        self.0.resize(faults.len(), (0, Phase::Waiting));
+        for (told, fault) in self.0.iter_mut().zip(faults) {
+            let is = (fault.begun, fault.phase);
+            if std::mem::replace(told, is) != is {
+                let Injected { name, what, .. } = fault;
+                let (state, begun) = (fault.phase.name(), fault.begun);
+                // Writing to a string cannot fail.
+                let _ = writeln!(
+                    text,
+                    "{title}: fault \"{name}\" is {state} (begun so far: {begun}): {what}"
+                );
+            }
+        }
+    }
+}
+
+/// Whether a line's state is to be told: it changed, or what it waits for.
+fn is_news(told: Option<&Link>, link: &Link) -> bool {
+    let Some(told) = told else {
+        // That it is not open at the very beginning is no news.
+        return link.state != LinkState::Closed;
+    };
+    (told.state, told.cause, told.since) != (link.state, link.cause, link.since)
+        || (link.state == LinkState::Opening && told.reason != link.reason)
+}

@@ -1,0 +1,34 @@
+//! `tickbus mirror FILE`: a machine without a simulator, for commissioning.
+
+use std::path::PathBuf;
+
+use super::Outcome;
+use super::host::{self, Job, span};
+use crate::fieldbus::Role;
+use crate::plc::Mirror;
+use crate::time::Nanos;
+
+/// Stand in for the machine: every %Q byte comes back on the %I byte of the same offset.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The driver.cfg of the device.
+    file: PathBuf,
+
+    /// How often the bytes are taken over.
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = span)]
+    tick: Nanos,
+
+    #[command(flatten)]
+    host: host::Hosting,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let job = Job {
+        title: "mirror",
+        file: &arguments.file,
+        role: Role::Device,
+        program: Box::new(Mirror),
+        interval: arguments.tick,
+    };
+    host::run(job, &arguments.host)
+}

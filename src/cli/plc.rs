@@ -1,0 +1,67 @@
+//! `tickbus plc PROGRAM --config FILE`: a PLC program as a process of its own.
+
+use std::path::PathBuf;
+
+use super::Outcome;
+use super::host::{self, Job, span};
+use crate::fieldbus::Role;
+use crate::plc;
+use crate::time::Nanos;
+
+/// Run a PLC program as the controller of a bus.
+///
+/// The programs are "rig" (the test rig), "mirror" (each %I byte comes back on the %Q byte of the same
+/// offset) and "reaction" (measures how long the machine takes to answer; its options are output, input,
+/// count, timeout, pause and tick). A path such as ./program.so hosts a program of your own, compiled by
+/// iec2c (its options are addressing, alive and order); docs/own-plc-program.md tells how to build one.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Which program: a name, or the path of your own.
+    #[arg(value_name = "PROGRAM")]
+    program: String,
+
+    /// The driver.cfg of the line; one that states no role serves both ends.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+
+    /// Scan interval [default: 10ms; 100us for "reaction"; your own program's is compiled in].
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    scan: Option<Nanos>,
+
+    /// An option of the program; may be given several times.
+    #[arg(long = "option", value_name = "KEY=VALUE", value_parser = pair)]
+    options: Vec<(String, String)>,
+
+    #[command(flatten)]
+    host: host::Hosting,
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    let pair = text.split_once('=').filter(|(key, _)| !key.is_empty());
+    let (key, value) = pair.ok_or("write KEY=VALUE, such as la1_code=lsb-first")?;
+    Ok((key.to_owned(), value.to_owned()))
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let program = match plc::program(&arguments.program, &arguments.options) {
+        Ok(program) => program,
+        Err(error) => {
+            eprintln!("plc: {error}");
+            // A wrong name is a slip on the command line, a wrong file is a wrong file.
+            return if plc::Hosted::is_path(&arguments.program) {
+                Outcome::WrongInput
+            } else {
+                Outcome::Usage
+            };
+        }
+    };
+    let interval = plc::interval(&*program, arguments.scan);
+    let job = Job {
+        title: "plc",
+        file: &arguments.config,
+        role: Role::Controller,
+        program,
+        interval,
+    };
+    host::run(job, &arguments.host)
+}

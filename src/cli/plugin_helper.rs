@@ -1,0 +1,14 @@
+//! `tickbus plugin-helper`: the process that calls a plug-in for its host.
+
+use super::Outcome;
+use crate::fieldbus::plugin;
+
+pub(super) fn run() -> Outcome {
+    match plugin::serve_host() {
+        Ok(()) => Outcome::Done,
+        Err(error) => {
+            eprintln!("plugin-helper: {error}");
+            Outcome::Usage
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! `tickbus report RECORDING`: an HTML page about a run.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::Outcome;
+use crate::config::nearest;
+use crate::record::Recording;
+use crate::report::{self, Contents, DEFAULT_BUDGET, Run, Statistics};
+
+/// Make an HTML page from a recording: chart, steps, faults, states of the line, distributions.
+///
+/// The page is one file that loads nothing; any browser of 2023 or later shows it.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The recording, VCD or CSV.
+    recording: PathBuf,
+
+    /// Where the page goes [default: beside the recording, ending with .html].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// The page's heading [default: the driver's name, or the recording's].
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
+
+    /// The signal whose values are numbers of steps; 0 is none.
+    #[arg(long, value_name = "SIGNAL")]
+    steps: Option<String>,
+
+    /// A signal that says, while it is on, that there is a fault; may be given several times.
+    #[arg(long = "fault", value_name = "SIGNAL")]
+    faults: Vec<String>,
+
+    /// Statistics, as a driver or `tickbus plc --stats` writes them; other lines in the file do no harm.
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+
+    /// A text to be shown as it is, such as a demo's report; may be given several times.
+    #[arg(long = "text", value_name = "FILE")]
+    texts: Vec<PathBuf>,
+
+    /// How many changes of values the page may hold; the busiest signals are thinned beyond that.
+    #[arg(long, value_name = "COUNT", default_value_t = DEFAULT_BUDGET)]
+    changes: usize,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    match make(arguments) {
+        Ok(told) => {
+            println!("report: ok {told}");
+            Outcome::Done
+        }
+        Err(mistakes) => {
+            for mistake in &mistakes {
+                eprintln!("{mistake}");
+            }
+            eprintln!("report: failed mistakes={}", mistakes.len());
+            Outcome::WrongInput
+        }
+    }
+}
+
+/// What goes onto the page beside the recording.
+struct Beside {
+    statistics: Option<Statistics>,
+    /// Each with the name of its file.
+    texts: Vec<(String, String)>,
+}
+
+impl Beside {
+    fn read(arguments: &Arguments, mistakes: &mut Vec<String>) -> Self {
+        let mut text = |path: &Path| {
+            let bytes = fs::read(path).map_err(|error| {
+                let path = path.display();
+                mistakes.push(format!(
+                    "{path}: this text cannot be read: {error}; check the path"
+                ));
+            });
+            bytes
+                .ok()
+                .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+        };
+        let statistics = arguments.stats.as_deref().and_then(&mut text);
+        let statistics = statistics.map(|text| Statistics::read(&text));
+        let texts = arguments.texts.iter();
+        let texts = texts
+            .filter_map(|path| Some((file_name(path), text(path)?)))
+            .collect();
+        if let (Some(statistics), Some(path)) = (&statistics, &arguments.stats)
+            && statistics.is_empty()
+        {
+            let path = path.display();
+            mistakes.push(format!(
+                "{path}: there are no statistics in it; lines with key=value are expected"
+            ));
+        }
+        Self { statistics, texts }
+    }
+}
+
+/// Makes the page, and tells what it has; or all mistakes.
+fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
+    let mut mistakes = Vec::new();
+    let beside = Beside::read(arguments, &mut mistakes);
+    let mut recording = match Recording::open(&arguments.recording, None) {
+        Ok(recording) => recording,
+        Err(error) => {
+            mistakes.push(error.to_string());
+            return Err(mistakes);
+        }
+    };
+    let (run, error) = report::read(&mut recording, arguments.changes);
+    let mut number = |option: &str, name: &String| {
+        let found = run.signal(name);
+        if found.is_none() {
+            mistakes.push(unknown(option, name, &run));
+        }
+        found
+    };
+    let steps = arguments
+        .steps
+        .as_ref()
+        .and_then(|name| number("--steps", name));
+    let faults = arguments
+        .faults
+        .iter()
+        .filter_map(|name| number("--fault", name));
+    let faults: Vec<usize> = faults.collect();
+    let columns = recording.columns();
+    let file = file_name(&arguments.recording);
+    let names = [arguments.title.as_ref(), Some(&columns.driver), Some(&file)];
+    let title = names.into_iter().flatten().find(|name| !name.is_empty());
+    let ending = recording.ending();
+    let parts = [&file, &columns.role, &ending].map(String::as_str);
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    let contents = Contents {
+        title: title.unwrap_or(&file),
+        source: &parts.collect::<Vec<_>>().join(" · "),
+        run: &run,
+        steps,
+        faults: &faults,
+        statistics: beside.statistics.as_ref(),
+        texts: &beside.texts,
+    };
+    let mut told = String::new();
+    // What came before a fault of the recording is worth a page, too; mistakes of the command line are not.
+    if mistakes.is_empty() {
+        let beside = || arguments.recording.with_extension("html");
+        let out = arguments.out.clone().unwrap_or_else(beside);
+        let file = out.display();
+        match report::write_file(&contents, &out) {
+            Ok(bytes) => {
+                let (signals, ticks) = (run.signals().len(), run.ticks());
+                told = format!("signals={signals} ticks={ticks} bytes={bytes} file={file}");
+            }
+            Err(error) => mistakes.push(format!(
+                "{file}: the page cannot be written: {error}; choose another place with --out"
+            )),
+        }
+    }
+    mistakes.extend(error.map(|error| error.to_string()));
+    if mistakes.is_empty() {
+        Ok(told)
+    } else {
+        Err(mistakes)
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn unknown(option: &str, name: &str, run: &Run) -> String {
+    let names = run.signals().iter().map(|signal| &*signal.name);
+    let right = nearest(name, names).map_or_else(
+        || "tickbus check lists the names of a driver.cfg".to_owned(),
+        |near| format!("did you mean \"{near}\"?"),
+    );
+    format!("{option}: the recording has no signal \"{name}\"; {right}")
+}

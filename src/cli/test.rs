@@ -1,0 +1,272 @@
+//! `tickbus test DIR`: runs the tests of PLC programs in a folder.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::Outcome;
+use crate::config::Mistakes;
+use crate::report::page_beside;
+use crate::testing::{Case, Group, Suite, Test, Verdict, junit_xml};
+
+/// Run tests of PLC programs from TOML files, on simulation time.
+///
+/// Every *.toml in DIR and in its folders is a test file; docs/testing.md tells what one looks like. Exit code 0
+/// when all tests pass, 1 when one fails or a file is wrong.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// Folders with test files, or test files.
+    #[arg(required = true, value_name = "DIR")]
+    paths: Vec<PathBuf>,
+
+    /// Write the results as `JUnit` XML, for a CI server.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+
+    /// Keep a recording of each failed test in DIR, as VCD, and a page about it.
+    #[arg(long, value_name = "DIR")]
+    keep: Option<PathBuf>,
+
+    /// Run only the tests with this text in their name or in that of their file.
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
+
+    /// List the tests, and run none.
+    #[arg(long)]
+    list: bool,
+}
+
+/// How many of each there are.
+#[derive(Default)]
+struct Count {
+    passed: usize,
+    failed: usize,
+    wrong: usize,
+    ticks: u64,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let mut files = Vec::new();
+    for path in &arguments.paths {
+        if let Err(error) = collect(path, &mut files) {
+            eprintln!(
+                "test: {}: {error}; name a folder with test files, or a test file",
+                path.display()
+            );
+            return Outcome::WrongInput;
+        }
+    }
+    if files.is_empty() {
+        let paths: Vec<String> = arguments
+            .paths
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        eprintln!(
+            "test: there is no *.toml in {}; docs/testing.md tells what a test file looks like",
+            paths.join(", ")
+        );
+        return Outcome::WrongInput;
+    }
+    let mut count = Count::default();
+    let groups: Vec<Group> = files
+        .iter()
+        .map(|file| run_file(file, arguments, &mut count))
+        .collect();
+    if let Some(path) = &arguments.junit
+        && !arguments.list
+        && let Err(error) = write_file(path, &junit_xml(&groups))
+    {
+        eprintln!("test: {}: cannot be written: {error}", path.display());
+        return Outcome::WrongInput;
+    }
+    conclude(arguments, &count)
+}
+
+fn conclude(arguments: &Arguments, count: &Count) -> Outcome {
+    let Count {
+        passed,
+        failed,
+        wrong,
+        ticks,
+    } = count;
+    let green = failed + wrong == 0 && (*passed > 0 || arguments.list);
+    if let (Some(only), 0) = (&arguments.only, passed + failed + wrong) {
+        eprintln!("test: no test has \"{only}\" in its name; --list lists them");
+    }
+    if !arguments.list {
+        tell(&format!(
+            "test: {} passed={passed} failed={failed} wrong={wrong} ticks={ticks}",
+            if green { "ok" } else { "failed" }
+        ));
+    }
+    if green {
+        Outcome::Done
+    } else {
+        Outcome::WrongInput
+    }
+}
+
+/// The test files at `path`, in the order of their names.
+fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    if !path.is_dir() {
+        // That it is there, and may be read, shows when it is read.
+        files.push(path.to_owned());
+        return Ok(());
+    }
+    let entries: std::io::Result<Vec<_>> = std::fs::read_dir(path)?.collect();
+    let mut entries: Vec<PathBuf> = entries?.into_iter().map(|entry| entry.path()).collect();
+    entries.sort();
+    for entry in entries {
+        // A link may lead back up; what it leads to can be named by itself.
+        if entry.is_dir() && !entry.is_symlink() {
+            collect(&entry, files)?;
+        } else if entry.extension().is_some_and(|ending| ending == "toml") {
+            files.push(entry);
+        }
+    }
+    Ok(())
+}
+
+fn run_file(file: &Path, arguments: &Arguments, count: &mut Count) -> Group {
+    let name = file.display().to_string();
+    let suite = match Suite::load(file) {
+        Ok(suite) => suite,
+        Err(mistakes) => {
+            count.wrong += mistakes.len();
+            eprintln!("{mistakes}");
+            let cases = vec![wrong_file(&mistakes)];
+            return Group { name, cases };
+        }
+    };
+    let wanted = |test: &&Test| {
+        let only = arguments.only.as_deref().unwrap_or_default();
+        test.name.contains(only) || name.contains(only)
+    };
+    let mut cases = Vec::new();
+    for test in suite.tests.iter().filter(wanted) {
+        if arguments.list {
+            tell(&format!(
+                "{name}:{}:{}: {}",
+                test.place.0, test.place.1, test.name
+            ));
+            count.passed += 1;
+        } else {
+            cases.push(run_test(&suite, test, arguments.keep.as_deref(), count));
+        }
+    }
+    Group { name, cases }
+}
+
+/// A file that cannot be read, as a CI server shows it.
+fn wrong_file(mistakes: &Mistakes) -> Case {
+    let first = mistakes.iter().next();
+    let line = first.and_then(|mistake| mistake.place);
+    Case {
+        name: "the test file is right".to_owned(),
+        line: line.map_or(1, |(line, _)| line),
+        took: std::time::Duration::ZERO,
+        verdict: Verdict::Wrong(
+            first
+                .map(|mistake| mistake.what.clone())
+                .unwrap_or_default(),
+            mistakes.to_string(),
+        ),
+        output: String::new(),
+    }
+}
+
+fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) -> Case {
+    let begun = Instant::now();
+    let ran = suite.run(test, None);
+    let took = begun.elapsed();
+    let mut output = String::new();
+    let verdict = match ran {
+        Err(error) => {
+            count.wrong += 1;
+            eprintln!("{error}");
+            Verdict::Wrong(error.to_string(), error.to_string())
+        }
+        Ok(ran) => {
+            count.ticks += ran.ticks;
+            output = format!("ticks={} simulation_time={}s", ran.ticks, ran.seconds());
+            match ran.failure {
+                None => {
+                    count.passed += 1;
+                    tell(&format!("ok    {} ({} ticks)", test.name, ran.ticks));
+                    Verdict::Passed
+                }
+                Some(failure) => {
+                    count.failed += 1;
+                    let (line, column) = failure.place;
+                    let mut full = format!("{}:{line}:{column}: {}", suite.file, failure.what);
+                    for more in &failure.more {
+                        full.push_str("\n      ");
+                        full.push_str(more);
+                    }
+                    if let Some(folder) = keep {
+                        let kept = record(suite, test, folder, &full);
+                        full.push_str(&kept);
+                    }
+                    tell(&format!("FAIL  {}\n      {full}", test.name));
+                    Verdict::Failed(failure.what, full)
+                }
+            }
+        }
+    };
+    Case {
+        name: test.name.clone(),
+        line: test.place.0,
+        took,
+        verdict,
+        output,
+    }
+}
+
+/// Runs a failed test once more, with a recorder: it is the same run. Says where the recording is.
+fn record(suite: &Suite, test: &Test, folder: &Path, failure: &str) -> String {
+    let stem = Path::new(&suite.file).file_stem().unwrap_or_default();
+    let name = format!("{} - {}", stem.to_string_lossy(), test.name);
+    // What some file system would take for something else.
+    let name: String = name
+        .chars()
+        .map(|c| match c {
+            '/' | '\\' | ':' | '*' | '?' | '"' | '<' | '>' | '|' => '_',
+            c => c,
+        })
+        .take(120)
+        .collect();
+    let file = std::path::absolute(folder.join(format!("{name}.vcd")));
+    let recorded = file.and_then(|file| {
+        std::fs::create_dir_all(folder)?;
+        suite
+            .run(test, Some(&file))
+            .map_err(std::io::Error::other)?;
+        Ok(file)
+    });
+    let file = match recorded {
+        Ok(file) => file,
+        Err(error) => return format!("\n      it could not be recorded: {error}"),
+    };
+    let texts = [("What failed".to_owned(), failure.to_owned())];
+    let page = match page_beside(&file, &test.name, None, &texts) {
+        Ok(page) => page.display().to_string(),
+        Err(error) => error,
+    };
+    format!(
+        "\n      recording: {}\n      report: {page}",
+        file.display()
+    )
+}
+
+fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    std::fs::write(path, text)
+}
+
+/// A line on stdout; a reader that has gone away (`| head`) is no reason to stop.
+fn tell(line: &str) {
+    let _ = writeln!(std::io::stdout().lock(), "{line}");
+}

@@ -1,0 +1,168 @@
+//! From what a driver.cfg says to a bus, and to the PLC program behind it if one is hosted.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
+use crate::fieldbus::socket::Socket;
+use crate::fieldbus::{Bus, Free, Options, Role, plugin};
+use crate::plc;
+use crate::signal::Area;
+use crate::time::{Clock, Nanos};
+
+use super::frames::area_bytes;
+use super::host::{HostThread, Hosted, SteppedHost, Tally};
+use super::replay::{Replay, ReplayTally};
+use super::{Config, DriverError};
+
+/// The bus cycle of a loopback whose driver.cfg names none.
+const LOOPBACK_CYCLE: Nanos = Nanos::from_millis(1);
+
+/// What stands at the other end in this process: a PLC program, or a recording.
+#[derive(Debug)]
+pub(super) enum Program {
+    Thread(Box<HostThread>),
+    Stepped(Arc<Tally>),
+    Replay(Arc<ReplayTally>),
+}
+
+impl Program {
+    /// Appends what the program has counted, one `key=value` a line.
+    pub(super) fn write(&self, text: &mut String) {
+        match self {
+            Self::Thread(host) => host.write(text),
+            Self::Stepped(tally) => tally.write(text),
+            Self::Replay(tally) => tally.write(text),
+        }
+    }
+}
+
+/// Makes the bus that `config` names, and starts the program at its other end if it hosts one.
+pub(super) fn open(
+    config: &Config,
+    clock: &Arc<dyn Clock>,
+) -> Result<(Bus, Option<Program>), DriverError> {
+    match &config.bus {
+        Options::Loopback(options) => open_loopback(config, options, clock),
+        Options::Socket(options) => {
+            let cycle = config.timing.cycle;
+            let socket = Socket::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(socket)), None))
+        }
+        Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),
+    }
+}
+
+fn open_plugin(config: &Config, options: &plugin::Options) -> Result<Box<dyn Free>, DriverError> {
+    let line = plugin::Line {
+        name: &config.name,
+        directory: config.folder(),
+        role: config.role,
+        table: &config.table,
+        cycle: config.timing.cycle,
+        max_age: config.timing.max_age,
+    };
+    let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
+    plugin::open(options, line).map_err(refused)
+}
+
+fn open_loopback(
+    config: &Config,
+    options: &loopback::Options,
+    clock: &Arc<dyn Clock>,
+) -> Result<(Bus, Option<Program>), DriverError> {
+    let cycle = config.timing.cycle.unwrap_or(LOOPBACK_CYCLE);
+    let (name, program_options, scan) = match (&options.peer, options.mode) {
+        (Peer::Link(name), Mode::Free) => {
+            return Ok((Bus::Free(Box::new(FreeLoopback::named(name, cycle))), None));
+        }
+        (Peer::Link(name), Mode::Stepped) => {
+            return Ok((Bus::Stepped(Box::new(SteppedLoopback::named(name))), None));
+        }
+        (Peer::Replay(file), _) => {
+            let (replay, tally) = Replay::open(config, &config.folder().join(file))?;
+            return Ok((Bus::Stepped(Box::new(replay)), Some(Program::Replay(tally))));
+        }
+        (
+            Peer::Program {
+                name,
+                options,
+                scan,
+            },
+            _,
+        ) => (name, options, *scan),
+    };
+    let folder = config.path.parent().unwrap_or(Path::new(""));
+    let mut program = plc::program_beside(folder, name, program_options)
+        .map_err(|source| program_error(config, source))?;
+    check_fit(config, &mut *program, Role::Controller)?;
+    let scan = plc::interval(&*program, scan);
+    if options.mode == Mode::Stepped {
+        let (host, tally) = SteppedHost::new(program, config, scan);
+        return Ok((Bus::Stepped(Box::new(host)), Some(Program::Stepped(tally))));
+    }
+    let sizes = [Area::Input, Area::Output].map(|area| area_bytes(&config.table, 0, area));
+    let (device, controller) = private_link(&[sizes.into()]);
+    let bus = |end| Box::new(FreeLoopback::over(end, cycle));
+    let title = format!("plc {}", program.name());
+    let hosted = Hosted {
+        program,
+        interval: scan,
+        tape: None,
+    };
+    let clock = Arc::clone(clock);
+    let bus_of_program = bus(controller);
+    let host = HostThread::start(
+        hosted,
+        title,
+        config,
+        Role::Controller,
+        bus_of_program,
+        clock,
+    )?;
+    Ok((
+        Bus::Free(bus(device)),
+        Some(Program::Thread(Box::new(host))),
+    ))
+}
+
+fn program_error(config: &Config, source: plc::ProgramError) -> DriverError {
+    let file = config.path.display().to_string();
+    DriverError::Program { file, source }
+}
+
+/// Whether the program finds the image that it needs, at the end with `role`.
+pub(super) fn check_fit(
+    config: &Config,
+    program: &mut dyn plc::Program,
+    role: Role,
+) -> Result<(), DriverError> {
+    let name = program.name().to_owned();
+    let refused = |what: String| DriverError::Config(format!("{}: {what}", config.path.display()));
+    let [station] = &config.table.stations[..] else {
+        return Err(refused(format!(
+            "the PLC program \"{name}\" serves one station, but this driver has {}; use one \
+             driver.cfg per station",
+            config.table.stations.len()
+        )));
+    };
+    program
+        .fit(&config.table, config.addressing)
+        .map_err(|source| program_error(config, source))?;
+    let (reads, writes) = match role {
+        Role::Controller => (("%I", station.input_bytes), ("%Q", station.output_bytes)),
+        Role::Device => (("%Q", station.output_bytes), ("%I", station.input_bytes)),
+    };
+    for ((area, has), needs) in [
+        (reads, program.input_bytes()),
+        (writes, program.output_bytes()),
+    ] {
+        if has < needs {
+            return Err(refused(format!(
+                "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \
+                 this driver cover {has}; complete the signal table"
+            )));
+        }
+    }
+    Ok(())
+}

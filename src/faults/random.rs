@@ -1,0 +1,69 @@
+//! Chance that can be repeated.
+
+/// Numbers that look like chance and are the same for the same seed: `SplitMix64` of Steele, Lea and Flood.
+#[derive(Clone, Debug)]
+pub(super) struct Random(u64);
+
+impl Random {
+    /// The numbers of the fault with number `id`: faults with one seed do not all throw alike.
+    pub(super) fn new(seed: u64, id: u32) -> Self {
+        let mut random = Self(seed ^ u64::from(id).wrapping_mul(0xA24B_AED4_963E_E407));
+        random.next();
+        random
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// From 0 up to, and without, 1.
+    #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// From -1 up to, and without, 1.
+    pub(super) fn around_zero(&mut self) -> f64 {
+        self.unit().mul_add(2.0, -1.0)
+    }
+
+    /// True with this chance.
+    pub(super) fn happens(&mut self, chance: f64) -> bool {
+        self.unit() < chance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_seed_throws_alike_and_another_fault_does_not() {
+        let throws = |seed, id| {
+            let mut random = Random::new(seed, id);
+            (0..1000)
+                .map(|_| random.around_zero())
+                .collect::<Vec<f64>>()
+        };
+        assert_eq!(throws(1, 0), throws(1, 0));
+        assert_ne!(throws(1, 0), throws(1, 1));
+        assert_ne!(throws(1, 0), throws(2, 0));
+        let throws = throws(1, 0);
+        assert!(throws.iter().all(|throw| (-1.0..1.0).contains(throw)));
+        let mean = throws.iter().sum::<f64>() / 1000.0;
+        assert!(mean.abs() < 0.1, "{mean}");
+    }
+
+    #[test]
+    fn what_is_certain_happens_and_what_is_impossible_does_not() {
+        let mut random = Random::new(1, 0);
+        assert!((0..1000).all(|_| random.happens(1.0)));
+        assert!(!(0..1000).any(|_| random.happens(0.0)));
+        let count = (0..1000).filter(|_| random.happens(0.25)).count();
+        assert!((200..300).contains(&count), "{count}");
+    }
+}

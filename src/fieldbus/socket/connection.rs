@@ -1,0 +1,251 @@
+//! One connection with its socket: carries bytes between the socket, the session and the port.
+
+use std::io::{self, ErrorKind, Read as _, Write as _};
+use std::net::{Shutdown, SocketAddr, TcpStream};
+
+use socket2::SockRef;
+
+use crate::fieldbus::{BusError, Port};
+use crate::os::{Interest, Source};
+use crate::time::Nanos;
+
+use super::{Comparison, Session, Terms};
+
+/// So many times the socket is read at most before something else is looked at.
+const READS: usize = 64;
+
+/// The longest that the system is asked to be patient: it takes no times beyond some hours.
+const LONGEST: Nanos = Nanos::from_secs(3600);
+
+/// One connection.
+#[derive(Debug)]
+pub(super) struct Connection {
+    stream: TcpStream,
+    peer: SocketAddr,
+    session: Session,
+    /// Whether the port knows that the peer is there.
+    announced: bool,
+    /// How many skipped cycles the port knows of.
+    skipped: u64,
+}
+
+impl Connection {
+    /// Takes over a connection that stands since now.
+    pub(super) fn new(
+        stream: TcpStream,
+        peer: SocketAddr,
+        terms: Terms,
+        port: &Port,
+    ) -> Result<Self, BusError> {
+        prepare(&stream, terms.max_age).map_err(|error| {
+            BusError::Link(format!("the connection with {peer} broke at once: {error}"))
+        })?;
+        log::debug!("connected with {peer}");
+        Ok(Self {
+            stream,
+            peer,
+            session: Session::new(terms, port.clock().now()),
+            announced: false,
+            skipped: 0,
+        })
+    }
+
+    /// Who is at the other end.
+    pub(super) fn peer(&self) -> SocketAddr {
+        self.peer
+    }
+
+    /// What to wait for.
+    pub(super) fn source(&self) -> Source<'_> {
+        let interest = if self.session.to_write().is_empty() {
+            Interest::Read
+        } else {
+            Interest::ReadWrite
+        };
+        Source::new(&self.stream, interest)
+    }
+
+    /// Until when to wait for it.
+    pub(super) fn deadline(&self) -> Nanos {
+        self.session.deadline()
+    }
+
+    /// For how long the peer has been silent, if that makes its data stale.
+    pub(super) fn stale_for(&self, now: Nanos) -> Option<Nanos> {
+        self.session
+            .is_stale(now)
+            .then(|| self.session.silence(now))
+    }
+
+    /// Does what there is to do: reads if `readable`, sends what is due, judges the time.
+    ///
+    /// # Errors
+    ///
+    /// Why the connection cannot go on.
+    pub(super) fn turn(
+        &mut self,
+        (readable, writable): (bool, bool),
+        port: &mut Port,
+        comparison: &mut Comparison,
+    ) -> Result<(), BusError> {
+        let now = port.clock().now();
+        if readable {
+            self.read(now, port)?;
+        }
+        self.send(now, writable, port, comparison)?;
+        self.session
+            .check(now)
+            .map_err(|fault| fault.of(self.peer))?;
+        self.report(now, port);
+        Ok(())
+    }
+
+    /// Reads all that has come.
+    ///
+    /// # Errors
+    ///
+    /// The peer has closed, or the connection broke.
+    pub(super) fn read_all(&mut self, port: &mut Port) -> Result<(), BusError> {
+        let now = port.clock().now();
+        for _ in 0..READS {
+            if !self.read(now, port)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads once; tells whether there was anything.
+    fn read(&mut self, now: Nanos, port: &mut Port) -> Result<bool, BusError> {
+        let count = match self.stream.read(self.session.space()) {
+            Ok(0) => return Err(self.session.left().of(self.peer)),
+            Ok(count) => count,
+            Err(error) if is_for_later(&error) => return Ok(false),
+            Err(error) => return Err(self.broken(&error)),
+        };
+        self.session.arrived(now, count);
+        while let Some(mut record) = self.session.take() {
+            for station in 0..port.stations() {
+                let (frame, rest) = record.split_at(port.sizes(station).1);
+                port.received(station, now, frame);
+                record = rest;
+            }
+        }
+        Ok(true)
+    }
+
+    /// Makes the records that are due, and writes as much as the system takes.
+    fn send(
+        &mut self,
+        now: Nanos,
+        writable: bool,
+        port: &mut Port,
+        comparison: &mut Comparison,
+    ) -> Result<(), BusError> {
+        let mut may_write = writable || self.session.to_write().is_empty();
+        loop {
+            if let Some(mut space) = self.session.due(now)
+                && port.sends(now)
+            {
+                for station in 0..port.stations() {
+                    let frame = port.outgoing(station, now);
+                    let (place, rest) = space.split_at_mut(frame.len());
+                    place.copy_from_slice(frame);
+                    space = rest;
+                }
+                self.session
+                    .made(now, |before, now| comparison.differ(before, now));
+            }
+            let rest = self.session.to_write();
+            if rest.is_empty() || !may_write {
+                return Ok(());
+            }
+            match self.stream.write(rest) {
+                Ok(count) => {
+                    if self.session.wrote(count) {
+                        (0..port.stations()).for_each(|station| port.sent(station));
+                    } else {
+                        may_write = false;
+                    }
+                }
+                Err(error) if is_for_later(&error) => may_write = false,
+                Err(error) => return Err(self.broken(&error)),
+            }
+        }
+    }
+
+    /// Lets the port know how the connection is doing.
+    fn report(&mut self, now: Nanos, port: &mut Port) {
+        for station in 0..port.stations() {
+            // Who has nothing to say is alive for as long as the connection stands.
+            if port.sizes(station).1 == 0 {
+                port.touch(station, now);
+            }
+        }
+        if !self.announced && self.session.has_heard() {
+            self.announced = true;
+            port.running(&format!("connected with {}", self.peer));
+        }
+        while self.skipped < self.session.skipped() {
+            self.skipped += 1;
+            port.count("socket.skipped");
+        }
+        port.observe(now);
+    }
+
+    fn broken(&self, error: &io::Error) -> BusError {
+        let within = match self.session.partial() {
+            Some(partial) => format!(" in the middle of a record: {partial} had come"),
+            None => String::new(),
+        };
+        let right = if self.session.has_heard() {
+            "see whether the peer still runs"
+        } else {
+            "see whether the peer runs, and if it serves another client, end that one"
+        };
+        let peer = self.peer;
+        BusError::Link(format!(
+            "the connection with {peer} broke{within} ({error}); {right}"
+        ))
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        bow_out(&self.stream);
+    }
+}
+
+/// Takes leave in good order before a connection is closed: unread bytes would make the system reset it,
+/// and the peer lose what it has not read yet.
+pub(super) fn bow_out(mut stream: &TcpStream) {
+    // What fails here has failed already.
+    let _ = stream.shutdown(Shutdown::Write);
+    let mut unread = [0; 4096];
+    for _ in 0..READS {
+        if !matches!(stream.read(&mut unread), Ok(count) if count > 0) {
+            break;
+        }
+    }
+}
+
+/// Whether it did not fail, and only has to be tried again when the socket is ready.
+fn is_for_later(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
+}
+
+/// Makes the system send at once, never wait, and give up a peer whose cable was pulled.
+fn prepare(stream: &TcpStream, max_age: Nanos) -> io::Result<()> {
+    stream.set_nonblocking(true)?;
+    stream.set_nodelay(true)?;
+    let limit = Session::patience(max_age).min(LONGEST).to_duration();
+    let socket = SockRef::from(stream);
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    socket.set_tcp_user_timeout(Some(limit))?;
+    // For a peer that has nothing to say; whole seconds are all that the system knows.
+    let pause = limit.max(std::time::Duration::from_secs(1));
+    let keepalive = socket2::TcpKeepalive::new()
+        .with_time(pause)
+        .with_interval(pause);
+    socket.set_tcp_keepalive(&keepalive)
+}

@@ -1,0 +1,17 @@
+//! What only the operating system can do, behind safe functions; one file per thing.
+
+mod library;
+mod log;
+#[cfg(unix)]
+mod own_file;
+mod poll;
+#[cfg(unix)]
+mod shared_memory;
+
+pub use library::{Library, one_line};
+pub use log::log_to_stderr;
+#[cfg(unix)]
+pub use own_file::own_file;
+pub use poll::{Interest, Poller, Source};
+#[cfg(unix)]
+pub use shared_memory::SharedMemory;

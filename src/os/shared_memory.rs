@@ -1,0 +1,210 @@
+//! Memory that two processes share.
+
+#![allow(unsafe_code, reason = "memory is mapped")]
+
+use std::io;
+use std::ptr::NonNull;
+use std::sync::atomic::{AtomicU64, Ordering, fence};
+
+use rustix::fd::{AsFd, OwnedFd};
+use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+
+/// Bytes of one word.
+const WORD: usize = size_of::<AtomicU64>();
+
+/// A piece of memory that another process may read and write at any time.
+///
+/// Whole images are copied in and out. The processes take turns by other means, such as a socket; a
+/// process that does not keep to its turn makes wrong bytes, and nothing worse.
+#[derive(Debug)]
+pub struct SharedMemory {
+    words: NonNull<AtomicU64>,
+    count: usize,
+}
+
+// SAFETY: the mapping belongs to the process, not to a thread, and all access to it is atomic.
+unsafe impl Send for SharedMemory {}
+
+impl SharedMemory {
+    /// Makes zeroed memory of at least `bytes` bytes, and the file by which another process
+    /// [opens](Self::open) it.
+    ///
+    /// # Errors
+    ///
+    /// The system has no such memory left.
+    pub fn create(bytes: usize) -> io::Result<(Self, OwnedFd)> {
+        let file = file(words(bytes) * WORD)?;
+        let memory = Self::open(&file, bytes)?;
+        Ok((memory, file))
+    }
+
+    /// Opens the memory of `bytes` bytes that another process has made.
+    ///
+    /// # Errors
+    ///
+    /// The file is no such memory, or is smaller.
+    pub fn open(file: &impl AsFd, bytes: usize) -> io::Result<Self> {
+        let count = words(bytes);
+        let has = u64::try_from(rustix::fs::fstat(file)?.st_size).unwrap_or(0);
+        if has < (count * WORD) as u64 {
+            let text = format!("the shared memory has {has} bytes, expected {bytes}");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, text));
+        }
+        // SAFETY: a new mapping, at an address that the system chooses, so no memory that is in use
+        // changes. The file is long enough, as checked; where the system can, it is sealed against being
+        // shortened, and elsewhere only this process and its helper have it, neither of which does that.
+        let start = unsafe {
+            mmap(
+                std::ptr::null_mut(),
+                count * WORD,
+                ProtFlags::READ | ProtFlags::WRITE,
+                MapFlags::SHARED,
+                file,
+                0,
+            )?
+        };
+        let words = NonNull::new(start.cast()).expect("mappings are not at address 0");
+        Ok(Self { words, count })
+    }
+
+    /// The memory as words.
+    ///
+    /// What makes it sound that the other process writes at any time, whatever runs there: the words are
+    /// atomics, to which concurrent writes are no data race, and of which every bit pattern is a value.
+    /// No reference to plain bytes of the mapping is ever made.
+    fn words(&self) -> &[AtomicU64] {
+        // SAFETY: the mapping has `count` words, page-aligned, zeroed by the system, and lives until
+        // `drop`; see above for the other process.
+        unsafe { std::slice::from_raw_parts(self.words.as_ptr(), self.count) }
+    }
+
+    /// Copies `bytes` to the beginning of word `at`.
+    ///
+    /// # Panics
+    ///
+    /// When they reach beyond the memory.
+    pub fn write(&self, at: usize, bytes: &[u8]) {
+        let words = &self.words()[at..at + Self::words_for(bytes.len())];
+        for (word, chunk) in words.iter().zip(bytes.chunks(WORD)) {
+            let mut value = [0; WORD];
+            value[..chunk.len()].copy_from_slice(chunk);
+            word.store(u64::from_ne_bytes(value), Ordering::Relaxed);
+        }
+        // Whatever tells the other process that it is its turn comes after the words.
+        fence(Ordering::Release);
+    }
+
+    /// Copies from the beginning of word `at` until `bytes` is full.
+    ///
+    /// # Panics
+    ///
+    /// When that reaches beyond the memory.
+    pub fn read(&self, at: usize, bytes: &mut [u8]) {
+        // Whatever told that it is our turn came before the words.
+        fence(Ordering::Acquire);
+        let words = &self.words()[at..at + Self::words_for(bytes.len())];
+        for (word, chunk) in words.iter().zip(bytes.chunks_mut(WORD)) {
+            let value = word.load(Ordering::Relaxed).to_ne_bytes();
+            chunk.copy_from_slice(&value[..chunk.len()]);
+        }
+    }
+
+    /// How many words hold `bytes` bytes.
+    pub fn words_for(bytes: usize) -> usize {
+        bytes.div_ceil(WORD)
+    }
+}
+
+impl Drop for SharedMemory {
+    fn drop(&mut self) {
+        // SAFETY: the whole of a mapping that `open` made; references to it end with borrows of `self`.
+        let unmapped = unsafe { munmap(self.words.as_ptr().cast(), self.count * WORD) };
+        debug_assert!(unmapped.is_ok(), "{unmapped:?}");
+    }
+}
+
+/// How many words hold `bytes` bytes: at least one, since nothing cannot be mapped.
+fn words(bytes: usize) -> usize {
+    SharedMemory::words_for(bytes).max(1)
+}
+
+/// A file in memory of a size that cannot change.
+#[cfg(target_os = "linux")]
+fn file(bytes: usize) -> io::Result<OwnedFd> {
+    use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, ftruncate, memfd_create};
+
+    let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
+    let file = memfd_create("tickbus-image", flags)?;
+    ftruncate(&file, bytes as u64)?;
+    let seals = SealFlags::SHRINK | SealFlags::GROW | SealFlags::SEAL;
+    fcntl_add_seals(&file, seals)?;
+    Ok(file)
+}
+
+/// A file that has no name any more.
+#[cfg(not(target_os = "linux"))]
+fn file(bytes: usize) -> io::Result<OwnedFd> {
+    use std::os::unix::fs::OpenOptionsExt as _;
+    use std::sync::atomic::AtomicU32;
+
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    let name = format!("tickbus-{}-{number}", std::process::id());
+    let path = std::env::temp_dir().join(name);
+    let mut options = std::fs::OpenOptions::new();
+    let file = options
+        .read(true)
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(&path)?;
+    std::fs::remove_file(&path)?;
+    file.set_len(bytes as u64)?;
+    Ok(file.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_of_any_length_come_out_of_the_other_mapping_as_they_went_in() {
+        let (one, file) = SharedMemory::create(64).expect("memory");
+        let two = SharedMemory::open(&file, 64).expect("the same memory");
+        for length in 0..=48 {
+            let sent: Vec<u8> = (1..=length).collect();
+            let mut got = vec![0; sent.len()];
+            one.write(2, &sent);
+            two.read(2, &mut got);
+            assert_eq!(got, sent);
+        }
+    }
+
+    #[test]
+    fn no_bytes_fit_at_the_very_end() {
+        let (memory, _file) = SharedMemory::create(16).expect("memory");
+        memory.write(2, &[]);
+        memory.read(2, &mut []);
+    }
+
+    #[test]
+    fn memory_that_is_too_small_is_refused() {
+        let (_memory, file) = SharedMemory::create(8).expect("memory");
+        let error = SharedMemory::open(&file, 4096).expect_err("too small");
+        assert!(error.to_string().contains("8 bytes, expected 4096"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_other_process_cannot_shorten_it() {
+        let (_memory, file) = SharedMemory::create(8).expect("memory");
+        assert!(rustix::fs::ftruncate(&file, 0).is_err());
+    }
+
+    #[test]
+    #[should_panic(expected = "range end index")]
+    fn nothing_is_written_beyond_it() {
+        let (memory, _file) = SharedMemory::create(16).expect("memory");
+        memory.write(1, &[0; 9]);
+    }
+}

@@ -1,0 +1,359 @@
+// Painting: rows of a chart on a canvas. A painting has a context, colours, a view (from, to, in units), and where
+// the traces lie (left, width).
+
+const FONT = "12px system-ui, sans-serif";
+const SMALL = "10.5px system-ui, sans-serif";
+/** Between the traces and the right edge; on narrow screens also at the left. */
+const MARGIN = 10;
+const NUMBERS = "12px ui-monospace, 'DejaVu Sans Mono', monospace";
+
+/** Colours as the style sheet has them at an element. */
+function coloursAt(element) {
+  const style = getComputedStyle(element);
+  const colour = (name) => style.getPropertyValue("--" + name).trim();
+  const names = ["text", "soft", "rail", "paper", "trace", "tint", "busy", "analog", "chosen", "cursor", "mark",
+    "good", "good-text", "stale", "stale-text", "bad", "bad-text", "idle", "idle-text", "gap", "gap-text", "step", "step-text"];
+  return Object.fromEntries(names.map((name) => [name, colour(name)]));
+}
+
+/** Sizes a canvas for the screen it is on, and gives its context in CSS pixels. */
+function context(canvas, width, height, ratio = window.devicePixelRatio || 1) {
+  const [wide, high] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
+  if (canvas.width !== wide || canvas.height !== high) {
+    canvas.width = wide;
+    canvas.height = high;
+    canvas.style.width = width + "px";
+    canvas.style.height = height + "px";
+  }
+  const ctx = canvas.getContext("2d");
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  ctx.clearRect(0, 0, width, height);
+  return ctx;
+}
+
+/** A text in so much room, its end cut off if it must. */
+function fitted(ctx, text, room) {
+  if (ctx.measureText(text).width <= room) return text;
+  // No text of more characters than pixels fits.
+  const signs = Array.from(text.slice(0, Math.max(0, Math.ceil(room))));
+  let [fits, fails] = [0, signs.length + 1];
+  while (fails - fits > 1) {
+    const middle = (fits + fails) >> 1;
+    if (ctx.measureText(signs.slice(0, middle).join("") + "…").width <= room) fits = middle;
+    else fails = middle;
+  }
+  return fits ? signs.slice(0, fits).join("") + "…" : "";
+}
+
+/** A number in few digits. */
+function short(value, digits = 6) {
+  if (Number.isNaN(value)) return "–";
+  return String(Number(value.toPrecision(digits))).replace("-", "−");
+}
+
+/** A value of a signal, with its unit. */
+function valueText(signal, value, digits) {
+  if (Number.isNaN(value)) return "–";
+  return signal.unit ? short(value, digits) + " " + signal.unit : short(value, digits);
+}
+
+const place = (painting, time) =>
+  painting.left + (time - painting.from) / (painting.to - painting.from) * painting.width;
+
+/** The trace of a bool between `top` and `bottom`. */
+function paintBool(painting, data, top, bottom) {
+  const { ctx, colours, left, width, from, to } = painting;
+  const { times } = data;
+  const first = indexAt(times, from);
+  const last = indexAt(times, to);
+  const fills = new Path2D();
+  const busy = new Path2D();
+  const lines = new Path2D();
+  const level = (value) => (value > 0.5 ? top : bottom);
+  function segment(value, x, end) {
+    if (Number.isNaN(value)) return;
+    const y = level(value);
+    if (value > 0.5) fills.rect(x, top, end - x, bottom - top);
+    lines.moveTo(x, y);
+    lines.lineTo(end, y);
+  }
+  const edge = Math.min(left + width, place(painting, run.end));
+  if (last - first <= width / 4) {
+    let x = Math.max(left, place(painting, 0));
+    for (let i = first; i <= last; i++) {
+      const end = i < last ? place(painting, times[i + 1]) : edge;
+      segment(valueOf(data, i), x, end);
+      if (i < last && i >= 0) {
+        lines.moveTo(end, top);
+        lines.lineTo(end, bottom);
+      }
+      x = end;
+    }
+  } else {
+    // Each pixel: one level, or changes that are too close to be told apart.
+    const step = (to - from) / width;
+    let index = first;
+    let [begin, was] = [left, valueOf(data, first)];
+    for (let x = 0; x < width; x++) {
+      const next = indexAt(times, from + (x + 1) * step, Math.max(index, 0), last + 1);
+      const now = next > index + 1 ? "busy" : valueOf(data, next);
+      if (next === index + 1) {
+        lines.moveTo(left + x + 0.5, top);
+        lines.lineTo(left + x + 0.5, bottom);
+      }
+      if (!Object.is(now, was)) {
+        if (was === "busy") busy.rect(begin, top, left + x - begin, bottom - top);
+        else segment(was, begin, left + x);
+        [begin, was] = [left + x, now];
+      }
+      index = next;
+    }
+    if (was === "busy") busy.rect(begin, top, left + width - begin, bottom - top);
+    else segment(was, begin, edge);
+  }
+  ctx.fillStyle = colours.tint;
+  ctx.fill(fills);
+  ctx.fillStyle = colours.busy;
+  ctx.fill(busy);
+  ctx.strokeStyle = colours.trace;
+  ctx.lineWidth = 1.5;
+  ctx.stroke(lines);
+}
+
+/** The trace of numbers between `top` and `bottom`; a value holds until the next. */
+function paintReal(painting, signal, data, top, bottom) {
+  const { ctx, colours, left, width, from, to } = painting;
+  const { times } = data;
+  const first = indexAt(times, from);
+  const last = indexAt(times, to);
+  const [low, high] = [signal.low ?? 0, signal.high ?? 0];
+  const size = high - low;
+  // Infinite values lie on the edge.
+  const y = (value) => {
+    const share = size > 0 ? Math.min(1, Math.max(0, (value - low) / size)) : 0.5;
+    return bottom - share * (bottom - top);
+  };
+  const lines = new Path2D();
+  const edge = Math.min(left + width, place(painting, run.end));
+  if (last - first <= 2 * width) {
+    let x = Math.max(left, place(painting, 0));
+    let isDown = false;
+    for (let i = first; i <= last; i++) {
+      const end = i < last ? place(painting, times[i + 1]) : edge;
+      const value = valueOf(data, i);
+      if (Number.isNaN(value)) {
+        isDown = false;
+      } else {
+        if (isDown) lines.lineTo(x, y(value));
+        else lines.moveTo(x, y(value));
+        lines.lineTo(end, y(value));
+        isDown = true;
+      }
+      x = end;
+    }
+  } else {
+    const step = (to - from) / width;
+    let index = first;
+    for (let x = 0; x < width; x++) {
+      const next = indexAt(times, from + (x + 1) * step, Math.max(index, 0), last + 1);
+      let [least, most] = extremes(data, index + 1, next + 1);
+      // What held when the pixel began joins it to the one before.
+      const held = valueOf(data, index);
+      if (!Number.isNaN(held)) {
+        least = Math.min(least, held);
+        most = Math.max(most, held);
+      }
+      if (least <= most && left + x < edge) {
+        lines.moveTo(left + x + 0.5, Math.max(y(least), y(most) + 1));
+        lines.lineTo(left + x + 0.5, y(most));
+      }
+      index = next;
+    }
+  }
+  ctx.strokeStyle = colours.analog;
+  ctx.lineWidth = 1.5;
+  ctx.lineJoin = "bevel";
+  ctx.stroke(lines);
+}
+
+/** What lasted: boxes with their text, told apart also by their pattern. */
+function paintSpans(painting, spans, top, bottom) {
+  const { ctx, colours, left, width, from, to } = painting;
+  ctx.font = FONT;
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  let drawnTo = -Infinity;
+  // Spans begin in order; the first that can be seen may begin long before.
+  for (const [begin, end, kind, text] of spans) {
+    if (end < from || begin > to) continue;
+    const x = Math.max(left, place(painting, begin));
+    const stop = Math.min(left + width, place(painting, end));
+    if (stop <= drawnTo && stop - x < 1) continue;
+    const wide = Math.max(stop - x, 3);
+    drawnTo = x + wide;
+    const colour = kind === "fault" ? "bad" : kind === "note" ? "idle" : kind;
+    ctx.fillStyle = colours[colour];
+    ctx.fillRect(x, top, wide, bottom - top);
+    if (kind === "stale" || kind === "bad" || kind === "gap") hatch(painting, x, top, wide, bottom - top, colours[colour + "-text"] || colours.text);
+    if (wide > 4) {
+      ctx.strokeStyle = colours.paper;
+      ctx.lineWidth = 1;
+      ctx.strokeRect(x + 0.5, top + 0.5, wide - 1, bottom - top - 1);
+    }
+    if (wide > 8) {
+      const words = fitted(ctx, text, wide - 3);
+      // Two letters of a word tell nothing.
+      if (words === text || words.length > 3) {
+        const room = ctx.measureText(words).width;
+        const begins = x + Math.min(5, (wide - room) / 2);
+        ctx.fillStyle = colours[colour];
+        ctx.fillRect(begins - 2, top + 2, Math.min(room + 4, x + wide - begins), bottom - top - 4);
+        ctx.fillStyle = colours[colour + "-text"];
+        ctx.fillText(words, begins, (top + bottom) / 2 + 0.5);
+      }
+    }
+  }
+}
+
+function hatch({ ctx }, x, y, width, height, colour) {
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(x, y, width, height);
+  ctx.clip();
+  ctx.beginPath();
+  for (let at = x - height - (x % 7); at < x + width; at += 7) {
+    ctx.moveTo(at, y + height);
+    ctx.lineTo(at + height, y);
+  }
+  ctx.globalAlpha = 0.35;
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = 1;
+  ctx.stroke();
+  ctx.restore();
+}
+
+/** The least step of 1, 2 or 5 times a power of ten that is no less. */
+function niceStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return power * [1, 2, 5, 10].find((factor) => factor * power >= least * (1 - 1e-9));
+}
+
+/** Seconds since the epoch of the simulation, of a time in units. */
+const secondsOf = (time) => (Number(run.begin) + time * run.unit) / 1e9;
+
+/** A time of the run for people, told to a step in seconds. */
+function timeText(time, step = run.unit / 1e9) {
+  const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
+  return secondsOf(time).toFixed(decimals).replace("-", "−") + " s";
+}
+
+/** A length of time in the unit that suits it. */
+function spanText(units) {
+  const seconds = Math.abs(units) * run.unit / 1e9;
+  const [size, name] = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]].find(([size]) => seconds >= size) ?? [1e-9, "ns"];
+  return Number((seconds / size).toPrecision(6)) + " " + name;
+}
+
+/** Where the axis has its lines: times in units, with the step in seconds. */
+function ticksOf(painting) {
+  const seconds = (painting.to - painting.from) * run.unit / 1e9;
+  const step = niceStep(Math.max(seconds / painting.width * (painting.isNarrow ? 72 : 100), 1e-9));
+  const ticks = [];
+  const end = secondsOf(painting.to);
+  // Counted, not summed up: a step may be too small to change a large number.
+  for (let n = Math.ceil(secondsOf(painting.from) / step), last = n + 100; n * step <= end && n < last; n++) {
+    ticks.push((n * step * 1e9 - Number(run.begin)) / run.unit);
+  }
+  return { ticks, step };
+}
+
+function paintAxis(painting, height) {
+  const { ctx, colours, left, width } = painting;
+  const { ticks, step } = ticksOf(painting);
+  ctx.font = NUMBERS;
+  ctx.textBaseline = "middle";
+  ctx.textAlign = "center";
+  for (const tick of ticks) {
+    const x = place(painting, tick);
+    const text = timeText(tick, step);
+    const half = ctx.measureText(text).width / 2;
+    ctx.fillStyle = colours.rail;
+    ctx.fillRect(Math.round(x), height - 5, 1, 5);
+    // At the ends there is room beyond the traces.
+    if (x + half > left + width + MARGIN) ctx.textAlign = "right";
+    else if (x - half < 0) ctx.textAlign = "left";
+    const shift = ctx.textAlign === "right" ? MARGIN : ctx.textAlign === "left" ? -MARGIN : 0;
+    ctx.fillStyle = colours.soft;
+    ctx.fillText(text, x + shift, height / 2 - 2);
+    ctx.textAlign = "center";
+  }
+}
+
+function paintGrid(painting, height) {
+  const { ctx, colours } = painting;
+  ctx.fillStyle = colours.rail;
+  ctx.globalAlpha = 0.5;
+  for (const tick of ticksOf(painting).ticks) ctx.fillRect(Math.round(place(painting, tick)), 0, 1, height);
+  ctx.globalAlpha = 1;
+}
+
+/** What the height of a trace stands for, and what it does not show. */
+function rangeText(row) {
+  const parts = [];
+  if (row.kind === "real" && row.low !== undefined && row.low < row.high) {
+    // What is next to nothing beside the whole is nothing to the eye.
+    const round = (value) => (Math.abs(value) < (row.high - row.low) * 1e-6 ? 0 : value);
+    parts.push(`${short(round(row.low), 4)} to ${valueText(row, round(row.high), 4)}`);
+  }
+  if (row.resolution) parts.push(`thinned to ${row.resolution}`);
+  return parts.join(", ");
+}
+
+/** One row with its label; `row` is a band or a signal, `value` the text at the cursor. */
+function paintRow(painting, row, top, height, value) {
+  const { ctx, colours, left, width, isNarrow } = painting;
+  const labelHeight = isNarrow ? 18 : 0;
+  const [high, low] = [top + labelHeight + 5, top + height - 5];
+  ctx.font = FONT;
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  const end = isNarrow ? left + width : left - 8;
+  let room = end - 8;
+  const middle = isNarrow ? top + 11 : top + height / 2;
+  if (value) {
+    ctx.font = NUMBERS;
+    ctx.textAlign = "right";
+    ctx.fillStyle = colours.text;
+    const text = fitted(ctx, value, room * 0.45);
+    ctx.fillText(text, end, middle);
+    room -= ctx.measureText(text).width + 8;
+    ctx.font = FONT;
+    ctx.textAlign = "left";
+  }
+  const range = rangeText(row);
+  ctx.fillStyle = row.spans ? colours.soft : colours.text;
+  const name = fitted(ctx, row.name, room);
+  ctx.fillText(name, 6, range && !isNarrow ? middle - 6 : middle);
+  if (range) {
+    const after = isNarrow ? 14 + ctx.measureText(name).width : 6;
+    ctx.font = SMALL;
+    ctx.fillStyle = colours.soft;
+    ctx.fillText(fitted(ctx, range, room + 6 - after), after, isNarrow ? middle : middle + 8);
+  }
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(left, top, width, height);
+  ctx.clip();
+  if (row.spans) {
+    paintSpans(painting, row.spans, high - 2, low + 2);
+  } else if (row.data) {
+    if (row.kind === "bool") paintBool(painting, row.data, high, low);
+    else paintReal(painting, row, row.data, high, low);
+  } else {
+    ctx.fillStyle = colours.soft;
+    ctx.fillText(row.failure ? "cannot be unpacked: " + row.failure : "…", left + 6, (high + low) / 2);
+  }
+  ctx.restore();
+  ctx.fillStyle = colours.rail;
+  ctx.fillRect(0, top + height - 1, left + width, 1);
+}

@@ -1,0 +1,179 @@
+//! Distributions of time spans.
+
+use std::fmt::Write as _;
+
+use hdrhistogram::Histogram;
+
+use super::Nanos;
+
+/// The shortest span that is told from others, in nanoseconds.
+const SHORTEST: u64 = 100;
+/// The longest: an hour. Longer ones count as this.
+const LONGEST: u64 = 3_600_000_000_000;
+/// Significant decimal digits of what is read out.
+const DIGITS: u8 = 2;
+
+/// A histogram of time spans, from 100 ns to an hour, good to 1 %.
+///
+/// Its size is fixed, some 15 kB; recording allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Spans(Histogram<u32>);
+
+impl Spans {
+    /// An empty histogram.
+    pub fn new() -> Self {
+        let histogram = Histogram::new_with_bounds(SHORTEST, LONGEST, DIGITS);
+        Self(histogram.expect("constant bounds that hdrhistogram takes"))
+    }
+
+    /// Counts one span; one below zero counts as zero.
+    pub fn record(&mut self, span: Nanos) {
+        self.0.saturating_record(u64::try_from(span.0).unwrap_or(0));
+    }
+
+    /// How many spans were counted.
+    pub fn count(&self) -> u64 {
+        self.0.len()
+    }
+
+    /// The span that a share of all spans does not exceed: 0.5 gives the median. Zero if there are none.
+    pub fn quantile(&self, share: f64) -> Nanos {
+        Nanos(i64::try_from(self.0.value_at_quantile(share)).unwrap_or(i64::MAX))
+    }
+
+    /// The mean in nanoseconds; zero if there are none.
+    pub fn mean(&self) -> f64 {
+        self.0.mean()
+    }
+
+    /// The longest span.
+    pub fn longest(&self) -> Nanos {
+        Nanos(i64::try_from(self.0.max()).unwrap_or(i64::MAX))
+    }
+
+    /// Each step of the histogram that has any spans: the longest that it takes, and how many there are.
+    pub fn steps(&self) -> impl Iterator<Item = (Nanos, u64)> + '_ {
+        self.0.iter_recorded().map(|step| {
+            let longest = i64::try_from(step.value_iterated_to()).unwrap_or(i64::MAX);
+            (Nanos(longest), step.count_since_last_iteration())
+        })
+    }
+
+    /// Appends `key.count`, and if there are any, `key.p50_us`, `p90`, `p99`, `max` and `mean`, one
+    /// `key=value` a line, in microseconds.
+    pub fn write(&self, key: &str, text: &mut String) {
+        self.write_in(key, Nanos::from_micros(1), "_us", text);
+    }
+
+    /// The same in multiples of `unit`, which `suffix` names.
+    pub fn write_in(&self, key: &str, unit: Nanos, suffix: &str, text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{key}.count={}", self.count());
+        if self.count() == 0 {
+            return;
+        }
+        let units = |span: Nanos| span.as_micros() / unit.as_micros();
+        for (name, share) in [("p50", 0.5), ("p90", 0.9), ("p99", 0.99)] {
+            let span = units(self.quantile(share));
+            let _ = writeln!(text, "{key}.{name}{suffix}={span:.1}");
+        }
+        let _ = writeln!(text, "{key}.max{suffix}={:.1}", units(self.longest()));
+        let mean = self.mean() / 1e3 / unit.as_micros();
+        let _ = writeln!(text, "{key}.mean{suffix}={mean:.1}");
+    }
+
+    /// The distribution for people: twelve rows at most, each longer than the one before by the same factor,
+    /// with a bar for its share.
+    pub fn chart(&self) -> String {
+        const ROWS: usize = 12;
+        const WIDTH: u64 = 40;
+        let steps: Vec<(f64, u64)> = self
+            .steps()
+            .map(|(longest, count)| (longest.as_micros(), count))
+            .collect();
+        let (Some((first, _)), Some((last, _))) = (steps.first(), steps.last()) else {
+            return String::new();
+        };
+        // Rows closer than the histogram's own steps would be empty every now and then.
+        let factor = (last / first).powf(1.0 / 11.0).max(1.03);
+        let mut rows = vec![(*first, 0_u64)];
+        for (longest, count) in &steps {
+            while rows.last().is_some_and(|(row, _)| *longest > row * 1.001) && rows.len() < ROWS {
+                let next = rows.last().expect("one at least").0 * factor;
+                rows.push((next, 0));
+            }
+            rows.last_mut().expect("one at least").1 += count;
+        }
+        let most = rows.iter().map(|(_, count)| *count).max().unwrap_or(1);
+        let mut text = String::new();
+        for (row, count) in rows {
+            let bar = (count * WIDTH).div_ceil(most.max(1));
+            let bar = "#".repeat(usize::try_from(bar).unwrap_or_default());
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "  up to {row:>10.1} us {count:>8}  {bar}");
+        }
+        text
+    }
+}
+
+impl Default for Spans {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_good_to_one_percent() {
+        let mut spans = Spans::new();
+        for micros in 1..=1000 {
+            spans.record(Nanos::from_micros(micros));
+        }
+        for (share, micros) in [(0.5, 500.0), (0.99, 990.0), (1.0, 1000.0)] {
+            let got = spans.quantile(share).as_micros();
+            assert!((got / micros - 1.0).abs() < 0.01, "{share}: {got}");
+        }
+        assert_eq!(spans.count(), 1000);
+        assert_eq!(spans.steps().map(|(_, count)| count).sum::<u64>(), 1000);
+    }
+
+    #[test]
+    fn the_ends_of_the_range_take_what_is_beyond_them() {
+        let mut spans = Spans::new();
+        spans.record(Nanos(-5));
+        spans.record(Nanos::MAX);
+        assert_eq!(spans.count(), 2);
+        assert!(spans.longest() >= Nanos::from_secs(3_590));
+    }
+
+    #[test]
+    fn the_chart_has_all_spans_in_a_few_rows() {
+        let mut spans = Spans::new();
+        for micros in [10, 11, 12, 100, 1000, 5000] {
+            spans.record(Nanos::from_micros(micros));
+        }
+        let chart = spans.chart();
+        assert!(chart.lines().count() <= 12, "{chart}");
+        let counts = chart
+            .lines()
+            .filter_map(|line| line.split_whitespace().nth(4));
+        let counts: Vec<u64> = counts
+            .map(|count| count.parse().expect("a count"))
+            .collect();
+        assert_eq!(counts.iter().sum::<u64>(), 6, "{chart}");
+        spans = Spans::new();
+        assert_eq!(spans.chart(), "");
+        spans.record(Nanos::from_micros(7));
+        assert_eq!(spans.chart().lines().count(), 1);
+    }
+
+    #[test]
+    fn an_empty_one_says_so() {
+        let mut text = String::new();
+        Spans::new().write("age", &mut text);
+        assert_eq!(text, "age.count=0\n");
+    }
+}

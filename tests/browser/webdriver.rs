@@ -1,0 +1,199 @@
+//! A headless Chromium, spoken to by the W3C's `WebDriver` protocol through chromedriver.
+
+use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+/// A browser of its own, which ends with this.
+pub(crate) struct Browser {
+    driver: Child,
+    port: u16,
+    session: String,
+    /// What they leave behind in the folder for temporary files.
+    _folder: tempfile::TempDir,
+}
+
+impl Browser {
+    /// Starts one, in a window of so many CSS pixels.
+    pub(crate) fn start(width: u32, height: u32) -> Self {
+        let folder = tempfile::tempdir().expect("there is room for a browser");
+        let started = Command::new("chromedriver")
+            .env("TMPDIR", folder.path())
+            .arg("--port=0")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut driver = started.expect("chromedriver is there (Debian's package chromium-driver)");
+        let mut lines = BufReader::new(driver.stdout.take().expect("it is piped")).lines();
+        let port = loop {
+            let line = lines
+                .next()
+                .expect("it tells its port")
+                .expect("it writes text");
+            if let Some((_, port)) = line.split_once("started successfully on port ") {
+                break port
+                    .trim_end_matches('.')
+                    .parse()
+                    .expect("a port is a number");
+            }
+        };
+        let mut browser = Self {
+            driver,
+            port,
+            session: String::new(),
+            _folder: folder,
+        };
+        let arguments = [
+            "--headless=new".to_owned(),
+            // As root, and in containers, there is no sandbox.
+            "--no-sandbox".to_owned(),
+            "--disable-dev-shm-usage".to_owned(),
+            "--force-device-scale-factor=1".to_owned(),
+            format!("--window-size={width},{height}"),
+        ];
+        let session = browser.call(
+            "POST",
+            "/session",
+            &json!({"capabilities": {"alwaysMatch": {
+                "goog:chromeOptions": {"args": arguments},
+                "goog:loggingPrefs": {"browser": "ALL"},
+                "timeouts": {"script": 120_000, "pageLoad": 120_000},
+            }}}),
+        );
+        session["sessionId"]
+            .as_str()
+            .expect("a session has a name")
+            .clone_into(&mut browser.session);
+        // Headless windows have a frame all the same, unless their size is said like this.
+        let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 640});
+        browser.devtools("Emulation.setDeviceMetricsOverride", &metrics);
+        browser
+    }
+
+    /// Opens a file, and waits until it is loaded.
+    pub(crate) fn open(&self, file: &Path) {
+        let file = file.canonicalize().expect("the page is there");
+        self.command("url", &json!({"url": format!("file://{}", file.display())}));
+    }
+
+    /// Runs a function's body in the page, which may wait, and gives what it returns.
+    pub(crate) fn run(&self, body: &str) -> Value {
+        let script = format!(
+            "const done = arguments[arguments.length - 1];\
+             (async () => {{ {body} }})().then((value) => done({{value}}), (error) => done({{error: String(error)}}));"
+        );
+        let mut answer = self.command("execute/async", &json!({"script": script, "args": []}));
+        assert!(answer["error"].is_null(), "{body}: {}", answer["error"]);
+        answer["value"].take()
+    }
+
+    /// Waits until a condition in the page holds.
+    pub(crate) fn wait(&self, condition: &str) {
+        let body =
+            format!("while (!({condition})) await new Promise((go) => requestAnimationFrame(go));");
+        self.run(&body);
+    }
+
+    /// Types into what has the focus.
+    pub(crate) fn keys(&self, keys: &str) {
+        let strokes = keys.chars().flat_map(|key| {
+            let key = key.to_string();
+            [
+                json!({"type": "keyDown", "value": key}),
+                json!({"type": "keyUp", "value": key}),
+            ]
+        });
+        let strokes: Vec<Value> = strokes.collect();
+        self.command(
+            "actions",
+            &json!({"actions": [{"type": "key", "id": "keys", "actions": strokes}]}),
+        );
+    }
+
+    /// Does what pointers, wheels and keys do, as the protocol has it.
+    pub(crate) fn act(&self, actions: &Value) {
+        self.command("actions", &json!({"actions": actions}));
+    }
+
+    /// A command of Chromium's own protocol.
+    pub(crate) fn devtools(&self, command: &str, parameters: &Value) -> Value {
+        self.command(
+            "goog/cdp/execute",
+            &json!({"cmd": command, "params": parameters}),
+        )
+    }
+
+    /// What the page has complained about.
+    pub(crate) fn complaints(&self) -> Vec<String> {
+        let log = self.command("se/log", &json!({"type": "browser"}));
+        let entries = log.as_array().expect("a log is a list").iter();
+        entries.map(|entry| entry["message"].to_string()).collect()
+    }
+
+    fn command(&self, command: &str, body: &Value) -> Value {
+        self.call(
+            "POST",
+            &format!("/session/{}/{command}", self.session),
+            body,
+        )
+    }
+
+    #[track_caller]
+    fn call(&self, method: &str, path: &str, body: &Value) -> Value {
+        let mut answer = self
+            .answer(method, path, body)
+            .expect("chromedriver answers");
+        let error = &answer["value"]["error"];
+        assert!(
+            !error.is_string() || path.ends_with("async"),
+            "{path}: {}",
+            answer["value"]
+        );
+        answer["value"].take()
+    }
+
+    fn answer(&self, method: &str, path: &str, body: &Value) -> io::Result<Value> {
+        let body = body.to_string();
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
+        stream.set_read_timeout(Some(Duration::from_secs(300)))?;
+        write!(
+            stream,
+            "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nContent-Type: application/json\r\n\
+             Content-Length: {}\r\nConnection: close\r\n\r\n{body}",
+            self.port,
+            body.len()
+        )?;
+        let mut reader = BufReader::new(stream);
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            reader.read_line(&mut line)?;
+            let line = line.trim().to_lowercase();
+            if let Some(value) = line.strip_prefix("content-length:") {
+                length = value.trim().parse().map_err(io::Error::other)?;
+            }
+            if line.is_empty() {
+                break;
+            }
+        }
+        let mut answer = vec![0; length];
+        reader.read_exact(&mut answer)?;
+        serde_json::from_slice(&answer).map_err(io::Error::other)
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // Also when a test has failed: a driver that is killed leaves its browser behind.
+        if !self.session.is_empty() {
+            let session = format!("/session/{}", self.session);
+            let _ = self.answer("DELETE", &session, &json!({}));
+        }
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}

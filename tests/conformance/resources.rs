@@ -1,0 +1,103 @@
+//! Threads, descriptors and memory of the process, to be counted.
+#![allow(unsafe_code, reason = "a global allocator that counts")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// Bytes that are allocated at this moment.
+static LIVE: AtomicUsize = AtomicUsize::new(0);
+
+struct Counting;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+// SAFETY: all calls are handed on to the system's allocator, as they came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        LIVE.fetch_add(layout.size(), Ordering::Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        LIVE.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+/// What a process holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Resources {
+    threads: usize,
+    descriptors: usize,
+    processes: usize,
+    bytes: usize,
+}
+
+/// Words of a reason may differ in length from one moment to the next.
+const SLACK: usize = 4096;
+
+impl PartialEq for Resources {
+    fn eq(&self, other: &Self) -> bool {
+        let exact = |one: &Self| (one.threads, one.descriptors, one.processes);
+        exact(self) == exact(other) && self.bytes.abs_diff(other.bytes) < SLACK
+    }
+}
+
+impl Resources {
+    /// What the process holds at this moment.
+    pub fn now() -> Self {
+        let count = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);
+        let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
+        let children = tasks
+            .flatten()
+            .filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
+        Self {
+            threads: count("/proc/self/task"),
+            descriptors: count("/proc/self/fd"),
+            processes: children.map(|list| list.split_whitespace().count()).sum(),
+            bytes: LIVE.load(Ordering::Relaxed),
+        }
+    }
+
+    /// What the process holds once nothing changes any more, while `pass` lets time pass.
+    pub fn settled(mut pass: impl FnMut()) -> Self {
+        let limit = Instant::now() + Duration::from_secs(10);
+        let mut last = Self::now();
+        let mut same = 0;
+        while same < 20 && Instant::now() < limit {
+            pass();
+            // A thread that something else than the clock has woken needs the processor, too.
+            std::thread::sleep(Duration::from_millis(1));
+            let now = Self::now();
+            same = if now == last { same + 1 } else { 0 };
+            last = now;
+        }
+        last
+    }
+}
+
+/// Whether this process runs the test called `test` (its module path) and nothing else. If not, it has run it
+/// in a process of its own by now, and that has passed.
+pub fn alone(test: &str) -> bool {
+    const MARK: &str = "TICKBUS_TEST_ALONE";
+    if std::env::var_os(MARK).is_some() {
+        return true;
+    }
+    let (_, name) = test.split_once("::").expect("a path below the crate");
+    let child = Command::new(std::env::current_exe().expect("the test's own file"))
+        .args([name, "--exact", "--test-threads=1", "--nocapture"])
+        .env(MARK, "1")
+        .output()
+        .expect("the test's own file runs");
+    let told = String::from_utf8_lossy(&child.stdout);
+    println!("{told}");
+    eprintln!("{}", String::from_utf8_lossy(&child.stderr));
+    assert!(child.status.success(), "it failed in a process of its own");
+    assert!(told.contains("1 passed"), "no test is called {name}");
+    false
+}

@@ -1,0 +1,164 @@
+//! The socket bus against a program that somebody else could have written, in another language.
+//!
+//! It has its own main function: where there is no Python the test is skipped, and says so by name and
+//! reason, which the harness of Rust cannot do at run time.
+#![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
+
+use std::process::{Command, ExitCode, Stdio};
+use std::time::{Duration, Instant};
+
+use tickbus::driver::{Config, Driver};
+use tickbus::signal::Slot;
+use tickbus::time::{Manual, Nanos};
+
+const NAME: &str = "a_plc_in_python_exchanges_with_a_device_that_replies";
+
+const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/plc.py");
+
+/// The same addresses as in the script.
+const DRIVER_CFG: &str = r#"
+[driver]
+id   = 1
+name = "Machine"
+
+[fieldbus]
+kind    = "socket"
+address = "127.0.0.1:0"
+send    = "reply"
+
+[[signal]]
+name    = "run"
+address = "%QX0.0"
+
+[[signal]]
+name    = "speed"
+address = "%QW2"
+type    = "INT"
+
+[[signal]]
+name    = "echo"
+address = "%QW4"
+type    = "INT"
+
+[[signal]]
+name    = "sensor"
+address = "%IX0.0"
+
+[[signal]]
+name    = "position"
+address = "%IW2"
+type    = "INT"
+
+[[signal]]
+name    = "copy"
+address = "%IW4"
+type    = "INT"
+"#;
+
+const RECORDS: u32 = 200;
+
+fn main() -> ExitCode {
+    // A filter that means another test, or a question for the list of tests.
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if arguments.iter().any(|argument| argument == "--list") {
+        println!("{NAME}: test\n\n1 test, 0 benchmarks");
+        return ExitCode::SUCCESS;
+    }
+    let mut filters = arguments
+        .iter()
+        .filter(|one| !one.starts_with('-'))
+        .peekable();
+    if filters.peek().is_some() && !filters.any(|filter| NAME.contains(filter.as_str())) {
+        report(0, 0, 0);
+        return ExitCode::SUCCESS;
+    }
+    println!("\nrunning 1 test");
+    let python = Command::new("python3").arg("--version").output();
+    if !python.is_ok_and(|python| python.status.success()) {
+        println!("test {NAME} ... ignored, there is no python3");
+        report(0, 0, 1);
+        return ExitCode::SUCCESS;
+    }
+    match run() {
+        Ok(()) => {
+            println!("test {NAME} ... ok");
+            report(1, 0, 0);
+            ExitCode::SUCCESS
+        }
+        Err(why) => {
+            println!("test {NAME} ... FAILED\n\n{why}");
+            report(0, 1, 0);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The line that the harness of Rust ends with.
+fn report(passed: u32, failed: u32, ignored: u32) {
+    let verdict = if failed == 0 { "ok" } else { "FAILED" };
+    println!(
+        "\ntest result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored; 0 measured; \
+         0 filtered out\n"
+    );
+}
+
+fn run() -> Result<(), String> {
+    let config = Config::parse("driver.cfg", DRIVER_CFG).map_err(|why| why.to_string())?;
+    // A device that replies needs no clock.
+    let mut device = Driver::open(config, Manual::new()).map_err(|why| why.to_string())?;
+    let mut slots = device.initial_slots();
+    let address = wait_for(|| {
+        let text = device.statistics();
+        let line = text.lines().find_map(|line| line.strip_prefix("address="));
+        line.map(str::to_owned)
+    })
+    .ok_or("the device does not listen")?;
+    let (host, port) = address.rsplit_once(':').ok_or("no port in the address")?;
+    let mut plc = Command::new("python3")
+        .args([SCRIPT, host, port, &RECORDS.to_string()])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|why| why.to_string())?;
+    let ended = wait_for(|| {
+        device.exchange(Nanos::ZERO, &mut slots);
+        let [run, speed, _, sensor, position, copy] = &mut slots[..6] else {
+            panic!("six signals");
+        };
+        *sensor = *run;
+        *position = Slot::from_real(speed.real() * 2.0);
+        *copy = *speed;
+        std::thread::yield_now();
+        plc.try_wait().expect("it was started")
+    });
+    if ended.is_none() {
+        // It is waited for below, whether or not it had just ended by itself.
+        let _ = plc.kill();
+    }
+    let output = plc.wait_with_output().map_err(|why| why.to_string())?;
+    let told =
+        [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+    let statistics = device.statistics();
+    let received = statistics
+        .lines()
+        .find_map(|line| line.strip_prefix("bus_cycles="))
+        .unwrap_or_default();
+    if told[0].trim() == format!("plc.py: ok records={received}") {
+        Ok(())
+    } else {
+        Err(format!("{}\n{}\n{statistics}", told[0], told[1]))
+    }
+}
+
+/// Looks again and again until there is something, for 20 s at most.
+fn wait_for<T>(mut look: impl FnMut() -> Option<T>) -> Option<T> {
+    let limit = Instant::now() + Duration::from_secs(20);
+    loop {
+        if let Some(found) = look() {
+            return Some(found);
+        }
+        if Instant::now() > limit {
+            return None;
+        }
+    }
+}

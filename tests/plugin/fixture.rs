@@ -1,0 +1,240 @@
+//! Libraries to be built, and drivers on them.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::net::UdpSocket;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{self, TryRecvError};
+use std::sync::{Arc, OnceLock};
+
+use tempfile::TempDir;
+use tickbus::driver::Code;
+use tickbus::time::{Manual, Nanos};
+
+use crate::conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
+
+/// The command that helper processes run.
+pub(crate) const HELPER: &str = env!("CARGO_BIN_EXE_tickbus");
+
+/// Builds `source` as a shared library, and gives its path. Another test process may do the same.
+pub(crate) fn build(source: impl AsRef<Path>, switches: &[&str], name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let built = folder.join(format!("{name}.{}", std::process::id()));
+    let status = Command::new("cc")
+        .args([
+            "-std=c99",
+            "-pedantic",
+            "-O1",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+        ])
+        .args(["-fPIC", "-shared"])
+        .args(switches)
+        .arg("-I")
+        .arg(root.join("include"))
+        .arg("-o")
+        .arg(&built)
+        .arg(root.join(&source))
+        .status();
+    let built_well = status.expect("cc runs").success();
+    assert!(built_well, "{}", source.as_ref().display());
+    let path = folder.join(name);
+    fs::rename(&built, &path).expect("renamed");
+    path
+}
+
+pub(crate) fn udp() -> &'static Path {
+    static BUILT: OnceLock<PathBuf> = OnceLock::new();
+    BUILT.get_or_init(|| {
+        build(
+            "examples/udp-fieldbus/udp_fieldbus.c",
+            &[],
+            "libudp_fieldbus.so",
+        )
+    })
+}
+
+pub(crate) fn misbehaving() -> &'static Path {
+    static BUILT: OnceLock<PathBuf> = OnceLock::new();
+    BUILT.get_or_init(|| build("tests/plugins/misbehave.c", &[], "libmisbehave.so"))
+}
+
+/// An address that nobody else has: all of 127.0.0.0/8 is this computer.
+pub(crate) fn address() -> String {
+    static NEXT: AtomicU32 = AtomicU32::new(1);
+    let next = NEXT.fetch_add(1, Ordering::Relaxed);
+    assert!(next < 256, "one address for each test");
+    let process = std::process::id();
+    let [top, high, low] = [process >> 16, process >> 8, process].map(|part| part & 0xFF);
+    format!("127.{high}.{low}.{next}:{}", 20_040 + top)
+}
+
+/// A busy computer lets helper processes wait for long.
+pub(crate) const PATIENT: &str = "open_timeout = \"1h\"\ncall_timeout = \"1h\"\n";
+
+/// The UDP example, between two drivers.
+pub(crate) struct Udp {
+    address: String,
+    isolated: bool,
+}
+
+impl Udp {
+    pub(crate) fn new(isolated: bool) -> Self {
+        let address = address();
+        Self { address, isolated }
+    }
+}
+
+pub(crate) fn isolation(isolated: bool) -> String {
+    if isolated {
+        format!("isolated = true\nhelper = \"{HELPER}\"\n")
+    } else {
+        String::new()
+    }
+}
+
+impl Bus for Udp {
+    fn fieldbus(&self, role: &str) -> String {
+        let (library, isolation) = (udp().display(), isolation(self.isolated));
+        let key = if role == "device" { "local" } else { "remote" };
+        format!(
+            "kind = \"plugin\"\nlibrary = \"{library}\"\noptions = {{ {key} = \"{}\" }}\n\
+             timeout = \"1ms\"\n{PATIENT}{isolation}",
+            self.address
+        )
+    }
+
+    /// A controller whose image has another size.
+    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        let device = self.address.clone();
+        let (running, stopped) = mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+            let words = [0x5442_5531_u32, 1, 77, 1, 0];
+            let mut request: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
+            request.extend_from_slice(&[1; 12]);
+            while stopped.try_recv() == Err(TryRecvError::Empty) {
+                // Nobody listens before the device has opened.
+                let _ = socket.send_to(&request, &device);
+                std::thread::yield_now();
+            }
+        });
+        Liar {
+            _peer: Box::new(running),
+            cause: "protocol",
+            words: "libudp_fieldbus.so: an image of 12 bytes came from 127.0.0.1, expected 6 bytes; give",
+        }
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            ("kind = \"plugin\"", "has no \"library\""),
+            (
+                "kind = \"plugin\"\nlibrary = \"libnone.so\"",
+                "libnone.so; check `library`",
+            ),
+            (
+                "kind = \"plugin\"\nlibrary = \"x\"\ncall_timeout = 3",
+                "write a duration",
+            ),
+            (
+                "kind = \"plugin\"\nlibrary = \"x\"\noptions = [1]",
+                "write them as",
+            ),
+            (
+                "kind = \"plugin\"\nlibrary = \"x\"\nhelper = \"tickbus\"",
+                "add isolated = true",
+            ),
+        ]
+    }
+}
+
+/// A driver on the misbehaving library; what it writes to `%I` comes back on `%Q`.
+pub(crate) struct Misbehaving {
+    pub(crate) folder: TempDir,
+    pub(crate) library: PathBuf,
+    pub(crate) isolated: bool,
+    /// The library's own options.
+    pub(crate) options: String,
+    /// Further lines for `[fieldbus]`.
+    pub(crate) extra: String,
+}
+
+impl Misbehaving {
+    pub(crate) fn new(isolated: bool, options: &str) -> Self {
+        Self {
+            folder: tempfile::tempdir().expect("a folder"),
+            library: misbehaving().to_owned(),
+            isolated,
+            options: options.to_owned(),
+            extra: PATIENT.to_owned(),
+        }
+    }
+
+    /// Misbehaves once only.
+    pub(crate) fn once(isolated: bool, options: &str) -> Self {
+        let mut this = Self::new(isolated, options);
+        let once = this.file("once");
+        let _ = write!(this.options, ", once = \"{}\"", once.display());
+        this
+    }
+
+    /// A library of its own, which no other test has loaded.
+    pub(crate) fn with_own_library(mut self) -> Self {
+        let copy = self.file("libown.so");
+        fs::copy(misbehaving(), &copy).expect("copied");
+        self.library = copy;
+        self
+    }
+
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn text(&self) -> String {
+        let (library, isolation) = (self.library.display(), isolation(self.isolated));
+        // The pause is long enough for a test to see the failure before it.
+        format!(
+            "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"plugin\"\ncycle = \"1ms\"\n\
+             max_age = \"300ms\"\nreconnect = [\"1s\"]\nlibrary = \"{library}\"\n\
+             options = {{ {} }}\n{isolation}{}\n{SIGNALS}",
+            self.options, self.extra
+        )
+    }
+
+    pub(crate) fn open(&self, clock: &Arc<Manual>) -> End {
+        End::open(&self.text(), clock)
+    }
+}
+
+/// Lets time pass until the line is in `state` for `cause`; gives the reason.
+#[track_caller]
+pub(crate) fn until(end: &End, clock: &Manual, state: &str, cause: &str) -> String {
+    until_by(CYCLE, end, clock, state, cause)
+}
+
+#[track_caller]
+pub(crate) fn until_by(step: Nanos, end: &End, clock: &Manual, state: &str, cause: &str) -> String {
+    let mut reason = String::new();
+    await_that(&format!("{state}, {cause}"), || {
+        clock.advance(step);
+        let link = end.link();
+        reason = link.reason;
+        (link.state.name(), link.cause.name()) == (state, cause)
+    });
+    reason
+}
+
+/// Lets time pass until what is sent has come back.
+#[track_caller]
+pub(crate) fn until_it_echoes(end: &mut End, clock: &Manual, value: f64) {
+    end.set("position", value);
+    await_that("the value comes back", || {
+        clock.advance(CYCLE);
+        end.tick().code == Code::Fresh && end.get("speed") == value
+    });
+}

@@ -1,0 +1,338 @@
+//! The two commands as processes of their own, over a real socket: started, killed, interrupted, misused.
+#![cfg(unix)]
+#![allow(missing_docs, reason = "tests")]
+
+use std::io::{BufRead as _, BufReader, Lines};
+use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tickbus::driver::{Code, Config, Driver};
+use tickbus::signal::Slot;
+use tickbus::time::{Monotonic, Nanos};
+
+const SIGNALS: &str = r#"
+[[signal]]
+name    = "out"
+address = "%QX0.0"
+latch   = "rising"
+
+[[signal]]
+name    = "in"
+address = "%IX0.0"
+latch   = "rising"
+
+[[signal]]
+name      = "level"
+address   = "%QB1"
+fail_safe = 255
+
+[[signal]]
+name    = "echo"
+address = "%IB1"
+"#;
+
+/// A driver.cfg that serves both ends.
+fn config(fieldbus: &str) -> String {
+    format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"socket\"\ncycle = \"1ms\"\n\
+         reconnect = [\"5ms\"]\n{fieldbus}\n{SIGNALS}"
+    )
+}
+
+fn save(text: &str) -> tempfile::NamedTempFile {
+    let file = tempfile::Builder::new().suffix(".cfg").tempfile();
+    let file = file.expect("a temporary file");
+    std::fs::write(file.path(), text).expect("it can be written");
+    file
+}
+
+/// A running `tickbus`, which ends with the test.
+struct Process {
+    child: Child,
+    lines: Lines<BufReader<ChildStdout>>,
+}
+
+impl Process {
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("tickbus runs");
+        let out = child.stdout.take().expect("its stdout is ours");
+        Self {
+            child,
+            lines: BufReader::new(out).lines(),
+        }
+    }
+
+    /// The next line that contains `text`.
+    fn until(&mut self, text: &str) -> String {
+        let mut before = Vec::new();
+        for line in &mut self.lines {
+            let line = line.expect("text");
+            if line.contains(text) {
+                return line;
+            }
+            before.push(line);
+        }
+        panic!("no line with {text:?}, but {before:#?}");
+    }
+
+    /// All that is left to read, and how it ended.
+    fn end(mut self) -> (Vec<String>, ExitStatus) {
+        let lines = (&mut self.lines).map(|line| line.expect("text")).collect();
+        let status = self.child.wait().expect("it was started");
+        (lines, status)
+    }
+
+    fn signal(&self, name: &str) {
+        let status = Command::new("kill")
+            .args([&format!("-{name}"), &self.child.id().to_string()])
+            .status();
+        assert!(status.expect("kill runs").success());
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // Both fail when it has ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn statistic(driver: &Driver, key: &str) -> Option<String> {
+    let text = driver.statistics();
+    let found = text
+        .lines()
+        .find_map(|line| line.strip_prefix(&format!("{key}=")));
+    found.map(str::to_owned)
+}
+
+#[track_caller]
+fn await_that(what: &str, mut done: impl FnMut() -> bool) {
+    let limit = Instant::now() + Duration::from_secs(20);
+    while !done() {
+        assert!(Instant::now() < limit, "waited 20 s in vain until {what}");
+        std::thread::yield_now();
+    }
+}
+
+fn device() -> (Driver, Vec<Slot>, String) {
+    let text = config("address = \"127.0.0.1:0\"\nmax_age = \"100ms\"");
+    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let clock = Monotonic::shared().expect("a thread");
+    let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+    let mut address = None;
+    await_that("the device listens", || {
+        address = statistic(&driver, "address");
+        address.is_some()
+    });
+    let slots = driver.initial_slots();
+    (driver, slots, address.expect("found"))
+}
+
+/// A PLC that is killed in the midst of it, again and again, and started again.
+#[test]
+fn a_killed_plc_is_stale_and_its_successor_is_served() {
+    const KILLS: u8 = 200;
+    let (mut driver, mut slots, address) = device();
+    let file = save(&config(""));
+    let path = file.path().to_str().expect("a plain name");
+    for kill in 1..=KILLS {
+        let plc = Process::start(&[
+            "plc",
+            "mirror",
+            "--config",
+            path,
+            "--address",
+            &address,
+            "--scan",
+            "1ms",
+        ]);
+        let value = Slot::from_real(f64::from(kill));
+        await_that("the PLC mirrors the value", || {
+            slots[3] = value;
+            driver.exchange(Nanos::ZERO, &mut slots);
+            slots[2] == value
+        });
+        plc.signal("KILL");
+        await_that("the data are stale", || {
+            driver.exchange(Nanos::ZERO, &mut slots).code == Code::Stale
+        });
+        assert_eq!(slots[2], Slot::from_real(255.0), "fail-safe when stale");
+        drop(plc);
+    }
+    assert_eq!(statistic(&driver, "link.running"), Some(KILLS.to_string()));
+    assert_eq!(statistic(&driver, "link.failed"), Some("0".to_owned()));
+    driver.close();
+}
+
+/// Both commands against each other: `mirror` for the machine, `plc reaction` for the PLC.
+#[test]
+fn reaction_measures_a_mirror() {
+    let file = save(&config("address = \"127.0.0.1:0\""));
+    let path = file.path().to_str().expect("a plain name");
+    let mut mirror = Process::start(&["mirror", path, "--tick", "200us", "--stats"]);
+    let listening = mirror.until("listening on");
+    let address = listening.rsplit(' ').next().expect("an address");
+    let plc = Process::start(&[
+        "plc",
+        "reaction",
+        "--config",
+        path,
+        "--address",
+        address,
+        "--option",
+        "count=50",
+        "--option",
+        "tick=200us",
+        "--option",
+        "pause=1ms",
+        "--stats",
+    ]);
+    let (lines, status) = plc.end();
+    let text = lines.join("\n");
+    assert!(status.success(), "{text}");
+    for expected in [
+        "plc: running: connected with 127.0.0.1:",
+        "reaction.count=50",
+        "reaction.lost=0",
+        "reaction.ticks.p50=",
+        "reaction of the other end: 50 edges answered, 0 lost",
+    ] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    assert!(
+        lines
+            .last()
+            .expect("a last line")
+            .starts_with("plc: ok scans=")
+    );
+
+    mirror.signal("INT");
+    let (lines, status) = mirror.end();
+    let text = lines.join("\n");
+    assert!(status.success(), "{text}");
+    assert!(
+        text.contains("cause.left=1") && text.contains("bus_cycle.p50_us="),
+        "{text}"
+    );
+    assert!(
+        lines
+            .last()
+            .expect("a last line")
+            .starts_with("mirror: ok scans=")
+    );
+}
+
+#[test]
+fn a_machine_that_does_not_answer_ends_the_measurement_with_code_3() {
+    let (mut driver, mut slots, address) = device();
+    let file = save(&config(""));
+    let path = file.path().to_str().expect("a plain name");
+    let over = std::sync::atomic::AtomicBool::new(false);
+    let (lines, status) = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !over.load(std::sync::atomic::Ordering::Relaxed) {
+                driver.exchange(Nanos::ZERO, &mut slots);
+                std::thread::yield_now();
+            }
+        });
+        let ended = Process::start(&[
+            "plc",
+            "reaction",
+            "--config",
+            path,
+            "--address",
+            &address,
+            "--option",
+            "timeout=20ms",
+            "--option",
+            "pause=1ms",
+        ])
+        .end();
+        over.store(true, std::sync::atomic::Ordering::Relaxed);
+        ended
+    });
+    let last = lines.last().expect("a last line");
+    assert!(
+        last.starts_with("plc: failed reason=")
+            && last.contains(" edges in a row were not answered"),
+        "{last}"
+    );
+    assert_eq!(status.code(), Some(3));
+}
+
+#[test]
+fn sigterm_and_a_duration_end_a_command_in_good_order() {
+    let file = save(&config("address = \"127.0.0.1:0\""));
+    let path = file.path().to_str().expect("a plain name");
+    let mut mirror = Process::start(&["mirror", path]);
+    mirror.until("listening on");
+    mirror.signal("TERM");
+    let (lines, status) = mirror.end();
+    assert!(status.success() && lines.last().expect("a line").starts_with("mirror: ok "));
+
+    let (lines, status) = Process::start(&["mirror", path, "--duration", "20ms"]).end();
+    assert!(status.success() && lines.last().expect("a line").starts_with("mirror: ok "));
+}
+
+fn refused(arguments: &[&str]) -> (String, Option<i32>) {
+    let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args(arguments)
+        .output()
+        .expect("tickbus runs");
+    let text = String::from_utf8(output.stderr).expect("text");
+    (text, output.status.code())
+}
+
+#[test]
+fn what_is_wrong_is_told_before_anything_starts() {
+    let device = save(&config("role = \"device\""));
+    let device = device.path().to_str().expect("a plain name");
+    let (text, code) = refused(&["plc", "mirror", "--config", device]);
+    assert!(
+        text.contains(":8:8: this command is the controller of the line"),
+        "{text}"
+    );
+    assert_eq!(code, Some(1));
+
+    let loopback = save(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"a\"\n\
+         [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n",
+    );
+    let loopback = loopback.path().to_str().expect("a plain name");
+    let (text, code) = refused(&["mirror", loopback]);
+    assert!(
+        text.contains(":5:8: both ends of the bus \"loopback\" live in one process"),
+        "{text}"
+    );
+    assert_eq!(code, Some(1));
+
+    let both = save(&config(""));
+    let both = both.path().to_str().expect("a plain name");
+    let (text, code) = refused(&["plc", "mirror", "--config", both, "--address", "here"]);
+    assert!(
+        text.contains("--address: ") && text.contains("127.0.0.1:"),
+        "{text}"
+    );
+    assert_eq!(code, Some(1));
+
+    let (text, code) = refused(&["plc", "rig", "--config", both]);
+    assert!(text.contains("works on 8 bytes of %I"), "{text}");
+    assert_eq!(code, Some(1));
+
+    let (text, code) = refused(&["plc", "mirror", "--config", "nowhere.cfg"]);
+    assert!(
+        text.contains("nowhere.cfg: there is no such file"),
+        "{text}"
+    );
+    assert_eq!(code, Some(1));
+
+    let (text, code) = refused(&["plc", "rigg", "--config", both]);
+    assert!(text.contains("no PLC program is called \"rigg\""), "{text}");
+    assert_eq!(code, Some(2));
+}

@@ -1,0 +1,239 @@
+//! The soak: a device that ticks as fast as it can, and a peer at the highest rate that dies again and
+//! again, in every way that a peer can.
+//!
+//! Some seconds by default; `make soak` runs it for minutes, or hours (`make soak MINUTES=120`). It counts what
+//! the peer did to the device, and what the device says was done to it: both must agree, so no error is
+//! unexplained. Threads, descriptors and memory must be the same in the end as at the beginning.
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    dead_code,
+    reason = "a test, which uses a part of the suite's fixtures"
+)]
+
+#[path = "conformance/resources.rs"]
+mod resources;
+
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use resources::Resources;
+use socket2::SockRef;
+use tickbus::driver::{Config, Driver};
+use tickbus::time::{Monotonic, Nanos};
+
+const CONFIG: &str = r#"
+[driver]
+id   = 1
+name = "soak"
+
+[fieldbus]
+kind    = "socket"
+address = "127.0.0.1:0"
+send    = "reply"
+cycle   = "1ms"
+max_age = "250ms"
+
+[[signal]]
+name    = "counter"
+address = "%QD0"
+type    = "UDINT"
+
+[[signal]]
+name    = "more"
+address = "%QB359"
+
+[[signal]]
+name    = "answer"
+address = "%ID0"
+type    = "UDINT"
+
+[[signal]]
+name    = "rest"
+address = "%IB133"
+"#;
+
+const RECORD: usize = 360;
+const ANSWER: usize = 134;
+
+/// How a peer ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Death {
+    /// It closes in good order.
+    Close,
+    /// The connection is reset.
+    Reset,
+    /// It dies in the middle of a record.
+    Half,
+    /// It falls silent until the device gives it up.
+    Silence,
+}
+
+const DEATHS: [Death; 4] = [Death::Close, Death::Reset, Death::Half, Death::Silence];
+
+impl Death {
+    /// The cause that the device gives for it.
+    fn cause(self) -> &'static str {
+        match self {
+            Self::Close => "left",
+            Self::Reset | Self::Silence => "link",
+            Self::Half => "protocol",
+        }
+    }
+}
+
+fn statistic(driver: &Driver, key: &str) -> Option<String> {
+    let text = driver.statistics();
+    let found = text
+        .lines()
+        .find_map(|line| line.strip_prefix(&format!("{key}=")));
+    found.map(str::to_owned)
+}
+
+fn count(driver: &Driver, key: &str) -> u64 {
+    statistic(driver, key).map_or(0, |text| text.parse().expect("a count"))
+}
+
+/// One life of a peer: flat out for `span`, then its death. Gives how many records were answered.
+fn live(address: &str, span: Duration, death: Death) -> u64 {
+    let mut stream = TcpStream::connect(address).expect("the device listens");
+    stream.set_nodelay(true).expect("a socket option");
+    let end = Instant::now() + span;
+    let mut record = [0; RECORD];
+    let mut answer = [0; ANSWER];
+    let mut answered = 0_u32;
+    while Instant::now() < end || answered == 0 {
+        record[..4].copy_from_slice(&answered.to_be_bytes());
+        stream.write_all(&record).expect("the device reads");
+        stream.read_exact(&mut answer).expect("the device answers");
+        answered += 1;
+    }
+    match death {
+        Death::Close => {}
+        Death::Reset => {
+            // Unread bytes would do it, too; this does it at once.
+            let socket = SockRef::from(&stream);
+            let linger = Some(Duration::ZERO);
+            socket.set_linger(linger).expect("a socket option");
+        }
+        Death::Half => stream
+            .write_all(&record[..RECORD / 2])
+            .expect("the device reads"),
+        Death::Silence => {
+            let closed = stream.read(&mut answer).expect("the device closes");
+            assert_eq!(closed, 0, "nobody asked");
+        }
+    }
+    drop(stream);
+    u64::from(answered)
+}
+
+/// What the process holds when the last peer is forgotten.
+fn rest() -> Resources {
+    Resources::settled(|| std::thread::sleep(Duration::from_millis(2)))
+}
+
+#[test]
+fn a_device_outlives_all_peers() {
+    let seconds = std::env::var("TICKBUS_SOAK_SECONDS").map_or(5, |text| {
+        text.parse().expect("TICKBUS_SOAK_SECONDS is a number")
+    });
+    let end = Instant::now() + Duration::from_secs(seconds);
+    let clock = Monotonic::shared().expect("a thread");
+    let config = Config::parse("soak.cfg", CONFIG).unwrap_or_else(|why| panic!("{why}"));
+    let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+    let mut slots = driver.initial_slots();
+    let address = loop {
+        match statistic(&driver, "address") {
+            Some(address) => break address,
+            None => std::thread::yield_now(),
+        }
+    };
+
+    let over = AtomicBool::new(false);
+    let (driver, lives, answered, before, after) = std::thread::scope(|scope| {
+        let ticking = scope.spawn(|| {
+            let mut driver = driver;
+            while !over.load(Ordering::Relaxed) {
+                driver.exchange(Nanos::ZERO, &mut slots);
+                slots[2] = slots[0];
+            }
+            driver
+        });
+        let mut lives = [0_u64; DEATHS.len()];
+        let (mut answered, mut round) = (0, 0_u64);
+        let mut before = None;
+        let mut told = Instant::now();
+        while Instant::now() < end {
+            round += 1;
+            for (death, lives) in DEATHS.into_iter().zip(&mut lives) {
+                // Silence takes a second, and is less frequent.
+                if death == Death::Silence && round % 10 != 1 {
+                    continue;
+                }
+                answered += live(&address, Duration::from_millis(50), death);
+                *lives += 1;
+            }
+            // The first rounds fill what is filled once.
+            if round == 5 {
+                before = Some(rest());
+            }
+            if told.elapsed() > Duration::from_secs(30) {
+                told = Instant::now();
+                println!(
+                    "soak: {lives:?} lives, {answered} records, {:?}",
+                    Resources::now()
+                );
+            }
+        }
+        let after = rest();
+        over.store(true, Ordering::Relaxed);
+        let driver = ticking.join().expect("no panic");
+        (driver, lives, answered, before, after)
+    });
+    println!("soak: lives {lives:?}, records {answered}, before {before:?}, after {after:?}");
+    assert_eq!(before, Some(after), "something piles up");
+
+    let limit = Instant::now() + Duration::from_secs(10);
+    while statistic(&driver, "state").as_deref() != Some("opening") {
+        assert!(Instant::now() < limit, "{}", driver.statistics());
+        std::thread::yield_now();
+    }
+    println!("{}", driver.statistics());
+    let total: u64 = lives.iter().sum();
+    assert_eq!(
+        count(&driver, "link.running"),
+        total,
+        "every peer was served"
+    );
+    for cause in ["left", "link", "protocol"] {
+        let done = DEATHS.iter().zip(lives);
+        let done = done.filter(|(death, _)| death.cause() == cause);
+        let done: u64 = done.map(|(_, lives)| lives).sum();
+        let key = format!("cause.{cause}");
+        assert_eq!(
+            count(&driver, &key),
+            done,
+            "{cause}: {}",
+            driver.statistics()
+        );
+    }
+    for unexplained in [
+        "link.failed",
+        "cause.refused",
+        "cause.defect",
+        "cause.hung",
+        "failed",
+    ] {
+        assert_eq!(count(&driver, unexplained), 0, "{unexplained}");
+    }
+    assert_eq!(
+        count(&driver, "bus_cycles"),
+        answered,
+        "every record was taken"
+    );
+    driver.close();
+}

@@ -8,9 +8,13 @@ import java.util.Collections;
 import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.List;
+import java.util.Locale;
 import java.util.Map;
 import java.util.Objects;
+import java.util.Optional;
 import java.util.function.Supplier;
+import java.util.stream.Collectors;
+import java.util.stream.Stream;
 
 /**
  * One open driver: a simulation's end of a PLC's fieldbus.
@@ -29,8 +33,8 @@ import java.util.function.Supplier;
  *
  * <p><b>Threads.</b> The first thread that exchanges becomes the driver's ticking thread: exchanges, events and the
  * getters and setters of the signals belong to it. Another thread's exchange throws {@link Status#BUSY} and does
- * nothing, until the ticking thread has ended or has called {@link #releaseThread}. {@link #statistics} and {@link #close}
- * can be called by any thread; while an exchange is running they throw {@link Status#BUSY}, and an
+ * nothing, until the ticking thread has ended or has called {@link #releaseThread}. {@link #statistics}, {@link #inject},
+ * {@link #faults} and {@link #close} can be called by any thread; while an exchange is running they throw {@link Status#BUSY}, and an
  * exchange that meets one of them waits for its end. Different drivers are independent of each other.
  *
  * <p><b>The tick</b>, {@link #exchange()}, takes no lock, makes no system call, and allocates nothing, in
@@ -47,6 +51,15 @@ public final class Tickbus implements AutoCloseable {
     private static final int PATIENCE = 100;
     /** Longs per event: signal, slot, time. */
     private static final int EVENT_WORDS = 3;
+
+    /** The fields of a fault's line. */
+    private static final int FAULT_ID = 0;
+    private static final int FAULT_STATE = 1;
+    private static final int FAULT_BEGUN = 2;
+    private static final int FAULT_KIND = 3;
+    private static final int FAULT_NAME = 4;
+    private static final int FAULT_WHAT = 5;
+    private static final int FAULT_FIELDS = 6;
 
     static {
         try {
@@ -97,10 +110,27 @@ public final class Tickbus implements AutoCloseable {
      *     reason
      */
     public static Tickbus open(Path driverCfg) {
+        return open(driverCfg, "");
+    }
+
+    /**
+     * Opens the driver that a configuration file describes, with some tables other than its own: so a test can
+     * have the plant's own signal table, and a PLC program in this process at the other end.
+     *
+     * <p>A {@code [fieldbus]} with a {@code kind} stands instead of the file's; one without sets the {@code mode} of
+     * the file's own loopback. Times and sizes of the file stay.
+     *
+     * @param driverCfg the driver.cfg, which must be right as it stands
+     * @param tables TOML as in a driver.cfg; empty changes nothing
+     * @return the open driver, to be closed
+     * @throws FieldbusException as {@link #open(Path)}; mistakes in the tables have their lines and columns, too
+     */
+    public static Tickbus open(Path driverCfg, String tables) {
         Objects.requireNonNull(driverCfg, "driverCfg");
+        Objects.requireNonNull(tables, "tables");
         NativeLibrary.load();
         Layout layout = new Layout();
-        long handle = initializeNative(driverCfg.toString(), layout);
+        long handle = initializeNative(driverCfg.toString(), tables, layout);
         try {
             layout.check();
             return new Tickbus(handle, layout);
@@ -283,6 +313,54 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
+     * Injects a fault: a wrong value of a signal, or a trouble of the line. It can begin at the next exchange.
+     *
+     * <p>Times and ticks count from this driver's first exchange: {@code at = "2s"} is two seconds after that.
+     *
+     * @param fault the keys of a {@code [[fault]]} section of driver.cfg, one a line, with or without its header
+     * @return the fault, to be ended
+     * @throws FieldbusException {@link Status#BAD_ARGUMENT} with every mistake at its line and column;
+     *     {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public InjectedFault inject(String fault) {
+        Objects.requireNonNull(fault, "fault");
+        int id = whenIdle(() -> injectNative(handle, fault));
+        return faults().stream().filter(one -> one.id() == id).findFirst().orElseThrow();
+    }
+
+    /**
+     * The faults that were injected, by driver.cfg or by {@link #inject}.
+     *
+     * @return in the order of injection; where there were more than 64, those that are long over may be missing
+     * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public List<InjectedFault> faults() {
+        return faultLines().map(line -> new InjectedFault(this, Integer.parseInt(line[FAULT_ID]), line[FAULT_KIND],
+            line[FAULT_NAME], line[FAULT_WHAT])).toList();
+    }
+
+    InjectedFault.State faultState(int id) {
+        return faultLine(id).map(line -> InjectedFault.State.valueOf(line[FAULT_STATE].toUpperCase(Locale.ROOT)))
+            .orElse(InjectedFault.State.OVER);
+    }
+
+    long faultBegun(int id) {
+        return faultLine(id).map(line -> Long.parseLong(line[FAULT_BEGUN])).orElse(0L);
+    }
+
+    void endFault(int id) {
+        whenIdle(() -> endFaultNative(handle, id));
+    }
+
+    private Optional<String[]> faultLine(int id) {
+        return faultLines().filter(line -> Integer.parseInt(line[FAULT_ID]) == id).findFirst();
+    }
+
+    private Stream<String[]> faultLines() {
+        return whenIdle(() -> faultsNative(handle)).lines().map(line -> line.split("\t", FAULT_FIELDS));
+    }
+
+    /**
      * Hands over the waiting events, oldest first: the writes of the PLC one by one, on buses that have them.
      *
      * @param handler called on this thread, for each event
@@ -409,8 +487,27 @@ public final class Tickbus implements AutoCloseable {
         }
     }
 
+    /**
+     * Makes an HTML page from a recording: a chart of the signals, faults, states of the line. It lies beside the
+     * recording, loads nothing, and any browser shows it.
+     *
+     * @param recording the VCD or CSV file that a {@code [record]} table named; its driver must be closed
+     * @param title the page's heading
+     * @param statistics what {@link #statistics} gave last; may be empty
+     * @param heading what the text is
+     * @param text shown as it is; empty for none
+     * @return the page
+     * @throws FieldbusException {@link Status#BAD_ARGUMENT} with the reason if it cannot be made
+     */
+    public static Path report(Path recording, String title, Map<String, String> statistics, String heading, String text) {
+        NativeLibrary.load();
+        String lines = statistics.entrySet().stream().map(entry -> entry.getKey() + "=" + entry.getValue())
+            .collect(Collectors.joining("\n"));
+        return Path.of(reportNative(recording.toString(), title, lines, heading + "\n" + text));
+    }
+
     /** Opens a driver and describes it to {@code layout}; throws {@link FieldbusException}. */
-    static native long initializeNative(String driverCfg, Layout layout);
+    static native long initializeNative(String driverCfg, String tables, Layout layout);
 
     /** The tick; gives a status code and never throws, whatever the handle. */
     static native int xChangeData(long handle);
@@ -423,6 +520,18 @@ public final class Tickbus implements AutoCloseable {
 
     /** Moves events into {@code into}, three longs each, and says how many; throws {@link FieldbusException}. */
     static native int eventsNative(long handle, long[] into);
+
+    /** Injects the fault that a section describes, and gives its number; throws {@link FieldbusException}. */
+    static native int injectNative(long handle, String fault);
+
+    /** Ends a fault at the next exchange; false if there is none. Throws {@link FieldbusException}. */
+    static native boolean endFaultNative(long handle, int id);
+
+    /** A line per fault, with tabs between its fields; throws {@link FieldbusException}. */
+    static native String faultsNative(long handle);
+
+    /** Makes the page of a recording; the text's first line is its heading. Throws {@link FieldbusException}. */
+    static native String reportNative(String recording, String title, String statistics, String text);
 
     /** Does nothing: what a native call costs, the baseline of the benchmarks. */
     static native int emptyNative();

@@ -1,6 +1,7 @@
 package tickbus;
 
 import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertFalse;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
@@ -56,13 +57,16 @@ class MisuseTest {
             assertStatus(Status.NOT_OPEN, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.statisticsNative(handle));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.eventsNative(handle, new long[3]));
+            assertStatus(Status.NOT_OPEN, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
+            assertStatus(Status.NOT_OPEN, () -> Tickbus.endFaultNative(handle, 1));
+            assertStatus(Status.NOT_OPEN, () -> Tickbus.faultsNative(handle));
         }
     }
 
     @Test
     void whatWasClosedStaysClosed() {
         Layout layout = new Layout();
-        long handle = Tickbus.initializeNative(mirror().toString(), layout);
+        long handle = Tickbus.initializeNative(mirror().toString(), "", layout);
         assertTrue(Tickbus.xChangeData(handle) >= 0);
         assertEquals(Status.NOT_OPEN.code(), Tickbus.xChangeData(handle + (1L << 40)));
         Tickbus.finalizeNative(handle);
@@ -71,19 +75,27 @@ class MisuseTest {
             assertStatus(Status.CLOSED, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.statisticsNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.eventsNative(handle, new long[3]));
+            assertStatus(Status.CLOSED, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
+            assertStatus(Status.CLOSED, () -> Tickbus.endFaultNative(handle, 1));
+            assertStatus(Status.CLOSED, () -> Tickbus.faultsNative(handle));
             assertTrue(tenantOfTheSamePlace.exchange() >= 0);
         }
     }
 
     @Test
     void argumentsThatAreNullOrTooShortAreRefused() {
-        assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.initializeNative(null, new Layout()));
-        assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.initializeNative(mirror().toString(), null));
+        assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.initializeNative(null, "", new Layout()));
+        assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.initializeNative(mirror().toString(), "", null));
         assertThrows(NullPointerException.class, () -> Tickbus.open(null));
         Layout layout = new Layout();
-        long handle = Tickbus.initializeNative(mirror().toString(), layout);
+        long handle = Tickbus.initializeNative(mirror().toString(), "", layout);
         try {
             assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.eventsNative(handle, null));
+            assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.injectNative(handle, null));
+            assertStatus(Status.BAD_ARGUMENT, () -> Tickbus.injectNative(handle, ""));
+            for (int id : new int[] {0, 1, -1, Integer.MIN_VALUE, Integer.MAX_VALUE}) {
+                assertFalse(Tickbus.endFaultNative(handle, id));
+            }
             assertEquals(0, Tickbus.eventsNative(handle, new long[0]));
             assertEquals(0, Tickbus.eventsNative(handle, new long[2]));
         } finally {
@@ -176,7 +188,7 @@ class MisuseTest {
 
     @Test
     void twoThreadsInTheNativeExchangeAreServedOrBusy() throws Exception {
-        long handle = Tickbus.initializeNative(mirror().toString(), new Layout());
+        long handle = Tickbus.initializeNative(mirror().toString(), "", new Layout());
         Callable<Integer> exchanges = () -> {
             int served = 0;
             for (int i = 0; i < 50_000; i++) {

@@ -14,6 +14,7 @@ import java.util.concurrent.TimeUnit;
 public final class ShutdownGuard implements AutoCloseable {
     private static final long GRACE_SECONDS = 5;
 
+    private final CountDownLatch told = new CountDownLatch(1);
     private final CountDownLatch done = new CountDownLatch(1);
     private final Thread hook;
     private volatile boolean triggered;
@@ -26,6 +27,7 @@ public final class ShutdownGuard implements AutoCloseable {
 
     private void end() {
         triggered = true;
+        told.countDown();
         try {
             if (!done.await(GRACE_SECONDS, TimeUnit.SECONDS)) {
                 System.err.println("the drivers were not closed within " + GRACE_SECONDS + " s; ending without them");
@@ -42,6 +44,21 @@ public final class ShutdownGuard implements AutoCloseable {
      */
     public boolean triggered() {
         return triggered;
+    }
+
+    /**
+     * Whether the JVM is ending, or begins to within a time.
+     *
+     * @param millis how long to wait for that
+     * @return true as soon as it was told to
+     */
+    public boolean triggers(long millis) {
+        try {
+            return told.await(millis, TimeUnit.MILLISECONDS);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+            return triggered;
+        }
     }
 
     /** The run is over and its drivers are closed. */

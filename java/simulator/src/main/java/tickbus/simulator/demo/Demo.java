@@ -5,12 +5,14 @@ import java.io.IOException;
 import java.io.PrintStream;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.util.ArrayList;
 import java.util.List;
 import tickbus.simulator.Arguments;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.DriverSet;
 import tickbus.simulator.ShutdownGuard;
 import tickbus.simulator.Simulator;
+import tickbus.simulator.TickMode;
 import tickbus.simulator.TimeSource;
 import tickbus.simulator.rig.Counters;
 import tickbus.simulator.rig.Rig;
@@ -29,23 +31,35 @@ public final class Demo {
     private static final int USAGE = 2;
     private static final int INTERRUPTED = 130;
 
+    private static final String OK_BEGINS = "demo: ok ";
+
+    /** A demo that failed on a machine that stood still meanwhile says nothing, and is begun anew. */
+    private static final int ATTEMPTS = 3;
+
     /** Step and time in it at which the rig's picture tells most: both lifts up, the lamp on. */
     private static final int PICTURE_STEP = 5;
 
     private static final long PICTURE_NANOS = 400_000_000L;
 
+    /** How long the news of a Ctrl-C may take to this process. */
+    private static final long INTERRUPTION_MILLIS = 500;
+
     private final DemoOptions options;
     private final Display display;
     private final Timeline timeline;
     private final Rig rig = new Rig();
+    private final Stalls stalls;
     private Watcher watcher;
-    private List<EdgeAudit.Line> edges = List.of();
+    private EdgeAudit audit;
+    private Operator operator;
     private boolean pictured;
 
-    private Demo(DemoOptions options, Display display) {
+    private Demo(DemoOptions options, Display display, List<String> notes) {
         this.options = options;
         this.display = display;
         timeline = new Timeline(display::event);
+        stalls = new Stalls(TimeSource.system(), options.stepNanos());
+        notes.forEach(note -> timeline.add(0, "note", note));
     }
 
     /**
@@ -80,7 +94,8 @@ public final class Demo {
             return USAGE;
         }
         Path folder = options.drivers();
-        return run(options, () -> DeviceDriverFolder.scan(folder).open(), out, err);
+        return run(options, () -> DeviceDriverFolder.scan(folder).open(),
+                driver -> options.plc() == null ? new HostedPlc(driver) : PlcCommand.process(options, driver), out, err);
     }
 
     /** Where drivers come from. */
@@ -89,29 +104,60 @@ public final class Demo {
         DriverSet open();
     }
 
-    static int run(DemoOptions options, Opener opener, PrintStream out, PrintStream err) {
+    /** Where the PLC comes from, given the driver that it is the other end of. */
+    @FunctionalInterface
+    interface PlcMaker {
+        Plc make(ControlInterfaceDeviceDriver driver);
+    }
+
+    static int run(DemoOptions options, Opener opener, PlcMaker plc, PrintStream out, PrintStream err) {
         Display display = out == System.out && TerminalDisplay.fits()
                 ? new TerminalDisplay(out, TimeSource.system(), options.cycles())
                 : new LogDisplay(out);
-        return run(options, opener, display, out, err);
+        return run(options, opener, plc, display, out, err);
     }
 
-    static int run(DemoOptions options, Opener opener, Display display, PrintStream out, PrintStream err) {
+    static int run(DemoOptions options, Opener opener, PlcMaker plc, Display display, PrintStream out,
+            PrintStream err) {
         // The guard is closed last, so that after Ctrl-C the verdict is still printed.
         try (ShutdownGuard guard = new ShutdownGuard()) {
-            String verdict = new Demo(options, display).play(opener, guard, err);
+            List<String> notes = new ArrayList<>();
+            String verdict;
+            while (true) {
+                Demo demo = new Demo(options, display, List.copyOf(notes));
+                verdict = demo.play(opener, plc, guard, err);
+                long stall = demo.stalls.longestNanos();
+                if (verdict.startsWith(OK_BEGINS) || guard.triggered() || stall == 0) {
+                    break;
+                }
+                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
+                        + stall / 1_000_000 + " ms: " + verdict);
+                if (notes.size() == ATTEMPTS) {
+                    verdict = failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, the last"
+                            + " time for " + stall / 1_000_000 + " ms, so nothing can be said; the last attempt ended: "
+                            + verdict.replaceFirst("^demo: failed reason=", ""));
+                    break;
+                }
+            }
+            if (options.recording() != null && options.plc() != null) {
+                String trouble = HtmlPage.make(options, out);
+                if (trouble != null && verdict.startsWith(OK_BEGINS)) {
+                    verdict = failed(trouble);
+                }
+            }
             out.println(verdict);
             out.flush();
-            return guard.triggered() ? INTERRUPTED : verdict.startsWith("demo: ok ") ? OK : FAILED;
+            return guard.triggered() ? INTERRUPTED : verdict.startsWith(OK_BEGINS) ? OK : FAILED;
         }
     }
 
     /** Everything from opening the drivers to writing the report. */
-    private String play(Opener opener, ShutdownGuard guard, PrintStream err) {
+    private String play(Opener opener, PlcMaker maker, ShutdownGuard guard, PrintStream err) {
         String verdict;
-        try (Simulator simulator = new Simulator(opener.open(), rig, options.control(), options.stepNanos(),
-                TimeSource.system())) {
-            verdict = verdict(simulator, guard, err);
+        // The PLC is ended last: to the driver, a PLC that goes first would be one that was lost.
+        try (Ending ending = new Ending(); Simulator simulator = new Simulator(opener.open(), rig, options.control(),
+                options.stepNanos(), TimeSource.system())) {
+            verdict = verdict(simulator, maker, ending, guard, err);
             display.end();
             verdict = report(verdict);
         } catch (RuntimeException | Error e) {
@@ -121,37 +167,54 @@ public final class Demo {
         return verdict;
     }
 
-    private String verdict(Simulator simulator, ShutdownGuard guard, PrintStream err) {
+    /** Ends the PLC, if there is one. */
+    private static final class Ending implements AutoCloseable {
+        private Plc plc;
+
+        @Override
+        public void close() {
+            if (plc != null) {
+                plc.close();
+            }
+        }
+    }
+
+    private String verdict(Simulator simulator, PlcMaker maker, Ending ending, ShutdownGuard guard, PrintStream err) {
         try {
-            operate(simulator, guard);
+            if (simulator.drivers().size() != 1) {
+                throw new DemoFailure("the driver folder has " + simulator.drivers().size()
+                        + " .cfg files; the demo takes exactly one");
+            }
+            ControlInterfaceDeviceDriver driver = simulator.drivers().get(0);
+            ending.plc = maker.make(driver);
+            operate(simulator, driver, ending.plc, guard);
             return check(simulator);
         } catch (RuntimeException | Error e) {
             return failure(e, err);
         }
     }
 
-    private void operate(Simulator simulator, ShutdownGuard guard) {
-        if (simulator.drivers().size() != 1) {
-            throw new DemoFailure("the driver folder has " + simulator.drivers().size()
-                    + " .cfg files; the demo takes exactly one");
-        }
-        ControlInterfaceDeviceDriver driver = simulator.drivers().get(0);
+    private void operate(Simulator simulator, ControlInterfaceDeviceDriver driver, Plc plc, ShutdownGuard guard) {
         for (String name : simulator.unconnected()) {
             timeline.add(0, "note", "no row of the control table writes " + name);
         }
-        watcher = new Watcher(simulator, rig, driver.id(), timeline);
-        EdgeAudit audit = new EdgeAudit(simulator, driver);
-        StatisticsPeer peer = new StatisticsPeer(driver);
-        Operator operator = new Operator(options, watcher, timeline, audit, peer);
+        watcher = new Watcher(simulator, rig, driver, timeline);
+        audit = new EdgeAudit(simulator, driver);
+        plc.start();
+        timeline.add(0, "PLC", plc.name());
+        operator = new Operator(options, watcher, timeline, audit, plc, stalls,
+                () -> new Outage(watcher, driver, timeline, plc.name(), PlcCommand.maxAgeNanos(driver)));
         simulator.run(options.mode(), () -> {
             if (guard.triggered()) {
                 throw new DemoFailure("interrupted");
             }
             if (simulator.ticks() > 0) {
+                lookForStalls(plc);
+                checkPlc(plc, guard);
                 audit.look();
                 watcher.look();
                 operator.act();
-                display.tick(watcher, operator);
+                display.tick(watcher, operator, plc);
                 picture();
             }
             if (!operator.done() && simulator.simulationNanos() >= options.timeLimitNanos()) {
@@ -163,13 +226,32 @@ public final class Demo {
         if (!operator.done()) {
             throw new DemoFailure("interrupted");
         }
-        edges = audit.compare(peer);
+        audit.end(plc.counts());
+    }
+
+    private void lookForStalls(Plc plc) {
+        if (options.mode() == TickMode.REAL_TIME) {
+            stalls.look();
+            stalls.silent(plc.longestSilenceNanos());
+        }
+    }
+
+    private static void checkPlc(Plc plc, ShutdownGuard guard) {
+        try {
+            plc.check();
+        } catch (DemoFailure e) {
+            // Ctrl-C in a terminal reaches every process of it, and the PLC may have been the faster one.
+            if (guard.triggers(INTERRUPTION_MILLIS)) {
+                throw new DemoFailure("interrupted");
+            }
+            throw e;
+        }
     }
 
     /** The verdict on a script that was played to its end. */
     private String check(Simulator simulator) {
         Counters counters = rig.counters();
-        long missed = EdgeAudit.missed(edges);
+        long missed = audit.missed();
         long inRig = rig.bottles().size();
         must(watcher.cycles() == options.cycles(), "the PLC counts " + watcher.cycles() + " cycles instead of "
                 + options.cycles());
@@ -184,9 +266,14 @@ public final class Demo {
                 "bottles unaccounted: " + counters.fed() + " fed, " + counters.delivered() + " delivered, "
                         + counters.removed() + " removed, " + inRig + " in the rig");
         must(missed == 0, "missed edges: " + missed + "; the report has them by signal");
-        return "demo: ok cycles=" + watcher.cycles() + " jams=" + counters.jams() + " ticks=" + simulator.ticks()
-                + " missed_edges=" + missed + " stale_ticks=" + watcher.staleTicks() + " report="
-                + options.report();
+        if (operator.outage() != null) {
+            must(operator.restarts() == 1, "the PLC was started again " + operator.restarts() + " times instead of once");
+            must(operator.outage().over(), "the outage never ended");
+            must(watcher.staleTicksInOutage() > 0, "no tick was stale while the PLC was dead");
+        }
+        return OK_BEGINS + "cycles=" + watcher.cycles() + " jams=" + counters.jams() + " restarts="
+                + operator.restarts() + " ticks=" + simulator.ticks() + " missed_edges=" + missed + " stale_ticks="
+                + watcher.staleTicksInOutage() + " report=" + options.report();
     }
 
     private static void must(boolean fulfilled, String reason) {
@@ -211,15 +298,19 @@ public final class Demo {
     private String report(String verdict) {
         try {
             folder();
-            Files.writeString(options.report(), Report.write(options, verdict, timeline, watcher, edges));
+            if (watcher != null) {
+                HtmlPage.keepStatistics(options, watcher.simulator().drivers().get(0).statistics());
+            }
+            Files.writeString(options.report(), Report.write(options, verdict, timeline, watcher, audit, operator));
             return verdict;
         } catch (IOException e) {
-            return verdict.startsWith("demo: ok ") ? failed("the report cannot be written: " + e) : verdict;
+            return verdict.startsWith(OK_BEGINS) ? failed("the report cannot be written: " + e) : verdict;
         }
     }
 
     private void picture() {
-        if (pictured || watcher.step() != PICTURE_STEP || watcher.stepNanos() < PICTURE_NANOS || !rig.lamp()) {
+        if (pictured || watcher.step() != PICTURE_STEP || watcher.stepNanos() < PICTURE_NANOS || !rig.lamp()
+                || rig.jammed()) {
             return;
         }
         pictured = true;

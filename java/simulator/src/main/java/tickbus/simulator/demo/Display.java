@@ -6,7 +6,7 @@ interface Display {
     void event(Timeline.Event event);
 
     /** A tick is done; called after every one. */
-    void tick(Watcher watcher, Operator operator);
+    void tick(Watcher watcher, Operator operator, Plc plc);
 
     /** Nothing more will be shown. */
     void end();

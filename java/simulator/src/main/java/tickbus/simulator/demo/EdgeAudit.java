@@ -12,51 +12,109 @@ import tickbus.simulator.Simulator;
 
 /**
  * Counts the rising edges of every Boolean signal at the simulation's end of the link, and compares them
- * with what the other end counted.
+ * with what the PLC's end counted: for each life of the PLC, and exactly.
  *
- * <p>Of a signal to the PLC the simulation makes edges: they are counted in the values that were handed to
- * the driver. Of a signal from the PLC the simulation sees edges: the driver reports them by the component
- * {@code <name>.edges}, which also has those that fell between two ticks.
+ * <p><b>While the PLC is there.</b> Of a signal to the PLC the simulation makes edges: they are counted in the
+ * values that were handed to the driver. Of a signal from the PLC the simulation sees edges: the driver reports
+ * them by the component {@code <name>.edges}, which also has those that fell between two ticks.
+ *
+ * <p><b>When it comes.</b> A life begins with the first tick whose data are not stale. The PLC's image begins with
+ * all bits off, so a signal that is on counts once at the PLC, whatever came before. Here that tick counts so:
+ * <ul>
+ *   <li>a signal to the PLC counts once if it is on, or if it rose while there was no PLC, because the driver
+ *       keeps a latched pulse for the next exchange, and however many such pulses merge into one;
+ *   <li>a signal from the PLC counts the edges that the driver reports; if it reports none, because the signal was
+ *       on when the driver saw it last, or by its fail-safe value, it counts once if it is on.
+ * </ul>
+ *
+ * <p><b>When it goes.</b> A PLC that is killed cannot be asked any more, so it must be killed while the counts that
+ * it gave last are {@linkplain #disagreement the same as here}. Nobody counts at the other end from then on. An edge
+ * from the PLC that arrives nevertheless was made after its last counts: it fails the audit, which could not be exact
+ * any more. So does a signal to the PLC that rises twice while the link comes up: nobody could tell whether the
+ * pulses merged.
  */
 final class EdgeAudit {
+    private static final int STALE = 2;
+
+    /** A pulse this long before the link came up may have merged with an earlier one, or not. */
+    private static final long COMING_UP_NANOS = 100_000_000L;
+
     /** A signal with its counts at both ends. */
     record Line(String signal, boolean toPlc, long here, long there) {
         long missed() {
             return Math.abs(here - there);
         }
+
+        private String text() {
+            return "\"" + signal + "\": " + here + " here, " + there + " at the PLC";
+        }
+    }
+
+    /** One life of the PLC. */
+    record Life(int number, String end, List<Line> lines) {
+    }
+
+    private enum State {
+        /** There never was a PLC, or its data are stale. */
+        AWAY,
+        PRESENT,
+        /** It is dead, but its last data are not stale yet. */
+        CUT
     }
 
     private static final class Counter {
         final String signal;
         final boolean toPlc;
         final DoubleSupplier value;
+        final DoubleSupplier edges;
         private boolean high;
         private long count;
+        /** Rises to the PLC while there is none, and when the last one was. */
+        private int pending;
+        private long pendingAt;
 
-        Counter(String signal, boolean toPlc, DoubleSupplier value) {
+        Counter(String signal, DoubleSupplier value, DoubleSupplier edges) {
             this.signal = signal;
-            this.toPlc = toPlc;
+            this.toPlc = edges == null;
             this.value = value;
+            this.edges = edges;
         }
 
-        /** Takes one tick; true if there was an edge. */
-        boolean look() {
-            long before = count;
-            double now = value.getAsDouble();
-            if (toPlc) {
-                count += now != 0 && !high ? 1 : 0;
-                high = now != 0;
-            } else {
-                count += (long) now;
+        /** The edges of one tick. */
+        long rises() {
+            boolean before = high;
+            high = value.getAsDouble() != 0;
+            return toPlc ? high && !before ? 1 : 0 : (long) edges.getAsDouble();
+        }
+
+        void pend(long now) {
+            pending++;
+            pendingAt = now;
+        }
+
+        /** The first tick of a life. */
+        void begin(long rises, long now) {
+            if (toPlc && pending > 1 && now - pendingAt < COMING_UP_NANOS) {
+                throw new DemoFailure("\"" + signal + "\" rose " + pending + " times while there was no PLC, the last"
+                        + " time just as the link came up, so its edges cannot be compared");
             }
-            return count != before;
+            boolean once = high || toPlc && pending > 0;
+            count = rises > 0 && !toPlc ? rises : once ? 1 : 0;
+            pending = 0;
         }
     }
 
+    private final Simulator simulator;
+    private final DoubleSupplier status;
     private final List<Counter> counters = new ArrayList<>();
+    private final List<Life> lives = new ArrayList<>();
+    private State state = State.AWAY;
     private long quietTicks;
+    private long lastEdgeNanoTime;
 
     EdgeAudit(Simulator simulator, ControlInterfaceDeviceDriver driver) {
+        this.simulator = simulator;
+        status = simulator.probe(driver.id() + ":bus.status");
         List<HardwareComponent> components = driver.components();
         var names = components.stream().map(HardwareComponent::name).collect(Collectors.toSet());
         for (HardwareComponent component : components) {
@@ -64,22 +122,45 @@ final class EdgeAudit {
                 continue;
             }
             boolean toPlc = component.direction() == Direction.WRITTEN_BY_SIMULATION;
-            String name = component.name() + (toPlc ? "" : ".edges");
-            if (!names.contains(name)) {
+            String edges = component.name() + ".edges";
+            if (!toPlc && !names.contains(edges)) {
                 throw new DemoFailure("\"" + component.name() + "\" has no latch in the driver's .cfg, so its edges"
                         + " are not counted; give it latch = \"rising\"");
             }
-            counters.add(new Counter(component.name(), toPlc, simulator.probe(driver.id() + ":" + name)));
+            String prefix = driver.id() + ":";
+            counters.add(new Counter(component.name(), simulator.probe(prefix + component.name()),
+                    toPlc ? null : simulator.probe(prefix + edges)));
         }
     }
 
     /** Counts one tick. */
     void look() {
-        boolean edge = false;
+        boolean stale = (int) status.getAsDouble() == STALE;
+        boolean begins = state == State.AWAY && !stale;
+        if (state == State.CUT && stale) {
+            state = State.AWAY;
+        } else if (begins) {
+            state = State.PRESENT;
+        }
+        boolean edge = begins;
         for (Counter counter : counters) {
-            edge |= counter.look();
+            long rises = counter.rises();
+            edge |= rises != 0;
+            if (begins) {
+                counter.begin(rises, simulator.simulationNanos());
+            } else if (state == State.PRESENT) {
+                counter.count += rises;
+            } else if (counter.toPlc && rises != 0) {
+                counter.pend(simulator.simulationNanos());
+            } else if (rises != 0) {
+                throw new DemoFailure("an edge of \"" + counter.signal + "\" came from the PLC after the last counts"
+                        + " that it gave before it was killed, so its edges cannot be compared");
+            }
         }
         quietTicks = edge ? 0 : quietTicks + 1;
+        if (edge) {
+            lastEdgeNanoTime = System.nanoTime();
+        }
     }
 
     /** Ticks since the last edge at this end. */
@@ -87,9 +168,40 @@ final class EdgeAudit {
         return quietTicks;
     }
 
-    /** Compares; fails if the other end has no count for a signal. */
-    List<Line> compare(PeerCounts peer) {
-        Map<String, Long> rises = peer.rises();
+    /** Whether the PLC gave counts after the last edge at this end. */
+    boolean isNewer(Plc.Counts counts) {
+        return counts.scans() >= 0 && counts.nanoTime() - lastEdgeNanoTime > 0;
+    }
+
+    /**
+     * What the PLC counts otherwise than this end.
+     *
+     * @return null if nothing
+     * @throws DemoFailure if it has no count for a signal
+     */
+    String disagreement(Plc.Counts counts) {
+        String differing = compare(counts).stream().filter(line -> line.missed() != 0).map(Line::text)
+                .collect(Collectors.joining("; "));
+        return differing.isEmpty() ? null : differing;
+    }
+
+    /** The PLC was killed: its life is over with the counts that it gave last. */
+    void cut(Plc.Counts last) {
+        close("killed", last);
+        state = State.CUT;
+    }
+
+    /** The demo is over for the PLC of the last life. */
+    void end(Plc.Counts last) {
+        close("end of the demo", last);
+    }
+
+    private void close(String end, Plc.Counts last) {
+        lives.add(new Life(lives.size() + 1, end, compare(last)));
+    }
+
+    private List<Line> compare(Plc.Counts counts) {
+        Map<String, Long> rises = counts.rises();
         if (rises.isEmpty()) {
             throw new DemoFailure("the PLC end gives no edge counts to compare with");
         }
@@ -104,8 +216,13 @@ final class EdgeAudit {
         return lines;
     }
 
-    /** Sum of the differences over all signals and both directions. */
-    static long missed(List<Line> lines) {
-        return lines.stream().mapToLong(Line::missed).sum();
+    /** The lives that are over. */
+    List<Life> lives() {
+        return List.copyOf(lives);
+    }
+
+    /** Sum of the differences over all lives, all signals and both directions. */
+    long missed() {
+        return lives.stream().flatMap(life -> life.lines().stream()).mapToLong(Line::missed).sum();
     }
 }

@@ -16,7 +16,7 @@ final class LogDisplay implements Display {
     }
 
     @Override
-    public void tick(Watcher watcher, Operator operator) {
+    public void tick(Watcher watcher, Operator operator, Plc plc) {
         // Events say enough; a line per tick would flood the log.
     }
 

@@ -3,8 +3,11 @@ package tickbus.simulator.demo;
 import java.util.ArrayDeque;
 import java.util.Deque;
 import java.util.Locale;
+import java.util.concurrent.locks.LockSupport;
 import java.util.function.BooleanSupplier;
+import java.util.function.Supplier;
 import tickbus.simulator.Simulator;
+import tickbus.simulator.rig.Bottle;
 import tickbus.simulator.rig.Button;
 import tickbus.simulator.rig.Lift;
 import tickbus.simulator.rig.Rig;
@@ -23,8 +26,11 @@ final class Operator {
     /** And how many scans of the PLC. */
     private static final int QUIET_SCANS = 3;
 
+    /** How long the counts of both ends may take to agree; then they are compared as they are. */
+    private static final long AGREEMENT_NANOS = 2 * SECOND;
+
     /** Statistics are slow, so they are asked for only now and then. */
-    private static final int TICKS_PER_LOOK_AT_SCANS = 25;
+    private static final int TICKS_PER_LOOK_AT_SCANS = 5;
 
     /** A part of the script; {@code faultExpected} while the jam and its recovery are under way. */
     private record Stage(String name, String awaited, long limitNanos, boolean faultExpected, Runnable begin,
@@ -37,25 +43,32 @@ final class Operator {
     private final Rig rig;
     private final Timeline timeline;
     private final EdgeAudit audit;
-    private final StatisticsPeer peer;
+    private final Plc plc;
+    private final Stalls stalls;
+    private final Supplier<Outage> blackout;
     private Stage stage;
+    private Outage outage;
     private long since;
     private long firstScan;
-    private boolean scansPassed;
+    private int restarts;
+    private String disagreement;
 
-    Operator(DemoOptions options, Watcher watcher, Timeline timeline, EdgeAudit audit, StatisticsPeer peer) {
+    Operator(DemoOptions options, Watcher watcher, Timeline timeline, EdgeAudit audit, Plc plc, Stalls stalls,
+            Supplier<Outage> blackout) {
         this.watcher = watcher;
         this.simulator = watcher.simulator();
         this.rig = watcher.rig();
         this.timeline = timeline;
         this.audit = audit;
-        this.peer = peer;
-        write(options.cycles(), options.jamCycle());
+        this.plc = plc;
+        this.stalls = stalls;
+        this.blackout = blackout;
+        write(options.cycles(), options.jamCycle(), plc.restartable() ? options.killCycle() : 0);
         next();
     }
 
-    private void write(int cycles, int jamCycle) {
-        stage("homing", "the Ready lamp", 25, () -> { }, watcher::readyLamp);
+    private void write(int cycles, int jamCycle, int killCycle) {
+        stage("homing", "the Ready lamp", 30, () -> { }, watcher::readyLamp);
         stage("start", "the Running lamp", 3, () -> press(Button.START), watcher::runningLamp);
         for (int cycle = 1; cycle < jamCycle; cycle++) {
             runCycle(cycle);
@@ -65,7 +78,13 @@ final class Operator {
         fault("clearing the jam", "half a second to pass", 2, this::clear, () -> elapsed() >= SECOND / 2);
         fault("recovery", "Not OK off and the Running lamp", 30, () -> press(Button.RESET),
                 () -> !rig.notOk() && !watcher.faultLamp() && watcher.runningLamp());
-        for (int cycle = jamCycle; cycle < cycles; cycle++) {
+        for (int cycle = jamCycle; cycle < killCycle; cycle++) {
+            runCycle(cycle);
+        }
+        if (killCycle > 0) {
+            restart(killCycle);
+        }
+        for (int cycle = Math.max(jamCycle, killCycle); cycle < cycles; cycle++) {
             runCycle(cycle);
         }
         stage("cycle " + cycles, "its step 2", 20, () -> { },
@@ -73,7 +92,19 @@ final class Operator {
         stage("stop in cycle " + cycles, "its end", 20, () -> press(Button.STOP),
                 () -> watcher.cycles() >= cycles);
         stage("parking", "the Parked lamp", 20, () -> { }, watcher::parkedLamp);
-        stage("settling", "all edges to pass and the PLC to scan", 5, () -> firstScan = peer.scans(), this::settled);
+        stage("settling", "all edges to pass and the PLC to scan", 8, () -> firstScan = plc.counts().scans(),
+                this::settled);
+    }
+
+    /** The PLC dies in the midst of a cycle, and comes back. */
+    private void restart(int cycle) {
+        stage("cycle " + cycle, "lift 2 to carry a bottle, and equal counts at both ends", 20,
+                () -> { }, () -> momentToKill(cycle));
+        stage("PLC killed", "stale data and the rig to stand still", 5, this::kill, () -> outage.standsStill());
+        stage("looking at the rig", "1.5 s to pass", 3, () -> { }, () -> elapsed() >= SECOND * 3 / 2);
+        stage("PLC started again", "data from it", 20, this::startAgain, () -> outage.over());
+        stage("homing after the outage", "the Ready lamp", 40, () -> { }, watcher::readyLamp);
+        stage("start after the outage", "the Running lamp", 3, () -> press(Button.START), watcher::runningLamp);
     }
 
     private void runCycle(int cycle) {
@@ -90,6 +121,12 @@ final class Operator {
 
     /** Acts once, after a tick. */
     void act() {
+        for (String line : plc.news()) {
+            timeline.add(simulator.simulationNanos(), "PLC", "says: " + line.replaceFirst("^plc: ", ""));
+        }
+        if (outage != null) {
+            outage.look(watcher.stale());
+        }
         if (done()) {
             return;
         }
@@ -159,11 +196,82 @@ final class Operator {
         timeline.add(simulator.simulationNanos(), "operator", text);
     }
 
-    private boolean settled() {
-        if (simulator.ticks() % TICKS_PER_LOOK_AT_SCANS == 0) {
-            scansPassed = firstScan < 0 || peer.scans() >= firstScan + QUIET_SCANS;
+    private boolean quiet() {
+        return audit.quietTicks() >= QUIET_TICKS && simulator.ticks() % TICKS_PER_LOOK_AT_SCANS == 0;
+    }
+
+    /**
+     * The moment that tells most: lift 2 is under way with a bottle on its cup. It is also one at which the PLC's
+     * newest counts have every edge, because there was none for a while: afterwards it cannot be asked any more.
+     */
+    private boolean momentToKill(int cycle) {
+        if (watcher.cycles() >= cycle) {
+            throw new DemoFailure("cycle " + cycle + " ended before the counts of both ends agreed, so the PLC could not"
+                    + " be killed in it" + differing());
         }
-        return scansPassed && audit.quietTicks() >= QUIET_TICKS
-                && elapsed() >= QUIET_TICKS * simulator.stepNanos();
+        if (!rig.moving() || rig.position(Lift.LA2) <= 1
+                || rig.bottles().stream().noneMatch(bottle -> bottle.place() == Bottle.Place.CUP2) || !quiet()) {
+            return false;
+        }
+        return agreed(plc.counts());
+    }
+
+    private String differing() {
+        return disagreement == null ? "" : ": " + disagreement;
+    }
+
+    /** Whether the PLC's newest counts have every edge that this end has. */
+    private boolean agreed(Plc.Counts counts) {
+        disagreement = audit.isNewer(counts) ? audit.disagreement(counts) : null;
+        return audit.isNewer(counts) && disagreement == null;
+    }
+
+    private void kill() {
+        outage = blackout.get();
+        String name = plc.name();
+        plc.kill();
+        // No tick runs while the PLC dies and the driver notices, so every edge is made before or after that.
+        Watcher.Link link = awaitLoss();
+        stalls.pause();
+        audit.cut(plc.counts());
+        watcher.plcKilled();
+        outage.left(link.toString());
+        say("kills the PLC (" + name + ", SIGKILL) in " + outage.place());
+    }
+
+    private Watcher.Link awaitLoss() {
+        long limit = System.nanoTime() + SECOND;
+        Watcher.Link link = watcher.lookAtLink();
+        while (link.state().equals("running") && System.nanoTime() - limit < 0) {
+            LockSupport.parkNanos(100_000);
+            link = watcher.lookAtLink();
+        }
+        return link;
+    }
+
+    private void startAgain() {
+        plc.start();
+        stalls.pause();
+        restarts++;
+        say("starts the PLC again (" + plc.name() + ")");
+    }
+
+    /** How often the PLC was started again. */
+    int restarts() {
+        return restarts;
+    }
+
+    /** The time without a PLC, null if it did not come to that. */
+    Outage outage() {
+        return outage;
+    }
+
+    private boolean settled() {
+        if (!quiet() || elapsed() < QUIET_TICKS * simulator.stepNanos()) {
+            return false;
+        }
+        Plc.Counts counts = plc.counts();
+        boolean scanned = firstScan < 0 || counts.scans() >= firstScan + QUIET_SCANS;
+        return scanned && (agreed(counts) || elapsed() > AGREEMENT_NANOS);
     }
 }

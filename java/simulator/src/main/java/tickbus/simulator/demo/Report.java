@@ -22,15 +22,17 @@ final class Report {
      * @param verdict the demo's last line
      * @param timeline what happened
      * @param run what ran, null if it never came to that
-     * @param edges the comparison, empty if it never came to that
+     * @param audit the comparison of edges, null if it never came to that
+     * @param operator who operated it, null if it never came to that
      */
-    static String write(DemoOptions options, String verdict, Timeline timeline, Watcher run,
-            List<EdgeAudit.Line> edges) {
+    static String write(DemoOptions options, String verdict, Timeline timeline, Watcher run, EdgeAudit audit,
+            Operator operator) {
         Report report = new Report();
         report.text.append("The test rig demo\n=================\n\n").append(verdict).append('\n');
         report.configuration(options, run);
         report.timeline(timeline);
-        report.edges(edges);
+        report.outage(operator == null ? null : operator.outage());
+        report.edges(audit == null ? List.of() : audit.lives());
         if (run != null) {
             report.faults(run.faults());
             report.counters(run);
@@ -54,6 +56,8 @@ final class Report {
         table.row("step size", Durations.text(options.stepNanos()));
         table.row("cycles", options.cycles());
         table.row("jam in cycle", options.jamCycle());
+        table.row("PLC", options.plc() == null ? "not the demo's affair" : options.plc() + ", killed in cycle "
+                + options.killCycle());
         table.row("time limit", Durations.text(options.timeLimitNanos()));
         if (run != null) {
             run.simulator().drivers().forEach(driver -> table.row("driver " + driver.id(), driver.name()));
@@ -67,20 +71,33 @@ final class Report {
         timeline.events().forEach(event -> text.append("  ").append(event.line()).append('\n'));
     }
 
-    private void edges(List<EdgeAudit.Line> edges) {
+    private void outage(Outage outage) {
+        if (outage != null) {
+            heading("The outage, in simulation time");
+            text.append(outage.text("  "));
+        }
+    }
+
+    private void edges(List<EdgeAudit.Life> lives) {
         heading("Rising edges at both ends");
-        if (edges.isEmpty()) {
+        if (lives.isEmpty()) {
             text.append("  not compared\n");
-            return;
         }
-        Columns table = new Columns("signal", "direction", ">made", ">seen", ">missed");
-        for (EdgeAudit.Line line : edges) {
-            long made = line.toPlc() ? line.here() : line.there();
-            long seen = line.toPlc() ? line.there() : line.here();
-            table.row(line.signal(), line.toPlc() ? "simulation to PLC" : "PLC to simulation", made, seen,
-                    line.missed());
+        for (EdgeAudit.Life life : lives) {
+            if (life.number() > 1) {
+                text.append('\n');
+            }
+            text.append("  Life ").append(life.number()).append(" of the PLC, until: ").append(life.end())
+                    .append("\n\n");
+            Columns table = new Columns("signal", "direction", ">made", ">seen", ">missed");
+            for (EdgeAudit.Line line : life.lines()) {
+                long made = line.toPlc() ? line.here() : line.there();
+                long seen = line.toPlc() ? line.there() : line.here();
+                table.row(line.signal(), line.toPlc() ? "simulation to PLC" : "PLC to simulation", made, seen,
+                        line.missed());
+            }
+            text.append(table.text("  "));
         }
-        text.append(table.text("  "));
     }
 
     private void faults(List<String> faults) {
@@ -97,7 +114,8 @@ final class Report {
         Counters rig = run.rig().counters();
         Columns table = new Columns("count", ">value");
         table.row("ticks", simulator.ticks());
-        table.row("stale ticks", run.staleTicks());
+        table.row("stale ticks at the start", run.staleTicksAtStart());
+        table.row("stale ticks in the outage", run.staleTicksInOutage());
         table.row("late ticks", simulator.lateTicks());
         table.row("dropped ticks", simulator.droppedTicks());
         table.row("cycles that the PLC counts", run.cycles());

@@ -7,6 +7,7 @@ import java.util.Deque;
 import java.util.List;
 import java.util.Locale;
 import tickbus.simulator.TimeSource;
+import tickbus.simulator.rig.Bottle;
 import tickbus.simulator.rig.Geometry;
 import tickbus.simulator.rig.Lift;
 import tickbus.simulator.rig.Rig;
@@ -15,7 +16,7 @@ import tickbus.simulator.text.Durations;
 /** A few lines on a terminal, redrawn in place some times a second. */
 final class TerminalDisplay implements Display {
     private static final long REDRAW_NANOS = 200_000_000L;
-    private static final int SHOWN_EVENTS = 5;
+    private static final int SHOWN_EVENTS = 6;
     private static final int BAR = 24;
     private static final int WIDTH = 79;
 
@@ -30,6 +31,7 @@ final class TerminalDisplay implements Display {
     private int drawn;
     private Watcher watcher;
     private Operator operator;
+    private Plc plc;
 
     TerminalDisplay(PrintStream out, TimeSource time, int cycles) {
         this.out = out;
@@ -61,9 +63,10 @@ final class TerminalDisplay implements Display {
     }
 
     @Override
-    public void tick(Watcher watcher, Operator operator) {
+    public void tick(Watcher watcher, Operator operator, Plc plc) {
         this.watcher = watcher;
         this.operator = operator;
+        this.plc = plc;
         long now = time.nanoTime();
         if (now - nextDraw >= 0) {
             nextDraw = now + REDRAW_NANOS;
@@ -101,15 +104,17 @@ final class TerminalDisplay implements Display {
         lines.add(text("phase   %-10s step %d  %s", watcher.phaseName(), watcher.step(), watcher.stepName()));
         lines.add(text("cycle   %d of %d     %s", Math.min(watcher.cycles() + 1, cycles), cycles, bar(progress())));
         for (Lift lift : Lift.values()) {
-            lines.add(text("%s     %s %6.1f mm  beam %s", lift, bar(rig.position(lift) / Geometry.STROKE),
-                    rig.position(lift), rig.beamBlocked(lift) ? "dark" : "free"));
+            lines.add(text("%s     %s %6.1f mm  beam %s  cup %s", lift, bar(rig.position(lift) / Geometry.STROKE),
+                    rig.position(lift), rig.beamBlocked(lift) ? "dark" : "free", cup(rig, lift)));
         }
         lines.add("lamp    " + (rig.lamp() ? "ON " : "off") + "   wheel 1 " + (rig.homed(1) ? "at index" : "between ")
                 + "   wheel 2 " + (rig.homed(2) ? "at index" : "between ") + (rig.notOk() ? "   NOT OK" : ""));
         lines.add("panel   " + light("Ready", watcher.readyLamp()) + light("Running", watcher.runningLamp())
                 + light("Fault", watcher.faultLamp()) + light("Parked", watcher.parkedLamp()));
-        lines.add(text("link    %s, age %.1f ms   ticks %d, stale %d, late %d", watcher.statusName(),
-                watcher.ageSeconds() * 1e3, watcher.simulator().ticks(), watcher.staleTicks(),
+        lines.add("PLC     " + plc());
+        lines.add("link    " + watcher.link());
+        lines.add(text("data    %-9s age %s   ticks %d, stale %d, late %d", watcher.statusName(), age(),
+                watcher.simulator().ticks(), watcher.staleTicksAtStart() + watcher.staleTicksInOutage(),
                 watcher.simulator().lateTicks()));
         lines.add("");
         lines.addAll(events);
@@ -117,6 +122,30 @@ final class TerminalDisplay implements Display {
             lines.add("");
         }
         return lines;
+    }
+
+    private static String cup(Rig rig, Lift lift) {
+        Bottle.Place cup = lift == Lift.LA1 ? Bottle.Place.CUP1 : Bottle.Place.CUP2;
+        return (rig.vacuum(lift) ? "on " : "off") + rig.bottles().stream().filter(bottle -> bottle.place() == cup)
+                .map(bottle -> ", holds bottle " + bottle.id()).findFirst().orElse("");
+    }
+
+    private String plc() {
+        Outage outage = operator.outage();
+        if (watcher.away()) {
+            return plc.name() + (operator.restarts() == 0 ? " KILLED, dead for " : " started again, away for ")
+                    + seconds(outage.lastedNanos());
+        }
+        return plc.name() + (outage == null ? "" : ", back after an outage of " + seconds(outage.lastedNanos()));
+    }
+
+    private static String seconds(long nanos) {
+        return text("%.1f s", nanos / 1e9);
+    }
+
+    private String age() {
+        double seconds = watcher.ageSeconds();
+        return seconds < 1 ? text("%.1f ms", seconds * 1e3) : seconds < 1e6 ? text("%.1f s", seconds) : "none";
     }
 
     private double progress() {

@@ -1,7 +1,9 @@
 package tickbus.simulator.demo;
 
+import controlinterface.ControlInterfaceDeviceDriver;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.Map;
 import java.util.function.DoubleSupplier;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.rig.Rig;
@@ -23,10 +25,32 @@ final class Watcher {
     };
     private static final String[] STATUS = {"fresh", "unchanged", "stale"};
     private static final int STALE = 2;
-    private static final long LONGEST_STALE_NANOS = 1_000_000_000L;
+    private static final long LONGEST_START_NANOS = 10_000_000_000L;
+
+    /** Statistics are slow, so they are asked for only now and then. */
+    private static final int TICKS_PER_LOOK_AT_LINK = 10;
+
+    /** How the driver says its link is doing; empty texts if it says nothing. */
+    record Link(String state, String cause, String reason) {
+        private static final Link UNKNOWN = new Link("", "", "");
+
+        private static Link of(Map<String, String> statistics) {
+            String state = statistics.get("state");
+            return state == null ? UNKNOWN : new Link(state, statistics.getOrDefault("cause", ""),
+                    statistics.getOrDefault("reason", ""));
+        }
+
+        @Override
+        public String toString() {
+            return state.isEmpty() ? "the driver says nothing about it"
+                    : state + (cause.isEmpty() || cause.equals(state) ? "" : ", " + cause)
+                    + (reason.isEmpty() ? "" : ": " + reason);
+        }
+    }
 
     private final Simulator simulator;
     private final Rig rig;
+    private final ControlInterfaceDeviceDriver driver;
     private final Timeline timeline;
     private final DoubleSupplier ready;
     private final DoubleSupplier running;
@@ -41,16 +65,24 @@ final class Watcher {
 
     private int lastPhase = -1;
     private int lastStep;
-    private int lastCycles;
     private boolean lastNotOk;
     private boolean lastStale;
     private long stepSince;
-    private long staleTicks;
-    private long staleInARow;
+    private Link link = Link.UNKNOWN;
+    /** Cycles of earlier lives of the PLC, and of the present one as it told last. */
+    private int cyclesBefore;
+    private int cyclesTold;
+    /** There was a PLC once. */
+    private boolean begun;
+    /** The PLC is dead: from the kill to the first data of the next life. */
+    private boolean away;
+    private long staleAtStart;
+    private long staleInOutage;
 
-    Watcher(Simulator simulator, Rig rig, int driver, Timeline timeline) {
+    Watcher(Simulator simulator, Rig rig, ControlInterfaceDeviceDriver driver, Timeline timeline) {
         this.simulator = simulator;
         this.rig = rig;
+        this.driver = driver;
         this.timeline = timeline;
         ready = simulator.probe("machine:panel.ready");
         running = simulator.probe("machine:panel.running");
@@ -59,28 +91,19 @@ final class Watcher {
         phase = simulator.probe("machine:panel.phase");
         step = simulator.probe("machine:panel.step");
         cycles = simulator.probe("machine:panel.cycles");
-        status = simulator.probe(driver + ":bus.status");
-        age = simulator.probe(driver + ":bus.age");
+        status = simulator.probe(driver.id() + ":bus.status");
+        age = simulator.probe(driver.id() + ":bus.age");
     }
 
-    /** Looks at everything once, after a tick. Fails if the link was stale for too long. */
+    /** Looks at everything once, after a tick. Fails if data are stale that must not be. */
     void look() {
         long now = simulator.simulationNanos();
-        lookAtLink(now);
-        if (cycles() != lastCycles) {
-            lastCycles = cycles();
-            timeline.add(now, "PLC", "cycles completed: " + lastCycles);
+        lookAtData(now);
+        if (simulator.ticks() % TICKS_PER_LOOK_AT_LINK == 0) {
+            lookAtLink();
         }
-        if (phase() != lastPhase) {
-            lastPhase = phase();
-            timeline.add(now, "PLC", "phase " + phaseName());
-        }
-        if (step() != lastStep) {
-            lastStep = step();
-            stepSince = now;
-            if (lastStep != 0) {
-                timeline.add(now, "PLC", "cycle " + (cycles() + 1) + ", step " + lastStep + ": " + stepName());
-            }
+        if (!stale() && !away) {
+            lookAtPlc(now);
         }
         if (rig.notOk() != lastNotOk) {
             lastNotOk = rig.notOk();
@@ -94,22 +117,81 @@ final class Watcher {
         }
     }
 
-    private void lookAtLink(long now) {
-        boolean stale = (int) status.getAsDouble() == STALE;
+    private void lookAtPlc(long now) {
+        int told = (int) cycles.getAsDouble();
+        if (told != cyclesTold) {
+            cyclesTold = told;
+            timeline.add(now, "PLC", "cycles completed: " + cycles());
+        }
+        if (phase() != lastPhase) {
+            lastPhase = phase();
+            timeline.add(now, "PLC", "phase " + phaseName());
+        }
+        if (step() != lastStep) {
+            lastStep = step();
+            stepSince = now;
+            if (lastStep != 0) {
+                timeline.add(now, "PLC", "cycle " + (cycles() + 1) + ", step " + lastStep + ": " + stepName());
+            }
+        }
+    }
+
+    private void lookAtData(long now) {
+        boolean stale = stale();
+        if (!stale) {
+            away &= !lastStale;
+            begun = true;
+        } else if (away) {
+            staleInOutage++;
+        } else if (begun) {
+            lookAtLink();
+            throw new DemoFailure("the data became stale, outside the start-up and the outage; link: " + link);
+        } else {
+            staleAtStart++;
+            if (now > LONGEST_START_NANOS) {
+                lookAtLink();
+                throw new DemoFailure("no data came from a PLC for " + Durations.text(LONGEST_START_NANOS)
+                        + " of simulation time; link: " + link);
+            }
+        }
         if (stale != lastStale) {
             lastStale = stale;
-            timeline.add(now, "link", stale ? "stale: nothing from the PLC" : "alive again");
+            timeline.add(now, "link", !stale ? "data are fresh" : (begun ? "data are stale" : "no data yet")
+                    + ", fail-safe values are delivered");
         }
-        if (!stale) {
-            staleInARow = 0;
-            return;
+    }
+
+    /** Asks the driver how its link is doing. */
+    Link lookAtLink() {
+        Link now = Link.of(driver.statistics());
+        if (!now.state().equals(link.state()) || !now.cause().equals(link.cause())) {
+            timeline.add(simulator.simulationNanos(), "link", now.toString());
         }
-        staleTicks++;
-        staleInARow++;
-        if (staleInARow * simulator.stepNanos() > LONGEST_STALE_NANOS) {
-            throw new DemoFailure("the link was stale for more than "
-                    + Durations.text(LONGEST_STALE_NANOS) + " of simulation time");
-        }
+        link = now;
+        return now;
+    }
+
+    /** The PLC is dead from here on, until data come again. */
+    void plcKilled() {
+        away = true;
+        cyclesBefore += cyclesTold;
+        cyclesTold = 0;
+        lastPhase = -1;
+        lastStep = 0;
+    }
+
+    /** Whether the data of the last tick were stale. */
+    boolean stale() {
+        return (int) status.getAsDouble() == STALE;
+    }
+
+    /** Whether the PLC is dead, as far as the data tell. */
+    boolean away() {
+        return away;
+    }
+
+    Link link() {
+        return link;
     }
 
     boolean readyLamp() {
@@ -133,6 +215,9 @@ final class Watcher {
     }
 
     String phaseName() {
+        if (stale() || away) {
+            return "no PLC";
+        }
         return phase() >= 0 && phase() < PHASES.length ? PHASES[phase()] : "unknown, " + phase();
     }
 
@@ -150,8 +235,9 @@ final class Watcher {
         return simulator.simulationNanos() - stepSince;
     }
 
+    /** Cycles that the PLC has completed, in all its lives. */
     int cycles() {
-        return (int) cycles.getAsDouble();
+        return cyclesBefore + cyclesTold;
     }
 
     String statusName() {
@@ -163,8 +249,14 @@ final class Watcher {
         return age.getAsDouble();
     }
 
-    long staleTicks() {
-        return staleTicks;
+    /** Stale ticks before the first data came. */
+    long staleTicksAtStart() {
+        return staleAtStart;
+    }
+
+    /** Stale ticks while the PLC was dead. */
+    long staleTicksInOutage() {
+        return staleInOutage;
     }
 
     /** A line per time that Not OK rose, with its causes. */

@@ -30,6 +30,7 @@ public final class Bottle {
     private int slot;
     private double height;
     private boolean treated;
+    private boolean back;
 
     Bottle() {}
 
@@ -82,6 +83,7 @@ public final class Bottle {
     void number(int newId) {
         id = newId;
         treated = false;
+        back = false;
     }
 
     void put(Place newPlace, int newSlot, double newHeight) {
@@ -96,5 +98,12 @@ public final class Bottle {
 
     void treat() {
         treated = true;
+    }
+
+    /** Back in a pocket; true the first time that it is, and was treated. */
+    boolean comesBack() {
+        boolean first = treated && !back;
+        back |= first;
+        return first;
     }
 }

@@ -135,7 +135,7 @@ final class Cell {
         if (fell != null) {
             fallen++;
             conveyor.away(fell);
-        } else if (onCup != null && onCup.place() == Bottle.Place.POCKET && onCup.treated()) {
+        } else if (onCup != null && onCup.place() == Bottle.Place.POCKET && onCup.comesBack()) {
             treated++;
         }
     }

@@ -21,7 +21,7 @@ final class StepMonitor {
     private int pattern;
     private int step;
 
-    /** The step completed last; 0 after a fault, when no cycle is under way. */
+    /** The step completed last; 0 when no cycle is under way: after a fault, or after a word that is no step's. */
     private int previous;
 
     private long cycles;
@@ -41,6 +41,9 @@ final class StepMonitor {
             pattern = newPattern;
             step = stepOf(newPattern);
             state = State.WAITING;
+            if (step == 0) {
+                previous = 0;
+            }
         } else if (state == State.WAITING && step > 0 && !busy) {
             state = State.COMPLETE;
             if (inTurn() && step == STEPS) {

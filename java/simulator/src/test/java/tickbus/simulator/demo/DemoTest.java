@@ -1,6 +1,7 @@
 package tickbus.simulator.demo;
 
 import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertNotEquals;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.io.ByteArrayOutputStream;
@@ -11,7 +12,6 @@ import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
-import java.util.Arrays;
 import java.util.List;
 import java.util.jar.Attributes;
 import java.util.jar.JarOutputStream;
@@ -23,11 +23,11 @@ import org.junit.jupiter.api.io.TempDir;
 
 /**
  * The whole way: simulator, drop-in driver, native library, loopback, the built-in PLC program. First as it
- * should be, then with the PLC, the rig and the link broken in turn. Stepped, so that no clock plays a part.
+ * should be, then with the PLC, the rig and the link broken in turn. Stepped, so that no clock plays a part; but
+ * the PLC as a process of its own, killed and started again, is a matter of real time.
  */
 @Tag("native")
 class DemoTest {
-    private static final Path CFG = Path.of("../../driver.cfg");
     private static final Path TABLE = Path.of("rig.table");
 
     @TempDir
@@ -50,24 +50,32 @@ class DemoTest {
         table = TABLE;
     }
 
-    /** Takes the project's driver.cfg with the lines of its [fieldbus] table after {@code kind} replaced. */
-    private void fieldbus(String... lines) throws IOException {
-        List<String> cfg = new ArrayList<>(Files.readAllLines(CFG));
-        int kind = cfg.indexOf("[fieldbus]") + 1;
-        assertTrue(kind > 0 && cfg.get(kind).startsWith("kind"), "driver.cfg begins [fieldbus] with its kind");
-        while (!cfg.get(kind + 1).isBlank()) {
-            cfg.remove(kind + 1);
-        }
-        cfg.addAll(kind + 1, Arrays.asList(lines));
-        Files.write(folder.resolve("drivers/driver.cfg"), cfg);
+    private void loopback(String... lines) throws IOException {
+        Cfg.write(folder.resolve("drivers"), lines);
+    }
+
+    /** The project's driver.cfg as it is, but for the port, and the PLC as a process. */
+    private int demoOfTwoProcesses() throws IOException {
+        String cfg = Files.readString(Path.of("../../driver.cfg"));
+        String anyPort = cfg.replace("\"127.0.0.1:20030\"", "\"127.0.0.1:0\"");
+        assertNotEquals(cfg, anyPort);
+        Files.writeString(folder.resolve("drivers/driver.cfg"), anyPort);
+        boolean windows = System.getProperty("os.name").startsWith("Windows");
+        Path plc = Path.of(System.getProperty("tickbus.native.dir"), windows ? "tickbus.exe" : "tickbus");
+        return demo("--plc", plc.toString());
     }
 
     private int demo() {
+        return demo("--mode", "best-effort");
+    }
+
+    private int demo(String... more) {
         ByteArrayOutputStream bytes = new ByteArrayOutputStream();
         PrintStream out = new PrintStream(bytes, true, StandardCharsets.UTF_8);
-        int code = Demo.run(new String[] {"--drivers", folder.resolve("drivers").toString(), "--control",
-            table.toString(), "--report", folder.resolve("demo/report.txt").toString(), "--mode", "best-effort"},
-                out, out);
+        List<String> args = new ArrayList<>(List.of("--drivers", folder.resolve("drivers").toString(), "--control",
+                table.toString(), "--report", folder.resolve("demo/report.txt").toString()));
+        args.addAll(List.of(more));
+        int code = Demo.run(args.toArray(String[]::new), out, out);
         output = bytes.toString(StandardCharsets.UTF_8);
         return code;
     }
@@ -83,33 +91,53 @@ class DemoTest {
 
     @Test
     void threeCyclesAndAJam() throws IOException {
-        fieldbus("program = \"rig\"", "scan = \"10ms\"", "cycle = \"2ms\"", "mode = \"stepped\"");
+        loopback("program = \"rig\"", "scan = \"10ms\"", "cycle = \"2ms\"", "mode = \"stepped\"");
         assertEquals(0, demo(), () -> output);
-        assertTrue(verdict().matches("demo: ok cycles=3 jams=1 ticks=\\d+ missed_edges=0 stale_ticks=0 report=.*"),
+        assertTrue(verdict().matches("demo: ok cycles=3 jams=1 restarts=0 ticks=\\d+ missed_edges=0 stale_ticks=0 report=.*"),
                 verdict());
     }
 
     @Test
+    void aPlcInAProcessOfItsOwnIsKilledAndComesBack() throws IOException {
+        assertEquals(0, demoOfTwoProcesses(), () -> output);
+        assertTrue(verdict().matches("demo: ok cycles=3 jams=1 restarts=1 ticks=\\d+ missed_edges=0"
+                + " stale_ticks=[1-9]\\d* report=.*"), verdict());
+        String report = Files.readString(folder.resolve("demo/report.txt"));
+        for (String part : List.of("kills the PLC (process", "rig stood still after", "Life 2 of the PLC")) {
+            assertTrue(report.contains(part), report);
+        }
+        String log = Files.readString(folder.resolve("demo/plc.log"));
+        assertEquals(2, log.lines().filter(line -> line.contains("is opening: opening the line")).count(), log);
+    }
+
+    @Test
+    void aProcessForAPlcThatTheDriverHostsItselfFails() throws IOException {
+        loopback("program = \"rig\"", "scan = \"10ms\"", "cycle = \"2ms\"", "mode = \"stepped\"");
+        assertEquals(1, demo("--plc", "tickbus", "--mode", "best-effort"), () -> output);
+        assertTrue(verdict().contains("so no PLC process can connect to it"), verdict());
+    }
+
+    @Test
     void aPlcThatReadsTheLiftsCodeTheOtherWayRoundFails() throws IOException {
-        fieldbus("program = \"rig\"", "program_options = { la1_code = \"lsb-first\" }", "scan = \"10ms\"",
+        loopback("program = \"rig\"", "program_options = { la1_code = \"lsb-first\" }", "scan = \"10ms\"",
                 "cycle = \"2ms\"", "mode = \"stepped\"");
         fails();
-        assertTrue(verdict().contains("unexpected fault in stage cycle 1: lift 1"), verdict());
+        assertTrue(verdict().contains("unexpected fault in stage jam in cycle 1: lift 1"), verdict());
     }
 
     @Test
     void aRigWithADisconnectedSensorFails() throws IOException {
-        fieldbus("program = \"rig\"", "scan = \"10ms\"", "cycle = \"2ms\"", "mode = \"stepped\"");
+        loopback("program = \"rig\"", "scan = \"10ms\"", "cycle = \"2ms\"", "mode = \"stepped\"");
         table = folder.resolve("short.table");
         Files.write(table, Files.readAllLines(TABLE).stream().filter(line -> !line.contains("Step 3 complete"))
                 .toList());
         fails();
-        assertTrue(verdict().contains("in stage cycle 1"), verdict());
+        assertTrue(verdict().contains("in stage jam in cycle 1"), verdict());
     }
 
     @Test
     void aLinkWithNobodyAtItsOtherEndFails() throws IOException {
-        fieldbus("link = \"nobody\"", "cycle = \"2ms\"");
+        loopback("link = \"nobody\"", "cycle = \"2ms\"");
         fails();
     }
 }

@@ -30,15 +30,22 @@ class OperatorTest {
     private int play(int cycles, Consumer<PlcDriver> sabotage) throws IOException {
         plc = new PlcDriver(TABLE);
         sabotage.accept(plc);
-        return play(cycles, TABLE);
+        return play(cycles, TABLE, HostedPlc::new);
     }
 
-    private int play(int cycles, Path table) {
-        DemoOptions options = new DemoOptions(folder, table, folder.resolve("demo/report.txt"), TickMode.BEST_EFFORT,
-                2_000_000, cycles, 120_000_000_000L);
+    /** The same, with a PLC that is killed and started again. */
+    private int playWithOutage(int cycles, Consumer<PlcDriver> sabotage) throws IOException {
+        plc = new PlcDriver(TABLE);
+        sabotage.accept(plc);
+        return play(cycles, TABLE, driver -> plc.new Power());
+    }
+
+    private int play(int cycles, Path table, Demo.PlcMaker maker) {
+        DemoOptions options = new DemoOptions(folder, table, folder.resolve("demo/report.txt"), null, null,
+                TickMode.BEST_EFFORT, 2_000_000, cycles, 120_000_000_000L);
         ByteArrayOutputStream bytes = new ByteArrayOutputStream();
         PrintStream out = new PrintStream(bytes, true, StandardCharsets.UTF_8);
-        int code = Demo.run(options, () -> new DriverSet(List.of(plc)), out, out);
+        int code = Demo.run(options, () -> new DriverSet(List.of(plc)), maker, out, out);
         output = bytes.toString(StandardCharsets.UTF_8);
         return code;
     }
@@ -62,7 +69,7 @@ class OperatorTest {
     @Test
     void threeCyclesWithOneJam() throws IOException {
         assertEquals(0, play(3, plc -> { }), () -> output);
-        assertTrue(verdict().matches("demo: ok cycles=3 jams=1 ticks=\\d+ missed_edges=0 stale_ticks=0 report=.*"
+        assertTrue(verdict().matches("demo: ok cycles=3 jams=1 restarts=0 ticks=\\d+ missed_edges=0 stale_ticks=0 report=.*"
                 + "report.txt"), verdict());
         assertEquals(1, plc.exits);
         assertTrue(Files.readString(folder.resolve("demo/rig.svg")).contains("<svg"));
@@ -87,15 +94,72 @@ class OperatorTest {
     }
 
     @Test
+    void aPlcThatIsKilledComesBackAndGoesOn() throws IOException {
+        assertEquals(0, playWithOutage(3, plc -> { }), () -> output);
+        assertTrue(verdict().matches("demo: ok cycles=3 jams=1 restarts=1 ticks=\\d+ missed_edges=0"
+                + " stale_ticks=[1-9]\\d* report=.*"), verdict());
+        String report = report();
+        for (String part : List.of("The outage", "rig stood still after", "with bottle", "kills the PLC",
+                "starts the PLC again", "Life 1 of the PLC, until: killed", "Life 2 of the PLC",
+                "stale ticks in the outage")) {
+            assertTrue(report.contains(part), () -> part + " is missing in\n" + report);
+        }
+    }
+
+    @Test
+    void oneCycleHasItsJamAndItsOutage() throws IOException {
+        assertEquals(0, playWithOutage(1, plc -> { }), () -> output);
+        assertTrue(verdict().startsWith("demo: ok cycles=1 jams=1 restarts=1 "), verdict());
+    }
+
+    @Test
+    void cupsThatLetGoInTheOutageFail() throws IOException {
+        assertEquals(1, playWithOutage(3, plc -> plc.dropsInOutage = true));
+        fails("'SC1' is off while the data are stale; that is not its fail-safe value");
+    }
+
+    @Test
+    void aLiftThatMovesInTheOutageFails() throws IOException {
+        assertEquals(1, playWithOutage(3, plc -> plc.creepsInOutage = true));
+        fails("'LA2 run' is on while the data are stale; that is not its fail-safe value");
+    }
+
+    @Test
+    void dataThatNeverBecomeStaleFail() throws IOException {
+        assertEquals(1, playWithOutage(3, plc -> plc.neverStale = true));
+        fails("but its data are not stale, although max_age is 250ms");
+    }
+
+    @Test
+    void anEdgeAfterTheLastCountsFails() throws IOException {
+        assertEquals(1, playWithOutage(3, plc -> plc.edgeAfterDeath = true));
+        fails("an edge of 'Ready lamp' came from the PLC after the last counts");
+    }
+
+    @Test
+    void anEdgeLostAtTheReturnIsMissed() throws IOException {
+        assertEquals(1, playWithOutage(3, plc -> plc.lostAtReturn = "LA2 bottom"));
+        fails("missed edges: 1");
+    }
+
+    @Test
+    void countsThatDoNotAgreeBeforeTheKillAreTold() throws IOException {
+        assertEquals(1, playWithOutage(3, plc -> plc.miscounted = "Not OK"));
+        fails("cycle 2 ended before the counts of both ends agreed");
+        assertTrue(verdict().contains("'Not OK': 1 here, 2 at the PLC"), verdict());
+    }
+
+    @Test
     void aDrumThatHangsIsATimeOutOfItsStage() throws IOException {
         assertEquals(1, play(3, plc -> plc.deafStep = 4));
-        fails("stage cycle 1: waited 20s of simulation time for its end; the PLC is in phase run, step 4");
+        fails("stage jam in cycle 1: waited 20s of simulation time for Not OK and the Fault lamp; the PLC is in phase"
+                + " run, step 4");
     }
 
     @Test
     void aStaleLinkFails() throws IOException {
         assertEquals(1, play(3, plc -> plc.staleFrom = 5_000_000_000L));
-        fails("the link was stale for more than 1s");
+        fails("the data became stale, outside the start-up and the outage");
     }
 
     @Test
@@ -136,7 +200,7 @@ class OperatorTest {
         plc = new PlcDriver(TABLE);
         Path table = folder.resolve("short.table");
         Files.write(table, Files.readAllLines(TABLE).stream().filter(line -> !line.contains("LA1 bottom")).toList());
-        assertEquals(1, play(3, table));
+        assertEquals(1, play(3, table, HostedPlc::new));
         assertTrue(output.contains("no row of the control table writes 4711:LA1 bottom"), output);
         fails("stage homing");
     }
@@ -146,7 +210,7 @@ class OperatorTest {
         plc = new PlcDriver(TABLE);
         Path table = folder.resolve("broken.table");
         Files.writeString(table, "4711:IM1 index | | | machine:im1.indx\n");
-        assertEquals(1, play(3, table));
+        assertEquals(1, play(3, table, HostedPlc::new));
         fails("did you mean 'machine:im1.index'?");
     }
 }

@@ -8,6 +8,7 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.HashMap;
+import java.util.HashSet;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
@@ -30,7 +31,9 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
         {"LA1 run", "LA1 code high", "SC1", "LA2 run", "LA2 up", "SC2", "Lamp"},
         {"LA1 run", "LA1 code high", "LA1 code low", "SC1", "LA2 run", "SC2", "Lamp"},
     };
+    private static final Set<String> FAIL_SAFE_ON = Set.of("SC1", "SC2");
     private static final long MILLI = 1_000_000;
+    private static final long MAX_AGE = 250 * MILLI;
 
     private final List<HardwareComponent> components = new ArrayList<>();
     private final Map<String, Double> in = new HashMap<>();
@@ -48,6 +51,10 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
     private int cycles;
     private boolean resume;
     private boolean stopping;
+    private long deadSince = Long.MAX_VALUE;
+    private boolean stale;
+    private boolean killed;
+    private final Set<String> pulses = new HashSet<>();
     int exits;
 
     /** What is broken: after how much simulation time the link goes stale, a step that never ends, and so on. */
@@ -56,6 +63,16 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
     int deafStep;
     boolean countless;
     boolean lampDark;
+    /** Without a PLC: the cups let go; lift 2 goes on; the driver goes on saying that all is fresh. */
+    boolean dropsInOutage;
+    boolean creepsInOutage;
+    boolean neverStale;
+    /** The PLC makes an edge after the last counts that it gave. */
+    boolean edgeAfterDeath;
+    /** An edge of this signal is lost at the PLC's end just when it comes back. */
+    String lostAtReturn;
+    /** The PLC counts an edge of this signal that there never was. */
+    String miscounted;
 
     PlcDriver(Path controlTable) throws IOException {
         Map<String, HardwareComponent> found = new LinkedHashMap<>();
@@ -104,6 +121,7 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
         if (now >= throwFrom) {
             throw new IllegalStateException("the cable is cut");
         }
+        stale = now >= staleFrom || now - deadSince > MAX_AGE && !neverStale;
         int index = 0;
         for (HardwareComponent component : components) {
             if (component.direction() == Direction.WRITTEN_BY_SIMULATION) {
@@ -111,7 +129,7 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
                 in.put(component.name(), value[index++]);
             }
         }
-        if (now >= nextScan) {
+        if (now >= nextScan && now < deadSince) {
             nextScan = now + 10 * MILLI;
             scans++;
             scan();
@@ -123,27 +141,110 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
                 inputs.add(deliver(component.name()));
             }
         }
-        delivered.putAll(out);
+        if (!stale) {
+            delivered.putAll(out);
+        }
         deliverHardwareInputs(inputs.stream().mapToDouble(Double::doubleValue).toArray());
     }
 
     private void count(String name, Map<String, Double> before, double value) {
         if (rises.containsKey(name) && before.get(name) == 0 && value != 0) {
             rises.merge(name, 1L, Long::sum);
+            if (before == in && now > deadSince) {
+                pulses.add(name);
+            }
         }
     }
 
     private double deliver(String name) {
         if (name.endsWith(".edges")) {
+            if (stale) {
+                return 0;
+            }
             String signal = name.substring(0, name.length() - ".edges".length());
             return delivered.getOrDefault(signal, 0.0) == 0 && out.get(signal) != 0 ? 1 : 0;
         }
         return switch (name) {
             case "bus.age" -> 0.001;
             case "bus.sequence" -> scans;
-            case "bus.status" -> now >= staleFrom ? 2 : 0;
-            default -> out.get(name);
+            case "bus.status" -> stale ? 2 : 0;
+            default -> stale ? failSafe(name) : out.get(name);
         };
+    }
+
+    private double failSafe(String name) {
+        boolean creeps = creepsInOutage && name.equals("LA2 run");
+        return creeps || FAIL_SAFE_ON.contains(name) && !dropsInOutage ? 1 : 0;
+    }
+
+    /** Its power switch. */
+    final class Power implements Plc {
+        @Override
+        public boolean restartable() {
+            return true;
+        }
+
+        @Override
+        public void start() {
+            deadSince = Long.MAX_VALUE;
+            rises.replaceAll((name, count) -> 0L);
+            out.replaceAll((name, value) -> 0.0);
+            phase = 0;
+            step = 0;
+            cycles = 0;
+            resume = false;
+            stopping = false;
+            inAtScan.clear();
+            // A pulse of the time without it comes late. Its image begins with all bits off, so what is on counts once.
+            pulses.forEach(name -> rises.merge(name, in.get(name) == 0 ? 1L : 0L, Long::sum));
+            pulses.clear();
+            in.replaceAll((name, value) -> 0.0);
+            if (lostAtReturn != null && killed) {
+                rises.merge(lostAtReturn, -1L, Long::sum);
+            }
+            if (miscounted != null) {
+                rises.merge(miscounted, 1L, Long::sum);
+            }
+        }
+
+        @Override
+        public void kill() {
+            deadSince = now;
+            killed = true;
+            if (edgeAfterDeath) {
+                out.put("Ready lamp", 1.0);
+            }
+        }
+
+        @Override
+        public Counts counts() {
+            return HostedPlc.counts(statistics(), System.nanoTime());
+        }
+
+        @Override
+        public List<String> news() {
+            return List.of();
+        }
+
+        @Override
+        public long longestSilenceNanos() {
+            return 0;
+        }
+
+        @Override
+        public String name() {
+            return "class " + PlcDriver.class.getSimpleName();
+        }
+
+        @Override
+        public void check() {
+            // It cannot end.
+        }
+
+        @Override
+        public void close() {
+            // Nor need it.
+        }
     }
 
     private boolean on(String name) {
@@ -190,7 +291,10 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
 
     private void scan() {
         switch (phase) {
-            case 0 -> enter(1);
+            case 0 -> {
+                only("SC1", "SC2");
+                enter(1);
+            }
             case 1, 5, 6 -> home();
             case 2 -> {
                 only();
@@ -234,30 +338,42 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
     private void home() {
         switch (part) {
             case 0 -> {
-                only(phase == 5 ? new String[] {"Acknowledge"} : new String[0]);
-                if (waited(100)) {
-                    part(1);
-                }
+                only(phase == 5 ? new String[] {"Acknowledge", "SC1", "SC2"} : new String[] {"SC1", "SC2"});
+                partAfter(waited(100));
             }
             case 1 -> {
-                only("LA1 run", "LA1 code low", "LA1 code high", "LA2 run");
-                if (waited(50) && on("LA1 bottom") && on("LA2 bottom")) {
-                    part(2);
-                }
+                only("LA1 run", "LA1 code low", "LA1 code high", "LA2 run", "SC1", "SC2");
+                partAfter(waited(50) && on("LA1 bottom") && on("LA2 bottom"));
             }
             case 2 -> {
                 only(on("Homing sensor 1") ? "no jog 1" : "IM1 jog", on("Homing sensor 2") ? "no jog 2" : "IM2 jog");
-                if (on("Homing sensor 1") && on("Homing sensor 2")) {
-                    part(3);
-                }
+                partAfter(on("Homing sensor 1") && on("Homing sensor 2"));
+            }
+            case 3 -> {
+                only();
+                partAfter(waited(1000));
+            }
+            case 4 -> {
+                only("LA1 run", "SC1");
+                partAfter(waited(50) && on("Step 2 complete"));
+            }
+            case 5 -> {
+                only("LA1 run", "LA1 code low", "LA1 code high", "SC1");
+                partAfter(waited(50) && on("LA1 bottom"));
             }
             default -> {
                 only();
-                if (waited(1000)) {
+                if (waited(100)) {
                     enter(phase == 6 ? 7 : resume ? 3 : 2);
                     resume = false;
                 }
             }
+        }
+    }
+
+    private void partAfter(boolean over) {
+        if (over) {
+            part(part + 1);
         }
     }
 
@@ -282,6 +398,7 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
             return Map.of("plc.scans", String.valueOf(scans));
         }
         Map<String, String> statistics = new LinkedHashMap<>();
+        statistics.put("max_age", "250ms");
         statistics.put("plc.scans", String.valueOf(scans));
         rises.forEach((name, count) -> statistics.put("plc.rises." + name, String.valueOf(count)));
         return statistics;

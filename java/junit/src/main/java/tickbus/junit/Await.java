@@ -1,0 +1,57 @@
+package tickbus.junit;
+
+import org.opentest4j.AssertionFailedError;
+
+/** A wait that needs its limit: {@code plc.await(on("Running lamp")).within(40)}. */
+public final class Await {
+    private final Plc plc;
+    private final Condition.Bound condition;
+
+    Await(Plc plc, Condition.Bound condition) {
+        this.plc = plc;
+        this.condition = condition;
+    }
+
+    /**
+     * Lets ticks pass until the condition holds; none if it does already.
+     *
+     * @param ticks fails if so many have not been enough; at least 1
+     * @return how many it took
+     */
+    public long within(long ticks) {
+        plc.limited(this);
+        if (ticks < 1) {
+            throw new IllegalArgumentException("a limit of " + ticks + " ticks; give it at least 1, or use expect(…)");
+        }
+        long begin = plc.ticks();
+        while (!condition.holds()) {
+            if (plc.ticks() - begin == ticks) {
+                throw plc.failure(condition, "within " + plc.span(ticks) + " of tick " + begin);
+            }
+            plc.tick();
+        }
+        return plc.ticks() - begin;
+    }
+
+    /**
+     * Lets ticks pass until the condition holds; none if it does already.
+     *
+     * @param duration fails if so much simulation time has not been enough, such as {@code "80ms"}; at least one tick
+     * @return how many ticks it took
+     */
+    public long within(String duration) {
+        plc.limited(this);
+        long ticks = Durations.parse(duration) / plc.stepNanos();
+        if (ticks < 1) {
+            throw new IllegalArgumentException("a limit of " + duration + " is shorter than one tick of "
+                + Durations.text(plc.stepNanos()) + "; give it more time, or use expect(…)");
+        }
+        return within(ticks);
+    }
+
+    /** The failure of a test that never gave the limit. */
+    AssertionFailedError unlimited() {
+        return new AssertionFailedError("await(" + condition.subject() + " " + condition.expected()
+            + ") was given no limit, so that it never waited; add .within(…)");
+    }
+}

@@ -1,0 +1,40 @@
+package tickbus.junit;
+
+/**
+ * A model of the machine that the PLC controls: as much of it as the tests need.
+ *
+ * <pre>{@code
+ * final class Lift implements Machine {
+ *     private double height;
+ *
+ *     @Override
+ *     public void step(Plc plc, long simulationNanos) {
+ *         if (plc.isOn("LA1 run")) {
+ *             height = Math.min(height + 0.5, 250);
+ *         }
+ *         plc.set("LA1 position", height);
+ *     }
+ * }
+ * }</pre>
+ */
+@FunctionalInterface
+public interface Machine {
+    /**
+     * Called once, before the first tick: the place to look signals up ({@link Plc#signal}) and to set what is there
+     * from the beginning.
+     *
+     * @param plc the PLC that it is connected to
+     */
+    default void connect(Plc plc) {
+    }
+
+    /**
+     * One tick: reads what the PLC has commanded ({@code %Q}), moves on, and sets what its sensors show ({@code %I}).
+     * It must not let time pass itself.
+     *
+     * @param plc the PLC
+     * @param simulationNanos the time at the end of this step, in nanoseconds since the test began;
+     *     {@link Plc#stepNanos} more than before
+     */
+    void step(Plc plc, long simulationNanos);
+}

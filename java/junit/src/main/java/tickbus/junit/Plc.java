@@ -1,0 +1,453 @@
+package tickbus.junit;
+
+import java.util.ArrayList;
+import java.util.LinkedHashMap;
+import java.util.LinkedHashSet;
+import java.util.List;
+import java.util.Map;
+import java.util.Objects;
+import java.util.Set;
+import org.opentest4j.AssertionFailedError;
+import tickbus.InjectedFault;
+import tickbus.Signal;
+import tickbus.Tickbus;
+
+/**
+ * The PLC under test, from outside: its inputs to be set, its outputs to be looked at, and the time to be let pass.
+ *
+ * <p>A tick is: the machine takes a step on what the PLC commands, its sensors and whatever the test has forced go to
+ * the PLC, the PLC scans if its scan is due by now, and its outputs come back. All this happens on the calling thread;
+ * between two calls time stands still.
+ *
+ * <p>A failure tells the tick, the simulation time, the signal, what was expected and what was seen, and the last
+ * changes of that signal. It is an {@link AssertionFailedError}.
+ *
+ * <p>{@link PlcTest} makes one for each test. For one thread at a time.
+ */
+public final class Plc {
+    /** How long {@link #press} holds a button: as long as a finger does, and longer than any scan. */
+    private static final String PRESS = "200ms";
+
+    /** What the test holds at a value, whatever the machine says. */
+    private record Forced(Signal signal, double value) {
+    }
+
+    /** A condition that has to hold from now on. */
+    private record Standing(Condition.Bound condition, long since) {
+    }
+
+    private final Tickbus bus;
+    private final long stepNanos;
+    private final Watch[] watches;
+    private final Map<String, Watch> byName = new LinkedHashMap<>();
+    private final List<Machine> machines = new ArrayList<>();
+    private final List<Forced> forced = new ArrayList<>();
+    private final List<Standing> standing = new ArrayList<>();
+    private final Set<Await> open = new LinkedHashSet<>();
+    private long ticks;
+    private boolean inStep;
+
+    Plc(Tickbus bus, long stepNanos) {
+        this.bus = bus;
+        this.stepNanos = stepNanos;
+        this.watches = bus.signals().stream().map(Watch::new).toArray(Watch[]::new);
+        for (Watch watch : watches) {
+            byName.put(watch.signal().name(), watch);
+        }
+    }
+
+    /**
+     * Connects a machine, beside those that are connected already.
+     *
+     * @param machine steps from now on with every tick
+     * @return this
+     */
+    public Plc connect(Machine machine) {
+        Objects.requireNonNull(machine, "machine");
+        machine.connect(this);
+        machines.add(machine);
+        return this;
+    }
+
+    // Signals
+
+    /**
+     * A signal's handle, which is faster than its name in a {@link Machine} that reads or writes it on every tick.
+     *
+     * @param name as in driver.cfg
+     * @return always the same one
+     * @throws IllegalArgumentException if there is none; the message has the nearest names
+     */
+    public Signal signal(String name) {
+        return watch(name).signal();
+    }
+
+    /**
+     * All signals.
+     *
+     * @return unmodifiable, in the order of driver.cfg
+     */
+    public List<Signal> signals() {
+        return bus.signals();
+    }
+
+    /**
+     * The driver's id.
+     *
+     * @return as driver.cfg says
+     */
+    public int id() {
+        return bus.id();
+    }
+
+    /**
+     * What driver and PLC program have counted so far, as {@link Tickbus#statistics}.
+     *
+     * @return unmodifiable, in an order fit for printing
+     */
+    public Map<String, String> statistics() {
+        return bus.statistics();
+    }
+
+    /**
+     * Sets an input of the PLC ({@code %I}), to be sent with the next tick. A machine that sets the same signal
+     * overwrites it then; see {@link #force}.
+     *
+     * @param signal as in driver.cfg
+     * @param value in the signal's unit
+     * @return this
+     */
+    public Plc set(String signal, double value) {
+        watch(signal).signal().set(value);
+        return this;
+    }
+
+    /**
+     * Sets an input of the PLC on or off; as {@link #set(String, double)}.
+     *
+     * @param signal as in driver.cfg
+     * @param on true for 1
+     * @return this
+     */
+    public Plc set(String signal, boolean on) {
+        return set(signal, on ? 1 : 0);
+    }
+
+    /**
+     * Holds an input of the PLC at a value, whatever the machine sets, until {@link #release}.
+     *
+     * @param signal as in driver.cfg
+     * @param value in the signal's unit
+     * @return this
+     */
+    public Plc force(String signal, double value) {
+        Signal handle = watch(signal).signal();
+        forced.removeIf(one -> one.signal() == handle);
+        handle.set(value);
+        forced.add(new Forced(handle, value));
+        return this;
+    }
+
+    /**
+     * Holds an input of the PLC on or off; as {@link #force(String, double)}.
+     *
+     * @param signal as in driver.cfg
+     * @param on true for 1
+     * @return this
+     */
+    public Plc force(String signal, boolean on) {
+        return force(signal, on ? 1 : 0);
+    }
+
+    /**
+     * Ends {@link #force}. The signal keeps its value until the machine or the test sets another.
+     *
+     * @param signal as in driver.cfg
+     * @return this
+     */
+    public Plc release(String signal) {
+        Signal handle = watch(signal).signal();
+        forced.removeIf(one -> one.signal() == handle);
+        return this;
+    }
+
+    /**
+     * Presses a push button: forces the signal on, lets 200 ms pass, and lets it go off again.
+     *
+     * @param button as in driver.cfg
+     * @return this
+     */
+    public Plc press(String button) {
+        force(button, true).run(PRESS);
+        return release(button).set(button, false);
+    }
+
+    /**
+     * A signal's value at the end of the last tick.
+     *
+     * @param signal as in driver.cfg
+     * @return in the signal's unit; 0 or 1 for a BOOL
+     */
+    public double get(String signal) {
+        return watch(signal).signal().get();
+    }
+
+    /**
+     * Whether a signal is on.
+     *
+     * @param signal as in driver.cfg
+     * @return false if it is 0
+     */
+    public boolean isOn(String signal) {
+        return watch(signal).signal().getBoolean();
+    }
+
+    /**
+     * How often a signal has gone from off to on since the test began, as seen from tick to tick.
+     *
+     * @param signal as in driver.cfg
+     * @return 0 or more
+     */
+    public long rises(String signal) {
+        return watch(signal).rises();
+    }
+
+    /**
+     * How often a signal has gone from on to off since the test began, as seen from tick to tick.
+     *
+     * @param signal as in driver.cfg
+     * @return 0 or more
+     */
+    public long falls(String signal) {
+        return watch(signal).falls();
+    }
+
+    // Faults
+
+    /**
+     * Injects a fault: a sensor that is stuck, a line that is down. It can begin with the next tick.
+     *
+     * <pre>{@code
+     * InjectedFault wire = plc.inject("""
+     *     kind   = "stuck"
+     *     signal = "LA1 bottom"
+     *     value  = false
+     *     """);
+     * }</pre>
+     *
+     * @param fault the keys of a {@code [[fault]]} section of driver.cfg, one a line; times count from the first tick
+     * @return the fault, to be ended; what is not ends with the test
+     * @throws tickbus.FieldbusException with every mistake in the text, and what would be right
+     */
+    public InjectedFault inject(String fault) {
+        return bus.inject(fault);
+    }
+
+    /**
+     * The faults that driver.cfg has, and those that were injected.
+     *
+     * @return in the order of injection
+     */
+    public List<InjectedFault> faults() {
+        return bus.faults();
+    }
+
+    // Time
+
+    /**
+     * One tick.
+     *
+     * @return this
+     */
+    public Plc tick() {
+        return tick(1);
+    }
+
+    /**
+     * Some ticks.
+     *
+     * @param count how many; 0 does nothing
+     * @return this
+     */
+    public Plc tick(long count) {
+        if (count < 0) {
+            throw new IllegalArgumentException(count + " ticks; time does not run backwards");
+        }
+        for (long i = 0; i < count; i++) {
+            step();
+        }
+        return this;
+    }
+
+    /**
+     * Lets simulation time pass.
+     *
+     * @param duration such as {@code "1.5s"}; rounded up to whole ticks
+     * @return this
+     */
+    public Plc run(String duration) {
+        return tick(ticksOf(duration));
+    }
+
+    /**
+     * How many ticks have passed.
+     *
+     * @return 0 before the first
+     */
+    public long ticks() {
+        return ticks;
+    }
+
+    /**
+     * How much simulation time has passed.
+     *
+     * @return nanoseconds: ticks times step
+     */
+    public long simulationNanos() {
+        return ticks * stepNanos;
+    }
+
+    /**
+     * The simulation time of a tick.
+     *
+     * @return nanoseconds
+     */
+    public long stepNanos() {
+        return stepNanos;
+    }
+
+    private void step() {
+        if (inStep) {
+            throw new IllegalStateException("a machine must not let time pass in its own step; set signals there, and"
+                + " let the test tick");
+        }
+        inStep = true;
+        try {
+            long time = ticks * stepNanos + stepNanos;
+            for (int i = 0; i < machines.size(); i++) {
+                machines.get(i).step(this, time);
+            }
+            for (int i = 0; i < forced.size(); i++) {
+                Forced one = forced.get(i);
+                one.signal().set(one.value());
+            }
+            bus.exchange(time);
+        } finally {
+            inStep = false;
+        }
+        ticks++;
+        for (Watch watch : watches) {
+            watch.look(ticks);
+        }
+        for (int i = 0; i < standing.size(); i++) {
+            Standing one = standing.get(i);
+            if (!one.condition().holds()) {
+                throw failure(one.condition(), "at every tick since tick " + one.since());
+            }
+        }
+    }
+
+    // Expectations
+
+    /**
+     * Fails unless the condition holds now.
+     *
+     * @param condition from {@link Condition}'s methods
+     * @return lets it be watched for a while: {@link Expectation#during}
+     */
+    public Expectation expect(Condition condition) {
+        Condition.Bound bound = condition.bind(this);
+        check(bound, "");
+        return new Expectation(this, bound);
+    }
+
+    /**
+     * Fails at the first tick from now on at whose end the condition does not hold, until the test ends.
+     *
+     * @param condition from {@link Condition}'s methods
+     * @return this
+     */
+    public Plc always(Condition condition) {
+        Condition.Bound bound = condition.bind(this);
+        check(bound, "at every tick since tick " + ticks);
+        standing.add(new Standing(bound, ticks));
+        return this;
+    }
+
+    /**
+     * Fails at the first tick from now on at whose end the condition holds, until the test ends.
+     *
+     * @param condition from {@link Condition}'s methods
+     * @return this
+     */
+    public Plc never(Condition condition) {
+        return always(condition.negated());
+    }
+
+    /**
+     * Begins to wait for a condition; the limit comes with {@link Await#within(long)}.
+     *
+     * @param condition from {@link Condition}'s methods
+     * @return to be given its limit; a test that forgets to fails
+     */
+    public Await await(Condition condition) {
+        Await await = new Await(this, condition.bind(this));
+        open.add(await);
+        return await;
+    }
+
+    void limited(Await await) {
+        open.remove(await);
+    }
+
+    void check(Condition.Bound condition, String when) {
+        if (!condition.holds()) {
+            throw failure(condition, when);
+        }
+    }
+
+    AssertionFailedError failure(Condition.Bound condition, String when) {
+        String expected = condition.expected();
+        String seen = condition.seen();
+        StringBuilder text = new StringBuilder(where()).append(": ").append(condition.subject()).append(" is ")
+            .append(seen).append(", expected ").append(expected);
+        if (!when.isEmpty()) {
+            text.append(" ").append(when);
+        }
+        condition.watches().forEach(watch -> text.append("\n  ").append(watch.history(stepNanos)));
+        return new AssertionFailedError(text.toString(), expected, seen);
+    }
+
+    // For the extension
+
+    /** A duration in ticks, rounded up. */
+    long ticksOf(String duration) {
+        long nanos = Durations.parse(duration);
+        return nanos / stepNanos + (nanos % stepNanos == 0 ? 0 : 1);
+    }
+
+    /** Where the test stands, for people. */
+    String where() {
+        return "tick " + ticks + " (" + Durations.text(simulationNanos()) + ")";
+    }
+
+    /** How long so many ticks are, for people. */
+    String span(long count) {
+        return count + (count == 1 ? " tick (" : " ticks (") + Durations.text(count * stepNanos) + ")";
+    }
+
+    Watch watch(String name) {
+        Watch watch = byName.get(Objects.requireNonNull(name, "signal"));
+        if (watch == null) {
+            // Says which names are near.
+            bus.signal(name);
+            throw new IllegalArgumentException("there is no signal '" + name + "'");
+        }
+        return watch;
+    }
+
+    /** The failure of a test that was about to wait and did not; null of others. */
+    AssertionFailedError unfinished() {
+        return open.isEmpty() ? null : open.iterator().next().unlimited();
+    }
+}

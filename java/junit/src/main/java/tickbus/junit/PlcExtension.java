@@ -1,0 +1,53 @@
+package tickbus.junit;
+
+import org.junit.jupiter.api.extension.AfterEachCallback;
+import org.junit.jupiter.api.extension.BeforeEachCallback;
+import org.junit.jupiter.api.extension.ExtensionContext;
+import org.junit.jupiter.api.extension.ParameterContext;
+import org.junit.jupiter.api.extension.ParameterResolutionException;
+import org.junit.jupiter.api.extension.ParameterResolver;
+
+/** Gives tests their {@link Plc}, and their machine; {@link PlcTest} brings it along. */
+public final class PlcExtension implements BeforeEachCallback, AfterEachCallback, ParameterResolver {
+    private static final ExtensionContext.Namespace NAMESPACE = ExtensionContext.Namespace.create(PlcExtension.class);
+
+    /** For JUnit. */
+    public PlcExtension() {
+    }
+
+    @Override
+    public void beforeEach(ExtensionContext context) {
+        store(context).put(Bench.class, Bench.open(Setup.of(context), context));
+    }
+
+    @Override
+    public void afterEach(ExtensionContext context) {
+        Bench bench = store(context).remove(Bench.class, Bench.class);
+        if (bench != null) {
+            bench.close(context);
+        }
+    }
+
+    @Override
+    public boolean supportsParameter(ParameterContext parameter, ExtensionContext context) {
+        Class<?> type = parameter.getParameter().getType();
+        if (type == Plc.class) {
+            return true;
+        }
+        return Machine.class.isAssignableFrom(type) && type.isAssignableFrom(Setup.of(context).machine());
+    }
+
+    @Override
+    public Object resolveParameter(ParameterContext parameter, ExtensionContext context) {
+        Bench bench = store(context).get(Bench.class, Bench.class);
+        if (bench == null) {
+            throw new ParameterResolutionException("a " + parameter.getParameter().getType().getSimpleName()
+                + " lives for one test; take it as a parameter of a test, or of a @BeforeEach or @AfterEach method");
+        }
+        return parameter.getParameter().getType() == Plc.class ? bench.plc() : bench.machine();
+    }
+
+    private static ExtensionContext.Store store(ExtensionContext context) {
+        return context.getStore(NAMESPACE);
+    }
+}

@@ -1,0 +1,7 @@
+/**
+ * PLC programs tested with JUnit: the program and a machine model run in one process, tick by tick, on simulation
+ * time.
+ *
+ * <p>Begin with {@link tickbus.junit.PlcTest}.
+ */
+package tickbus.junit;

@@ -1,0 +1,62 @@
+package tickbus.simulator.demo;
+
+import java.io.IOException;
+import java.io.PrintStream;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.List;
+import java.util.Map;
+import java.util.stream.Collectors;
+
+/** The page about the run, which {@code tickbus report} makes of the driver's recording once that is whole. */
+final class HtmlPage {
+    /** The PLC's output that has the number of its step. */
+    private static final String STEPS = "Step";
+
+    /** The PLC's output that is on while there is a fault. */
+    private static final String FAULT = "Fault lamp";
+
+    private HtmlPage() {
+    }
+
+    /** Keeps the statistics of the driver for the page: they are gone when it is closed. */
+    static void keepStatistics(DemoOptions options, Map<String, String> statistics) throws IOException {
+        String lines = statistics.entrySet().stream().map(entry -> entry.getKey() + "=" + entry.getValue() + "\n")
+                .collect(Collectors.joining());
+        Files.writeString(statistics(options), lines);
+    }
+
+    /**
+     * Makes the page.
+     *
+     * @param options where everything is
+     * @param out gets a line that tells where the page is
+     * @return what went wrong, null if nothing did
+     */
+    static String make(DemoOptions options, PrintStream out) {
+        Path page = options.report().resolveSibling("report.html");
+        List<String> command = List.of(options.plc().toString(), "report", options.recording().toString(), "--out",
+                page.toString(), "--steps", STEPS, "--fault", FAULT, "--stats", statistics(options).toString(),
+                "--text", options.report().toString());
+        try {
+            Process process = new ProcessBuilder(command).redirectErrorStream(true).start();
+            process.getOutputStream().close();
+            String told = new String(process.getInputStream().readAllBytes(), StandardCharsets.UTF_8).strip();
+            if (process.waitFor() == 0) {
+                out.println("demo: page=" + page);
+                return null;
+            }
+            return "the page about the run could not be made: " + told.replace("\n", "; ");
+        } catch (IOException e) {
+            return "the page about the run could not be made: " + e.getMessage();
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+            return "interrupted";
+        }
+    }
+
+    private static Path statistics(DemoOptions options) {
+        return options.report().resolveSibling("statistics.txt");
+    }
+}

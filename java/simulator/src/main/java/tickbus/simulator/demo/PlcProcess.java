@@ -1,0 +1,236 @@
+package tickbus.simulator.demo;
+
+import java.io.BufferedReader;
+import java.io.File;
+import java.io.IOException;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.LinkedHashMap;
+import java.util.List;
+import java.util.Map;
+import java.util.Queue;
+import java.util.concurrent.ConcurrentLinkedQueue;
+import java.util.concurrent.TimeUnit;
+import java.util.function.Supplier;
+
+/**
+ * A PLC as a process of its own, such as {@code tickbus plc}: started, killed, started again, and surely ended.
+ *
+ * <p>It prints its statistics now and then as lines {@code key=value} with an empty line behind them; a thread reads
+ * these, so that the tick never waits for the process. Every other line is news for people. Its standard error goes
+ * to a file.
+ *
+ * <p>The process ends with {@link #close}; with the JVM, on whatever way that is told to end; and, should the JVM
+ * itself be killed, no later than the time that its own command line gives it, since then nobody is left to end it.
+ */
+final class PlcProcess implements Plc {
+    private static final long SECONDS_TO_DIE = 5;
+    private static final int LAST_WORDS = 5;
+
+    /** What lines for people begin with. */
+    private static final String WORDS = "plc: ";
+
+    private final Supplier<List<String>> command;
+    private final Path log;
+    private final Thread hook = new Thread(this::destroy, "end of the PLC process");
+    private final Queue<String> news = new ConcurrentLinkedQueue<>();
+    private final long intervalNanos;
+    private volatile Life life;
+    private volatile long longestSilence;
+
+    /** One run of the process, with what it has told. */
+    private final class Life {
+        final Process process;
+        final Thread reader;
+        volatile boolean killed;
+        private volatile Map<String, String> block = Map.of();
+        private volatile long blockTime;
+
+        Life(Process process) {
+            this.process = process;
+            reader = new Thread(this::read, "output of PLC process " + process.pid());
+            reader.setDaemon(true);
+            reader.start();
+        }
+
+        private void read() {
+            Map<String, String> lines = new LinkedHashMap<>();
+            try (BufferedReader out = process.inputReader(StandardCharsets.UTF_8)) {
+                for (String line = out.readLine(); line != null; line = out.readLine()) {
+                    int equals = line.indexOf('=');
+                    if (line.isEmpty() && !lines.isEmpty()) {
+                        long now = System.nanoTime();
+                        if (!block.isEmpty()) {
+                            longestSilence = Math.max(longestSilence, now - blockTime - intervalNanos);
+                        }
+                        blockTime = now;
+                        block = Map.copyOf(lines);
+                        lines.clear();
+                    } else if (equals > 0 && !line.startsWith(WORDS)) {
+                        lines.put(line.substring(0, equals), line.substring(equals + 1));
+                    } else if (!line.isEmpty()) {
+                        news.add(line);
+                    }
+                }
+            } catch (IOException e) {
+                // The pipe of a process that was killed.
+            }
+        }
+
+        Counts counts() {
+            Map<String, String> now = block;
+            return now.isEmpty() ? Counts.NONE : HostedPlc.counts(now, blockTime);
+        }
+
+        void await(String complaint) {
+            try {
+                if (!process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
+                    throw new DemoFailure(name() + " of the PLC " + complaint);
+                }
+                reader.join(TimeUnit.SECONDS.toMillis(SECONDS_TO_DIE));
+            } catch (InterruptedException e) {
+                Thread.currentThread().interrupt();
+                throw new DemoFailure("interrupted");
+            }
+        }
+    }
+
+    /**
+     * A process that is not started yet.
+     *
+     * @param command gives the executable and its arguments for the next life
+     * @param intervalNanos how often it prints its statistics
+     * @param log gets its standard error; emptied now, added to by each life
+     */
+    PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
+        this.command = command;
+        this.intervalNanos = intervalNanos;
+        this.log = log;
+        try {
+            Files.createDirectories(log.toAbsolutePath().getParent());
+            Files.writeString(log, "");
+        } catch (IOException e) {
+            throw new DemoFailure("the PLC's log cannot be written: " + e);
+        }
+        Runtime.getRuntime().addShutdownHook(hook);
+    }
+
+    @Override
+    public boolean restartable() {
+        return true;
+    }
+
+    @Override
+    public void start() {
+        ProcessBuilder builder = new ProcessBuilder(command.get())
+                .redirectInput(ProcessBuilder.Redirect.from(nothing()))
+                .redirectError(ProcessBuilder.Redirect.appendTo(log.toFile()));
+        // Its log is a file, so it may say more than what breaks.
+        builder.environment().put("TICKBUS_LOG", "info");
+        Process process;
+        try {
+            process = builder.start();
+        } catch (IOException e) {
+            throw new DemoFailure("the PLC cannot be started: " + e.getMessage()
+                    + "; build it (make build), or name the tickbus executable by --plc");
+        }
+        life = new Life(process);
+    }
+
+    private static File nothing() {
+        return new File(System.getProperty("os.name").startsWith("Windows") ? "NUL" : "/dev/null");
+    }
+
+    @Override
+    public void kill() {
+        Life now = life;
+        now.killed = true;
+        now.process.destroyForcibly();
+        now.await("was not dead " + SECONDS_TO_DIE + " s after it was killed");
+    }
+
+    @Override
+    public Counts counts() {
+        Life now = life;
+        return now == null ? Counts.NONE : now.counts();
+    }
+
+    @Override
+    public List<String> news() {
+        if (news.isEmpty()) {
+            return List.of();
+        }
+        List<String> taken = new ArrayList<>();
+        for (String line = news.poll(); line != null; line = news.poll()) {
+            taken.add(line);
+        }
+        return taken;
+    }
+
+    @Override
+    public long longestSilenceNanos() {
+        return longestSilence;
+    }
+
+    @Override
+    public String name() {
+        Life now = life;
+        return now == null ? "no process" : "process " + now.process.pid();
+    }
+
+    @Override
+    public void check() {
+        Life now = life;
+        if (now == null || now.killed || now.process.isAlive()) {
+            return;
+        }
+        now.await("hangs at its end");
+        throw new DemoFailure(name() + " of the PLC ended by itself with exit code " + now.process.exitValue()
+                + lastWords());
+    }
+
+    private String lastWords() {
+        try {
+            List<String> lines = Files.readAllLines(log);
+            if (!lines.isEmpty()) {
+                List<String> last = lines.subList(Math.max(0, lines.size() - LAST_WORDS), lines.size());
+                return "; its last words: " + String.join("; ", last);
+            }
+        } catch (IOException e) {
+            // It is about the process, not about its log.
+        }
+        return "; it said nothing on standard error";
+    }
+
+    @Override
+    public void close() {
+        Life now = life;
+        if (now != null && now.process.isAlive()) {
+            now.killed = true;
+            // In good order first, so that the last lines are in its log.
+            now.process.destroy();
+            try {
+                if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
+                    destroy();
+                }
+            } catch (InterruptedException e) {
+                destroy();
+                Thread.currentThread().interrupt();
+            }
+        }
+        try {
+            Runtime.getRuntime().removeShutdownHook(hook);
+        } catch (IllegalStateException e) {
+            // The JVM is ending, and the hook runs already.
+        }
+    }
+
+    private void destroy() {
+        Life now = life;
+        if (now != null) {
+            now.process.destroyForcibly();
+        }
+    }
+}

@@ -1,0 +1,108 @@
+package tickbus.simulator.plc;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import controlinterface.Direction;
+import controlinterface.HardwareComponent;
+import java.nio.file.Path;
+import java.util.List;
+import tickbus.Signal;
+import tickbus.junit.Machine;
+import tickbus.junit.Plc;
+import tickbus.simulator.DriverSet;
+import tickbus.simulator.Simulator;
+import tickbus.simulator.TimeSource;
+import tickbus.simulator.rig.Rig;
+
+/**
+ * The rig behind its control table, as the simulator runs it, stepped by a {@link Plc} of the test kit.
+ *
+ * <p>A machine of your own needs none of this: implement {@link Machine} and set its sensors there. This one is a model
+ * that exists already and has a simulator of its own, so the simulator is stepped whole, with the {@link Plc} in the
+ * place of its driver.
+ */
+public final class SimulatedRig implements Machine {
+    private static final Path CONTROL_TABLE = Path.of("rig.table");
+
+    private final Rig rig;
+    private Line line;
+    private Simulator simulator;
+
+    /** A rig as it is found at power-up. */
+    public SimulatedRig() {
+        this(new Rig());
+    }
+
+    SimulatedRig(Rig rig) {
+        this.rig = rig;
+    }
+
+    /** The model, for what no signal tells: bottles, jams. */
+    Rig rig() {
+        return rig;
+    }
+
+    @Override
+    public void connect(Plc plc) {
+        line = new Line(plc);
+        simulator = new Simulator(new DriverSet(List.of(line)), rig, CONTROL_TABLE, plc.stepNanos(),
+                TimeSource.system());
+    }
+
+    @Override
+    public void step(Plc plc, long simulationNanos) {
+        line.deliver();
+        simulator.tick();
+    }
+
+    /** The simulator's driver: its components are the signals of the PLC. The exchange is made by the kit. */
+    private static final class Line extends ControlInterfaceDeviceDriver {
+        private final Plc plc;
+        private final Signal[] written;
+        private final Signal[] read;
+        private final double[] inputs;
+
+        Line(Plc plc) {
+            this.plc = plc;
+            written = plc.signals().stream().filter(Signal::isWritten).toArray(Signal[]::new);
+            read = plc.signals().stream().filter(signal -> !signal.isWritten()).toArray(Signal[]::new);
+            inputs = new double[read.length];
+        }
+
+        /** What the PLC commanded at the end of the last tick. */
+        void deliver() {
+            for (int i = 0; i < read.length; i++) {
+                inputs[i] = read[i].get();
+            }
+            deliverHardwareInputs(inputs);
+        }
+
+        @Override
+        public void updateComponentValues(double[] value) {
+            for (int i = 0; i < written.length; i++) {
+                written[i].set(value[i]);
+            }
+        }
+
+        @Override
+        public List<HardwareComponent> components() {
+            return plc.signals().stream().map(signal -> new HardwareComponent(signal.name(),
+                    signal.isWritten() ? Direction.WRITTEN_BY_SIMULATION : Direction.READ_BY_SIMULATION,
+                    signal.type(), signal.unit())).toList();
+        }
+
+        @Override
+        public int id() {
+            return plc.id();
+        }
+
+        @Override
+        public String name() {
+            return "PLC under test";
+        }
+
+        @Override
+        public void exit() {
+            // The kit closes the line.
+        }
+    }
+}

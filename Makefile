@@ -1,12 +1,12 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo test bench lint dist build setup clean
+.PHONY: help demo test bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-demo: ## build, then watch the PLC program run the rig: three cycles, one jam
+demo: ## build, then watch the PLC program run the rig: three cycles, one jam, one PLC killed
 	@exec tools/demo
 
 test: setup ## build and test everything that CI checks
@@ -14,6 +14,9 @@ test: setup ## build and test everything that CI checks
 
 bench: setup ## measure, and print each figure beside the one asked for
 	@exec tools/bench
+
+soak: setup ## a device and a peer that dies again and again, for MINUTES (3)
+	@exec tools/soak $(MINUTES)
 
 lint: setup ## formatting, clippy, documentation, Java warnings, shell scripts
 	@exec tools/lint

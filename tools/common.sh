@@ -52,19 +52,29 @@ native_library() {
     esac
 }
 
+# The tickbus command's file name on this system.
+tickbus_command() {
+    case "$(platform)" in
+        windows-*) echo tickbus.exe ;;
+        *) echo tickbus ;;
+    esac
+}
+
 # Maven, without its chatter and its colours, on the Java reactor.
 maven() {
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
 }
 
-# Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver and a driver.cfg) and
-# simulator/ (the simulator and the rig's control table). Needs what tools/build makes.
+# Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
+# command) and simulator/ (the simulator and the rig's control table). Needs what tools/build makes.
 assemble() {
     local folder=$1 release
     release=$(version)
     rm -rf "$folder/DeviceDriver" "$folder/simulator"
     mkdir -p "$folder/DeviceDriver" "$folder/simulator"
-    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$folder/DeviceDriver/"
+    # The command is there for plug-ins in helper processes.
+    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "target/release/$(tickbus_command)" \
+        "$folder/DeviceDriver/"
     cp java/simulator/rig.table "java/simulator/target/simulator-$release.jar" \
         "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
 }

@@ -5,6 +5,7 @@ mod log;
 #[cfg(unix)]
 mod own_file;
 mod poll;
+mod serial;
 #[cfg(unix)]
 mod shared_memory;
 
@@ -13,5 +14,8 @@ pub use log::log_to_stderr;
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::{Interest, Poller, Source};
+#[cfg(unix)]
+pub use serial::SerialPort;
+pub use serial::{Parity, SerialSettings};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Role, loopback, plugin, socket};
+use super::{Role, loopback, modbus, plugin, socket};
 use crate::config::{Table, Value, did_you_mean, shown};
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
@@ -25,7 +25,7 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 3] = ["loopback", "socket", "plugin"];
+const BUILT: [&str; 4] = ["loopback", "socket", "plugin", "modbus-server"];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,6 +36,8 @@ pub enum Options {
     Socket(socket::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
+    /// `kind = "modbus-server"`: clients of Modbus read and write the image.
+    ModbusServer(modbus::ServerOptions),
 }
 
 impl Options {
@@ -45,6 +47,7 @@ impl Options {
             Self::Loopback(_) => "loopback",
             Self::Socket(_) => "socket",
             Self::Plugin(_) => "plugin",
+            Self::ModbusServer(_) => "modbus-server",
         }
     }
 
@@ -54,6 +57,7 @@ impl Options {
             Self::Loopback(options) => options.events,
             Self::Socket(options) => options.events,
             Self::Plugin(options) => options.events,
+            Self::ModbusServer(options) => options.events,
         }
     }
 
@@ -64,7 +68,7 @@ impl Options {
                 peer: loopback::Peer::Replay(file),
                 ..
             }) => Some(file),
-            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => None,
+            _ => None,
         }
     }
 
@@ -72,7 +76,7 @@ impl Options {
     pub const fn is_in_process(&self) -> bool {
         match self {
             Self::Loopback(_) => true,
-            Self::Socket(_) | Self::Plugin(_) => false,
+            _ => false,
         }
     }
 
@@ -88,6 +92,15 @@ impl Options {
                 self.kind()
             )),
             Self::Socket(options) => options.set_address(address),
+            Self::ModbusServer(options) => options.line.set_address(address, |_| Ok(())),
+        }
+    }
+
+    /// Reads the keys that the bus has in the next of `count` `[[station]]` tables.
+    pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        match self {
+            Self::ModbusServer(options) => options.stations.read_station(count, false, table),
+            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => {}
         }
     }
 
@@ -104,6 +117,9 @@ impl Options {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
+            Some("modbus-server") => {
+                modbus::ServerOptions::read(role, table).map(Self::ModbusServer)
+            }
             other => {
                 table.finish_open();
                 report_kind(kind, other?);

@@ -136,6 +136,18 @@ impl Port {
         }
     }
 
+    /// As [`sent`](Self::sent), for a peer that has only these bytes of the frame: no pulse elsewhere counts as
+    /// seen by it.
+    pub fn sent_part(&mut self, station: usize, bytes: Range<usize>) {
+        if self
+            .troubles
+            .wires()
+            .is_none_or(|wires| wires.sent(station))
+        {
+            self.image.stations[station].sent_part(bytes);
+        }
+    }
+
     /// Hands in a whole frame that arrived at `now`.
     ///
     /// # Panics

@@ -5,6 +5,7 @@ mod log;
 #[cfg(unix)]
 mod own_file;
 mod poll;
+mod poll_set;
 mod serial;
 #[cfg(unix)]
 mod shared_memory;
@@ -14,6 +15,7 @@ pub use log::log_to_stderr;
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::{Interest, Poller, Source};
+pub use poll_set::{PollSet, Ready};
 #[cfg(unix)]
 pub use serial::SerialPort;
 pub use serial::{Parity, SerialSettings};

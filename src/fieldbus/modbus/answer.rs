@@ -67,9 +67,7 @@ fn act(
 ) -> Result<Done, Exception> {
     match function {
         Function::ReadCoils => read(Table::Coils, READ_BITS, data, tables, reply),
-        Function::ReadDiscreteInputs => {
-            read(Table::DiscreteInputs, READ_BITS, data, tables, reply)
-        }
+        Function::ReadDiscreteInputs => read(Table::DiscreteInputs, READ_BITS, data, tables, reply),
         Function::ReadHoldingRegisters => {
             read(Table::HoldingRegisters, READ_REGISTERS, data, tables, reply)
         }

@@ -46,9 +46,7 @@ impl Identification {
     ///
     /// The kind of interface is another one, the way of access is none, or there is no such object.
     pub(super) fn answer(&self, data: &[u8], reply: &mut Vec<u8>) -> Result<(), Exception> {
-        let (&kind, data) = data
-            .split_first()
-            .ok_or(Exception::ILLEGAL_DATA_VALUE)?;
+        let (&kind, data) = data.split_first().ok_or(Exception::ILLEGAL_DATA_VALUE)?;
         if kind != READ_DEVICE_IDENTIFICATION {
             return Err(Exception::ILLEGAL_FUNCTION);
         }
@@ -68,7 +66,11 @@ impl Identification {
             // A stream from an object that is not there begins at the beginning.
             (false, false) => 0,
         };
-        let wanted = if single { 1 } else { self.objects.len() - first };
+        let wanted = if single {
+            1
+        } else {
+            self.objects.len() - first
+        };
         let begin = reply.len();
         reply.extend_from_slice(&[
             super::Function::DeviceIdentification.code(),
@@ -99,7 +101,16 @@ impl Identification {
     /// Takes over the objects of an answer, of which `data` is what follows the function code; gives the object
     /// to ask for next, if more follow. `None` when the answer is malformed.
     pub(super) fn take(&mut self, data: &[u8]) -> Option<Option<u8>> {
-        let &[READ_DEVICE_IDENTIFICATION, _, _, more, next, count, ref objects @ ..] = data else {
+        let &[
+            READ_DEVICE_IDENTIFICATION,
+            _,
+            _,
+            more,
+            next,
+            count,
+            ref objects @ ..,
+        ] = data
+        else {
             return None;
         };
         let mut rest = objects;
@@ -109,7 +120,13 @@ impl Identification {
             rest = after;
             if let Some(object) = self.objects.get_mut(usize::from(id)) {
                 // One line of printable characters, whatever the device says.
-                let printable = |byte: &u8| if matches!(byte, b' '..=b'~') { char::from(*byte) } else { '?' };
+                let printable = |byte: &u8| {
+                    if matches!(byte, b' '..=b'~') {
+                        char::from(*byte)
+                    } else {
+                        '?'
+                    }
+                };
                 *object = text.iter().map(printable).collect();
             }
         }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::config::{Table, Value};
-use crate::fieldbus::socket::{Address, AddressError};
+use crate::fieldbus::tcp::{Address, AddressError};
 use crate::os::{Parity, SerialSettings};
 use crate::time::Nanos;
 
@@ -45,6 +45,19 @@ impl fmt::Display for Line {
 }
 
 impl Line {
+    /// Takes another address than the driver.cfg names, if `check` has nothing against it.
+    pub(in crate::fieldbus) fn set_address(
+        &mut self,
+        address: &str,
+        check: impl FnOnce(&Address) -> Result<(), AddressError>,
+    ) -> Result<(), String> {
+        let why = |error: AddressError| error.to_string();
+        let address: Address = address.parse().map_err(why)?;
+        check(&address).map_err(why)?;
+        *self = Self::Tcp(address);
+        Ok(())
+    }
+
     /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits` and `silence`; without any of them it is
     /// `address`. `check` has its say about what the driver.cfg states.
     pub(super) fn read(
@@ -69,7 +82,8 @@ impl Line {
             let Some(value) = stated else {
                 return Some(Self::Tcp(address));
             };
-            let text = value.text("write a host and a port in quotes, such as \"127.0.0.1:1502\"")?;
+            let text =
+                value.text("write a host and a port in quotes, such as \"127.0.0.1:1502\"")?;
             let read = text.parse().and_then(|address| {
                 check(&address)?;
                 Ok(address)
@@ -77,9 +91,7 @@ impl Line {
             return match read {
                 Ok(address) => Some(Self::Tcp(address)),
                 Err(error) => {
-                    let text = error.to_string();
-                    let (what, right) = text.split_once("; ").unwrap_or((&text, ""));
-                    value.wrong(what, right);
+                    value.wrong(error.what, error.right);
                     None
                 }
             };
@@ -117,9 +129,7 @@ fn read_settings(
 ) -> Option<SerialSettings> {
     let baud = match baud {
         None => Some(19_200),
-        Some(value) => value
-            .whole(BAUDS)
-            .and_then(|baud| u32::try_from(baud).ok()),
+        Some(value) => value.whole(BAUDS).and_then(|baud| u32::try_from(baud).ok()),
     };
     let parities = [
         ("even", Parity::Even),

@@ -85,15 +85,11 @@ impl Place {
 }
 
 fn named(name: &str) -> Option<Table> {
-    Table::ALL
-        .into_iter()
-        .find(|table| table.element() == name)
+    Table::ALL.into_iter().find(|table| table.element() == name)
 }
 
 fn numbered(digit: char) -> Option<Table> {
-    Table::ALL
-        .into_iter()
-        .find(|table| table.digit() == digit)
+    Table::ALL.into_iter().find(|table| table.digit() == digit)
 }
 
 /// A place that names its table.
@@ -104,7 +100,8 @@ impl FromStr for Place {
         if text.starts_with("offset:") {
             return Err(PlaceError {
                 what: format!("\"{}\" names no table", shown(text)),
-                right: "write it before the offset, as in \"holding-register offset:20\"".to_owned(),
+                right: "write it before the offset, as in \"holding-register offset:20\""
+                    .to_owned(),
             });
         }
         Self::parse(text, Table::HoldingRegisters)
@@ -155,7 +152,10 @@ mod tests {
             Place::parse("offset:65535", Table::InputRegisters).map(|place| place.table),
             Ok(Table::InputRegisters)
         );
-        assert_eq!(holding(20).to_string(), "holding-register offset:20 (4x00021)");
+        assert_eq!(
+            holding(20).to_string(),
+            "holding-register offset:20 (4x00021)"
+        );
     }
 
     #[test]

@@ -93,7 +93,8 @@ impl Framer {
         self.last = Some(now);
         let room = ADU_LIMIT - self.bytes.len();
         self.overlong |= bytes.len() > room;
-        self.bytes.extend_from_slice(&bytes[..bytes.len().min(room)]);
+        self.bytes
+            .extend_from_slice(&bytes[..bytes.len().min(room)]);
     }
 
     /// What has come so far of a telegram that no silence has ended.

@@ -61,9 +61,17 @@ impl Stations {
     }
 
     /// Reads the keys of the next of `count` `[[station]]` tables; `write_to` is one where this end may write.
-    pub(super) fn read_station(&mut self, count: usize, guarded: bool, table: &mut Table<'_>) {
+    pub(in crate::fieldbus) fn read_station(
+        &mut self,
+        count: usize,
+        guarded: bool,
+        table: &mut Table<'_>,
+    ) {
         let unit = if count > 1 {
-            table.require("unit", "write the number of its Modbus unit, such as unit = 1")
+            table.require(
+                "unit",
+                "write the number of its Modbus unit, such as unit = 1",
+            )
         } else {
             table.take("unit")
         };

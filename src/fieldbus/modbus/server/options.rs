@@ -5,16 +5,13 @@ use crate::fieldbus::Role;
 use crate::fieldbus::modbus::line::Line;
 use crate::fieldbus::modbus::stations::{Stations, Units};
 use crate::fieldbus::modbus::{CONTROLLER_INPUTS, Map, Place, Side, table};
-use crate::fieldbus::socket::{Address, Host};
+use crate::fieldbus::tcp::Address;
 
 use super::super::place::SHAPE;
 
 /// Where a server listens unless a driver.cfg says otherwise: on this machine alone, at a port that needs no
 /// privilege.
-const ADDRESS: Address = Address {
-    host: Host::Ip(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST)),
-    port: 1502,
-};
+const ADDRESS: Address = Address::local(1502);
 
 /// The most clients of a server, unless a driver.cfg says otherwise.
 const CLIENTS: usize = 1024;

@@ -129,6 +129,7 @@ fn bus(options: &Options) -> String {
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
         Options::ModbusServer(options) => parts.extend(modbus_server(options)),
+        Options::ModbusClient(options) => parts.push(format!("TODO {}", options.line)),
     }
     if options.events() {
         parts.push("with events".to_owned());

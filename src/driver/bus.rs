@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
-use crate::fieldbus::modbus::ModbusServer;
+use crate::fieldbus::modbus::{ModbusClient, ModbusServer};
 use crate::fieldbus::socket::Socket;
 use crate::fieldbus::{Bus, Free, Options, Role, plugin};
 use crate::plc;
@@ -54,6 +54,11 @@ pub(super) fn open(
         Options::ModbusServer(options) => {
             let server = ModbusServer::new(options, &config.table, config.role, &config.name);
             Ok((Bus::Free(Box::new(server)), None))
+        }
+        Options::ModbusClient(options) => {
+            let cycle = config.timing.cycle;
+            let client = ModbusClient::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(client)), None))
         }
     }
 }

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use super::{Role, loopback, modbus, plugin, socket};
-use crate::config::{Table, Value, did_you_mean, shown};
+use super::tcp::Address;
+use crate::config::{Collector, Table, Value, did_you_mean, shown};
+use crate::signal::SignalTable;
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -25,7 +27,13 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 4] = ["loopback", "socket", "plugin", "modbus-server"];
+const BUILT: [&str; 5] = [
+    "loopback",
+    "socket",
+    "plugin",
+    "modbus-server",
+    "modbus-client",
+];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,6 +46,8 @@ pub enum Options {
     Plugin(plugin::Options),
     /// `kind = "modbus-server"`: clients of Modbus read and write the image.
     ModbusServer(modbus::ServerOptions),
+    /// `kind = "modbus-client"`: reads and writes the tables of a Modbus server.
+    ModbusClient(modbus::ClientOptions),
 }
 
 impl Options {
@@ -48,6 +58,7 @@ impl Options {
             Self::Socket(_) => "socket",
             Self::Plugin(_) => "plugin",
             Self::ModbusServer(_) => "modbus-server",
+            Self::ModbusClient(_) => "modbus-client",
         }
     }
 
@@ -58,6 +69,7 @@ impl Options {
             Self::Socket(options) => options.events,
             Self::Plugin(options) => options.events,
             Self::ModbusServer(options) => options.events,
+            Self::ModbusClient(options) => options.events,
         }
     }
 
@@ -93,6 +105,9 @@ impl Options {
             )),
             Self::Socket(options) => options.set_address(address),
             Self::ModbusServer(options) => options.line.set_address(address, |_| Ok(())),
+            Self::ModbusClient(options) => {
+                options.line.set_address(address, Address::check_dialled)
+            }
         }
     }
 
@@ -100,7 +115,15 @@ impl Options {
     pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
+            Self::ModbusClient(options) => options.stations.read_station(count, true, table),
             Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => {}
+        }
+    }
+
+    /// Reports what does not go together with the stations and signals of the driver.
+    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        if let Self::ModbusClient(options) = self {
+            options.fit(table, collector);
         }
     }
 
@@ -119,6 +142,9 @@ impl Options {
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
             Some("modbus-server") => {
                 modbus::ServerOptions::read(role, table).map(Self::ModbusServer)
+            }
+            Some("modbus-client") => {
+                modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
             }
             other => {
                 table.finish_open();

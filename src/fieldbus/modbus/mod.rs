@@ -1,9 +1,10 @@
 //! Modbus: over TCP and, as RTU, over a serial line; as server and as client.
 //!
 //! The codec knows no port and no image: [`answer`] is a server's half, a request in and an answer out against
-//! [`Tables`]. [`mbap`] and [`rtu`] put telegrams around it.
+//! [`Tables`]; [`Query`] is a client's half. [`mbap`] and [`rtu`] put telegrams around it.
 
 mod answer;
+mod client;
 mod function;
 mod identification;
 mod line;
@@ -18,6 +19,7 @@ mod table;
 mod tables;
 
 pub use answer::{Done, answer, refuse};
+pub use client::{Block, ClientOptions, Fault, ModbusClient, Query, queries};
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;
 pub use line::{Line, Serial};

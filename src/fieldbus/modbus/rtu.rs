@@ -27,6 +27,11 @@ pub fn silence(baud: u32) -> Nanos {
     Nanos(7 * half_character)
 }
 
+/// How long one character takes.
+pub fn character(baud: u32) -> Nanos {
+    Nanos(CHARACTER * 1_000_000_000 / i64::from(baud.max(1)))
+}
+
 /// The checksum over the bytes of a telegram, as it is sent: the low byte first.
 pub fn checksum(bytes: &[u8]) -> [u8; 2] {
     let mut crc = 0xFFFF_u16;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::{Role, loopback, modbus, plugin, socket};
 use super::tcp::Address;
+use super::{Role, loopback, modbus, plugin, socket};
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::SignalTable;
 

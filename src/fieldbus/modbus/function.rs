@@ -6,18 +6,18 @@ use std::fmt;
 pub const PDU_LIMIT: usize = 253;
 
 /// Set in the function code of an answer that is an exception.
-pub const EXCEPTION_BIT: u8 = 0x80;
+pub(super) const EXCEPTION_BIT: u8 = 0x80;
 
 /// Most coils or discrete inputs that one request reads.
-pub const READ_BITS: usize = 2000;
+pub(super) const READ_BITS: usize = 2000;
 /// Most registers that one request reads.
-pub const READ_REGISTERS: usize = 125;
+pub(super) const READ_REGISTERS: usize = 125;
 /// Most coils that one request writes.
-pub const WRITE_BITS: usize = 1968;
+pub(super) const WRITE_BITS: usize = 1968;
 /// Most registers that one request writes.
-pub const WRITE_REGISTERS: usize = 123;
+pub(super) const WRITE_REGISTERS: usize = 123;
 /// Most registers that a request writes which reads others, too.
-pub const READ_WRITE_REGISTERS: usize = 121;
+pub(super) const READ_WRITE_REGISTERS: usize = 121;
 
 /// A function that both ends know here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

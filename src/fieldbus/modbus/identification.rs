@@ -3,7 +3,7 @@
 use super::{Exception, PDU_LIMIT};
 
 /// The kind of encapsulated interface that reads the device identification.
-pub const READ_DEVICE_IDENTIFICATION: u8 = 14;
+pub(super) const READ_DEVICE_IDENTIFICATION: u8 = 14;
 
 /// The three objects that every device has, as a stream and one by one.
 const CONFORMITY: u8 = 0x81;

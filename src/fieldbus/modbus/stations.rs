@@ -7,7 +7,7 @@ const IDENTITY_LIMIT: usize = 1000;
 
 /// The numbers that units of a line may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Units {
+pub(super) enum Units {
     /// All that fit into a byte.
     Tcp,
     /// On a serial line 0 is everyone and those above 247 are reserved.
@@ -18,7 +18,7 @@ pub enum Units {
 
 /// What a driver.cfg says of one station, or of all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Keys {
+pub(super) struct Keys {
     /// Its unit.
     pub unit: Option<u8>,
     /// The identity of the device that may be written to.

@@ -16,7 +16,7 @@ pub enum Table {
 }
 
 /// Elements that a 16-bit address reaches.
-pub const ADDRESSES: usize = 0x1_0000;
+pub(super) const ADDRESSES: usize = 0x1_0000;
 
 impl Table {
     /// All of them.

@@ -49,7 +49,9 @@ impl ModbusClient {
         let stations = stations.map(|(index, station)| {
             let blocks = |area| {
                 // What does not fit was reported when the driver.cfg was read.
-                options.blocks(area, station.bytes(area)).unwrap_or_default()
+                options
+                    .blocks(area, station.bytes(area))
+                    .unwrap_or_default()
             };
             Station {
                 unit: options.unit(index),
@@ -103,7 +105,9 @@ impl Free for ModbusClient {
                     ))
                 };
                 prepare(&stream, port.max_age().times(PATIENCE)).map_err(broken)?;
-                port.opening(&format!("connected with {peer}; waiting for its first answer"));
+                port.opening(&format!(
+                    "connected with {peer}; waiting for its first answer"
+                ));
                 let framing = Framing::Tcp {
                     transaction: 0,
                     inbox: Vec::new(),

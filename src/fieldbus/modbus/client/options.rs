@@ -65,7 +65,11 @@ impl ClientOptions {
     /// read.
     pub(in crate::fieldbus) fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
         let line = Line::read(&mut table, ADDRESS, |address| {
-            if moved { Ok(()) } else { address.check_dialled() }
+            if moved {
+                Ok(())
+            } else {
+                address.check_dialled()
+            }
         });
         let at = table.at();
         let unit = table.take("unit");
@@ -202,7 +206,9 @@ impl Lie {
             let parts = vec![Part { place, bytes: None }];
             return Some(Self { parts, at });
         }
-        let right = format!("{SHAPE}; or a list such as [{{ at = \"coil:1\", bytes = 2 }}, {{ at = \"offset:0\" }}]");
+        let right = format!(
+            "{SHAPE}; or a list such as [{{ at = \"coil:1\", bytes = 2 }}, {{ at = \"offset:0\" }}]"
+        );
         let list = value.list(&right)?;
         if list.is_empty() || list.len() > PARTS {
             value.wrong(

@@ -257,8 +257,8 @@ impl<'a> Poll<'a> {
         let mut taken = 0;
         loop {
             let parsed = Telegram::parse(&bytes[taken..]);
-            let parsed = parsed
-                .map_err(|error| BusError::Protocol(format!("of {}: {error}", self.peer)))?;
+            let parsed =
+                parsed.map_err(|error| BusError::Protocol(format!("of {}: {error}", self.peer)))?;
             let Some((telegram, length)) = parsed else {
                 return Ok(taken);
             };
@@ -353,7 +353,12 @@ impl<'a> Poll<'a> {
 
     /// There is no answer to what is asked: goes on with the next station, unless nobody answers at all.
     fn give_up(&mut self, what: &str, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let Some(Asking { station, what: asked, .. }) = self.asking.take() else {
+        let Some(Asking {
+            station,
+            what: asked,
+            ..
+        }) = self.asking.take()
+        else {
             return Ok(());
         };
         port.count("modbus-client.unanswered");

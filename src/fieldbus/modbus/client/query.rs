@@ -351,9 +351,21 @@ mod tests {
     fn a_server_answers_what_a_client_asks() {
         let image: Vec<u8> = (0..=255).chain(0..=254).collect();
         for (reads, writes, combine) in [
-            (block(HOLDING, 0, 0, 511), block(HOLDING, 1024, 0, 511), true),
-            (block(HOLDING, 0, 0, 511), block(HOLDING, 1024, 0, 511), false),
-            (block(Table::Coils, 0, 0, 511), block(Table::Coils, 16_384, 0, 511), true),
+            (
+                block(HOLDING, 0, 0, 511),
+                block(HOLDING, 1024, 0, 511),
+                true,
+            ),
+            (
+                block(HOLDING, 0, 0, 511),
+                block(HOLDING, 1024, 0, 511),
+                false,
+            ),
+            (
+                block(Table::Coils, 0, 0, 511),
+                block(Table::Coils, 16_384, 0, 511),
+                true,
+            ),
         ] {
             let (mut held, mut read) = (vec![0; 512], vec![0; 511]);
             for query in queries(&[reads], &[writes], combine) {

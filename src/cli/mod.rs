@@ -3,6 +3,7 @@
 //! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
 
 mod check;
+mod export;
 mod host;
 mod mirror;
 mod plc;
@@ -26,6 +27,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Check(check::Arguments),
+    Export(export::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     Report(report::Arguments),
@@ -67,6 +69,7 @@ pub fn main() -> ExitCode {
     crate::os::log_to_stderr(log::LevelFilter::Error);
     match arguments.command {
         Command::Check(arguments) => check::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

@@ -15,6 +15,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["plc"],
     &["fieldbus"],
     &["driver"],
+    &["export"],
     &["testing"],
     &["jni", "cli"],
 ];

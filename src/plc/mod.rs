@@ -10,6 +10,7 @@ use std::sync::Arc;
 use crate::signal::{Addressing, SignalTable};
 use crate::time::Nanos;
 
+mod axes;
 mod drum;
 mod hosted;
 mod mirror;
@@ -19,6 +20,7 @@ mod reaction;
 pub mod blocks;
 pub mod rig;
 
+pub use axes::Axes;
 pub use drum::Drum;
 pub use hosted::Hosted;
 pub use mirror::Mirror;

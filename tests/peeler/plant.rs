@@ -3,7 +3,7 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
-use tickbus::axis::{Axis, Demand, Drive, Feedback, Field, Motion};
+use tickbus::axis::{Demand, Drive, Feedback, Field};
 use tickbus::driver::Config;
 use tickbus::signal::Slot;
 
@@ -96,26 +96,6 @@ const BEGINNINGS: [&[f64]; 2] = [
     ],
 ];
 
-fn demand(axis: &Axis, slots: &[Slot]) -> Demand {
-    let value = |field| axis.slot(field).map_or(0.0, |slot| slots[slot].real());
-    let on = |field| value(field) != 0.0;
-    Demand {
-        execute: on(Field::Execute),
-        tracking: on(Field::Tracking),
-        torque_control: on(Field::TorqueControl),
-        speed_control: on(Field::SpeedControl),
-        enable: on(Field::Enable),
-        motion: Motion {
-            position: value(Field::TargetPosition),
-            speed: value(Field::Speed),
-            acceleration: value(Field::Acceleration),
-            deceleration: value(Field::Deceleration),
-            torque: value(Field::Torque),
-        },
-        jerk: 0.0,
-    }
-}
-
 impl Plant {
     pub(crate) fn new(configs: [&Config; 2]) -> Self {
         let mut number = 0;
@@ -163,7 +143,7 @@ impl Plant {
         self.time += TICK;
         for side in 0..2 {
             for (number, axis) in configs[side].axes.iter().enumerate() {
-                let demand = demand(axis, slots[side]);
+                let demand = axis.demand(slots[side]);
                 let (follows, stop) = self.surroundings(side, number, &demand);
                 let drive = &mut self.sides[side].drives[number];
                 let mut told = drive.step(TICK, &demand, follows, stop);
@@ -321,14 +301,7 @@ impl Plant {
     fn tell(&self, config: &Config, slots: &mut [Slot], side: usize) {
         let level = |on: bool| Slot::from_real(f64::from(u8::from(on)));
         for (axis, told) in config.axes.iter().zip(&self.sides[side].told) {
-            for (field, value) in [
-                (Field::Healthy, level(told.healthy)),
-                (Field::InPosition, level(told.in_position)),
-                (Field::ActualPosition, Slot::from_real(told.position)),
-                (Field::ActualSpeed, Slot::from_real(told.speed)),
-            ] {
-                slots[axis.slot(field).expect("every axis has it")] = value;
-            }
+            axis.tell(told, slots);
         }
         if side == 1 {
             return;

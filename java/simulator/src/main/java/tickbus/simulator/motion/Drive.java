@@ -7,25 +7,24 @@ package tickbus.simulator.motion;
  * <p>From rest over a way d with speed v, acceleration a and deceleration b that takes v/a + (d − v²/2a − v²/2b)/v + v/b
  * where d is at least v²/2a + v²/2b, else w/a + w/b with the peak w = √(2dab/(a+b)).
  *
- * <p>A smooth drive changes its speed along an S instead of evenly; the acceleration of the command is then the greatest
- * one in the S, so that each change of speed takes 1.5 times as long.
+ * <p>With a jerk above 0 each change of speed is an S: the acceleration rises and falls at that rate, so that it takes
+ * longer, by acceleration / jerk where the acceleration is reached.
  */
 public final class Drive {
-    /** Greatest acceleration of an S compared with the even change of speed in the same time. */
-    private static final double PEAK = 1.5;
+    /** Halvings in the search for the peak of a short S; more would change nothing. */
+    private static final int HALVINGS = 60;
 
     private final Legs legs;
-    private final boolean smooth;
+    /** Of the motion under way; 0 for none. */
+    private double jerk;
 
     /**
      * A drive at rest.
      *
      * @param position where it stands
-     * @param smooth whether it changes its speed along an S
      */
-    public Drive(double position, boolean smooth) {
+    public Drive(double position) {
         this.legs = new Legs(position);
-        this.smooth = smooth;
     }
 
     /**
@@ -65,6 +64,15 @@ public final class Drive {
     }
 
     /**
+     * How fast the acceleration may change in the motions that begin from now on.
+     *
+     * @param rate units per second cubed; 0 or less lets it jump
+     */
+    public void jerk(double rate) {
+        jerk = Math.max(0, rate);
+    }
+
+    /**
      * Goes to a target and stops there. One that is under way goes on from its present speed if it can, else it brakes
      * first.
      *
@@ -74,29 +82,53 @@ public final class Drive {
      * @param deceleration above 0
      */
     public void moveTo(double target, double speed, double acceleration, double deceleration) {
-        double up = steady(acceleration);
-        double down = steady(deceleration);
         legs.begin();
         double now = legs.velocity();
         double way = target - legs.position();
-        if (now != 0 && (now * way <= 0 || now * now / (2 * down) > Math.abs(way))) {
-            change(-now, down);
+        if (now != 0 && (now * way <= 0 || Math.abs(now) / 2 * time(now, deceleration) > Math.abs(way))) {
+            change(-now, deceleration);
         }
         double sign = Math.signum(target - legs.plannedPosition());
-        double distance = Math.abs(target - legs.plannedPosition());
         double entry = Math.abs(legs.plannedVelocity());
         if (entry > speed) {
-            distance -= (entry * entry - speed * speed) / (2 * down);
-            change(-sign * (entry - speed), down);
+            change(-sign * (entry - speed), deceleration);
             entry = speed;
         }
-        double peak = Math.sqrt((2 * distance * up * down + entry * entry * down) / (up + down));
-        double top = Math.max(entry, Math.min(speed, peak));
-        double ramps = (top * top - entry * entry) / (2 * up) + top * top / (2 * down);
-        change(sign * (top - entry), up);
-        legs.leg(top == 0 ? 0 : Math.max(0, (distance - ramps) / top), 0, false);
-        change(-sign * top, down);
+        double distance = Math.abs(target - legs.plannedPosition());
+        double top = top(distance, entry, speed, acceleration, deceleration);
+        change(sign * (top - entry), acceleration);
+        double ramps = ramps(entry, top, acceleration, deceleration);
+        legs.leg(top == 0 ? 0 : Math.max(0, (distance - ramps) / top), 0);
+        change(-sign * top, deceleration);
         legs.endsAt(target);
+    }
+
+    /** The greatest speed that a distance leaves room for. */
+    private double top(double distance, double entry, double speed, double acceleration, double deceleration) {
+        if (jerk == 0) {
+            double peak = Math.sqrt((2 * distance * acceleration * deceleration + entry * entry * deceleration)
+                    / (acceleration + deceleration));
+            return Math.max(entry, Math.min(speed, peak));
+        }
+        if (ramps(entry, speed, acceleration, deceleration) <= distance) {
+            return speed;
+        }
+        double low = entry;
+        double high = speed;
+        for (int i = 0; i < HALVINGS; i++) {
+            double middle = (low + high) / 2;
+            if (ramps(entry, middle, acceleration, deceleration) <= distance) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        return low;
+    }
+
+    /** The way from one speed to a higher one, and from that to rest. */
+    private double ramps(double entry, double top, double acceleration, double deceleration) {
+        return (entry + top) / 2 * time(top - entry, acceleration) + top / 2 * time(top, deceleration);
     }
 
     /**
@@ -109,11 +141,11 @@ public final class Drive {
     public void runAt(double velocity, double acceleration, double deceleration) {
         legs.begin();
         if (legs.velocity() * velocity < 0) {
-            change(-legs.velocity(), steady(deceleration));
+            change(-legs.velocity(), deceleration);
         }
         double by = velocity - legs.plannedVelocity();
         boolean faster = Math.abs(velocity) > Math.abs(legs.plannedVelocity());
-        change(by, steady(faster ? acceleration : deceleration));
+        change(by, faster ? acceleration : deceleration);
         if (velocity == 0) {
             legs.endsAt(legs.plannedPosition());
         } else {
@@ -144,11 +176,18 @@ public final class Drive {
         legs.advance(nanos);
     }
 
-    private double steady(double acceleration) {
-        return smooth ? acceleration / PEAK : acceleration;
+    /** How long a change of speed takes. */
+    private double time(double by, double acceleration) {
+        double change = Math.abs(by);
+        if (jerk == 0) {
+            return change / acceleration;
+        }
+        double ramp = acceleration / jerk;
+        return change >= acceleration * ramp ? change / acceleration + ramp : 2 * Math.sqrt(change / jerk);
     }
 
     private void change(double by, double acceleration) {
-        legs.leg(Math.abs(by) / acceleration, by, smooth);
+        double time = time(by, acceleration);
+        legs.leg(time, by, jerk == 0 ? 0 : Math.min(time / 2, acceleration / jerk));
     }
 }

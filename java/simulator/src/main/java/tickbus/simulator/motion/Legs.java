@@ -15,7 +15,8 @@ public final class Legs {
 
     private final double[] duration = new double[MOST];
     private final double[] change = new double[MOST];
-    private final boolean[] soft = new boolean[MOST];
+    /** How long the acceleration of a leg takes to rise, and to fall; 0 where it jumps. */
+    private final double[] rise = new double[MOST];
     private int legs;
     private double startPosition;
     private double startVelocity;
@@ -114,17 +115,26 @@ public final class Legs {
     }
 
     /**
-     * Adds a leg.
+     * Adds a leg in which the speed changes evenly, or not at all.
      *
      * @param time how long it lasts, in seconds, at least 0
      * @param by how much the speed changes in it, in units per second
-     * @param smooth whether the acceleration rises from 0 and falls back to 0 as a parabola, to 1.5 times its mean;
-     *     otherwise it is the same all the time. The way is the same
      */
-    public void leg(double time, double by, boolean smooth) {
+    public void leg(double time, double by) {
+        leg(time, by, 0);
+    }
+
+    /**
+     * Adds a leg in which the speed changes along an S: the acceleration rises evenly, stays, and falls evenly.
+     *
+     * @param time how long it lasts, in seconds, at least 0
+     * @param by how much the speed changes in it, in units per second
+     * @param ramp how long the acceleration takes to rise, and likewise to fall, in seconds, at most half the time
+     */
+    public void leg(double time, double by, double ramp) {
         duration[legs] = time;
         change[legs] = by;
-        soft[legs] = smooth;
+        rise[legs] = ramp;
         legs++;
         plannedPosition += (plannedVelocity + by / 2) * time;
         plannedVelocity += by;
@@ -197,17 +207,37 @@ public final class Legs {
     }
 
     private void within(int leg, double from, double speed, double time) {
-        double part = time / duration[leg];
-        double gained;
-        double way;
-        if (soft[leg]) {
-            gained = part * part * (3 - 2 * part);
-            way = part * part * part * (1 - part / 2);
-        } else {
-            gained = part;
-            way = part * part / 2;
+        double gained = gained(leg, time);
+        position = from + speed * time + way(leg, time);
+        velocity = speed + gained;
+    }
+
+    /** By how much the speed has changed so far in a leg. */
+    private double gained(int leg, double time) {
+        double ramp = rise[leg];
+        double left = duration[leg] - time;
+        double steepest = change[leg] / (duration[leg] - ramp);
+        if (time < ramp) {
+            return steepest * time * time / ramp / 2;
         }
-        position = from + speed * time + change[leg] * way * duration[leg];
-        velocity = speed + change[leg] * gained;
+        if (left < ramp) {
+            return change[leg] - steepest * left * left / ramp / 2;
+        }
+        return steepest * (time - ramp / 2);
+    }
+
+    /** How far this change has led so far. */
+    private double way(int leg, double time) {
+        double ramp = rise[leg];
+        double left = duration[leg] - time;
+        double steepest = change[leg] / (duration[leg] - ramp);
+        if (time < ramp) {
+            return steepest * time * time * time / ramp / 6;
+        }
+        if (left < ramp) {
+            return change[leg] * (duration[leg] / 2 - left) + steepest * left * left * left / ramp / 6;
+        }
+        double steady = time - ramp;
+        return steepest * (ramp * ramp / 6 + steady * (ramp + steady) / 2);
     }
 }

@@ -37,14 +37,14 @@ final class Ramp {
      */
     void moveTo(double target, double speed, double steepness, double brake) {
         legs.begin();
-        legs.leg(Math.abs(legs.velocity()) / brake, -legs.velocity(), false);
+        legs.leg(Math.abs(legs.velocity()) / brake, -legs.velocity());
         double distance = Math.abs(target - legs.plannedPosition());
         double sign = Math.signum(target - legs.plannedPosition());
         double rise = Math.min(speed / steepness, Math.sqrt(distance / steepness));
         double cruise = Math.max(0, (distance - steepness * rise * rise) / speed);
-        legs.leg(rise, sign * steepness * rise, false);
-        legs.leg(cruise, 0, false);
-        legs.leg(rise, -sign * steepness * rise, false);
+        legs.leg(rise, sign * steepness * rise);
+        legs.leg(cruise, 0);
+        legs.leg(rise, -sign * steepness * rise);
         legs.endsAt(target);
     }
 
@@ -57,7 +57,7 @@ final class Ramp {
     void runAt(double speed, double steepness) {
         legs.begin();
         double change = speed - legs.velocity();
-        legs.leg(Math.abs(change) / steepness, change, false);
+        legs.leg(Math.abs(change) / steepness, change);
         if (speed == 0) {
             legs.endsAt(legs.plannedPosition());
         } else {

@@ -1,0 +1,133 @@
+package tickbus.simulator.peeler;
+
+import java.util.ArrayList;
+import java.util.List;
+import tickbus.simulator.Machine;
+
+/**
+ * The peeling line as a machine: charger and lathe, with 25 axes.
+ *
+ * <p>Inputs are {@code <axis>.Execute} and the other parts of each axis's command; outputs are {@code <axis>.Healthy},
+ * {@code .InPosition}, {@code .ActualPosition}, {@code .ActualSpeed}, {@code .Status} and {@code .Error} of each axis,
+ * then the sensors of the charger and the simulation time. The same inputs at the same steps give the same motion, bit
+ * for bit. A step allocates nothing but when a block changes hands or something goes wrong.
+ */
+public final class Peeler implements Machine {
+    private static final double SECONDS = 1e-9;
+    private static final int AXIS_INPUTS = Axes.inputs().size();
+    private static final int AXIS_OUTPUTS = Axes.outputs().size();
+
+    private final Axes axes;
+    private final Mishaps mishaps = new Mishaps();
+    private final Charger charger;
+    private final Lathe lathe;
+    private long now;
+
+    /** A line with as many blocks as it takes, and blocks on all steps of its feeder. */
+    public Peeler() {
+        this(Integer.MAX_VALUE, Charger.STEPS);
+    }
+
+    /**
+     * A line.
+     *
+     * @param blocks how many blocks there are; after the last one the charger runs empty
+     * @param onSteps how many of them lie on the step feeder in the beginning, at most 4
+     */
+    public Peeler(int blocks, int onSteps) {
+        axes = new Axes();
+        charger = new Charger(axes, new BlockSupply(blocks), mishaps, onSteps);
+        lathe = new Lathe(axes, mishaps);
+    }
+
+    @Override
+    public String name() {
+        return "peeler";
+    }
+
+    @Override
+    public List<String> inputs() {
+        return Axes.inputs();
+    }
+
+    @Override
+    public List<String> outputs() {
+        List<String> names = new ArrayList<>(Axes.outputs());
+        for (int i = 1; i <= Charger.SENSORS; i++) {
+            names.add("block at feeder step " + i);
+        }
+        names.add("pre-centring distance 1");
+        names.add("pre-centring distance 2");
+        names.add("simulation time");
+        return names;
+    }
+
+    @Override
+    public void input(int index, double value) {
+        if (index < 0 || index >= AXIS_INPUTS) {
+            throw new IndexOutOfBoundsException(index);
+        }
+        axes.input(index, value);
+    }
+
+    @Override
+    public double output(int index) {
+        if (index < AXIS_OUTPUTS) {
+            return axes.output(index);
+        }
+        int other = index - AXIS_OUTPUTS;
+        if (other < Charger.SENSORS) {
+            return charger.sensor(other) ? 1 : 0;
+        }
+        return switch (other - Charger.SENSORS) {
+            case 0 -> charger.distance(true);
+            case 1 -> charger.distance(false);
+            case 2 -> now * SECONDS;
+            default -> throw new IndexOutOfBoundsException(index);
+        };
+    }
+
+    @Override
+    public void step(long nanos) {
+        if (nanos < 0) {
+            throw new IllegalArgumentException("the machine cannot go back by " + -nanos + " ns");
+        }
+        now += nanos;
+        charger.obstruct();
+        lathe.obstruct(charger.presented());
+        axes.step(nanos);
+        lathe.step(nanos, charger.presented(), charger.clamped());
+        charger.step(nanos, lathe.block());
+    }
+
+    /**
+     * Makes an axis fail, or mends it: a failed one is not healthy, and does not move.
+     *
+     * @param name which one
+     * @param failed whether it fails
+     */
+    public void fail(AxisName name, boolean failed) {
+        axes.get(name).fail(failed);
+    }
+
+    /**
+     * What must not happen and did.
+     *
+     * @return texts in the order in which it happened; empty in a good run
+     */
+    public List<String> mishaps() {
+        return mishaps.texts();
+    }
+
+    Axes axes() {
+        return axes;
+    }
+
+    Charger charger() {
+        return charger;
+    }
+
+    Lathe lathe() {
+        return lathe;
+    }
+}

@@ -1,5 +1,6 @@
 //! What a bus sees of its driver.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::faults::{Board, Fate};
@@ -132,6 +133,18 @@ impl Port {
             .is_none_or(|wires| wires.sent(station))
         {
             self.image.stations[station].sent();
+        }
+    }
+
+    /// As [`sent`](Self::sent), for a peer that has only these bytes of the frame: no pulse elsewhere counts as
+    /// seen by it.
+    pub fn sent_part(&mut self, station: usize, bytes: Range<usize>) {
+        if self
+            .troubles
+            .wires()
+            .is_none_or(|wires| wires.sent(station))
+        {
+            self.image.stations[station].sent_part(bytes);
         }
     }
 

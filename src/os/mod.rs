@@ -5,6 +5,7 @@ mod log;
 #[cfg(unix)]
 mod own_file;
 mod poll;
+mod poll_set;
 #[cfg(unix)]
 mod shared_memory;
 
@@ -13,5 +14,6 @@ pub use log::log_to_stderr;
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::{Interest, Poller, Source};
+pub use poll_set::{PollSet, Ready};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;

@@ -1,5 +1,7 @@
 //! `tickbus check FILE`: prints the signal table of a driver.cfg, or every mistake in it.
 
+mod axes;
+
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -90,6 +92,10 @@ fn report(config: &Config) -> String {
         );
     }
     out.push('\n');
+    if !config.axes.is_empty() {
+        out.push_str(&aligned(&axes::HEADINGS, config.axes.iter().map(axes::row)));
+        out.push('\n');
+    }
     out.push_str(&aligned(
         &HEADINGS,
         config

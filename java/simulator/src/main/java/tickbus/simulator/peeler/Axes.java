@@ -2,6 +2,7 @@ package tickbus.simulator.peeler;
 
 import java.util.ArrayList;
 import java.util.List;
+import java.util.Map;
 
 /** All axes of the line, and the variables through which their PLCs command them and see them. */
 final class Axes {
@@ -32,8 +33,9 @@ final class Axes {
     private static List<String> variables(List<String> parts) {
         List<String> names = new ArrayList<>();
         for (AxisName name : AxisName.values()) {
+            Map<String, String> others = name.kind() == AxisKind.TORQUE ? AxisCommand.NAMES_OF_TORQUE : Map.of();
             for (String part : parts) {
-                names.add(name.label() + "." + part);
+                names.add(name.label() + "." + others.getOrDefault(part, part));
             }
         }
         return names;

@@ -1,6 +1,7 @@
 package tickbus.simulator.peeler;
 
 import java.util.List;
+import java.util.Map;
 
 /**
  * The command of one axis as the PLC shows it at one moment: five bits and six values.
@@ -11,6 +12,9 @@ final class AxisCommand {
     /** What the variables are called, behind the axis's name and a dot, in their order. */
     static final List<String> NAMES = List.of("Execute", "Tracking", "TorqueControl", "SpeedControl", "Enable",
             "TargetPosition", "Speed", "Acceleration", "Deceleration", "Torque", "Jerk");
+
+    /** What bits of the same place are called on an axis that opens and closes. */
+    static final Map<String, String> NAMES_OF_TORQUE = Map.of("Tracking", "Close", "TorqueControl", "Open");
 
     private final double[] values = new double[NAMES.size()];
 

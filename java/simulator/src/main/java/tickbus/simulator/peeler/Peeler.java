@@ -7,7 +7,8 @@ import tickbus.simulator.Machine;
 /**
  * The peeling line as a machine: charger and lathe, with 25 axes.
  *
- * <p>Inputs are {@code <axis>.Execute} and the other parts of each axis's command; outputs are {@code <axis>.Healthy},
+ * <p>Inputs are {@code <axis>.Execute} and the other parts of each axis's command, where an axis that opens and
+ * closes has {@code .Close} and {@code .Open} instead of {@code .Tracking} and {@code .TorqueControl}; outputs are {@code <axis>.Healthy},
  * {@code .InPosition}, {@code .ActualPosition}, {@code .ActualSpeed}, {@code .Status} and {@code .Error} of each axis,
  * then the sensors of the charger and the simulation time. The same inputs at the same steps give the same motion, bit
  * for bit. A step allocates nothing but when a block changes hands or something goes wrong.

@@ -120,6 +120,124 @@ public final class Peeler implements Machine {
         return mishaps.texts();
     }
 
+    /**
+     * Where an axis stands.
+     *
+     * @param name which one
+     * @return in the axis's unit
+     */
+    public double position(AxisName name) {
+        return axes.get(name).position();
+    }
+
+    /**
+     * How fast an axis is, with its direction as sign.
+     *
+     * @param name which one
+     * @return in the axis's unit per second
+     */
+    public double speed(AxisName name) {
+        return axes.get(name).velocity();
+    }
+
+    /**
+     * The torque of an axis's last command.
+     *
+     * @param name which one
+     * @return percent; of the knife carriage, the thickness of the veneer in millimetres
+     */
+    public double torque(AxisName name) {
+        return axes.get(name).torque();
+    }
+
+    /**
+     * How many commands an axis has begun.
+     *
+     * @param name which one
+     * @return counts from 0
+     */
+    public int commands(AxisName name) {
+        return axes.get(name).commands();
+    }
+
+    /**
+     * The block in a place.
+     *
+     * @param place where
+     * @return its number from 1 on, 0 if there is none
+     */
+    public int blockAt(Place place) {
+        Block block = block(place);
+        return block == null ? 0 : block.number();
+    }
+
+    /**
+     * What the block in a place looks like.
+     *
+     * @param place where
+     * @return such as {@code cylinder}; empty if there is none
+     */
+    public String shapeAt(Place place) {
+        Block block = block(place);
+        return block == null ? "" : block.shape();
+    }
+
+    private Block block(Place place) {
+        return switch (place) {
+            case STEP_1, STEP_2, STEP_3, STEP_4 -> charger.onStep(place.ordinal());
+            case LINEAR_FEEDER -> charger.fed();
+            case CENTRING -> charger.centred();
+            case CLAMPS -> charger.clamped();
+            case LATHE -> lathe.block();
+        };
+    }
+
+    /**
+     * How far the block in the lathe is held off its axis.
+     *
+     * @return millimetres, of the end where it is more; 0 if there is none
+     */
+    public double eccentricity() {
+        Block block = lathe.block();
+        return block == null ? 0 : Math.max(block.eccentricity(true), block.eccentricity(false));
+    }
+
+    /**
+     * Whether what comes off the block in the lathe is a whole ribbon.
+     *
+     * @return false too if there is no block
+     */
+    public boolean round() {
+        return lathe.held() != null && lathe.held().round();
+    }
+
+    /**
+     * What is left of the block in the lathe.
+     *
+     * @return cubic metres; 0 if there is none
+     */
+    public double held() {
+        return lathe.held() == null ? 0 : lathe.held().volume() / 1e9;
+    }
+
+    /**
+     * How fast the surface of the block in the lathe passes the knife.
+     *
+     * @return metres per second
+     */
+    public double surfaceSpeed() {
+        return lathe.surfaceSpeed() / 1e3;
+    }
+
+    /**
+     * Where the wood went.
+     *
+     * @return live counts
+     */
+    public Wood wood() {
+        return lathe.wood();
+    }
+
     Axes axes() {
         return axes;
     }

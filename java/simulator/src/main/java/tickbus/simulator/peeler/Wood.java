@@ -3,7 +3,7 @@ package tickbus.simulator.peeler;
 /**
  * Where the wood went, in cubic millimetres: nothing is lost on the way from the block to veneer, waste and core.
  */
-final class Wood {
+public final class Wood {
     private static final double MM3_PER_M3 = 1e9;
     private static final double MM_PER_M = 1e3;
 
@@ -48,48 +48,93 @@ final class Wood {
         unpeeled += volume;
     }
 
-    /** Blocks that the lathe took. */
-    int blocks() {
+    /**
+     * Blocks that the lathe took.
+     *
+     * @return a count
+     */
+    public int blocks() {
         return blocks;
     }
 
-    /** Blocks that were peeled down to their cores. */
-    int coreCount() {
+    /**
+     * Blocks that were peeled down to their cores.
+     *
+     * @return a count
+     */
+    public int coreCount() {
         return coreCount;
     }
 
-    /** Blocks that fell before that. */
-    int unpeeledCount() {
+    /**
+     * Blocks that fell before that.
+     *
+     * @return a count
+     */
+    public int unpeeledCount() {
         return unpeeledCount;
     }
 
-    /** Metres of whole ribbon on the belt. */
-    double ribbon() {
+    /**
+     * Whole ribbon on the veneer belt.
+     *
+     * @return metres
+     */
+    public double ribbon() {
         return ribbon / MM_PER_M;
     }
 
-    /** All that was ever between the lathe's spindles, in cubic metres, as the others. */
-    double chucked() {
+    /**
+     * All that was ever between the lathe's spindles.
+     *
+     * @return cubic metres
+     */
+    public double chucked() {
         return chucked / MM3_PER_M3;
     }
 
-    double veneer() {
+    /**
+     * Of that, whole ribbon on the veneer belt.
+     *
+     * @return cubic metres
+     */
+    public double veneer() {
         return veneer / MM3_PER_M3;
     }
 
-    double torn() {
+    /**
+     * Of that, torn or short pieces on the veneer belt.
+     *
+     * @return cubic metres
+     */
+    public double torn() {
         return torn / MM3_PER_M3;
     }
 
-    double chipped() {
+    /**
+     * Of that, what went into the chipper.
+     *
+     * @return cubic metres
+     */
+    public double chipped() {
         return chipped / MM3_PER_M3;
     }
 
-    double cores() {
+    /**
+     * Of that, cores.
+     *
+     * @return cubic metres
+     */
+    public double cores() {
         return cores / MM3_PER_M3;
     }
 
-    double unpeeled() {
+    /**
+     * Of that, blocks that fell before they were peeled.
+     *
+     * @return cubic metres
+     */
+    public double unpeeled() {
         return unpeeled / MM3_PER_M3;
     }
 }

@@ -14,7 +14,7 @@ pub mod section;
 
 use std::collections::HashMap;
 
-use crate::signal::SignalTable;
+use crate::signal::{SignalTable, Slot};
 
 pub use command::{Command, Mode, Motion};
 pub use drive::{Demand, Drive, Feedback};
@@ -103,6 +103,46 @@ impl Axis {
     /// The name of the signal of one of its fields.
     pub fn signal(&self, field: Field) -> String {
         format!("{}.{}", self.name, field.name(self.kind))
+    }
+}
+
+impl Axis {
+    /// What the PLC asks of it, as it stands in the slots of a machine.
+    pub fn demand(&self, slots: &[Slot]) -> Demand {
+        let value = |field| self.slot(field).map_or(0.0, |slot| slots[slot].real());
+        let on = |field| value(field) != 0.0;
+        Demand {
+            execute: on(Field::Execute),
+            tracking: on(Field::Tracking),
+            torque_control: on(Field::TorqueControl),
+            speed_control: on(Field::SpeedControl),
+            enable: on(Field::Enable),
+            motion: Motion {
+                position: value(Field::TargetPosition),
+                speed: value(Field::Speed),
+                acceleration: value(Field::Acceleration),
+                deceleration: value(Field::Deceleration),
+                torque: value(Field::Torque),
+            },
+            jerk: value(Field::Jerk),
+        }
+    }
+
+    /// Puts what it tells the PLC into the slots of a machine.
+    pub fn tell(&self, told: &Feedback, slots: &mut [Slot]) {
+        let bit = |on: bool| f64::from(u8::from(on));
+        for (field, value) in [
+            (Field::Healthy, bit(told.healthy)),
+            (Field::InPosition, bit(told.in_position)),
+            (Field::ActualPosition, told.position),
+            (Field::ActualSpeed, told.speed),
+            (Field::Status, f64::from(told.status)),
+            (Field::Error, f64::from(told.error)),
+        ] {
+            if let Some(slot) = self.slot(field) {
+                slots[slot] = Slot::from_real(value);
+            }
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
 
+mod axes;
 mod check;
 mod host;
 mod mirror;
@@ -25,6 +26,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Axes(axes::Arguments),
     Check(check::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
@@ -66,6 +68,7 @@ pub fn main() -> ExitCode {
     // What happens to the line is told on stdout.
     crate::os::log_to_stderr(log::LevelFilter::Error);
     match arguments.command {
+        Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),

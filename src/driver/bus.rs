@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
 use crate::fieldbus::modbus::{ModbusClient, ModbusServer};
+use crate::fieldbus::s7::{S7Client, S7Server};
 use crate::fieldbus::socket::Socket;
 use crate::fieldbus::{Bus, Free, Options, Role, plugin};
 use crate::plc;
@@ -49,6 +50,15 @@ pub(super) fn open(
             let cycle = config.timing.cycle;
             let socket = Socket::new(options, &config.table, config.role, cycle);
             Ok((Bus::Free(Box::new(socket)), None))
+        }
+        Options::S7Server(options) => {
+            let server = S7Server::new(options, &config.table, config.role, &config.name);
+            Ok((Bus::Free(Box::new(server)), None))
+        }
+        Options::S7Client(options) => {
+            let cycle = config.timing.cycle;
+            let client = S7Client::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(client)), None))
         }
         Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),
         Options::ModbusServer(options) => {

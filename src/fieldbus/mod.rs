@@ -13,6 +13,7 @@ mod troubles;
 pub mod loopback;
 pub mod modbus;
 pub mod plugin;
+pub mod s7;
 pub mod socket;
 pub mod tcp;
 

@@ -186,8 +186,23 @@ impl Port {
         bytes: &[u8],
         written: Range<usize>,
     ) {
+        self.received_parts(station, now, bytes, [written]);
+    }
+
+    /// As [`received_part`](Self::received_part), for a peer that wrote several ranges of bits at once.
+    ///
+    /// # Panics
+    ///
+    /// When the frame has not the station's size.
+    pub fn received_parts(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        bytes: &[u8],
+        written: impl IntoIterator<Item = Range<usize>>,
+    ) {
         if let Some(changes) = self.changes.get_mut(station) {
-            changes.written(written);
+            written.into_iter().for_each(|bits| changes.written(bits));
         }
         self.received(station, now, bytes);
     }

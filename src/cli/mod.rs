@@ -5,6 +5,7 @@
 mod check;
 mod export;
 mod host;
+mod import;
 mod mirror;
 mod plc;
 #[cfg(unix)]
@@ -28,6 +29,7 @@ struct Arguments {
 enum Command {
     Check(check::Arguments),
     Export(export::Arguments),
+    Import(import::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     Report(report::Arguments),
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
     match arguments.command {
         Command::Check(arguments) => check::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

@@ -10,6 +10,7 @@
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
 //! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
+//! | [`axis`] | axes: their structures of command and feedback, profiles of motion, what a command means |
 //! | [`faults`] | wrong values and troubles of the line, when they are asked for |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
 //! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
@@ -26,6 +27,7 @@
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
+pub mod axis;
 pub mod cli;
 pub mod config;
 pub mod driver;

@@ -2,6 +2,7 @@
 //!
 //! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
 
+mod axes;
 mod check;
 mod export;
 mod host;
@@ -27,6 +28,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Axes(axes::Arguments),
     Check(check::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
     // What happens to the line is told on stdout.
     crate::os::log_to_stderr(log::LevelFilter::Error);
     match arguments.command {
+        Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),

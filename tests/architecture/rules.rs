@@ -8,6 +8,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["os"],
     &["config"],
     &["signal"],
+    &["axis"],
     &["faults"],
     &["image"],
     &["record"],

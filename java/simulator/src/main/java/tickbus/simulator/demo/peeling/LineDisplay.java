@@ -18,6 +18,8 @@ final class LineDisplay {
     /** Largest distance of knife and rolls, in millimetres. */
     private static final double FARTHEST = 300;
 
+    private static final double DM3 = 1000;
+
     private final PrintStream out;
     private final Screen screen;
     private final int logs;
@@ -71,8 +73,8 @@ final class LineDisplay {
         double roll = line.position(AxisName.TOP_ROLL);
         lines.add(text("rolls     %s %5.1f mm  pitch %4.2f deg", Screen.bar(1 - roll / FARTHEST), roll,
                 line.position(AxisName.PITCH_ANGLE)));
-        lines.add(text("wood      %7.1f m of ribbon  %6.4f m3   torn %6.4f   chipped %6.4f   cores %6.4f", wood.ribbon(),
-                wood.veneer(), wood.torn(), wood.chipped(), wood.cores()));
+        lines.add(text("wood      ribbon %.1f m, %.1f dm3; torn %.1f, chipped %.1f, cores %.1f dm3", wood.ribbon(),
+                DM3 * wood.veneer(), DM3 * wood.torn(), DM3 * wood.chipped(), DM3 * wood.cores()));
         AxisName busiest = rate.busiest();
         lines.add(text("commands  %d, busiest axis %s: %d, at most %d in a second", rate.commands(), busiest.label(),
                 rate.commands(busiest), rate.most(busiest)));

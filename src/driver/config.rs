@@ -174,7 +174,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     let addressing = driver
         .as_ref()
         .map_or(Addressing::Bytes, |driver| driver.addressing);
-    let fieldbus = fieldbus
+    let mut fieldbus = fieldbus
         .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
         .map(|table| read_fieldbus(table, asked));
     let replayed = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
@@ -210,7 +210,12 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
         .as_ref()
         .map(|fieldbus| fieldbus.sizes.clone())
         .unwrap_or_default();
-    let table = layout::lay_out(sections, declared, sizes);
+    let bus = fieldbus.as_mut().and_then(|fieldbus| fieldbus.bus.as_mut());
+    let table = layout::lay_out(sections, declared, sizes, bus);
+    let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
+    if let (Some(bus), Some(table)) = (bus, &table) {
+        bus.fit(table, root.collector());
+    }
     let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
     if table
         .as_ref()

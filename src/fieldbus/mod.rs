@@ -3,6 +3,7 @@
 mod bus;
 mod changes;
 mod dead_band;
+mod identity;
 mod link;
 mod options;
 mod port;
@@ -10,12 +11,15 @@ mod role;
 mod troubles;
 
 pub mod loopback;
+pub mod modbus;
 pub mod plugin;
 pub mod socket;
+pub mod tcp;
 
 pub use bus::{Bus, BusError, Free, Stepped};
 pub use changes::ChangeEvents;
 pub use dead_band::DeadBands;
+pub use identity::Guard;
 pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use options::{KINDS, Options};
 pub use port::{CallWatch, Port};

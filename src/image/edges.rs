@@ -4,6 +4,8 @@
 //! takes none of its edges along, because the next frame's counters hold them too. The reading side
 //! compares counters and shapes the levels that it shows, so that every edge is seen as an edge.
 
+use std::ops::Range;
+
 use crate::signal::{Area, Latch, SignalTable};
 use crate::time::Nanos;
 
@@ -240,6 +242,22 @@ impl PulseShaper {
         self.levels.copy_from_slice(&self.next_levels);
         if self.busy {
             self.shown.copy_from_slice(&self.next_shown);
+        }
+    }
+
+    /// As [`confirm`](Self::confirm), for a receiver that has seen these bytes of the frame alone.
+    pub fn confirm_part(&mut self, bytes: Range<usize>) {
+        for (group, (byte, _)) in self.masks.iter().enumerate() {
+            if bytes.contains(byte) {
+                self.levels[group] = self.next_levels[group];
+            }
+        }
+        if self.busy {
+            for (index, bit) in self.bits.iter().enumerate() {
+                if bytes.contains(&bit.byte) {
+                    self.shown[index] = self.next_shown[index];
+                }
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! One station's two ends.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
@@ -259,6 +260,11 @@ impl BusStation {
     /// The exchange that carried the bytes of [`outgoing`](Self::outgoing) was completed.
     pub fn sent(&mut self) {
         self.tx_shaper.confirm();
+    }
+
+    /// The exchange carried these bytes of [`outgoing`](Self::outgoing) and was completed.
+    pub fn sent_part(&mut self, bytes: Range<usize>) {
+        self.tx_shaper.confirm_part(bytes);
     }
 
     /// Time since the simulation ticked last; [`Nanos::MAX`] before the first tick.

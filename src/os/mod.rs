@@ -5,6 +5,8 @@ mod log;
 #[cfg(unix)]
 mod own_file;
 mod poll;
+mod poll_set;
+mod serial;
 #[cfg(unix)]
 mod shared_memory;
 
@@ -13,5 +15,9 @@ pub use log::log_to_stderr;
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::{Interest, Poller, Source};
+pub use poll_set::{PollSet, Ready};
+#[cfg(unix)]
+pub use serial::SerialPort;
+pub use serial::{Parity, SerialSettings};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;

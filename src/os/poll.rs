@@ -30,15 +30,17 @@ pub struct Source<'a> {
 impl<'a> Source<'a> {
     /// Waits for `socket`.
     pub fn new(socket: &'a impl AsFd, interest: Interest) -> Self {
-        let flags = match interest {
-            Interest::Read => PollFlags::IN,
-            Interest::Write => PollFlags::OUT,
-            Interest::ReadWrite => PollFlags::IN | PollFlags::OUT,
-        };
         Self {
-            fd: PollFd::new(socket, flags),
+            fd: PollFd::new(socket, flags(interest)),
             ready: PollFlags::empty(),
         }
+    }
+
+    /// What the system told of a socket.
+    #[cfg(not(any(target_os = "linux", target_os = "android")))]
+    pub(super) fn looked_at(fd: PollFd<'a>) -> Self {
+        let ready = fd.revents();
+        Self { fd, ready }
     }
 
     /// Whether a read would not wait, after [`Poller::wait`].
@@ -127,12 +129,23 @@ impl Drop for Poller {
     }
 }
 
-fn poll_once(fds: &mut [PollFd<'_>], patience: Option<Duration>) -> io::Result<()> {
+pub(super) const fn flags(interest: Interest) -> PollFlags {
+    match interest {
+        Interest::Read => PollFlags::IN,
+        Interest::Write => PollFlags::OUT,
+        Interest::ReadWrite => PollFlags::IN.union(PollFlags::OUT),
+    }
+}
+
+/// A time-out that the system takes.
+pub(super) fn timespec(patience: Duration) -> Timespec {
     // Longer than any time-out that the system takes, and soon enough to look again.
     const LONGEST: Duration = Duration::from_secs(3600);
-    let patience = patience.map(|span| {
-        Timespec::try_from(span.min(LONGEST)).expect("an hour fits into every system's time")
-    });
+    Timespec::try_from(patience.min(LONGEST)).expect("an hour fits into every system's time")
+}
+
+pub(super) fn poll_once(fds: &mut [PollFd<'_>], patience: Option<Duration>) -> io::Result<()> {
+    let patience = patience.map(timespec);
     match poll(fds, patience.as_ref()) {
         Ok(_) => Ok(()),
         // A signal for another part of the process: nothing is ready, and the caller looks again.
@@ -144,8 +157,23 @@ fn poll_once(fds: &mut [PollFd<'_>], patience: Option<Duration>) -> io::Result<(
     }
 }
 
+/// Handles of one's own on sockets of others.
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+pub(super) mod own {
+    use super::{BorrowedFd, io};
+
+    #[cfg(unix)]
+    pub(crate) type Owned = std::os::fd::OwnedFd;
+    #[cfg(not(unix))]
+    pub(crate) type Owned = std::os::windows::io::OwnedSocket;
+
+    pub(crate) fn duplicate(socket: BorrowedFd<'_>) -> io::Result<Owned> {
+        socket.try_clone_to_owned()
+    }
+}
+
 /// The pair of sockets by which other threads wake one that polls.
-mod wake {
+pub(super) mod wake {
     use super::{AsFd, BorrowedFd, io};
 
     #[cfg(unix)]
@@ -154,10 +182,10 @@ mod wake {
     type Socket = std::net::UdpSocket;
 
     #[derive(Debug)]
-    pub(super) struct Sender(Socket);
+    pub(crate) struct Sender(Socket);
 
     #[derive(Debug)]
-    pub(super) struct Receiver(Socket);
+    pub(crate) struct Receiver(Socket);
 
     #[cfg(unix)]
     fn sockets() -> io::Result<(Socket, Socket)> {
@@ -173,7 +201,7 @@ mod wake {
         Ok((sender, receiver))
     }
 
-    pub(super) fn pair() -> io::Result<(Sender, Receiver)> {
+    pub(crate) fn pair() -> io::Result<(Sender, Receiver)> {
         let (sender, receiver) = sockets()?;
         sender.set_nonblocking(true)?;
         receiver.set_nonblocking(true)?;
@@ -181,18 +209,20 @@ mod wake {
     }
 
     impl Sender {
-        pub(super) fn send(&self) -> io::Result<usize> {
+        pub(crate) fn send(&self) -> io::Result<usize> {
             self.0.send(&[1])
         }
     }
 
     impl Receiver {
-        pub(super) fn drain(&self) {
+        pub(crate) fn drain(&self) {
             let mut one = [0];
             while self.0.recv(&mut one).is_ok() {}
         }
+    }
 
-        pub(super) fn as_fd(&self) -> BorrowedFd<'_> {
+    impl AsFd for Receiver {
+        fn as_fd(&self) -> BorrowedFd<'_> {
             self.0.as_fd()
         }
     }

@@ -1,21 +1,12 @@
 //! The end that makes the connection.
 
-use std::io::{self, ErrorKind};
-use std::net::{SocketAddr, TcpStream};
-
-use rustix::io::Errno;
-use socket2::{Domain, Protocol, Socket, Type};
-
+use crate::fieldbus::tcp::{self, Address, no_wait};
 use crate::fieldbus::{BusError, Port};
-use crate::os::{Interest, Poller, Source};
-use crate::time::{Nanos, Stop};
+use crate::os::Poller;
+use crate::time::Stop;
 
 use super::connection::Connection;
-use super::resolve::resolve;
-use super::{Address, Comparison, Terms, no_wait};
-
-/// How long an address has to answer. The system itself would try for minutes.
-const PATIENCE: Nanos = Nanos::from_secs(5);
+use super::{Comparison, Terms};
 
 /// Connects, and serves the connection until it ends or `stop` does.
 ///
@@ -29,16 +20,10 @@ pub(super) fn connect(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    port.opening(&format!("connecting to {address}"));
-    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
-        return Ok(());
-    };
     let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
-    let Some(stream) = reach_any(&addresses, &mut poller, port, stop)? else {
+    let Some((stream, peer)) = tcp::connect(address, &mut poller, port, stop)? else {
         return Ok(());
     };
-    let peer = stream.peer_addr().map_err(|error| no_wait(&error))?;
-    port.tell("address", &peer.to_string());
     port.opening(&format!(
         "connected with {peer}; waiting for its first record"
     ));
@@ -57,78 +42,4 @@ pub(super) fn connect(
         ready = (sources[0].is_readable(), sources[0].is_writable());
     }
     Ok(())
-}
-
-/// Tries one address of a host after the other; `None` when `stop` came first.
-fn reach_any(
-    addresses: &[SocketAddr],
-    poller: &mut Poller,
-    port: &Port,
-    stop: &Stop,
-) -> Result<Option<TcpStream>, BusError> {
-    let mut failed = None;
-    for address in addresses {
-        match reach(*address, poller, port, stop) {
-            Ok(reached) => return Ok(reached),
-            Err(error) => failed = Some((address, error)),
-        }
-    }
-    let (address, error) = failed.expect("a host has an address");
-    Err(BusError::Link(match error.kind() {
-        ErrorKind::TimedOut => format!(
-            "no answer from {address} within {PATIENCE}; check \"address\", the cable, and the firewalls \
-             on the way"
-        ),
-        _ => format!(
-            "cannot connect to {address} ({error}); start the program that listens there, or correct \
-             \"address\""
-        ),
-    }))
-}
-
-fn reach(
-    address: SocketAddr,
-    poller: &mut Poller,
-    port: &Port,
-    stop: &Stop,
-) -> io::Result<Option<TcpStream>> {
-    let stream = begin(address)?;
-    let limit = port.clock().now() + PATIENCE;
-    while !stop.is_stopped() {
-        let mut sources = [Source::new(&stream, Interest::Write)];
-        poller.wait(&**port.clock(), limit, &mut sources)?;
-        if sources[0].is_writable() {
-            if let Some(error) = stream.take_error()? {
-                return Err(error);
-            }
-            // A port that nobody listens on may connect to itself, if the system happens to choose it
-            // for this end.
-            if stream.local_addr()? == stream.peer_addr()? {
-                return Err(ErrorKind::ConnectionRefused.into());
-            }
-            return Ok(Some(stream));
-        }
-        if port.clock().now() >= limit {
-            return Err(ErrorKind::TimedOut.into());
-        }
-    }
-    Ok(None)
-}
-
-/// Begins to connect, and does not wait.
-fn begin(address: SocketAddr) -> io::Result<TcpStream> {
-    let socket = Socket::new(
-        Domain::for_address(address),
-        Type::STREAM,
-        Some(Protocol::TCP),
-    )?;
-    socket.set_nonblocking(true)?;
-    match socket.connect(&address.into()) {
-        Err(error) if !is_under_way(&error) => Err(error),
-        _ => Ok(socket.into()),
-    }
-}
-
-fn is_under_way(error: &io::Error) -> bool {
-    error.kind() == ErrorKind::WouldBlock || Errno::from_io_error(error) == Some(Errno::INPROGRESS)
 }

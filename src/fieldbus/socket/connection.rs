@@ -1,10 +1,9 @@
 //! One connection with its socket: carries bytes between the socket, the session and the port.
 
-use std::io::{self, ErrorKind, Read as _, Write as _};
-use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::io::{self, Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
 
-use socket2::SockRef;
-
+use crate::fieldbus::tcp::{bow_out, is_for_later, prepare};
 use crate::fieldbus::{BusError, Port};
 use crate::os::{Interest, Source};
 use crate::time::Nanos;
@@ -13,9 +12,6 @@ use super::{Comparison, Session, Terms};
 
 /// So many times the socket is read at most before something else is looked at.
 const READS: usize = 64;
-
-/// The longest that the system is asked to be patient: it takes no times beyond some hours.
-const LONGEST: Nanos = Nanos::from_secs(3600);
 
 /// One connection.
 #[derive(Debug)]
@@ -37,7 +33,7 @@ impl Connection {
         terms: Terms,
         port: &Port,
     ) -> Result<Self, BusError> {
-        prepare(&stream, terms.max_age).map_err(|error| {
+        prepare(&stream, Session::patience(terms.max_age)).map_err(|error| {
             BusError::Link(format!("the connection with {peer} broke at once: {error}"))
         })?;
         log::debug!("connected with {peer}");
@@ -214,38 +210,4 @@ impl Drop for Connection {
     fn drop(&mut self) {
         bow_out(&self.stream);
     }
-}
-
-/// Takes leave in good order before a connection is closed: unread bytes would make the system reset it,
-/// and the peer lose what it has not read yet.
-pub(super) fn bow_out(mut stream: &TcpStream) {
-    // What fails here has failed already.
-    let _ = stream.shutdown(Shutdown::Write);
-    let mut unread = [0; 4096];
-    for _ in 0..READS {
-        if !matches!(stream.read(&mut unread), Ok(count) if count > 0) {
-            break;
-        }
-    }
-}
-
-/// Whether it did not fail, and only has to be tried again when the socket is ready.
-fn is_for_later(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
-}
-
-/// Makes the system send at once, never wait, and give up a peer whose cable was pulled.
-fn prepare(stream: &TcpStream, max_age: Nanos) -> io::Result<()> {
-    stream.set_nonblocking(true)?;
-    stream.set_nodelay(true)?;
-    let limit = Session::patience(max_age).min(LONGEST).to_duration();
-    let socket = SockRef::from(stream);
-    #[cfg(any(target_os = "linux", target_os = "android"))]
-    socket.set_tcp_user_timeout(Some(limit))?;
-    // For a peer that has nothing to say; whole seconds are all that the system knows.
-    let pause = limit.max(std::time::Duration::from_secs(1));
-    let keepalive = socket2::TcpKeepalive::new()
-        .with_time(pause)
-        .with_interval(pause);
-    socket.set_tcp_keepalive(&keepalive)
 }

@@ -1,15 +1,14 @@
 //! The end that waits for connections and serves one at a time.
 
-use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, TcpListener};
 
+use crate::fieldbus::tcp::{self, Address, bow_out, is_of_the_client, no_wait};
 use crate::fieldbus::{BusError, Port};
 use crate::os::{Interest, Poller, Source};
 use crate::time::{Nanos, Stop};
 
-use super::connection::{Connection, bow_out};
-use super::resolve::resolve;
-use super::{Address, Comparison, Terms, no_wait};
+use super::connection::Connection;
+use super::{Comparison, Terms};
 
 /// For how long nobody is accepted beside the served one after the system could not.
 const PAUSE: Nanos = Nanos::from_secs(1);
@@ -26,29 +25,9 @@ pub(super) fn listen(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    port.opening(&format!("beginning to listen on {address}"));
-    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
+    let Some((listener, bound)) = tcp::listen(address, port, stop)? else {
         return Ok(());
     };
-    let cannot = |error: io::Error| {
-        let right = match error.kind() {
-            ErrorKind::AddrNotAvailable => {
-                "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
-            }
-            ErrorKind::PermissionDenied => {
-                "write a port above 1023, or get the right to use this one"
-            }
-            _ => "end the program that has this port, or write another \"address\"",
-        };
-        BusError::Link(format!("cannot listen on {address} ({error}); {right}"))
-    };
-    let listener = TcpListener::bind(&*addresses).map_err(cannot)?;
-    listener.set_nonblocking(true).map_err(cannot)?;
-    let bound = listener.local_addr().map_err(cannot)?;
-    port.tell("address", &bound.to_string());
-    if !bound.ip().is_loopback() {
-        log::info!("listening on {bound}: whoever reaches this machine there can be the peer");
-    }
     let mut server = Server {
         listener,
         waiting: format!("listening on {bound}"),
@@ -185,15 +164,4 @@ impl Server {
              that one first"
         );
     }
-}
-
-/// Whether accepting failed for a reason that lies with the one client.
-fn is_of_the_client(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        ErrorKind::WouldBlock
-            | ErrorKind::Interrupted
-            | ErrorKind::ConnectionAborted
-            | ErrorKind::ConnectionReset
-    )
 }

@@ -13,7 +13,6 @@ mod fault;
 mod listen;
 mod options;
 mod record;
-mod resolve;
 mod session;
 
 use crate::signal::SignalTable;
@@ -23,7 +22,7 @@ use super::{BusError, Free, Port, Role};
 
 use comparison::Comparison;
 pub use fault::Fault;
-pub use options::{Address, AddressError, Host, Options, TcpRole};
+pub use options::{Options, TcpRole};
 pub use record::{Partial, Records};
 pub use session::{Sending, Session, Terms};
 
@@ -85,12 +84,4 @@ impl Free for Socket {
             stop,
         )
     }
-}
-
-/// The system does not let this thread wait, or not for this socket.
-fn no_wait(error: &std::io::Error) -> BusError {
-    BusError::Link(format!(
-        "the system cannot wait for the socket ({error}); close other programs or raise the limit of \
-         open files"
-    ))
 }

@@ -17,7 +17,7 @@ use super::{Address, Host};
 /// # Errors
 ///
 /// The name is not known, or cannot be looked up.
-pub(super) fn resolve(
+pub(crate) fn resolve(
     address: &Address,
     clock: &dyn Clock,
     stop: &Stop,

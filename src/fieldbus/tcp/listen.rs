@@ -1,0 +1,57 @@
+//! Waiting for connections.
+
+use std::io::{self, ErrorKind};
+use std::net::{SocketAddr, TcpListener};
+
+use crate::fieldbus::{BusError, Port};
+use crate::time::Stop;
+
+use super::Address;
+use super::resolve::resolve;
+
+/// Listens on `address`, without blocking; gives what was bound; `None` when `stop` came first.
+///
+/// # Errors
+///
+/// The host is not known, or the address cannot be listened on.
+pub(crate) fn listen(
+    address: &Address,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<Option<(TcpListener, SocketAddr)>, BusError> {
+    port.opening(&format!("beginning to listen on {address}"));
+    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
+        return Ok(None);
+    };
+    let cannot = |error: io::Error| {
+        let right = match error.kind() {
+            ErrorKind::AddrNotAvailable => {
+                "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
+            }
+            ErrorKind::PermissionDenied => {
+                "write a port above 1023, or get the right to use this one"
+            }
+            _ => "end the program that has this port, or write another \"address\"",
+        };
+        BusError::Link(format!("cannot listen on {address} ({error}); {right}"))
+    };
+    let listener = TcpListener::bind(&*addresses).map_err(cannot)?;
+    listener.set_nonblocking(true).map_err(cannot)?;
+    let bound = listener.local_addr().map_err(cannot)?;
+    port.tell("address", &bound.to_string());
+    if !bound.ip().is_loopback() {
+        log::info!("listening on {bound}: whoever reaches this machine there can be the peer");
+    }
+    Ok(Some((listener, bound)))
+}
+
+/// Whether accepting failed for a reason that lies with the one client.
+pub(crate) fn is_of_the_client(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::WouldBlock
+            | ErrorKind::Interrupted
+            | ErrorKind::ConnectionAborted
+            | ErrorKind::ConnectionReset
+    )
+}

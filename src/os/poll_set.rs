@@ -1,0 +1,380 @@
+//! Waiting for many sockets at once.
+
+use std::fmt;
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+use rustix::fd::AsFd;
+
+use super::Interest;
+use super::poll::wake;
+use crate::time::{Clock, Nanos, Stop};
+
+/// Lets one thread wait for many sockets, for a deadline, and for its [`Stop`], whichever is first.
+///
+/// A socket is known by the key that it was added with. While the set lives it is the waker of its token.
+pub struct PollSet {
+    stop: Stop,
+    wake: wake::Receiver,
+    watch: watch::Watch,
+    ready: Vec<Ready>,
+}
+
+impl fmt::Debug for PollSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PollSet").finish_non_exhaustive()
+    }
+}
+
+/// A socket that need not be waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ready {
+    /// The key that the socket was added with.
+    pub key: usize,
+    /// A read would not wait.
+    pub is_readable: bool,
+    /// A write would not wait.
+    pub is_writable: bool,
+}
+
+/// The key of the socket by which other threads wake this one.
+const WAKE: usize = usize::MAX;
+
+impl PollSet {
+    /// An empty set that `stop` wakes.
+    ///
+    /// # Errors
+    ///
+    /// The system gives no more sockets.
+    pub fn new(stop: &Stop) -> io::Result<Self> {
+        let (sender, wake) = wake::pair()?;
+        let mut watch = watch::Watch::new()?;
+        watch.add(WAKE, &wake, Interest::Read)?;
+        // A full buffer already wakes; nothing else can fail between the ends of one pair.
+        stop.set_waker(Some(Arc::new(move || drop(sender.send()))));
+        Ok(Self {
+            stop: stop.clone(),
+            wake,
+            watch,
+            ready: Vec::new(),
+        })
+    }
+
+    /// Adds a socket. The caller keeps it, and [removes](Self::remove) it before it is closed.
+    ///
+    /// # Errors
+    ///
+    /// The system cannot wait for it.
+    ///
+    /// # Panics
+    ///
+    /// When `key` is the greatest number, which the set needs for itself.
+    pub fn add(&mut self, key: usize, socket: &impl AsFd, interest: Interest) -> io::Result<()> {
+        assert_ne!(key, WAKE, "a key that is taken");
+        self.watch.add(key, socket, interest)
+    }
+
+    /// Waits for something else of a socket that was added.
+    ///
+    /// # Errors
+    ///
+    /// The system cannot wait for it.
+    pub fn change(&mut self, key: usize, socket: &impl AsFd, interest: Interest) -> io::Result<()> {
+        self.watch.change(key, socket, interest)
+    }
+
+    /// Removes a socket that was added.
+    pub fn remove(&mut self, key: usize, socket: &impl AsFd) {
+        self.watch.remove(key, socket);
+        self.ready.retain(|ready| ready.key != key);
+    }
+
+    /// Waits until a socket is ready, `deadline` has come on `clock`, or the token was stopped or woken; it may
+    /// end early. What is ready stands in [`ready`](Self::ready).
+    ///
+    /// # Errors
+    ///
+    /// The system cannot wait.
+    pub fn wait(&mut self, clock: &dyn Clock, deadline: Nanos) -> io::Result<()> {
+        self.ready.clear();
+        let (watch, ready, stop) = (&mut self.watch, &mut self.ready, &self.stop);
+        let mut waited = Ok(());
+        clock.wait_with(deadline, stop, &mut |patience| {
+            // A token that was roused before the waker came would never be again.
+            let patience = if stop.is_roused() {
+                Some(Duration::ZERO)
+            } else {
+                patience
+            };
+            waited = watch.wait(patience, ready);
+        });
+        waited?;
+        if let Some(woken) = self.ready.iter().position(|ready| ready.key == WAKE) {
+            self.ready.swap_remove(woken);
+            self.wake.drain();
+        }
+        Ok(())
+    }
+
+    /// The sockets that were ready after the last wait, in no order.
+    pub fn ready(&self) -> &[Ready] {
+        &self.ready
+    }
+}
+
+impl Drop for PollSet {
+    fn drop(&mut self) {
+        self.stop.set_waker(None);
+    }
+}
+
+/// Linux tells which of many sockets are ready without a look at each of them.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+mod watch {
+    use rustix::buffer::spare_capacity;
+    use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
+    use rustix::fd::OwnedFd;
+    use rustix::io::Errno;
+
+    use super::{AsFd, Duration, Interest, Ready, io};
+    use crate::os::poll::timespec;
+
+    /// So many sockets are told at most by one wait; the others by the next.
+    const MOST: usize = 256;
+
+    pub(super) struct Watch {
+        epoll: OwnedFd,
+        events: Vec<Event>,
+    }
+
+    const fn flags(interest: Interest) -> EventFlags {
+        match interest {
+            Interest::Read => EventFlags::IN,
+            Interest::Write => EventFlags::OUT,
+            Interest::ReadWrite => EventFlags::IN.union(EventFlags::OUT),
+        }
+    }
+
+    const fn data(key: usize) -> EventData {
+        EventData::new_u64(key as u64)
+    }
+
+    impl Watch {
+        pub(super) fn new() -> io::Result<Self> {
+            Ok(Self {
+                epoll: epoll::create(CreateFlags::CLOEXEC)?,
+                events: Vec::with_capacity(MOST),
+            })
+        }
+
+        pub(super) fn add(
+            &mut self,
+            key: usize,
+            socket: &impl AsFd,
+            interest: Interest,
+        ) -> io::Result<()> {
+            Ok(epoll::add(&self.epoll, socket, data(key), flags(interest))?)
+        }
+
+        pub(super) fn change(
+            &mut self,
+            key: usize,
+            socket: &impl AsFd,
+            interest: Interest,
+        ) -> io::Result<()> {
+            Ok(epoll::modify(
+                &self.epoll,
+                socket,
+                data(key),
+                flags(interest),
+            )?)
+        }
+
+        pub(super) fn remove(&mut self, _key: usize, socket: &impl AsFd) {
+            // What fails here was never added, and is in nobody's way.
+            let _ = epoll::delete(&self.epoll, socket);
+        }
+
+        pub(super) fn wait(
+            &mut self,
+            patience: Option<Duration>,
+            ready: &mut Vec<Ready>,
+        ) -> io::Result<()> {
+            let patience = patience.map(timespec);
+            self.events.clear();
+            match epoll::wait(
+                &self.epoll,
+                spare_capacity(&mut self.events),
+                patience.as_ref(),
+            ) {
+                Ok(_) => {}
+                // A signal for another part of the process.
+                Err(Errno::INTR) => return Ok(()),
+                Err(error) => return Err(error.into()),
+            }
+            let broken = EventFlags::HUP | EventFlags::ERR;
+            ready.extend(self.events.iter().map(|event| {
+                // A packed field has to be copied out.
+                let (flags, data) = (event.flags, event.data);
+                Ready {
+                    key: usize::try_from(data.u64()).unwrap_or(super::WAKE),
+                    is_readable: flags.intersects(EventFlags::IN | broken),
+                    is_writable: flags.intersects(EventFlags::OUT | broken),
+                }
+            }));
+            Ok(())
+        }
+    }
+}
+
+/// Elsewhere each of them is looked at, through a handle of the set's own.
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+mod watch {
+    use rustix::event::PollFd;
+
+    use super::{AsFd, Duration, Interest, Ready, io};
+    use crate::os::poll::{Source, flags, own, poll_once};
+
+    pub(super) struct Watch {
+        sockets: Vec<(usize, own::Owned, Interest)>,
+    }
+
+    impl Watch {
+        #[expect(clippy::unnecessary_wraps, reason = "as on Linux")]
+        pub(super) fn new() -> io::Result<Self> {
+            Ok(Self {
+                sockets: Vec::new(),
+            })
+        }
+
+        pub(super) fn add(
+            &mut self,
+            key: usize,
+            socket: &impl AsFd,
+            interest: Interest,
+        ) -> io::Result<()> {
+            self.sockets
+                .push((key, own::duplicate(socket.as_fd())?, interest));
+            Ok(())
+        }
+
+        #[expect(clippy::unnecessary_wraps, reason = "as on Linux")]
+        pub(super) fn change(
+            &mut self,
+            key: usize,
+            _socket: &impl AsFd,
+            interest: Interest,
+        ) -> io::Result<()> {
+            for entry in &mut self.sockets {
+                if entry.0 == key {
+                    entry.2 = interest;
+                }
+            }
+            Ok(())
+        }
+
+        pub(super) fn remove(&mut self, key: usize, _socket: &impl AsFd) {
+            self.sockets.retain(|entry| entry.0 != key);
+        }
+
+        pub(super) fn wait(
+            &mut self,
+            patience: Option<Duration>,
+            ready: &mut Vec<Ready>,
+        ) -> io::Result<()> {
+            let mut all: Vec<PollFd<'_>> = self
+                .sockets
+                .iter()
+                .map(|(_, socket, interest)| PollFd::new(socket, flags(*interest)))
+                .collect();
+            poll_once(&mut all, patience)?;
+            for ((key, ..), fd) in self.sockets.iter().zip(&all) {
+                let source = Source::looked_at(fd.clone());
+                let found = Ready {
+                    key: *key,
+                    is_readable: source.is_readable(),
+                    is_writable: source.is_writable(),
+                };
+                if found.is_readable || found.is_writable {
+                    ready.push(found);
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::{Manual, Monotonic};
+    use std::io::Write as _;
+    use std::net::{TcpListener, TcpStream};
+
+    fn pairs(count: usize) -> Vec<(TcpStream, TcpStream)> {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = listener.local_addr().expect("it is bound");
+        (0..count)
+            .map(|_| {
+                let client = TcpStream::connect(address).expect("it listens");
+                (client, listener.accept().expect("it connected").0)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn those_that_are_ready_are_told_and_no_others() {
+        let mut pairs = pairs(100);
+        let (clock, stop) = (Manual::new(), Stop::new());
+        let mut set = PollSet::new(&stop).expect("sockets");
+        for (key, (_, server)) in pairs.iter().enumerate() {
+            set.add(key, server, Interest::Read).expect("it is open");
+        }
+        for key in [3, 77] {
+            pairs[key].0.write_all(&[1]).expect("the server is there");
+        }
+        let mut keys = Vec::new();
+        while keys.len() < 2 {
+            set.wait(&*clock, Nanos::MAX).expect("it waits");
+            keys = set.ready().iter().map(|ready| ready.key).collect();
+        }
+        keys.sort_unstable();
+        assert_eq!(keys, [3, 77]);
+        assert!(set.ready().iter().all(|ready| !ready.is_writable));
+        set.change(3, &pairs[3].1, Interest::Write)
+            .expect("it is open");
+        set.remove(77, &pairs[77].1);
+        assert_eq!(set.ready().len(), 1, "who was removed is not told any more");
+        set.wait(&*clock, Nanos::MAX).expect("it waits");
+        let writable = Ready {
+            key: 3,
+            is_readable: false,
+            is_writable: true,
+        };
+        assert_eq!(set.ready(), [writable]);
+    }
+
+    #[test]
+    fn a_stop_and_a_deadline_end_a_wait() {
+        let clock = Monotonic::shared().expect("a thread");
+        let stop = Stop::new();
+        let mut set = PollSet::new(&stop).expect("sockets");
+        let deadline = clock.now() + Nanos::from_millis(2);
+        while clock.now() < deadline {
+            set.wait(&*clock, deadline).expect("it waits");
+        }
+        drop(set);
+        let waiting = std::thread::spawn({
+            let clock = Arc::clone(&clock);
+            let stop = stop.clone();
+            move || {
+                // A set stays on its thread.
+                let mut set = PollSet::new(&stop).expect("sockets");
+                set.wait(&*clock, Nanos::MAX)
+            }
+        });
+        stop.stop();
+        waiting.join().expect("no panic").expect("stopped");
+    }
+}

@@ -18,6 +18,7 @@
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`driver`] | one device: configuration, open, exchange, statistics, close |
+//! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | [`cli`] | the `tickbus` command |
@@ -29,6 +30,7 @@ pub mod axis;
 pub mod cli;
 pub mod config;
 pub mod driver;
+pub mod export;
 pub mod faults;
 pub mod fieldbus;
 pub mod image;

@@ -11,7 +11,7 @@ use super::Outcome;
 use crate::config::{short_number, shown};
 use crate::driver::{Config, Timing};
 use crate::fieldbus::socket::{self, Sending, TcpRole};
-use crate::fieldbus::{Options, loopback, plugin};
+use crate::fieldbus::{Options, loopback, modbus, plugin};
 use crate::record;
 use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
 use crate::time::Nanos;
@@ -134,6 +134,8 @@ fn bus(options: &Options) -> String {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
+        Options::ModbusServer(options) => parts.extend(modbus_server(options)),
+        Options::ModbusClient(options) => parts.push(format!("TODO {}", options.line)),
     }
     if options.events() {
         parts.push("with events".to_owned());
@@ -156,6 +158,18 @@ fn socket(options: &socket::Options) -> Vec<String> {
     ];
     if options.min_interval > Nanos::ZERO {
         parts.push(format!("at most every {}", options.min_interval));
+    }
+    parts
+}
+
+fn modbus_server(options: &modbus::ServerOptions) -> Vec<String> {
+    let mut parts = vec![match &options.line {
+        modbus::Line::Tcp(address) => format!("listens on {address}"),
+        serial @ modbus::Line::Serial(_) => format!("listens on {serial}"),
+    }];
+    if let Some(offset) = options.map.window {
+        let table = modbus::Table::HoldingRegisters;
+        parts.push(format!("%I from {} on", modbus::Place { table, offset }));
     }
     parts
 }

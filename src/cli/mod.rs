@@ -4,6 +4,7 @@
 
 mod axes;
 mod check;
+mod export;
 mod host;
 mod mirror;
 mod plc;
@@ -28,6 +29,7 @@ struct Arguments {
 enum Command {
     Axes(axes::Arguments),
     Check(check::Arguments),
+    Export(export::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     Report(report::Arguments),
@@ -70,6 +72,7 @@ pub fn main() -> ExitCode {
     match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

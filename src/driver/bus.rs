@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
+use crate::fieldbus::modbus::{ModbusClient, ModbusServer};
 use crate::fieldbus::socket::Socket;
 use crate::fieldbus::{Bus, Free, Options, Role, plugin};
 use crate::plc;
@@ -50,6 +51,15 @@ pub(super) fn open(
             Ok((Bus::Free(Box::new(socket)), None))
         }
         Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),
+        Options::ModbusServer(options) => {
+            let server = ModbusServer::new(options, &config.table, config.role, &config.name);
+            Ok((Bus::Free(Box::new(server)), None))
+        }
+        Options::ModbusClient(options) => {
+            let cycle = config.timing.cycle;
+            let client = ModbusClient::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(client)), None))
+        }
     }
 }
 

@@ -3,9 +3,11 @@
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 
+use crate::axis::{self, Axis};
 use crate::config::{Table, Value, did_you_mean, shown};
-use crate::signal::section::{NAME_LIMIT, STATION, Section};
-use crate::signal::{AREA_LIMIT, Area, SignalTable, Station};
+use crate::fieldbus::Options;
+use crate::signal::section::{self, NAME_LIMIT, STATION, Section};
+use crate::signal::{AREA_LIMIT, Addressing, Area, SignalTable, Station};
 
 /// The most signals of one driver.
 pub(super) const SIGNAL_LIMIT: usize = 100_000;
@@ -46,14 +48,41 @@ struct Declared<'a> {
     sizes: Sizes<'a>,
 }
 
+/// Reads the `[[signal]]` and the `[[axis]]` tables; signals come in the order of the file.
+pub(super) fn read_signals<'a>(
+    signals: Vec<Table<'a>>,
+    axes: Vec<Table<'a>>,
+    addressing: Addressing,
+) -> (Vec<Axis>, Vec<Section<'a>>) {
+    let mut all = Vec::new();
+    for table in signals {
+        let at = table.at();
+        all.extend(section::read(table, addressing).map(|section| (at, section)));
+    }
+    let mut read = Vec::new();
+    let mut places = axis::section::Places::default();
+    for (number, table) in axes.into_iter().enumerate() {
+        let at = table.at();
+        if let Some(axis) = axis::section::read(table, number, addressing, &mut places) {
+            read.push(axis.axis);
+            all.extend(axis.sections.into_iter().map(|section| (at, section)));
+        }
+    }
+    // Stable, so that the signals of one axis stay in their order.
+    all.sort_by_key(|(at, _)| *at);
+    (read, all.into_iter().map(|(_, section)| section).collect())
+}
+
 /// Lays the signals out over their stations and reports what does not go together.
 ///
-/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`. Answers with a table too
+/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`; `bus` reads its own keys out of the
+/// former. Answers with a table too
 /// when there were mistakes, as far as it makes sense.
 pub(super) fn lay_out<'a>(
     mut sections: Vec<Section<'a>>,
     declared: Option<Vec<Table<'a>>>,
     sizes: Sizes<'a>,
+    bus: Option<&mut Options>,
 ) -> Option<SignalTable> {
     let (stations, certain) = match declared {
         None => (
@@ -63,7 +92,7 @@ pub(super) fn lay_out<'a>(
             }],
             true,
         ),
-        Some(tables) => read_stations(tables, &sizes)?,
+        Some(tables) => read_stations(tables, &sizes, bus)?,
     };
     // A signal whose station is not known is left out of the rules about places.
     let mut placed = vec![true; sections.len()];
@@ -98,6 +127,7 @@ pub(super) fn lay_out<'a>(
 fn read_stations<'a>(
     tables: Vec<Table<'a>>,
     of_fieldbus: &Sizes<'a>,
+    mut bus: Option<&mut Options>,
 ) -> Option<(Vec<Declared<'a>>, bool)> {
     for (key, value) in [
         ("input_bytes", &of_fieldbus.input),
@@ -120,10 +150,17 @@ fn read_stations<'a>(
     let mut certain = true;
     let mut lines = HashMap::new();
     let mut stations = Vec::new();
+    let count = tables.len();
     for mut table in tables {
         let name = table.require("name", "give the station a name of its own");
         let sizes = Sizes::take(&mut table);
-        table.finish();
+        if let Some(bus) = &mut bus {
+            bus.read_station(count, &mut table);
+            table.finish();
+        } else {
+            // Which keys are right cannot be told without the bus kind.
+            table.finish_open();
+        }
         let label = name
             .as_ref()
             .and_then(|name| name.label(NAME_LIMIT, "give the station a name"));

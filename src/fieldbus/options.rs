@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use super::{Role, loopback, plugin, socket};
-use crate::config::{Table, Value, did_you_mean, shown};
+use super::tcp::Address;
+use super::{Role, loopback, modbus, plugin, socket};
+use crate::config::{Collector, Table, Value, did_you_mean, shown};
+use crate::signal::SignalTable;
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -25,7 +27,13 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 3] = ["loopback", "socket", "plugin"];
+const BUILT: [&str; 5] = [
+    "loopback",
+    "socket",
+    "plugin",
+    "modbus-server",
+    "modbus-client",
+];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,6 +44,10 @@ pub enum Options {
     Socket(socket::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
+    /// `kind = "modbus-server"`: clients of Modbus read and write the image.
+    ModbusServer(modbus::ServerOptions),
+    /// `kind = "modbus-client"`: reads and writes the tables of a Modbus server.
+    ModbusClient(modbus::ClientOptions),
 }
 
 impl Options {
@@ -45,6 +57,8 @@ impl Options {
             Self::Loopback(_) => "loopback",
             Self::Socket(_) => "socket",
             Self::Plugin(_) => "plugin",
+            Self::ModbusServer(_) => "modbus-server",
+            Self::ModbusClient(_) => "modbus-client",
         }
     }
 
@@ -54,6 +68,8 @@ impl Options {
             Self::Loopback(options) => options.events,
             Self::Socket(options) => options.events,
             Self::Plugin(options) => options.events,
+            Self::ModbusServer(options) => options.events,
+            Self::ModbusClient(options) => options.events,
         }
     }
 
@@ -64,7 +80,7 @@ impl Options {
                 peer: loopback::Peer::Replay(file),
                 ..
             }) => Some(file),
-            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => None,
+            _ => None,
         }
     }
 
@@ -72,7 +88,7 @@ impl Options {
     pub const fn is_in_process(&self) -> bool {
         match self {
             Self::Loopback(_) => true,
-            Self::Socket(_) | Self::Plugin(_) => false,
+            _ => false,
         }
     }
 
@@ -88,6 +104,26 @@ impl Options {
                 self.kind()
             )),
             Self::Socket(options) => options.set_address(address),
+            Self::ModbusServer(options) => options.line.set_address(address, |_| Ok(())),
+            Self::ModbusClient(options) => {
+                options.line.set_address(address, Address::check_dialled)
+            }
+        }
+    }
+
+    /// Reads the keys that the bus has in the next of `count` `[[station]]` tables.
+    pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        match self {
+            Self::ModbusServer(options) => options.stations.read_station(count, false, table),
+            Self::ModbusClient(options) => options.stations.read_station(count, true, table),
+            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => {}
+        }
+    }
+
+    /// Reports what does not go together with the stations and signals of the driver.
+    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        if let Self::ModbusClient(options) = self {
+            options.fit(table, collector);
         }
     }
 
@@ -104,6 +140,12 @@ impl Options {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
+            Some("modbus-server") => {
+                modbus::ServerOptions::read(role, table).map(Self::ModbusServer)
+            }
+            Some("modbus-client") => {
+                modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
+            }
             other => {
                 table.finish_open();
                 report_kind(kind, other?);

@@ -158,13 +158,38 @@ impl Port {
         let times = match self.troubles.wires() {
             None => 1,
             Some(wires) => match wires.arrives(station, now, bytes) {
-                Fate::Lost | Fate::Held => 0,
+                Fate::Lost => {
+                    if let Some(changes) = self.changes.get_mut(station) {
+                        changes.forget();
+                    }
+                    0
+                }
+                Fate::Held => 0,
                 Fate::Passes(times) => times,
             },
         };
         for _ in 0..times {
             self.hand_in(station, now, bytes);
         }
+    }
+
+    /// Hands in a whole frame that arrived at `now` and of which the peer wrote these bits alone (bit n of byte k
+    /// is 8k + n). Where events are wanted, each signal within them is one, even if its value is the same.
+    ///
+    /// # Panics
+    ///
+    /// When the frame has not the station's size.
+    pub fn received_part(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        bytes: &[u8],
+        written: Range<usize>,
+    ) {
+        if let Some(changes) = self.changes.get_mut(station) {
+            changes.written(written);
+        }
+        self.received(station, now, bytes);
     }
 
     fn hand_in(&mut self, station: usize, now: Nanos, bytes: &[u8]) {

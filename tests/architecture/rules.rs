@@ -16,6 +16,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["plc"],
     &["fieldbus"],
     &["driver"],
+    &["export"],
     &["testing"],
     &["jni", "cli"],
 ];

@@ -339,7 +339,14 @@ impl Charger {
                 let grips = SPINDLES.into_iter().all(|axis| axes[axis].stands());
                 (held && grips).then_some(Centring::Lift)
             }
-            Centring::Lift => both(Y, pair(LIFTED)).then_some(Centring::Present),
+            Centring::Lift => {
+                let lifted = both(Y, pair(LIFTED));
+                if lifted && self.transfer.step != Transfer::Waiting {
+                    // Where the clamps come there is room for one block: this one waits for the arm to be back, and empty.
+                    return Nanos::ZERO;
+                }
+                lifted.then_some(Centring::Present)
+            }
             Centring::Present => {
                 let there = both(X, pair(0.0));
                 axes[LINEAR_FEEDER].want(to(PICK_UP));

@@ -241,7 +241,11 @@ impl Charger {
         let clamped = on(6);
         let at_lathe = io.axes[ARM].inputs.position < 1.0;
         self.feeding.go(Feeding::Rest);
-        self.centring.go(if held && !clamped {
+        // Where the clamps come, both hold the same block; anywhere else the spindles hold another one.
+        let with_clamps = clamped
+            && X.into_iter()
+                .all(|axis| io.axes[axis].inputs.position < 1.0);
+        self.centring.go(if held && !with_clamps {
             Centring::Lift
         } else {
             Centring::Release

@@ -1,5 +1,11 @@
 //! S7 with the programs of others at the other end: python-snap7, rust7, and tshark looking on.
-#![allow(missing_docs, unreachable_pub, reason = "a test")]
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    clippy::float_cmp,
+    clippy::unnecessary_wraps,
+    reason = "tests of one shape; the values are small whole numbers"
+)]
 
 mod foreign;
 #[path = "peers/pcap.rs"]
@@ -171,7 +177,8 @@ fn run(end: &mut End, mut python: Command, script: &str, arguments: &[String]) -
     out
 }
 
-const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nevents = true\n\
+/// What a client wrote last stays when it is gone.
+const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\n\
     db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\", offset = 2, length = 6 }]";
 
 fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {

@@ -96,10 +96,7 @@ impl Options {
 
     /// Whether both ends of the bus are in one process.
     pub const fn is_in_process(&self) -> bool {
-        match self {
-            Self::Loopback(_) => true,
-            _ => false,
-        }
+        matches!(self, Self::Loopback(_))
     }
 
     /// Takes another address than the driver.cfg names, from a command line.

@@ -128,6 +128,8 @@ fn bus(options: &Options) -> String {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
+        Options::OpcuaClient(options) => parts.push(format!("connects to {}", options.url)),
+        Options::OpcuaServer(options) => parts.push(format!("listens on {}", options.address)),
     }
     if options.events() {
         parts.push("with events".to_owned());

@@ -11,6 +11,7 @@ mod role;
 mod troubles;
 
 pub mod loopback;
+pub mod opcua;
 pub mod plugin;
 pub mod socket;
 pub mod tcp;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Role, loopback, plugin, socket};
+use super::{Role, loopback, opcua, plugin, socket};
 use crate::config::{Table, Value, did_you_mean, shown};
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
@@ -25,7 +25,13 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 3] = ["loopback", "socket", "plugin"];
+const BUILT: [&str; 5] = [
+    "loopback",
+    "socket",
+    "plugin",
+    "opcua-server",
+    "opcua-client",
+];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,6 +42,10 @@ pub enum Options {
     Socket(socket::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
+    /// `kind = "opcua-client"`: a PLC that is an OPC UA server.
+    OpcuaClient(opcua::ClientOptions),
+    /// `kind = "opcua-server"`: a server for PLCs that are OPC UA clients.
+    OpcuaServer(opcua::ServerOptions),
 }
 
 impl Options {
@@ -45,6 +55,8 @@ impl Options {
             Self::Loopback(_) => "loopback",
             Self::Socket(_) => "socket",
             Self::Plugin(_) => "plugin",
+            Self::OpcuaClient(_) => "opcua-client",
+            Self::OpcuaServer(_) => "opcua-server",
         }
     }
 
@@ -54,6 +66,8 @@ impl Options {
             Self::Loopback(options) => options.events,
             Self::Socket(options) => options.events,
             Self::Plugin(options) => options.events,
+            Self::OpcuaClient(options) => options.events,
+            Self::OpcuaServer(options) => options.events,
         }
     }
 
@@ -64,16 +78,13 @@ impl Options {
                 peer: loopback::Peer::Replay(file),
                 ..
             }) => Some(file),
-            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => None,
+            _ => None,
         }
     }
 
     /// Whether both ends of the bus are in one process.
     pub const fn is_in_process(&self) -> bool {
-        match self {
-            Self::Loopback(_) => true,
-            Self::Socket(_) | Self::Plugin(_) => false,
-        }
+        matches!(self, Self::Loopback(_))
     }
 
     /// Takes another address than the driver.cfg names, from a command line.
@@ -88,6 +99,8 @@ impl Options {
                 self.kind()
             )),
             Self::Socket(options) => options.set_address(address),
+            Self::OpcuaClient(options) => options.set_address(address),
+            Self::OpcuaServer(options) => options.set_address(address),
         }
     }
 
@@ -104,6 +117,8 @@ impl Options {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
+            Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
+            Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
                 table.finish_open();
                 report_kind(kind, other?);

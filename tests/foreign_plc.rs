@@ -1,17 +1,15 @@
 //! The socket bus against a program that somebody else could have written, in another language.
-//!
-//! It has its own main function: where there is no Python the test is skipped, and says so by name and
-//! reason, which the harness of Rust cannot do at run time.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
+
+mod foreign;
 
 use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
+use foreign::Absent;
 use tickbus::driver::{Config, Driver};
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
-
-const NAME: &str = "a_plc_in_python_exchanges_with_a_device_that_replies";
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/plc.py");
 
@@ -58,51 +56,19 @@ type    = "INT"
 const RECORDS: u32 = 200;
 
 fn main() -> ExitCode {
-    // A filter that means another test, or a question for the list of tests.
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if arguments.iter().any(|argument| argument == "--list") {
-        println!("{NAME}: test\n\n1 test, 0 benchmarks");
-        return ExitCode::SUCCESS;
-    }
-    let mut filters = arguments
-        .iter()
-        .filter(|one| !one.starts_with('-'))
-        .peekable();
-    if filters.peek().is_some() && !filters.any(|filter| NAME.contains(filter.as_str())) {
-        report(0, 0, 0);
-        return ExitCode::SUCCESS;
-    }
-    println!("\nrunning 1 test");
-    let python = Command::new("python3").arg("--version").output();
-    if !python.is_ok_and(|python| python.status.success()) {
-        println!("test {NAME} ... ignored, there is no python3");
-        report(0, 0, 1);
-        return ExitCode::SUCCESS;
-    }
-    match run() {
-        Ok(()) => {
-            println!("test {NAME} ... ok");
-            report(1, 0, 0);
-            ExitCode::SUCCESS
-        }
-        Err(why) => {
-            println!("test {NAME} ... FAILED\n\n{why}");
-            report(0, 1, 0);
-            ExitCode::FAILURE
-        }
-    }
+    foreign::main(&[(
+        "a_plc_in_python_exchanges_with_a_device_that_replies",
+        exchanges,
+    )])
 }
 
-/// The line that the harness of Rust ends with.
-fn report(passed: u32, failed: u32, ignored: u32) {
-    let verdict = if failed == 0 { "ok" } else { "FAILED" };
-    println!(
-        "\ntest result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored; 0 measured; \
-         0 filtered out\n"
-    );
+fn exchanges() -> Result<(), Absent> {
+    let python = foreign::python_with("main", &["socket"])?;
+    run(python).unwrap_or_else(|why| panic!("{why}"));
+    Ok(())
 }
 
-fn run() -> Result<(), String> {
+fn run(mut python: Command) -> Result<(), String> {
     let config = Config::parse("driver.cfg", DRIVER_CFG).map_err(|why| why.to_string())?;
     // A device that replies needs no clock.
     let mut device = Driver::open(config, Manual::new()).map_err(|why| why.to_string())?;
@@ -114,7 +80,7 @@ fn run() -> Result<(), String> {
     })
     .ok_or("the device does not listen")?;
     let (host, port) = address.rsplit_once(':').ok_or("no port in the address")?;
-    let mut plc = Command::new("python3")
+    let mut plc = python
         .args([SCRIPT, host, port, &RECORDS.to_string()])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

@@ -1,24 +1,17 @@
 //! Recordings under the eyes of readers that others wrote.
-//!
-//! It has its own main function: where the readers are not installed the test is skipped, and says so by name
-//! and reason, which the harness of Rust cannot do at run time. `make test` installs them.
 #![allow(missing_docs, reason = "a test")]
 
-use std::path::Path;
-use std::process::{Command, ExitCode};
+mod foreign;
 
+use std::path::Path;
+use std::process::ExitCode;
+
+use foreign::Absent;
 use tickbus::driver::{Config, Driver};
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};
 
-const NAME: &str = "readers_that_others_wrote_read_the_same_from_vcd_and_csv";
-
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/read_vcd.py");
-
-const PYTHON: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/target/venv/bin/python");
-
-/// What the script says with its exit code when a reader is not there.
-const MISSING: i32 = 77;
 
 /// Beside the rig's signals: one of each other kind, with names that VCD does not allow.
 const MORE: &str = r#"
@@ -38,57 +31,29 @@ address = "%IL24"
 "#;
 
 fn main() -> ExitCode {
-    // Asked for by name, or by none: what the harness of Rust would do.
-    let asked: Vec<String> = std::env::args().skip(1).collect();
-    let names = asked.iter().filter(|argument| !argument.starts_with('-'));
-    if asked.iter().any(|argument| argument == "--list") {
-        println!("{NAME}: test");
-        return ExitCode::SUCCESS;
-    }
-    if !names.clone().all(|name| NAME.contains(name.as_str())) {
-        return ExitCode::SUCCESS;
-    }
-    println!("\nrunning 1 test");
-    let outcome = run();
-    let (verdict, counts) = match &outcome {
-        Ok(None) => ("ok".to_owned(), "ok. 1 passed; 0 failed; 0 ignored"),
-        Ok(Some(why)) => (
-            format!("ignored, {why}"),
-            "ok. 0 passed; 0 failed; 1 ignored",
-        ),
-        Err(why) => (
-            format!("FAILED\n{why}"),
-            "FAILED. 0 passed; 1 failed; 0 ignored",
-        ),
-    };
-    println!("test {NAME} ... {verdict}\n\ntest result: {counts}; 0 measured; 0 filtered out\n");
-    ExitCode::from(u8::from(outcome.is_err()))
+    foreign::main(&[(
+        "readers_that_others_wrote_read_the_same_from_vcd_and_csv",
+        readers_agree,
+    )])
 }
 
-/// Records the same run twice, and has both files read; why it was skipped, if it was.
-fn run() -> Result<Option<String>, String> {
-    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+fn readers_agree() -> Result<(), Absent> {
+    let mut python = foreign::python_with("main", &["vcd", "vcdvcd"])?;
+    let folder = tempfile::tempdir().expect("a folder");
     record(folder.path(), "run.vcd");
     record(folder.path(), "run.csv");
-    let python = if Path::new(PYTHON).exists() {
-        PYTHON
-    } else {
-        "python3"
-    };
-    let output = Command::new(python)
+    let output = python
         .arg(SCRIPT)
         .args([folder.path().join("run.vcd"), folder.path().join("run.csv")])
-        .output();
-    let Ok(output) = output else {
-        return Ok(Some("there is no python3".to_owned()));
-    };
+        .output()
+        .expect("it starts");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
     let (told, complaint) = (text(&output.stdout), text(&output.stderr));
-    match output.status.code() {
-        Some(0) if told.contains("read_vcd: ok ticks=500 variables=") => Ok(None),
-        Some(MISSING) => Ok(Some(told)),
-        _ => Err(format!("{told}\n{complaint}")),
-    }
+    assert!(
+        output.status.success() && told.contains("read_vcd: ok ticks=500 variables="),
+        "{told}\n{complaint}"
+    );
+    Ok(())
 }
 
 fn record(folder: &Path, file: &str) {

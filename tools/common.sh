@@ -16,6 +16,16 @@ have() {
     command -v "$1" >/dev/null 2>&1
 }
 
+# Whether packages of the system may be installed: on Debian or Ubuntu, as root or with a sudo that asks for no
+# password.
+can_install() {
+    have apt-get && { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; }
+}
+
+as_root() {
+    if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
+}
+
 # at_least 1.88 1.95.0: whether the second version is no older than the first.
 at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]

@@ -3,8 +3,7 @@ module.
 
 usage: read_vcd.py RUN.vcd RUN.csv
 
-Both are recordings of the same run, so that every value of every tick must be the same in both. Exit code 77 says
-that a package is not installed.
+Both are recordings of the same run, so that every value of every tick must be the same in both.
 """
 
 import csv
@@ -12,12 +11,8 @@ import re
 import struct
 import sys
 
-try:
-    from vcd.reader import tokenize
-    from vcdvcd import VCDVCD
-except ImportError:
-    print("the Python packages vcdvcd and pyvcd are not installed (pip install vcdvcd pyvcd)")
-    sys.exit(77)
+from vcd.reader import tokenize
+from vcdvcd import VCDVCD
 
 
 def legal(name):

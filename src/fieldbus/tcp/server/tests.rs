@@ -2,12 +2,12 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::thread::{JoinHandle, yield_now};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::*;
 use crate::fieldbus::{LinkState, LinkStatus, Role};
 use crate::image::image;
-use crate::time::{Clock, Manual};
+use crate::time::{Clock, Manual, Monotonic};
 
 /// Telegrams of a length byte and so many more, which come back; one of 255 is against the protocol, and one
 /// of 200 is answered by a great deal.
@@ -67,6 +67,25 @@ struct Running {
     thread: Option<JoinHandle<Result<(), BusError>>>,
 }
 
+/// Waits in real time have an end.
+struct Waiting {
+    clock: Arc<Monotonic>,
+    limit: Nanos,
+}
+
+impl Waiting {
+    fn begin() -> Self {
+        let clock = Monotonic::shared().expect("a thread");
+        let limit = clock.now() + Nanos::from_secs(20);
+        Self { clock, limit }
+    }
+
+    #[track_caller]
+    fn check(&self, what: &str) {
+        assert!(self.clock.now() < self.limit, "waited in vain: {what}");
+    }
+}
+
 impl Running {
     fn new() -> Self {
         let clock = Manual::new();
@@ -109,13 +128,9 @@ impl Running {
 
     #[track_caller]
     fn until(&self, done: impl Fn(&Self) -> bool) {
-        let limit = Instant::now() + Duration::from_secs(20);
+        let waiting = Waiting::begin();
         while !done(self) {
-            assert!(
-                Instant::now() < limit,
-                "in vain: {}",
-                self.status.link().reason
-            );
+            waiting.check(&self.status.link().reason);
             yield_now();
         }
     }
@@ -231,10 +246,10 @@ fn who_does_not_read_is_not_read_and_dropped_in_the_end() {
     slow.set_nonblocking(true).expect("an option");
     let mut greedy = vec![0; 200];
     greedy[0] = 199;
-    let limit = Instant::now() + Duration::from_secs(20);
+    let waiting = Waiting::begin();
     // Until the system takes no more: then the server has stopped reading.
     while server.fact("clients.dropped").is_none() {
-        assert!(Instant::now() < limit, "a server that reads for ever");
+        waiting.check("a server that reads for ever");
         if (&slow).write(&greedy).is_err() {
             server.clock.advance(Nanos::from_millis(10));
         }

@@ -214,6 +214,8 @@ final class PlcProcess implements Plc {
             try {
                 if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
                     destroy();
+                    // Killing is an order, not a fact.
+                    now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS);
                 }
             } catch (InterruptedException e) {
                 destroy();

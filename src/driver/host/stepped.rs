@@ -1,0 +1,91 @@
+//! A program that is scanned by the tick, on simulation time.
+
+use std::sync::Arc;
+
+use crate::driver::Config;
+use crate::fieldbus::{BusError, LinkStatus, Port, Role, Stepped};
+use crate::plc::Program;
+use crate::time::{Manual, Nanos};
+
+use super::Tally;
+use super::cpu::{Cpu, half};
+
+/// The most scans that one exchange makes up for: 1,000 s of scans every 10 ms. A longer step is a wrong
+/// time, and would keep the tick for as long as it takes to scan through it.
+const MOST_SCANS: i64 = 100_000;
+
+/// A hosted program that is scanned by the tick, on simulation time.
+pub(in crate::driver) struct SteppedHost {
+    cpu: Cpu,
+    port: Port,
+    interval: Nanos,
+    /// When the next scan is due; `None` before the first exchange.
+    due: Option<Nanos>,
+    /// One frame on its way from one port to the other.
+    wire: Box<[u8]>,
+}
+
+impl SteppedHost {
+    pub(in crate::driver) fn new(
+        program: Box<dyn Program>,
+        config: &Config,
+        interval: Nanos,
+    ) -> (Self, Arc<Tally>) {
+        let max_age = config.timing.max_age;
+        let (cpu, bus) = half(program, &config.table, Role::Controller, max_age);
+        let tally = Arc::clone(&cpu.tally);
+        let status = LinkStatus::new(cpu.program.name(), max_age);
+        let port = Port::new(bus, Manual::new(), Role::Controller, None, status);
+        let (tx, rx) = port.sizes(0);
+        let wire = vec![0; tx.max(rx)].into();
+        (
+            Self {
+                cpu,
+                port,
+                interval,
+                due: None,
+                wire,
+            },
+            tally,
+        )
+    }
+}
+
+/// Carries the frame that `from` sends over to `to`.
+fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) {
+    if !from.sends(now) {
+        return;
+    }
+    let frame = from.outgoing(0, now);
+    let wire = &mut wire[..frame.len()];
+    wire.copy_from_slice(frame);
+    to.received(0, now, wire);
+    from.sent(0);
+}
+
+impl Stepped for SteppedHost {
+    fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+        port.running("the hosted program is there");
+        let is_down = port.is_down(now);
+        if !is_down {
+            carry(port, &mut self.port, now, &mut self.wire);
+        }
+        let mut due = self.due.unwrap_or(now);
+        if due + self.interval.times(MOST_SCANS) < now {
+            self.due = Some(now);
+            return Err(BusError::Refused(format!(
+                "simulation time jumped from {due} to {now}, over more than {MOST_SCANS} scans of the \
+                 hosted program; hand in the nanoseconds since the simulation began, tick by tick",
+            )));
+        }
+        while due <= now {
+            self.cpu.scan(due, true);
+            due += self.interval;
+        }
+        self.due = Some(due);
+        if !is_down {
+            carry(&mut self.port, port, now, &mut self.wire);
+        }
+        Ok(due)
+    }
+}

@@ -1,0 +1,103 @@
+//! A harness for tests whose other end is a program that somebody else wrote.
+//!
+//! Where such a program is not installed, its test is skipped, and says so by name and reason, which the harness
+//! of Rust cannot do at run time. A test target that uses this one says `harness = false` in Cargo.toml.
+//! `make test` installs the programs (`tools/peers`).
+#![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::process::{Command, ExitCode, Stdio};
+
+/// The program at the other end is not there; the text says which, and how to get it.
+#[derive(Debug)]
+pub struct Absent(pub String);
+
+/// A test panics when it fails.
+pub type Test = fn() -> Result<(), Absent>;
+
+/// Runs the tests that the command line asks for, one after the other.
+pub fn main(tests: &[(&str, Test)]) -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if arguments.iter().any(|argument| argument == "--list") {
+        tests.iter().for_each(|(name, _)| println!("{name}: test"));
+        println!("\n{} tests, 0 benchmarks", tests.len());
+        return ExitCode::SUCCESS;
+    }
+    let filters: Vec<_> = arguments
+        .iter()
+        .filter(|one| !one.starts_with('-'))
+        .collect();
+    let is_asked = |name: &str| {
+        filters.is_empty() || filters.iter().any(|filter| name.contains(filter.as_str()))
+    };
+    let asked: Vec<_> = tests.iter().filter(|(name, _)| is_asked(name)).collect();
+    println!("\nrunning {} tests", asked.len());
+    let (mut passed, mut failed, mut ignored) = (0, 0, 0);
+    for (name, test) in &asked {
+        match catch_unwind(AssertUnwindSafe(test)) {
+            Ok(Ok(())) => {
+                passed += 1;
+                println!("test {name} ... ok");
+            }
+            Ok(Err(Absent(why))) => {
+                ignored += 1;
+                println!("test {name} ... ignored, {why}");
+            }
+            Err(panic) => {
+                failed += 1;
+                println!("test {name} ... FAILED\n{}", words(&*panic));
+            }
+        }
+    }
+    let verdict = if failed == 0 { "ok" } else { "FAILED" };
+    println!(
+        "\ntest result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored; 0 measured; {} \
+         filtered out\n",
+        tests.len() - asked.len()
+    );
+    ExitCode::from(u8::from(failed > 0))
+}
+
+fn words(panic: &(dyn Any + Send)) -> &str {
+    let owned = panic.downcast_ref::<String>().map(String::as_str);
+    owned
+        .or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("it panicked")
+}
+
+/// A Python that has all of `modules`: that of the environment `name` under target/peers, or the system's.
+pub fn python_with(name: &str, modules: &[&str]) -> Result<Command, Absent> {
+    let own =
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("target/peers/{name}/bin/python"));
+    let import = format!("import {}", modules.join(", "));
+    for python in [own, PathBuf::from("python3")] {
+        let tried = Command::new(&python)
+            .args(["-c", &import])
+            .stderr(Stdio::null())
+            .status();
+        if tried.is_ok_and(|status| status.success()) {
+            return Ok(Command::new(python));
+        }
+    }
+    Err(Absent(format!(
+        "no Python has {}; run tools/peers",
+        modules.join(" and ")
+    )))
+}
+
+/// A command that the Debian package `package` brings.
+pub fn command(name: &str, package: &str) -> Result<Command, Absent> {
+    let found = Command::new(name)
+        .arg("--version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    match found {
+        Ok(_) => Ok(Command::new(name)),
+        Err(_) => Err(Absent(format!(
+            "there is no {name} (apt-get install {package})"
+        ))),
+    }
+}

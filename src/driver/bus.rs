@@ -87,7 +87,8 @@ fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
             let client = opcua::Client::new(options, line).map_err(refused)?;
             Ok(Box::new(client))
         }
-        _ => unreachable!("called for the two OPC UA buses"),
+        Options::OpcuaServer(options) => Ok(Box::new(opcua::Server::new(options, line))),
+        other => unreachable!("{} is another room's", other.kind()),
     }
 }
 

@@ -17,6 +17,8 @@ mod pki;
 #[cfg(feature = "opcua")]
 mod reactor;
 #[cfg(feature = "opcua")]
+mod server;
+#[cfg(feature = "opcua")]
 mod values;
 
 #[cfg(feature = "opcua")]
@@ -26,4 +28,6 @@ pub use line::Line;
 pub use node::{Identifier, Namespace, NodeName, NodeNameError, Pattern};
 pub use options::{ClientOptions, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};
+#[cfg(feature = "opcua")]
+pub use server::Server;
 pub use url::{Url, UrlError};

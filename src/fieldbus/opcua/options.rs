@@ -84,8 +84,7 @@ impl ClientOptions {
             "write where the server is, such as url = \"opc.tcp://192.168.0.1:4840\"",
         );
         let keys = Keys::take(&mut table);
-        let intervals =
-            ["publishing_interval", "sampling_interval"].map(|key| table.take(key));
+        let intervals = ["publishing_interval", "sampling_interval"].map(|key| table.take(key));
         let nodes = table.take("nodes");
         let pattern = table.take("node_pattern");
         let write_to = table.take("write_to");
@@ -113,7 +112,8 @@ impl ClientOptions {
         let write_to = match write_to {
             None => Some(None),
             Some(value) => {
-                let right = "write the identity that the statistics show, or remove it to stay read-only";
+                let right =
+                    "write the identity that the statistics show, or remove it to stay read-only";
                 let text = value.label(IDENTITY_LIMIT, right);
                 text.map(|text| Some(text.to_owned()))
             }

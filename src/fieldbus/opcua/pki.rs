@@ -167,7 +167,9 @@ impl Pki {
                 ));
             }
             Err(error) => {
-                return refused(format!("the certificate of the server is not good enough ({error})"));
+                return refused(format!(
+                    "the certificate of the server is not good enough ({error})"
+                ));
             }
         }
         if self.trust == Trust::Any {
@@ -283,6 +285,9 @@ mod tests {
     #[test]
     fn the_name_of_an_application_has_only_what_a_urn_may_have() {
         assert_eq!(application_uri("Test rig"), "urn:tickbus:Test%20rig");
-        assert_eq!(application_uri("Pr\u{fc}fstand-1"), "urn:tickbus:Pr%C3%BCfstand-1");
+        assert_eq!(
+            application_uri("Pr\u{fc}fstand-1"),
+            "urn:tickbus:Pr%C3%BCfstand-1"
+        );
     }
 }

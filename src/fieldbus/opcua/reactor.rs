@@ -42,7 +42,10 @@ impl Reactor {
     ///
     /// The system refused what it waits with.
     pub(super) fn new(stop: &Stop) -> Result<Self, BusError> {
-        let runtime = Builder::new_current_thread().enable_io().enable_time().build();
+        let runtime = Builder::new_current_thread()
+            .enable_io()
+            .enable_time()
+            .build();
         let runtime = runtime.map_err(|error| {
             BusError::Link(format!(
                 "the system cannot wait for sockets ({error}); close other programs or raise the limit \

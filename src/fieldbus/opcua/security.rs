@@ -59,8 +59,10 @@ pub enum Mode {
 }
 
 impl Mode {
-    const NAMES: [(&'static str, Self); 2] =
-        [("Sign", Self::Sign), ("SignAndEncrypt", Self::SignAndEncrypt)];
+    const NAMES: [(&'static str, Self); 2] = [
+        ("Sign", Self::Sign),
+        ("SignAndEncrypt", Self::SignAndEncrypt),
+    ];
 
     /// The name that OPC UA gives it.
     pub const fn name(self) -> &'static str {
@@ -197,7 +199,10 @@ impl<'a> Keys<'a> {
                 .label(TEXT_LIMIT, "name the file whose first line is the password")
                 .map(|file| Secret::File(file.into())),
             [_, Some(name), _] => name
-                .label(TEXT_LIMIT, "name the environment variable that has the password")
+                .label(
+                    TEXT_LIMIT,
+                    "name the environment variable that has the password",
+                )
                 .map(|name| Secret::Environment(name.to_owned())),
             [.., Some(clear)] => clear
                 .text("write the password in quotes")

@@ -59,7 +59,9 @@ impl FromStr for Url {
             return refuse(format!("the url \"{}\" has an odd path", shown(text)));
         }
         // The last colon of a bare IPv6 address is not that of a port.
-        let has_port = host.rsplit_once(':').is_some_and(|(_, after)| !after.contains(']'));
+        let has_port = host
+            .rsplit_once(':')
+            .is_some_and(|(_, after)| !after.contains(']'));
         let address: Address = if has_port {
             host.parse()?
         } else {

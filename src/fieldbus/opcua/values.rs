@@ -24,8 +24,8 @@ impl Values {
         let stations = 0..table.stations.len();
         let here = |station| {
             let signals = table.signals.iter().enumerate();
-            let here = signals
-                .filter(move |(_, signal)| signal.station == station && signal.area == area);
+            let here =
+                signals.filter(move |(_, signal)| signal.station == station && signal.area == area);
             here.map(|(index, _)| index).collect()
         };
         Self {
@@ -201,14 +201,29 @@ mod tests {
     #[test]
     fn every_type_goes_both_ways_with_every_bit() {
         for (data_type, values) in [
-            (DataType::Bool, vec![Variant::Boolean(true), Variant::Boolean(false)]),
-            (DataType::Sint, vec![Variant::SByte(-128), Variant::SByte(127)]),
+            (
+                DataType::Bool,
+                vec![Variant::Boolean(true), Variant::Boolean(false)],
+            ),
+            (
+                DataType::Sint,
+                vec![Variant::SByte(-128), Variant::SByte(127)],
+            ),
             (DataType::Byte, vec![Variant::Byte(255)]),
-            (DataType::Int, vec![Variant::Int16(-2), Variant::Int16(i16::MAX)]),
+            (
+                DataType::Int,
+                vec![Variant::Int16(-2), Variant::Int16(i16::MAX)],
+            ),
             (DataType::Word, vec![Variant::UInt16(0xFF01)]),
-            (DataType::Dint, vec![Variant::Int32(i32::MIN), Variant::Int32(-3)]),
+            (
+                DataType::Dint,
+                vec![Variant::Int32(i32::MIN), Variant::Int32(-3)],
+            ),
             (DataType::Udint, vec![Variant::UInt32(u32::MAX - 1)]),
-            (DataType::Real, vec![Variant::Float(-0.0), Variant::Float(f32::INFINITY)]),
+            (
+                DataType::Real,
+                vec![Variant::Float(-0.0), Variant::Float(f32::INFINITY)],
+            ),
             (DataType::Lint, vec![Variant::Int64(i64::MIN + 1)]),
             (DataType::Ulint, vec![Variant::UInt64(u64::MAX - 1)]),
             (DataType::Lreal, vec![Variant::Double(-1e300)]),
@@ -233,7 +248,10 @@ mod tests {
         let odd = f32::from_bits(0x7FC0_1234);
         let table = table(DataType::Real, ByteOrder::Abcd);
         let mut values = Values::new(&table, Area::Output);
-        values.set(0, bits(DataType::Real, &Variant::Float(odd)).expect("it is one"));
+        values.set(
+            0,
+            bits(DataType::Real, &Variant::Float(odd)).expect("it is one"),
+        );
         let mut frame = [0; 8];
         values.give(0, &mut frame);
         assert_eq!(frame[..4], [0x7F, 0xC0, 0x12, 0x34]);

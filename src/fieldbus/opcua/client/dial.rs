@@ -3,11 +3,11 @@
 use std::net::TcpStream;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use opcua::client::ConnectionSource;
 use opcua::client::transport::{
     Connector, RequestRecv, SecureChannelState, StreamConnection, StreamConnector, StreamTransport,
     TransportConfiguration,
 };
-use opcua::client::ConnectionSource;
 use opcua::core::comms::tcp_codec::TcpCodec;
 use opcua::types::{DecodingOptions, EndpointDescription, Error, StatusCode};
 use tokio::io::{ReadHalf, WriteHalf};
@@ -38,7 +38,12 @@ impl Dial {
         options: DecodingOptions,
     ) -> Result<StreamConnection<Reader, Writer>, Error> {
         let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        let lost = || Error::new(StatusCode::BadConnectionClosed, "the connection was used up");
+        let lost = || {
+            Error::new(
+                StatusCode::BadConnectionClosed,
+                "the connection was used up",
+            )
+        };
         let stream = stream.take().ok_or_else(lost)?;
         let stream = tokio::net::TcpStream::from_std(stream)
             .map_err(|error| Error::new(StatusCode::BadCommunicationError, error))?;

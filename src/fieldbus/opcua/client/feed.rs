@@ -109,7 +109,9 @@ pub(super) async fn subscribe(
             rhythm.max_age
         );
     }
-    let read: Vec<usize> = (0..fields.len()).filter(|index| fields[*index].is_read).collect();
+    let read: Vec<usize> = (0..fields.len())
+        .filter(|index| fields[*index].is_read)
+        .collect();
     for chunk in read.chunks(CHUNK) {
         let requests = chunk.iter().map(|&index| {
             let latched = fields[index].latched;

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use opcua::client::Session;
 use opcua::types::{
-    AttributeId, DataTypeId, DataValue, NodeId, ReadValueId, TimestampsToReturn, VariableId, Variant,
+    AttributeId, DataTypeId, DataValue, NodeId, ReadValueId, TimestampsToReturn, VariableId,
+    Variant,
 };
 
 use crate::fieldbus::BusError;
@@ -73,7 +74,10 @@ pub(super) async fn ask(session: &Session) -> Result<Server, BusError> {
 async fn read(session: &Session, wanted: &[ReadValueId]) -> Result<Vec<DataValue>, BusError> {
     let values = session.read(wanted, TimestampsToReturn::Neither, 0.0).await;
     let values = values.map_err(|error| {
-        BusError::Link(format!("the server cannot be read ({})", meaning(error.status())))
+        BusError::Link(format!(
+            "the server cannot be read ({})",
+            meaning(error.status())
+        ))
     })?;
     if values.len() == wanted.len() {
         Ok(values)
@@ -95,7 +99,10 @@ impl Server {
                 let found = self.namespaces.iter().position(|known| known == uri);
                 let found = found.and_then(|index| u16::try_from(index).ok());
                 found.ok_or_else(|| {
-                    format!("the server has no namespace \"{uri}\"; it has {:?}", self.namespaces)
+                    format!(
+                        "the server has no namespace \"{uri}\"; it has {:?}",
+                        self.namespaces
+                    )
                 })?
             }
         };
@@ -198,10 +205,14 @@ fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String
     }
     if let Some(Variant::Byte(access)) = access.value {
         if *is_read && access & READS == 0 {
-            return Err(format!("\"{name}\" is {node}, which this user may not read"));
+            return Err(format!(
+                "\"{name}\" is {node}, which this user may not read"
+            ));
         }
         if !is_read && writes && access & WRITES == 0 {
-            return Err(format!("\"{name}\" is {node}, which this user may not write"));
+            return Err(format!(
+                "\"{name}\" is {node}, which this user may not write"
+            ));
         }
     }
     Ok(())

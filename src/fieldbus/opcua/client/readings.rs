@@ -111,7 +111,10 @@ impl Readings {
                 port.count("opcua.source_time_back");
             }
             self.made[signal] = Some(made);
-            if self.newest.is_none_or(|newest| newest.ticks() < made.ticks()) {
+            if self
+                .newest
+                .is_none_or(|newest| newest.ticks() < made.ticks())
+            {
                 self.newest = Some(made);
             }
         }
@@ -120,9 +123,15 @@ impl Readings {
             self.quality[signal] = Quality::Bad(status);
             return Ok(());
         }
-        let bits = value.value.as_ref().and_then(|value| values::bits(field.data_type, value));
+        let bits = value
+            .value
+            .as_ref()
+            .and_then(|value| values::bits(field.data_type, value));
         let Some(bits) = bits else {
-            let theirs = value.value.as_ref().and_then(opcua::types::Variant::scalar_type_id);
+            let theirs = value
+                .value
+                .as_ref()
+                .and_then(opcua::types::Variant::scalar_type_id);
             return Err(BusError::Protocol(format!(
                 "\"{}\" is {}, which is {:?} in OPC UA, but the value that came is {}; correct \"type\", or \
                  the node {}",

@@ -171,11 +171,13 @@ pub(super) async fn open(
     loop {
         let status = match events.next().await {
             Some(Ok(SessionPollResult::Reconnected(_))) => break,
-            Some(Ok(
-                SessionPollResult::ReconnectFailed(status)
-                | SessionPollResult::ConnectionLost(status),
-            )
-            | Err(status)) => status,
+            Some(
+                Ok(
+                    SessionPollResult::ReconnectFailed(status)
+                    | SessionPollResult::ConnectionLost(status),
+                )
+                | Err(status),
+            ) => status,
             Some(Ok(_)) => continue,
             None => StatusCode::BadConnectionClosed,
         };
@@ -266,4 +268,3 @@ pub(super) fn identity(endpoint: &EndpointDescription, product: &str) -> String 
     let uri = endpoint.server.application_uri.as_ref();
     format!("{uri} {product}").trim().to_owned()
 }
-

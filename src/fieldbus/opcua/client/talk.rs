@@ -112,7 +112,8 @@ impl Talk<'_> {
                     Ok(more) => statuses.extend(more),
                     Err(error) => {
                         let why = meaning(error.status());
-                        let error = BusError::Link(format!("the server did not answer a Write ({why})"));
+                        let error =
+                            BusError::Link(format!("the server did not answer a Write ({why})"));
                         inbox.push(News::Written(Err(error)));
                         return;
                     }

@@ -83,7 +83,10 @@ impl Writings {
         let flight = self.flight.take().unwrap_or_default();
         let mut whole = true;
         for (at, (signal, bits)) in flight.into_iter().enumerate() {
-            let status = statuses.get(at).copied().unwrap_or(StatusCode::BadUnknownResponse);
+            let status = statuses
+                .get(at)
+                .copied()
+                .unwrap_or(StatusCode::BadUnknownResponse);
             let name = &table.signals[signal].name;
             if status.is_bad() {
                 whole = false;
@@ -91,7 +94,9 @@ impl Writings {
                 port.count("opcua.writes_refused");
                 if self.refused[signal] != Some(status) {
                     let why = meaning(status);
-                    log::warn!("the server does not take the value of \"{name}\" ({why}); it is tried again");
+                    log::warn!(
+                        "the server does not take the value of \"{name}\" ({why}); it is tried again"
+                    );
                     port.tell("refused", &format!("{name}: {why}"));
                 }
                 self.refused[signal] = Some(status);
@@ -110,7 +115,10 @@ impl Writings {
             for &signal in self.values.signals(station) {
                 if self.known[signal].is_some() {
                     let signal = &table.signals[signal];
-                    port.sent_part(station, signal.byte..signal.byte + signal.data_type.size_bytes());
+                    port.sent_part(
+                        station,
+                        signal.byte..signal.byte + signal.data_type.size_bytes(),
+                    );
                 }
             }
         }

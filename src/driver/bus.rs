@@ -70,6 +70,9 @@ pub(super) fn open(
             let client = ModbusClient::new(options, &config.table, config.role, cycle);
             Ok((Bus::Free(Box::new(client)), None))
         }
+        Options::OpcuaClient(_) | Options::OpcuaServer(_) => {
+            Ok((Bus::Free(open_opcua(config)?), None))
+        }
     }
 }
 
@@ -84,6 +87,39 @@ fn open_plugin(config: &Config, options: &plugin::Options) -> Result<Box<dyn Fre
     };
     let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
     plugin::open(options, line).map_err(refused)
+}
+
+#[cfg(feature = "opcua")]
+fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
+    use crate::fieldbus::opcua;
+
+    let line = opcua::Line {
+        name: &config.name,
+        id: config.id,
+        directory: config.folder(),
+        role: config.role,
+        table: &config.table,
+        cycle: config.timing.cycle,
+    };
+    let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
+    match &config.bus {
+        Options::OpcuaClient(options) => {
+            let client = opcua::Client::new(options, line).map_err(refused)?;
+            Ok(Box::new(client))
+        }
+        Options::OpcuaServer(options) => Ok(Box::new(opcua::Server::new(options, line))),
+        other => unreachable!("{} is another room's", other.kind()),
+    }
+}
+
+#[cfg(not(feature = "opcua"))]
+fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
+    Err(DriverError::Config(format!(
+        "{}: bus kind \"{}\" is not in this build of tickbus; use the library of a `make dist`, which has it, \
+         or build with `cargo build --release --features opcua`",
+        config.path.display(),
+        config.bus.kind()
+    )))
 }
 
 fn open_loopback(

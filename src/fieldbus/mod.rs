@@ -12,6 +12,7 @@ mod troubles;
 
 pub mod loopback;
 pub mod modbus;
+pub mod opcua;
 pub mod plugin;
 pub mod s7;
 pub mod socket;

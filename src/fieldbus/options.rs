@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::tcp::Address;
-use super::{Role, loopback, modbus, plugin, s7, socket};
+use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::SignalTable;
 
@@ -27,7 +27,7 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 7] = [
+const BUILT: [&str; 9] = [
     "loopback",
     "socket",
     "plugin",
@@ -35,6 +35,8 @@ const BUILT: [&str; 7] = [
     "modbus-client",
     "s7-server",
     "s7-client",
+    "opcua-server",
+    "opcua-client",
 ];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
@@ -54,6 +56,10 @@ pub enum Options {
     S7Server(s7::ServerOptions),
     /// `kind = "s7-client"`: the memory of a CPU is read and written.
     S7Client(s7::ClientOptions),
+    /// `kind = "opcua-client"`: a PLC that is an OPC UA server.
+    OpcuaClient(opcua::ClientOptions),
+    /// `kind = "opcua-server"`: a server for PLCs that are OPC UA clients.
+    OpcuaServer(opcua::ServerOptions),
 }
 
 impl Options {
@@ -67,6 +73,8 @@ impl Options {
             Self::ModbusClient(_) => "modbus-client",
             Self::S7Server(_) => "s7-server",
             Self::S7Client(_) => "s7-client",
+            Self::OpcuaClient(_) => "opcua-client",
+            Self::OpcuaServer(_) => "opcua-server",
         }
     }
 
@@ -80,6 +88,8 @@ impl Options {
             Self::ModbusClient(options) => options.events,
             Self::S7Server(options) => options.events,
             Self::S7Client(options) => options.events,
+            Self::OpcuaClient(options) => options.events,
+            Self::OpcuaServer(options) => options.events,
         }
     }
 
@@ -117,6 +127,8 @@ impl Options {
             }
             Self::S7Server(options) => options.set_address(address),
             Self::S7Client(options) => options.set_address(address),
+            Self::OpcuaClient(options) => options.set_address(address),
+            Self::OpcuaServer(options) => options.set_address(address),
         }
     }
 
@@ -127,7 +139,11 @@ impl Options {
             Self::ModbusClient(options) => options.stations.read_station(count, true, table),
             Self::S7Server(options) => options.read_station(count, table),
             Self::S7Client(options) => options.read_station(count, table),
-            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => {}
+            Self::Loopback(_)
+            | Self::Socket(_)
+            | Self::Plugin(_)
+            | Self::OpcuaClient(_)
+            | Self::OpcuaServer(_) => {}
         }
     }
 
@@ -162,6 +178,8 @@ impl Options {
             Some("modbus-client") => {
                 modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
             }
+            Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
+            Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
                 table.finish_open();
                 report_kind(kind, other?);

@@ -277,6 +277,16 @@ impl Port {
             .unwrap_or_default()
     }
 
+    /// How long ago the simulation ticked last; [`Nanos::MAX`] for never.
+    pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
+        self.image.stations[station].tick_age(now)
+    }
+
+    /// For how long the simulation may not tick before fail-safe bytes go out; `None` for ever.
+    pub fn watchdog(&self) -> Option<Nanos> {
+        self.watchdog
+    }
+
     /// Looks whether the line has become stale, or is so no more. [`outgoing`](Self::outgoing) does it, too;
     /// this is for buses that have nothing to send for long.
     pub fn observe(&mut self, now: Nanos) {

@@ -185,7 +185,7 @@ impl Connection<'_> {
             self.read(now, port)?;
         }
         if self.has_identity && self.pace.take(now) {
-            self.cycle(now, port)?;
+            self.cycle(now, port);
         }
         if is_writable || !self.dialog.to_write().is_empty() {
             self.write()?;
@@ -232,13 +232,13 @@ impl Connection<'_> {
     }
 
     /// A cycle is due.
-    fn cycle(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+    fn cycle(&mut self, now: Nanos, port: &mut Port) {
         if !self.dialog.is_idle() {
             port.count("s7.skipped");
-            return Ok(());
+            return;
         }
         if !port.sends(now) {
-            return Ok(());
+            return;
         }
         if self.bus.guard.may_write() {
             for image in &self.bus.frames.written {
@@ -251,7 +251,6 @@ impl Connection<'_> {
         if let Some(News::Done) = self.dialog.begin(now) {
             self.done(now, port);
         }
-        Ok(())
     }
 
     /// A cycle is complete.

@@ -294,8 +294,8 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
             Quantity::Torque if axis.kind == Kind::Torque => Some("%".to_owned()),
             _ => None,
         },
-        // A PLC may drop Execute at any time after it has been sent.
-        latch: (field == Field::Execute).then_some(Latch::Rising),
+        // Either may be shorter than a tick, or than a bus cycle.
+        latch: matches!(field, Field::Execute | Field::Acknowledge).then_some(Latch::Rising),
         hold: Nanos::ZERO,
         fail_safe: scale.map_or_else(Slot::default, |scale| Slot::from_real(scale.offset)),
         dead_band: band.filter(|_| feedback).unwrap_or_default(),

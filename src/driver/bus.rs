@@ -47,7 +47,7 @@ pub(super) fn open(
         Options::Loopback(options) => open_loopback(config, options, clock),
         Options::Socket(options) => {
             let cycle = config.timing.cycle;
-            let socket = Socket::new(options, &config.table, config.role, cycle);
+            let socket = Socket::new(options, &config.table, config.role, cycle, &config.axes);
             Ok((Bus::Free(Box::new(socket)), None))
         }
         Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),

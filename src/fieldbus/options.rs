@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::tcp::Address;
 use super::{Role, loopback, modbus, plugin, socket};
+use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::SignalTable;
 
@@ -116,14 +117,17 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
             Self::ModbusClient(options) => options.stations.read_station(count, true, table),
-            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => {}
+            Self::Socket(options) => options.read_station(count, table),
+            Self::Loopback(_) | Self::Plugin(_) => {}
         }
     }
 
-    /// Reports what does not go together with the stations and signals of the driver.
-    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
-        if let Self::ModbusClient(options) = self {
-            options.fit(table, collector);
+    /// Reports what does not go together with the stations, signals and axes of the driver.
+    pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
+        match self {
+            Self::ModbusClient(options) => options.fit(table, collector),
+            Self::Socket(options) => options.fit(table, axes, collector),
+            _ => {}
         }
     }
 

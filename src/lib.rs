@@ -19,6 +19,7 @@
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`driver`] | one device: configuration, open, exchange, statistics, close |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
+//! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | [`cli`] | the `tickbus` command |
@@ -34,6 +35,7 @@ pub mod export;
 pub mod faults;
 pub mod fieldbus;
 pub mod image;
+pub mod import;
 mod jni;
 pub mod os;
 pub mod plc;

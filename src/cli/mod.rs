@@ -6,6 +6,7 @@ mod axes;
 mod check;
 mod export;
 mod host;
+mod import;
 mod mirror;
 mod plc;
 #[cfg(unix)]
@@ -30,6 +31,7 @@ enum Command {
     Axes(axes::Arguments),
     Check(check::Arguments),
     Export(export::Arguments),
+    Import(import::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     Report(report::Arguments),
@@ -73,6 +75,7 @@ pub fn main() -> ExitCode {
         Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

@@ -7,6 +7,7 @@ mod names;
 mod record;
 mod s7;
 mod siemens;
+mod st;
 mod symbols;
 
 use crate::config::Mistakes;
@@ -18,16 +19,22 @@ use crate::fieldbus::Role;
 pub enum Target {
     /// TIA Portal: SCL for an S7-1500 or S7-1200.
     S71500,
+    /// CODESYS V3: Structured Text to paste.
+    Codesys,
+    /// `OpenPLC`: one program in Structured Text.
+    OpenPlc,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 1] = [Self::S71500];
+    pub const ALL: [Self; 3] = [Self::S71500, Self::Codesys, Self::OpenPlc];
 
     /// As the command line names it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::S71500 => "s7-1500",
+            Self::Codesys => "codesys",
+            Self::OpenPlc => "openplc",
         }
     }
 }
@@ -66,6 +73,8 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
     }
     let mut export = match target {
         Target::S71500 => s7::export(config),
+        Target::Codesys => st::codesys::export(config),
+        Target::OpenPlc => st::openplc::export(config),
     };
     export.files.push(symbols::file(config));
     Ok(export)

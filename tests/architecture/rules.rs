@@ -16,7 +16,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["plc"],
     &["fieldbus"],
     &["driver"],
-    &["export"],
+    &["export", "import"],
     &["testing"],
     &["jni", "cli"],
 ];

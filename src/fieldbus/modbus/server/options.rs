@@ -27,8 +27,10 @@ pub struct ServerOptions {
     pub stations: Stations,
     /// The most clients at once.
     pub clients: usize,
-    /// Whether every write of a client is reported as an event, beside the image.
+    /// Whether every change that a client makes is reported as an event, beside the image.
     pub events: bool,
+    /// Whether every write is, changed or not.
+    pub every_write: bool,
 }
 
 impl ServerOptions {
@@ -58,7 +60,7 @@ impl ServerOptions {
                 .whole(1..=10_000)
                 .and_then(|clients| usize::try_from(clients).ok())
         });
-        let events = events.map_or(Some(false), |value| value.boolean());
+        let events = events.as_ref().map_or(Some((false, false)), read_events);
         let input = match role {
             Role::Device => Side::Sends,
             Role::Controller => Side::Holds,
@@ -71,9 +73,20 @@ impl ServerOptions {
             },
             stations: stations?,
             clients: clients?,
-            events: events?,
+            events: events?.0,
+            every_write: events?.1,
         })
     }
+}
+
+/// Whether changes are reported as events, and whether every write is.
+fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
+    if value.is_boolean() {
+        return value.boolean().map(|events| (events, false));
+    }
+    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
+    value.text(right)?;
+    value.choice("kinds of events", &[("writes", (true, true))])
 }
 
 /// The holding register at which `%I` begins once more.

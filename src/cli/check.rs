@@ -149,8 +149,12 @@ fn bus(options: &Options) -> String {
 
 fn socket(options: &socket::Options) -> Vec<String> {
     let address = &options.address;
+    let each: Vec<String> = options.stations.iter().map(ToString::to_string).collect();
     let mut parts = vec![
         match options.tcp {
+            TcpRole::Listen if !each.is_empty() => {
+                format!("listens on {}, one station each", each.join(" and "))
+            }
             TcpRole::Listen => format!("listens on {address}"),
             TcpRole::Connect => format!("connects to {address}"),
         },
@@ -162,6 +166,9 @@ fn socket(options: &socket::Options) -> Vec<String> {
     ];
     if options.min_interval > Nanos::ZERO {
         parts.push(format!("at most every {}", options.min_interval));
+    }
+    if let socket::Message::Axis { .. } = options.message {
+        parts.push("one axis in each message".to_owned());
     }
     parts
 }

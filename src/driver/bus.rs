@@ -48,7 +48,7 @@ pub(super) fn open(
         Options::Loopback(options) => open_loopback(config, options, clock),
         Options::Socket(options) => {
             let cycle = config.timing.cycle;
-            let socket = Socket::new(options, &config.table, config.role, cycle);
+            let socket = Socket::new(options, &config.table, config.role, cycle, &config.axes);
             Ok((Bus::Free(Box::new(socket)), None))
         }
         Options::S7Server(options) => {

@@ -214,7 +214,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     let table = layout::lay_out(sections, declared, sizes, bus);
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
-        bus.fit(table, root.collector());
+        bus.fit(table, &axes, root.collector());
     }
     let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
     if table

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::tcp::Address;
 use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
+use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::SignalTable;
 
@@ -137,19 +138,17 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
             Self::ModbusClient(options) => options.stations.read_station(count, true, table),
+            Self::Socket(options) => options.read_station(count, table),
             Self::S7Server(options) => options.read_station(count, table),
             Self::S7Client(options) => options.read_station(count, table),
-            Self::Loopback(_)
-            | Self::Socket(_)
-            | Self::Plugin(_)
-            | Self::OpcuaClient(_)
-            | Self::OpcuaServer(_) => {}
+            Self::Loopback(_) | Self::Plugin(_) | Self::OpcuaClient(_) | Self::OpcuaServer(_) => {}
         }
     }
 
-    /// Reports what does not go together with the stations and signals of the driver.
-    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+    /// Reports what does not go together with the stations, signals and axes of the driver.
+    pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
+            Self::Socket(options) => options.fit(table, axes, collector),
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),

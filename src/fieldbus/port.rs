@@ -90,13 +90,18 @@ impl Port {
     /// Whether frames go out in the cycle at `now`. To be asked once a cycle, before
     /// [`outgoing`](Self::outgoing): an injected fault may swallow them, and what was to be sent is lost.
     pub fn sends(&mut self, now: Nanos) -> bool {
+        self.sends_of(0..self.stations(), now)
+    }
+
+    /// The same for a bus whose `stations` have a cycle of their own.
+    pub fn sends_of(&mut self, stations: Range<usize>, now: Nanos) -> bool {
         if self.is_down(now) {
             return false;
         }
         if !self.troubles.decides_to_lose_a_cycle() {
             return true;
         }
-        for station in 0..self.stations() {
+        for station in stations {
             self.outgoing(station, now);
             self.sent(station);
         }

@@ -8,7 +8,7 @@ use crate::config::{Collector, Mistakes, Table, Value, load_text, read_text};
 use crate::faults::{self, Fault};
 use crate::fieldbus::{Options, Role};
 use crate::record;
-use crate::signal::{Addressing, SignalTable, Station, section};
+use crate::signal::{Addressing, SignalTable, Station};
 use crate::time::Nanos;
 
 /// Waits between attempts to reach the peer again, where a driver.cfg states none.
@@ -205,7 +205,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     }
     layout::check_twins(&signals, "signal");
     layout::check_twins(&axes, "axis");
-    let (mut axes, sections) = read_signals(signals, axes, addressing);
+    let (mut axes, sections) = layout::read_signals(signals, axes, addressing);
     let sizes = fieldbus
         .as_ref()
         .map(|fieldbus| fieldbus.sizes.clone())
@@ -214,7 +214,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     let table = layout::lay_out(sections, declared, sizes, bus);
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
-        bus.fit(table, root.collector());
+        bus.fit(table, &axes, root.collector());
     }
     let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
     if table
@@ -260,31 +260,6 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
             None => None,
         },
     })
-}
-
-/// Reads the `[[signal]]` and the `[[axis]]` tables; signals come in the order of the file.
-fn read_signals<'a>(
-    signals: Vec<Table<'a>>,
-    axes: Vec<Table<'a>>,
-    addressing: Addressing,
-) -> (Vec<Axis>, Vec<section::Section<'a>>) {
-    let mut all = Vec::new();
-    for table in signals {
-        let at = table.at();
-        all.extend(section::read(table, addressing).map(|section| (at, section)));
-    }
-    let mut read = Vec::new();
-    let mut places = axis::section::Places::default();
-    for (number, table) in axes.into_iter().enumerate() {
-        let at = table.at();
-        if let Some(axis) = axis::section::read(table, number, addressing, &mut places) {
-            read.push(axis.axis);
-            all.extend(axis.sections.into_iter().map(|section| (at, section)));
-        }
-    }
-    // Stable, so that the signals of one axis stay in their order.
-    all.sort_by_key(|(at, _)| *at);
-    (read, all.into_iter().map(|(_, section)| section).collect())
 }
 
 struct DriverTable {

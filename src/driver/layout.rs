@@ -3,10 +3,11 @@
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 
+use crate::axis::{self, Axis};
 use crate::config::{Table, Value, did_you_mean, shown};
 use crate::fieldbus::Options;
-use crate::signal::section::{NAME_LIMIT, STATION, Section};
-use crate::signal::{AREA_LIMIT, Area, SignalTable, Station};
+use crate::signal::section::{self, NAME_LIMIT, STATION, Section};
+use crate::signal::{AREA_LIMIT, Addressing, Area, SignalTable, Station};
 
 /// The most signals of one driver.
 pub(super) const SIGNAL_LIMIT: usize = 100_000;
@@ -45,6 +46,31 @@ impl<'a> Sizes<'a> {
 struct Declared<'a> {
     name: String,
     sizes: Sizes<'a>,
+}
+
+/// Reads the `[[signal]]` and the `[[axis]]` tables; signals come in the order of the file.
+pub(super) fn read_signals<'a>(
+    signals: Vec<Table<'a>>,
+    axes: Vec<Table<'a>>,
+    addressing: Addressing,
+) -> (Vec<Axis>, Vec<Section<'a>>) {
+    let mut all = Vec::new();
+    for table in signals {
+        let at = table.at();
+        all.extend(section::read(table, addressing).map(|section| (at, section)));
+    }
+    let mut read = Vec::new();
+    let mut places = axis::section::Places::default();
+    for (number, table) in axes.into_iter().enumerate() {
+        let at = table.at();
+        if let Some(axis) = axis::section::read(table, number, addressing, &mut places) {
+            read.push(axis.axis);
+            all.extend(axis.sections.into_iter().map(|section| (at, section)));
+        }
+    }
+    // Stable, so that the signals of one axis stay in their order.
+    all.sort_by_key(|(at, _)| *at);
+    (read, all.into_iter().map(|(_, section)| section).collect())
 }
 
 /// Lays the signals out over their stations and reports what does not go together.

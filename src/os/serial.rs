@@ -49,7 +49,7 @@ mod unix {
     use rustix::fs::{Mode, OFlags, open};
     use rustix::termios::{
         ControlModes, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector,
-        SpecialCodeIndex, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr,
+        SpecialCodeIndex, ioctl_tiocexcl, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
     };
 
     use super::{Parity, SerialSettings};
@@ -119,6 +119,13 @@ mod unix {
 
         fn flush(&mut self) -> io::Result<()> {
             self.0.flush()
+        }
+    }
+
+    impl Drop for SerialPort {
+        fn drop(&mut self) {
+            // Where another program has it open, too, it would stay so.
+            let _ = ioctl_tiocnxcl(&self.0);
         }
     }
 

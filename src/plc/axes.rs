@@ -15,7 +15,7 @@ const TIME: &str = "simulation time";
 /// Commands by number, acknowledges and end switches work as with a simulator.
 #[derive(Debug)]
 pub struct Axes {
-    axes: Vec<(Axis, Drive)>,
+    drives: Vec<(Axis, Drive)>,
     reflexes: Option<Reflexes>,
     image: Option<Image>,
     began: Option<Nanos>,
@@ -45,7 +45,7 @@ impl Axes {
             Drive::new(middle, axis.limits)
         };
         Self {
-            axes: axes
+            drives: axes
                 .iter()
                 .map(|axis| (axis.clone(), drive(axis)))
                 .collect(),
@@ -63,7 +63,7 @@ impl Program for Axes {
     }
 
     fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
-        if self.axes.is_empty() {
+        if self.drives.is_empty() {
             return Err(ProgramError::Unfit {
                 program: Self::NAME.to_owned(),
                 what: "finds no axis".to_owned(),
@@ -128,7 +128,7 @@ impl Program for Axes {
         if let Some(reflexes) = &mut self.reflexes {
             reflexes.received(slots);
         }
-        for (axis, drive) in &mut self.axes {
+        for (axis, drive) in &mut self.drives {
             let demand = axis.demand(slots);
             let [low, _] = axis.limits.unwrap_or([f64::NEG_INFINITY, 0.0]);
             let told = drive.step(passed, &demand, demand.motion.position, low);

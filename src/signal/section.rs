@@ -335,6 +335,9 @@ fn fitting_dead_band(value: &Value<'_>, band: f64, data_type: DataType) -> Optio
     Some(band)
 }
 
+/// What is right where two numbers stand.
+const PAIR: &str = "write two numbers, such as [0, 27648]";
+
 /// A linear scale for raw values of `data_type`.
 pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     const SHAPE: &str = "write scale = { raw = [0, 27648], value = [0.0, 250.0] }";
@@ -347,7 +350,6 @@ pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     let engineering = table.require("value", SHAPE);
     table.finish();
     let (raw, engineering) = (raw?, engineering?);
-    const PAIR: &str = "write two numbers, such as [0, 27648]";
     let (raw_pair, pair) = (pair_of(&raw, PAIR), pair_of(&engineering, PAIR));
     let raw_pair = raw_pair?;
     for (number, element) in &raw_pair {

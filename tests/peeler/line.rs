@@ -129,9 +129,19 @@ impl Line {
         }
     }
 
+    /// How many scans take so long.
+    fn scans(seconds: f64) -> u32 {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "short"
+        )]
+        let scans = (seconds * 100.0) as u32;
+        scans
+    }
+
     pub(crate) fn seconds(&mut self, seconds: f64) {
-        let end = self.now.0 as f64 / 1e9 + seconds;
-        while (self.now.0 as f64) < end * 1e9 {
+        for _ in 0..Self::scans(seconds) {
             self.scan();
         }
     }
@@ -139,10 +149,11 @@ impl Line {
     /// Scans until something is so, for some seconds at most.
     #[track_caller]
     pub(crate) fn until(&mut self, what: &str, seconds: f64, is: impl Fn(&Self) -> bool) {
-        let end = self.now.0 as f64 / 1e9 + seconds;
+        let mut left = Self::scans(seconds);
         while !is(self) {
+            left = left.saturating_sub(1);
             assert!(
-                (self.now.0 as f64) < end * 1e9,
+                left > 0,
                 "no {what} in {seconds} s: {:#?}\n{}\n{:?}\n{:?}",
                 self.plant,
                 self.report(0).summary(),

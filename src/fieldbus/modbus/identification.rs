@@ -133,3 +133,16 @@ impl Identification {
         rest.is_empty().then_some((more == 0xFF).then_some(next))
     }
 }
+
+/// How long an answer's PDU is, as far as that can be told from its beginning.
+pub(super) fn length(beginning: &[u8]) -> Option<usize> {
+    if beginning.first()? & super::function::EXCEPTION_BIT != 0 {
+        return Some(2);
+    }
+    let count = *beginning.get(HEADER - 1)?;
+    let mut end = HEADER;
+    for _ in 0..count {
+        end += 2 + usize::from(*beginning.get(end + 1)?);
+    }
+    Some(end)
+}

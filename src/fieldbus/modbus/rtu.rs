@@ -102,18 +102,13 @@ impl Framer {
             .extend_from_slice(&bytes[..bytes.len().min(room)]);
     }
 
-    /// What has come so far of a telegram that no silence has ended.
-    pub fn so_far(&self) -> &[u8] {
-        &self.bytes
-    }
-
     /// Until when to wait for the silence; [`Nanos::MAX`] when nothing has come.
     pub fn deadline(&self) -> Nanos {
         self.last.map_or(Nanos::MAX, |last| last + self.silence)
     }
 
     /// Whether the line has been silent for long enough at `now`.
-    pub fn is_silent(&self, now: Nanos) -> bool {
+    fn is_silent(&self, now: Nanos) -> bool {
         self.last.is_none_or(|last| now >= last + self.silence)
     }
 
@@ -128,8 +123,7 @@ impl Framer {
         Some(result)
     }
 
-    /// Forgets what has come.
-    pub fn clear(&mut self) {
+    fn clear(&mut self) {
         self.bytes.clear();
         self.overlong = false;
         self.last = None;
@@ -193,7 +187,7 @@ mod tests {
         for now in 0..1_000 {
             framer.arrived(Nanos(now), &[0; 64]);
         }
-        assert_eq!(framer.so_far().len(), ADU_LIMIT);
+        assert_eq!(framer.bytes.len(), ADU_LIMIT);
         let taken = framer.take(Nanos(5_000), |telegram| telegram.is_none());
         assert_eq!(taken, Some(true));
         framer.arrived(Nanos(6_000), &READ);

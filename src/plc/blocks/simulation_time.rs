@@ -60,6 +60,7 @@ impl SimulationTime {
 
 #[cfg(test)]
 mod tests {
+    use super::Simulation::{Running, Stopped, Unknown};
     use super::*;
 
     #[test]
@@ -83,7 +84,6 @@ mod tests {
             let state = block.call(Nanos::from_millis(millis), seconds, Nanos::from_millis(100));
             told.push((state, block.restarted));
         }
-        use Simulation::{Running, Stopped, Unknown};
         assert_eq!(
             told,
             [

@@ -241,7 +241,11 @@ impl Charger {
         let clamped = on(6);
         let at_lathe = io.axes[ARM].inputs.position < 1.0;
         self.feeding.go(Feeding::Rest);
-        self.centring.go(if held && !clamped {
+        // Where the clamps come, both hold the same block; anywhere else the spindles hold another one.
+        let with_clamps = clamped
+            && X.into_iter()
+                .all(|axis| io.axes[axis].inputs.position < 1.0);
+        self.centring.go(if held && !with_clamps {
             Centring::Lift
         } else {
             Centring::Release
@@ -339,7 +343,14 @@ impl Charger {
                 let grips = SPINDLES.into_iter().all(|axis| axes[axis].stands());
                 (held && grips).then_some(Centring::Lift)
             }
-            Centring::Lift => both(Y, pair(LIFTED)).then_some(Centring::Present),
+            Centring::Lift => {
+                let lifted = both(Y, pair(LIFTED));
+                if lifted && self.transfer.step != Transfer::Waiting {
+                    // Where the clamps come there is room for one block: this one waits for the arm to be back, and empty.
+                    return Nanos::ZERO;
+                }
+                lifted.then_some(Centring::Present)
+            }
             Centring::Present => {
                 let there = both(X, pair(0.0));
                 axes[LINEAR_FEEDER].want(to(PICK_UP));

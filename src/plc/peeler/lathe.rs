@@ -271,6 +271,38 @@ impl Lathe {
         axes[KNIFE].inputs.position > CLEAR_OF_CORE && axes[ROTATION].inputs.speed.abs() < 0.01
     }
 
+    /// Knife and rolls come near, and the block begins to turn.
+    fn come_near(&mut self, axes: &mut [Axis]) {
+        // The grip is there: less pressure cracks no block.
+        for axis in SPINDLES {
+            axes[axis].want(squeeze(Mode::Close, HOLD_TORQUE));
+        }
+        gate(axes, ROUND_UP_GATE, true);
+        axes[NOSEBAR].want(to(NOSEBAR_CLOSE));
+        axes[KNIFE].want(to(APPROACH));
+        for axis in ROLLS {
+            axes[axis].want(to(ROLLS_APPROACH));
+        }
+        self.turns = FIRST_TURNS;
+        axes[ROTATION].repeat(turn(FIRST_TURNS));
+    }
+
+    /// Lets knife and rolls follow, once they are there and the block turns; tells whether they do.
+    fn begin_to_peel(axes: &mut [Axis]) -> bool {
+        let there = [KNIFE, ROLLS[0], ROLLS[1], ROLLS[2]]
+            .into_iter()
+            .all(|axis| axes[axis].is_done());
+        let turns = axes[ROTATION].inputs.speed.abs() > 0.9 * FIRST_TURNS;
+        if there && turns {
+            for axis in [ROLLS[0], ROLLS[1], ROLLS[2], PITCH] {
+                axes[axis].want(track(0.0, 0.0));
+            }
+            axes[ROLL_ROTATION].want(track(0.0, ROLL_LEAD));
+            axes[KNIFE].want(track(0.0, ROUND_UP));
+        }
+        there && turns
+    }
+
     /// One scan of the sequence; gives how long the step has lasted, where that matters, and may.
     fn sequence(&mut self, io: &mut Io, now: Nanos) -> (Nanos, Nanos) {
         let lasts = now - *self.since.get_or_insert(now);
@@ -313,32 +345,10 @@ impl Lathe {
                 if presented || !clear {
                     return (Nanos::ZERO, LIMIT);
                 }
-                // The grip is there: less pressure cracks no block.
-                spindles(axes, Mode::Close, HOLD_TORQUE);
-                gate(axes, ROUND_UP_GATE, true);
-                axes[NOSEBAR].want(to(NOSEBAR_CLOSE));
-                axes[KNIFE].want(to(APPROACH));
-                for axis in ROLLS {
-                    axes[axis].want(to(ROLLS_APPROACH));
-                }
-                self.turns = FIRST_TURNS;
-                axes[ROTATION].repeat(turn(FIRST_TURNS));
+                self.come_near(axes);
                 Some(Step::Approach)
             }
-            Step::Approach => {
-                let there = [KNIFE, ROLLS[0], ROLLS[1], ROLLS[2]]
-                    .into_iter()
-                    .all(|axis| axes[axis].is_done());
-                let turns = axes[ROTATION].inputs.speed.abs() > 0.9 * FIRST_TURNS;
-                (there && turns).then(|| {
-                    for axis in [ROLLS[0], ROLLS[1], ROLLS[2], PITCH] {
-                        axes[axis].want(track(0.0, 0.0));
-                    }
-                    axes[ROLL_ROTATION].want(track(0.0, ROLL_LEAD));
-                    axes[KNIFE].want(track(0.0, ROUND_UP));
-                    Step::RoundUp
-                })
-            }
+            Step::Approach => Self::begin_to_peel(axes).then_some(Step::RoundUp),
             Step::RoundUp => {
                 self.keep_speed(axes);
                 (axes[KNIFE].inputs.position <= ROUND).then(|| {

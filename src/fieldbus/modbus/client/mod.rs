@@ -129,7 +129,7 @@ impl Free for ModbusClient {
                 port.opening(&format!("asking on {}", line.device));
                 let now = port.clock().now();
                 let framing = Framing::Rtu {
-                    framer: super::rtu::Framer::new(line.silence),
+                    inbox: Vec::new(),
                     character: super::rtu::character(line.settings.baud),
                     silence: line.silence,
                     quiet_until: now + line.silence,

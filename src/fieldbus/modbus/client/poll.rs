@@ -2,9 +2,9 @@
 //! out.
 
 use crate::fieldbus::identity::Guard;
-use crate::fieldbus::modbus::identification::READ_DEVICE_IDENTIFICATION;
+use crate::fieldbus::modbus::identification::{self, READ_DEVICE_IDENTIFICATION};
 use crate::fieldbus::modbus::mbap::{self, Telegram};
-use crate::fieldbus::modbus::rtu::{self, Framer};
+use crate::fieldbus::modbus::rtu;
 use crate::fieldbus::modbus::{Exception, Function, Identification};
 use crate::fieldbus::{BusError, Port};
 use crate::time::{Nanos, Pace};
@@ -37,9 +37,10 @@ pub(super) enum Framing {
         /// What has come of the next one.
         inbox: Vec<u8>,
     },
-    /// By silence.
+    /// By their length, and silence between them.
     Rtu {
-        framer: Framer,
+        /// What has come of an answer.
+        inbox: Vec<u8>,
         /// How long one character takes.
         character: Nanos,
         silence: Nanos,
@@ -77,7 +78,10 @@ pub(super) struct Poll<'a> {
     timeout: Nanos,
     /// What messages call the server.
     peer: String,
+    cycle: Nanos,
     pace: Pace,
+    /// When it was last looked at what is due.
+    looked: Nanos,
     asking: Option<Asking>,
     request: Vec<u8>,
     written: usize,
@@ -106,7 +110,9 @@ impl<'a> Poll<'a> {
             framing,
             timeout,
             peer,
+            cycle,
             pace: Pace::new(now, cycle),
+            looked: now,
             asking: None,
             request: Vec::new(),
             written: 0,
@@ -120,12 +126,13 @@ impl<'a> Poll<'a> {
         let Some(asking) = &self.asking else {
             return self.pace.due();
         };
-        match &self.framing {
+        // An answer that takes its time is waited for cycle by cycle, so that its age is looked at.
+        let deadline = asking.limit.min(self.looked + self.cycle);
+        match self.framing {
             Framing::Rtu { quiet_until, .. } if self.written < self.request.len() => {
-                asking.limit.min(*quiet_until)
+                deadline.min(quiet_until)
             }
-            Framing::Rtu { framer, .. } => asking.limit.min(framer.deadline()),
-            Framing::Tcp { .. } => asking.limit,
+            _ => deadline,
         }
     }
 
@@ -144,7 +151,7 @@ impl<'a> Poll<'a> {
 
     /// Does what is due at `now`: begins a cycle, gives up what is not answered.
     pub(super) fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        self.judge_silence(now, port)?;
+        self.looked = now;
         match &self.asking {
             Some(asking) if now >= asking.limit => {
                 let within = self.timeout;
@@ -175,52 +182,42 @@ impl<'a> Poll<'a> {
                 Ok(())
             }
             Framing::Rtu {
-                framer,
+                inbox,
                 silence,
                 quiet_until,
                 ..
             } => {
-                framer.arrived(now, bytes);
                 *quiet_until = now + *silence;
+                let room = rtu::ADU_LIMIT - inbox.len();
+                inbox.extend_from_slice(&bytes[..bytes.len().min(room)]);
                 let Some(asking) = &self.asking else {
+                    port.count("modbus-client.unasked");
+                    self.clear();
                     return Ok(());
                 };
-                // The whole answer need not wait for the silence behind it.
-                let so_far = framer.so_far();
-                let query = match asking.what {
-                    Asked::Query(index) => self.stations[asking.station].queries.get(index),
-                    Asked::Identity { .. } => None,
-                };
-                let expected = so_far
-                    .get(1..)
-                    .and_then(|pdu| length(query.copied(), pdu))
-                    .map(|pdu| 1 + pdu + 2);
-                if expected != Some(so_far.len()) {
-                    return Ok(());
+                // A client knows how long an answer is. So pauses within one, which some adapters make, do no
+                // harm, and none has to be waited for.
+                let expected = inbox.get(1..).and_then(|pdu| match asking.what {
+                    Asked::Query(index) => {
+                        let queries = &self.stations[asking.station].queries;
+                        length(queries.get(index).copied(), pdu)
+                    }
+                    Asked::Identity { .. } => identification::length(pdu),
+                });
+                match expected.map(|pdu| 1 + pdu + 2) {
+                    Some(expected) if inbox.len() >= expected => {
+                        let telegram = inbox.clone();
+                        self.hear(&telegram, now, port)
+                    }
+                    _ => Ok(()),
                 }
-                let telegram = so_far.to_vec();
-                self.hear(&telegram, now, port)
             }
-        }
-    }
-
-    /// Looks whether silence has ended a telegram.
-    fn judge_silence(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let Framing::Rtu { framer, .. } = &mut self.framing else {
-            return Ok(());
-        };
-        let taken = framer.take(now, |telegram| telegram.map(<[u8]>::to_vec));
-        match taken {
-            None => Ok(()),
-            Some(telegram) => self.hear(&telegram.unwrap_or_default(), now, port),
         }
     }
 
     /// A telegram of RTU came.
     fn hear(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(asking) = &self.asking else {
-            port.count("modbus-client.unasked");
-            self.clear();
             return Ok(());
         };
         let unit = self.stations[asking.station].unit;
@@ -242,8 +239,8 @@ impl<'a> Poll<'a> {
     }
 
     fn clear(&mut self) {
-        if let Framing::Rtu { framer, .. } = &mut self.framing {
-            framer.clear();
+        if let Framing::Rtu { inbox, .. } = &mut self.framing {
+            inbox.clear();
         }
     }
 
@@ -535,12 +532,12 @@ impl<'a> Poll<'a> {
                 mbap::append(*transaction, polled.unit, request, |pdu| write(polled, pdu));
             }
             Framing::Rtu {
-                framer,
+                inbox,
                 character,
                 quiet_until,
                 ..
             } => {
-                framer.clear();
+                inbox.clear();
                 rtu::append(polled.unit, request, |pdu| write(polled, pdu));
                 // The line needs its time for both.
                 let characters = i64::try_from(request.len() + answer).unwrap_or(i64::MAX);

@@ -5,6 +5,7 @@ use crate::fieldbus::Role;
 use crate::fieldbus::modbus::line::Line;
 use crate::fieldbus::modbus::stations::{Stations, Units};
 use crate::fieldbus::modbus::{CONTROLLER_INPUTS, Map, Place, Side, table};
+use crate::fieldbus::options::read_events;
 use crate::fieldbus::tcp::Address;
 
 use super::super::place::SHAPE;
@@ -27,8 +28,10 @@ pub struct ServerOptions {
     pub stations: Stations,
     /// The most clients at once.
     pub clients: usize,
-    /// Whether every write of a client is reported as an event, beside the image.
+    /// Whether every change that a client makes is reported as an event, beside the image.
     pub events: bool,
+    /// Whether every write is, changed or not.
+    pub every_write: bool,
 }
 
 impl ServerOptions {
@@ -58,7 +61,7 @@ impl ServerOptions {
                 .whole(1..=10_000)
                 .and_then(|clients| usize::try_from(clients).ok())
         });
-        let events = events.map_or(Some(false), |value| value.boolean());
+        let events = events.as_ref().map_or(Some((false, false)), read_events);
         let input = match role {
             Role::Device => Side::Sends,
             Role::Controller => Side::Holds,
@@ -71,7 +74,8 @@ impl ServerOptions {
             },
             stations: stations?,
             clients: clients?,
-            events: events?,
+            events: events?.0,
+            every_write: events?.1,
         })
     }
 }

@@ -14,6 +14,8 @@ use crate::fieldbus::modbus::{Done, Exception, Function, Identification, Map, Ta
 pub(super) struct UnitSet {
     map: Map,
     identification: Identification,
+    /// Whether a write is an event even where it changes nothing.
+    every_write: bool,
     units: Box<[Unit]>,
 }
 
@@ -61,6 +63,7 @@ impl UnitSet {
         Self {
             map: options.map,
             identification: Identification::of_driver(driver),
+            every_write: options.every_write,
             units: (0..table.stations.len()).map(unit).collect(),
         }
     }
@@ -117,7 +120,12 @@ impl UnitSet {
                 return None;
             }
             (None, Some(bits)) => {
-                port.received_part(station, now, &unit.holds[..unit.holds_len], bits);
+                let frame = &unit.holds[..unit.holds_len];
+                if self.every_write {
+                    port.received_part(station, now, frame, bits);
+                } else {
+                    port.received(station, now, frame);
+                }
             }
             (None, None) => port.touch(station, now),
         }

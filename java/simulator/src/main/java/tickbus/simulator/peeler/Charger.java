@@ -228,6 +228,10 @@ final class Charger {
                 mishaps.add("the clamps let block " + clamped.number() + " fall");
             }
             clamped = null;
+        } else if (clamped != null && centred != null && clamped != centred && atTransfer()) {
+            mishaps.add("block " + centred.number() + " in the centring spindles ran into block " + clamped.number()
+                    + " in the clamps");
+            centred = null;
         } else if (clamped != null && clamped == centred
                 && axis(AxisName.TRANSFER_ARM).position() < ARM_AT_SPINDLES - NEAR) {
             mishaps.add("the transfer arm tore block " + clamped.number() + " from the centring spindles");

@@ -9,9 +9,7 @@ import java.io.IOException;
 import java.net.InetAddress;
 import java.net.Socket;
 import java.nio.ByteBuffer;
-import java.nio.file.Files;
 import java.nio.file.Path;
-import java.util.List;
 import java.util.concurrent.locks.LockSupport;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
@@ -40,11 +38,7 @@ class LinkTest {
     Path folder;
 
     private Simulator open() throws IOException {
-        DriverFolder.make(folder);
-        for (String name : List.of("charger", "lathe")) {
-            String cfg = Files.readString(Path.of("../../plc/peeler", name + ".cfg"));
-            Files.writeString(folder.resolve(name + ".cfg"), cfg.replaceFirst("127\\.0\\.0\\.1:200[01]", "127.0.0.1:0"));
-        }
+        DriverFolder.ofPeelingLine(folder);
         return new Simulator(DeviceDriverFolder.scan(folder).open(), new Peeler(), Path.of("peeler.table"), 2_000_000,
                 TimeSource.system());
     }

@@ -76,7 +76,8 @@ maven() {
 }
 
 # Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
-# command) and simulator/ (the simulator, the control tables, and in peeler/ the driver.cfg of the peeling line). Needs what tools/build makes.
+# command) and simulator/ (the simulator, the control tables, and in peeler/ the driver.cfg of the
+# peeling line). Needs what tools/build makes.
 assemble() {
     local folder=$1 release
     release=$(version)

@@ -153,7 +153,7 @@ pub fn read<'a>(
     let commands = commands.map(|value| read_commands(&value, kind, bounds));
     let numbered = commands.is_some();
     let switches = switches
-        .map(|value| read_switches(&value, addressing, bounds))
+        .map(|value| read_switches(&value, number, addressing, bounds))
         .unwrap_or_default();
 
     let feedback_bytes = if diagnostics == Some(true) || numbered {

@@ -255,6 +255,62 @@ proptest! {
     }
 }
 
+/// Whatever is wrong with a file of axes is told, and what is right is consistent.
+fn check_any(text: &str) -> Result<(), TestCaseError> {
+    use std::collections::HashSet;
+
+    let Ok(config) = Config::parse("any.cfg", text) else {
+        return Ok(());
+    };
+    let mut names = HashSet::new();
+    let mut bits = HashSet::new();
+    for signal in &config.table.signals {
+        prop_assert!(names.insert(signal.name.clone()), "{} twice", signal.name);
+        let size = config.table.stations[signal.station].bytes(signal.area);
+        for bit in signal.address().bits() {
+            prop_assert!(bit < size * 8);
+            prop_assert!(bits.insert((signal.station, signal.area, bit)));
+        }
+        prop_assert!(
+            signal
+                .scale
+                .is_none_or(|scale| scale.offset.is_finite() && scale.gain != 0.0)
+        );
+        prop_assert!(signal.fail_safe.real().is_finite());
+    }
+    for axis in &config.axes {
+        for field in [Field::Execute, Field::Enable, Field::ActualPosition] {
+            prop_assert!(axis.slot(field).is_some());
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn lines_that_are_lost_doubled_or_changed_do_no_harm(
+        changes in prop::collection::vec((0_usize..60, 0_usize..8), 1..6)
+    ) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/right/axes.cfg");
+        let text = std::fs::read_to_string(path).expect("the file");
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        for (line, change) in changes {
+            let line = line % lines.len();
+            match change {
+                0 => drop(lines.remove(line)),
+                1 => lines.insert(line, lines[line].clone()),
+                2 => lines[line] = lines[line].replace("65", "1e308"),
+                3 => lines[line] = lines[line].replace("0.0", "-1e308"),
+                4 => lines[line] = lines[line].replace("lift", "drum"),
+                5 => lines[line] = lines[line].replace('0', "7"),
+                6 => lines[line] = lines[line].replace("true", "false"),
+                _ => lines[line] = lines[line].replace('"', ""),
+            }
+        }
+        check_any(&lines.join("\n"))?;
+    }
+}
+
 /// A machine whose driver listens, and a PLC that is a bare TCP client.
 struct Pair {
     machine: Machine,

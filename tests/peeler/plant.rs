@@ -66,6 +66,7 @@ impl Places {
 }
 
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(crate) struct Plant {
     pub(crate) sides: [Side; 2],
     places: Places,

@@ -498,7 +498,12 @@ fn a_command_number_stands_for_what_the_table_of_the_machine_says() {
         pair.turn();
     }
     pair.outputs[22..24].copy_from_slice(&[0, 0]);
-    pair.set("A.Error", 0.0);
+    assert_eq!(
+        pair.get("A.Error"),
+        0.0,
+        "the simulation's own is as it was"
+    );
+    pair.until("no error", |pair| pair.inputs[12..14] == [0, 0]);
     pair.until("a command of the PLC's own", |pair| {
         pair.get("A.TargetPosition") == 7.0 && pair.get("A.Execute") == 1.0
     });

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
 use crate::fieldbus::modbus::{ModbusClient, ModbusServer};
+use crate::fieldbus::s7::{S7Client, S7Server};
 use crate::fieldbus::socket::Socket;
 use crate::fieldbus::{Bus, Free, Options, Role, plugin};
 use crate::plc;
@@ -47,8 +48,17 @@ pub(super) fn open(
         Options::Loopback(options) => open_loopback(config, options, clock),
         Options::Socket(options) => {
             let cycle = config.timing.cycle;
-            let socket = Socket::new(options, &config.table, config.role, cycle);
+            let socket = Socket::new(options, &config.table, config.role, cycle, &config.axes);
             Ok((Bus::Free(Box::new(socket)), None))
+        }
+        Options::S7Server(options) => {
+            let server = S7Server::new(options, &config.table, config.role, &config.name);
+            Ok((Bus::Free(Box::new(server)), None))
+        }
+        Options::S7Client(options) => {
+            let cycle = config.timing.cycle;
+            let client = S7Client::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(client)), None))
         }
         Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),
         Options::ModbusServer(options) => {
@@ -59,6 +69,9 @@ pub(super) fn open(
             let cycle = config.timing.cycle;
             let client = ModbusClient::new(options, &config.table, config.role, cycle);
             Ok((Bus::Free(Box::new(client)), None))
+        }
+        Options::OpcuaClient(_) | Options::OpcuaServer(_) => {
+            Ok((Bus::Free(open_opcua(config)?), None))
         }
     }
 }
@@ -74,6 +87,39 @@ fn open_plugin(config: &Config, options: &plugin::Options) -> Result<Box<dyn Fre
     };
     let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
     plugin::open(options, line).map_err(refused)
+}
+
+#[cfg(feature = "opcua")]
+fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
+    use crate::fieldbus::opcua;
+
+    let line = opcua::Line {
+        name: &config.name,
+        id: config.id,
+        directory: config.folder(),
+        role: config.role,
+        table: &config.table,
+        cycle: config.timing.cycle,
+    };
+    let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
+    match &config.bus {
+        Options::OpcuaClient(options) => {
+            let client = opcua::Client::new(options, line).map_err(refused)?;
+            Ok(Box::new(client))
+        }
+        Options::OpcuaServer(options) => Ok(Box::new(opcua::Server::new(options, line))),
+        other => unreachable!("{} is another room's", other.kind()),
+    }
+}
+
+#[cfg(not(feature = "opcua"))]
+fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
+    Err(DriverError::Config(format!(
+        "{}: bus kind \"{}\" is not in this build of tickbus; use the library of a `make dist`, which has it, \
+         or build with `cargo build --release --features opcua`",
+        config.path.display(),
+        config.bus.kind()
+    )))
 }
 
 fn open_loopback(

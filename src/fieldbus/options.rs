@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::tcp::Address;
-use super::{Role, loopback, modbus, plugin, socket};
+use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
+use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::SignalTable;
 
@@ -27,12 +28,16 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 5] = [
+const BUILT: [&str; 9] = [
     "loopback",
     "socket",
     "plugin",
     "modbus-server",
     "modbus-client",
+    "s7-server",
+    "s7-client",
+    "opcua-server",
+    "opcua-client",
 ];
 
 /// What the `[fieldbus]` table says to its bus, by bus kind.
@@ -48,6 +53,14 @@ pub enum Options {
     ModbusServer(modbus::ServerOptions),
     /// `kind = "modbus-client"`: reads and writes the tables of a Modbus server.
     ModbusClient(modbus::ClientOptions),
+    /// `kind = "s7-server"`: clients of S7 communication read and write the image.
+    S7Server(s7::ServerOptions),
+    /// `kind = "s7-client"`: the memory of a CPU is read and written.
+    S7Client(s7::ClientOptions),
+    /// `kind = "opcua-client"`: a PLC that is an OPC UA server.
+    OpcuaClient(opcua::ClientOptions),
+    /// `kind = "opcua-server"`: a server for PLCs that are OPC UA clients.
+    OpcuaServer(opcua::ServerOptions),
 }
 
 impl Options {
@@ -59,6 +72,10 @@ impl Options {
             Self::Plugin(_) => "plugin",
             Self::ModbusServer(_) => "modbus-server",
             Self::ModbusClient(_) => "modbus-client",
+            Self::S7Server(_) => "s7-server",
+            Self::S7Client(_) => "s7-client",
+            Self::OpcuaClient(_) => "opcua-client",
+            Self::OpcuaServer(_) => "opcua-server",
         }
     }
 
@@ -70,6 +87,10 @@ impl Options {
             Self::Plugin(options) => options.events,
             Self::ModbusServer(options) => options.events,
             Self::ModbusClient(options) => options.events,
+            Self::S7Server(options) => options.events,
+            Self::S7Client(options) => options.events,
+            Self::OpcuaClient(options) => options.events,
+            Self::OpcuaServer(options) => options.events,
         }
     }
 
@@ -86,10 +107,7 @@ impl Options {
 
     /// Whether both ends of the bus are in one process.
     pub const fn is_in_process(&self) -> bool {
-        match self {
-            Self::Loopback(_) => true,
-            _ => false,
-        }
+        matches!(self, Self::Loopback(_))
     }
 
     /// Takes another address than the driver.cfg names, from a command line.
@@ -108,6 +126,10 @@ impl Options {
             Self::ModbusClient(options) => {
                 options.line.set_address(address, Address::check_dialled)
             }
+            Self::S7Server(options) => options.set_address(address),
+            Self::S7Client(options) => options.set_address(address),
+            Self::OpcuaClient(options) => options.set_address(address),
+            Self::OpcuaServer(options) => options.set_address(address),
         }
     }
 
@@ -116,14 +138,21 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
             Self::ModbusClient(options) => options.stations.read_station(count, true, table),
-            Self::Loopback(_) | Self::Socket(_) | Self::Plugin(_) => {}
+            Self::Socket(options) => options.read_station(count, table),
+            Self::S7Server(options) => options.read_station(count, table),
+            Self::S7Client(options) => options.read_station(count, table),
+            Self::Loopback(_) | Self::Plugin(_) | Self::OpcuaClient(_) | Self::OpcuaServer(_) => {}
         }
     }
 
-    /// Reports what does not go together with the stations and signals of the driver.
-    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
-        if let Self::ModbusClient(options) = self {
-            options.fit(table, collector);
+    /// Reports what does not go together with the stations, signals and axes of the driver.
+    pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
+        match self {
+            Self::Socket(options) => options.fit(table, axes, collector),
+            Self::ModbusClient(options) => options.fit(table, collector),
+            Self::S7Server(options) => options.fit(table, collector),
+            Self::S7Client(options) => options.fit(table, collector),
+            _ => {}
         }
     }
 
@@ -139,6 +168,8 @@ impl Options {
         match known {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
+            Some("s7-server") => s7::ServerOptions::read(table).map(Self::S7Server),
+            Some("s7-client") => s7::ClientOptions::read(moved, table).map(Self::S7Client),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
             Some("modbus-server") => {
                 modbus::ServerOptions::read(role, table).map(Self::ModbusServer)
@@ -146,6 +177,8 @@ impl Options {
             Some("modbus-client") => {
                 modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
             }
+            Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
+            Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
                 table.finish_open();
                 report_kind(kind, other?);
@@ -153,6 +186,18 @@ impl Options {
             }
         }
     }
+}
+
+/// Reads `events` of a bus that knows what was written: whether changes are reported as events, and whether every
+/// write is.
+pub(super) fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
+    if value.is_boolean() {
+        return value.boolean().map(|events| (events, false));
+    }
+    value.text(
+        "write true for every change, \"writes\" for every write, changed or not, or false",
+    )?;
+    value.choice("kinds of events", &[("writes", (true, true))])
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {

@@ -90,13 +90,18 @@ impl Port {
     /// Whether frames go out in the cycle at `now`. To be asked once a cycle, before
     /// [`outgoing`](Self::outgoing): an injected fault may swallow them, and what was to be sent is lost.
     pub fn sends(&mut self, now: Nanos) -> bool {
+        self.sends_of(0..self.stations(), now)
+    }
+
+    /// The same for a bus whose `stations` have a cycle of their own.
+    pub fn sends_of(&mut self, stations: Range<usize>, now: Nanos) -> bool {
         if self.is_down(now) {
             return false;
         }
         if !self.troubles.decides_to_lose_a_cycle() {
             return true;
         }
-        for station in 0..self.stations() {
+        for station in stations {
             self.outgoing(station, now);
             self.sent(station);
         }
@@ -186,8 +191,23 @@ impl Port {
         bytes: &[u8],
         written: Range<usize>,
     ) {
+        self.received_parts(station, now, bytes, [written]);
+    }
+
+    /// As [`received_part`](Self::received_part), for a peer that wrote several ranges of bits at once.
+    ///
+    /// # Panics
+    ///
+    /// When the frame has not the station's size.
+    pub fn received_parts(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        bytes: &[u8],
+        written: impl IntoIterator<Item = Range<usize>>,
+    ) {
         if let Some(changes) = self.changes.get_mut(station) {
-            changes.written(written);
+            written.into_iter().for_each(|bits| changes.written(bits));
         }
         self.received(station, now, bytes);
     }
@@ -260,6 +280,16 @@ impl Port {
         ages.map(|station| station.peer_age(now))
             .max()
             .unwrap_or_default()
+    }
+
+    /// How long ago the simulation ticked last; [`Nanos::MAX`] for never.
+    pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
+        self.image.stations[station].tick_age(now)
+    }
+
+    /// For how long the simulation may not tick before fail-safe bytes go out; `None` for ever.
+    pub fn watchdog(&self) -> Option<Nanos> {
+        self.watchdog
     }
 
     /// Looks whether the line has become stale, or is so no more. [`outgoing`](Self::outgoing) does it, too;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use tickbus::driver::{Code, Config, Driver, Exchange};
 use tickbus::fieldbus::Link;
 use tickbus::signal::Slot;
-use tickbus::time::{Manual, Nanos};
+use tickbus::time::{Clock, Manual, Nanos};
 
 /// The signals that both ends share; `{fieldbus}` is the bus's own table.
 pub const SIGNALS: &str = r#"
@@ -50,7 +50,7 @@ pub struct End {
 }
 
 impl End {
-    pub fn open(text: &str, clock: &Arc<Manual>) -> Self {
+    pub fn open<C: Clock + 'static>(text: &str, clock: &Arc<C>) -> Self {
         let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
         let driver = Driver::open(config, Arc::clone(clock) as _).expect("opens");
         let slots = driver.initial_slots();

@@ -1,0 +1,33 @@
+//! OPC UA: a client of a PLC that is a server, and a server for PLCs that are clients.
+//!
+//! What a driver.cfg says to them is read by every build. The buses themselves stand on the crate
+//! `async-opcua` and are built with the cargo feature `opcua` alone.
+
+mod node;
+mod options;
+mod security;
+mod url;
+
+#[cfg(feature = "opcua")]
+mod client;
+#[cfg(feature = "opcua")]
+mod line;
+#[cfg(feature = "opcua")]
+mod pki;
+#[cfg(feature = "opcua")]
+mod reactor;
+#[cfg(feature = "opcua")]
+mod server;
+#[cfg(feature = "opcua")]
+mod values;
+
+#[cfg(feature = "opcua")]
+pub use client::Client;
+#[cfg(feature = "opcua")]
+pub use line::Line;
+pub use node::{Identifier, Namespace, NodeName, NodeNameError, Pattern};
+pub use options::{ClientOptions, ServerOptions};
+pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};
+#[cfg(feature = "opcua")]
+pub use server::Server;
+pub use url::{Url, UrlError};

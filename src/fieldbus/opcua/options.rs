@@ -1,0 +1,267 @@
+//! What a driver.cfg says to the two OPC UA buses.
+
+use std::collections::BTreeMap;
+
+use crate::config::{Table, Value, shown};
+use crate::fieldbus::tcp::{Address, AddressError};
+use crate::time::Nanos;
+
+use super::security::{Credentials, Keys, Policy};
+use super::{NodeName, Pattern, Url, UrlError};
+
+/// The longest `write_to`, in characters.
+const IDENTITY_LIMIT: usize = 1000;
+
+/// The shortest publishing and sampling interval: both are whole milliseconds at best.
+const SHORTEST: Nanos = Nanos::from_millis(1);
+
+/// Where a server listens, unless a driver.cfg says otherwise: on this machine alone.
+const ADDRESS: Address = Address::local(super::url::PORT);
+
+/// What a driver.cfg says to a client.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClientOptions {
+    /// The server.
+    pub url: Url,
+    /// How messages are protected.
+    pub security: Policy,
+    /// Certificates and login.
+    pub credentials: Credentials,
+    /// How often the server reports changes; `None` leaves it to the cycle. At least 1 ms.
+    pub publishing_interval: Option<Nanos>,
+    /// How often the server looks for changes; `None` leaves it to the publishing interval.
+    pub sampling_interval: Option<Nanos>,
+    /// The nodes of signals that have one of their own, by the signals' names.
+    pub nodes: BTreeMap<String, NodeName>,
+    /// How the node ids of all other signals are made.
+    pub node_pattern: Pattern,
+    /// The identity of the one server that is written to.
+    pub write_to: Option<String>,
+    /// Whether every change that the server reports is an event, beside the image.
+    pub events: bool,
+}
+
+/// What a driver.cfg says to a server.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ServerOptions {
+    /// Where it listens; port 0 lets the system choose one.
+    pub address: Address,
+    /// How messages may be protected; never empty.
+    pub security: Vec<Policy>,
+    /// Certificates, and the user that may log in.
+    pub credentials: Credentials,
+    /// Whether everybody may log in.
+    pub anonymous: bool,
+    /// Whether every change that a client makes is reported as an event, beside the image.
+    pub events: bool,
+}
+
+impl ClientOptions {
+    /// Takes another address than the driver.cfg names, as a URL or as `HOST:PORT`.
+    ///
+    /// # Errors
+    ///
+    /// The text is neither.
+    pub(in crate::fieldbus) fn set_address(&mut self, address: &str) -> Result<(), String> {
+        if address.contains("://") {
+            self.url = address.parse().map_err(|why: UrlError| why.to_string())?;
+            return Ok(());
+        }
+        let parsed: Address = address
+            .parse()
+            .map_err(|why: AddressError| why.to_string())?;
+        parsed
+            .check_dialled()
+            .map_err(|why: AddressError| why.to_string())?;
+        self.url.address = parsed;
+        Ok(())
+    }
+
+    /// Reads the keys of a client.
+    pub(in crate::fieldbus) fn read(mut table: Table<'_>) -> Option<Self> {
+        let url = table.require(
+            "url",
+            "write where the server is, such as url = \"opc.tcp://192.168.0.1:4840\"",
+        );
+        let keys = Keys::take(&mut table);
+        let intervals = ["publishing_interval", "sampling_interval"].map(|key| table.take(key));
+        let nodes = table.take("nodes");
+        let pattern = table.take("node_pattern");
+        let write_to = table.take("write_to");
+        let events = table.take("events");
+        table.finish();
+
+        let url = url.and_then(|value| {
+            let text = value.text("write it in quotes, such as \"opc.tcp://192.168.0.1:4840\"")?;
+            let parsed = text.parse();
+            parsed
+                .map_err(|error: UrlError| value.wrong(error.what, error.right))
+                .ok()
+        });
+        let security = match &keys.security {
+            None => Some(Policy::Basic256Sha256),
+            Some(value) => value.choice("security policies", &Policy::NAMES),
+        };
+        let credentials = keys.read();
+        let [publishing, sampling] = intervals.map(|value| match value {
+            None => Some(None),
+            Some(value) => interval(&value).map(Some),
+        });
+        let nodes = nodes.map_or(Some(BTreeMap::new()), |value| read_nodes(&value));
+        let node_pattern = pattern.map_or(Some(Pattern::default()), |value| read_pattern(&value));
+        let write_to = match write_to {
+            None => Some(None),
+            Some(value) => {
+                let right =
+                    "write the identity that the statistics show, or remove it to stay read-only";
+                let text = value.label(IDENTITY_LIMIT, right);
+                text.map(|text| Some(text.to_owned()))
+            }
+        };
+        let events = events.map_or(Some(false), |value| value.boolean());
+        Some(Self {
+            url: url?,
+            security: security?,
+            credentials: credentials?,
+            publishing_interval: publishing?,
+            sampling_interval: sampling?,
+            nodes: nodes?,
+            node_pattern: node_pattern?,
+            write_to: write_to?,
+            events: events?,
+        })
+    }
+}
+
+impl ServerOptions {
+    /// Takes another address than the driver.cfg names.
+    ///
+    /// # Errors
+    ///
+    /// The text is no address.
+    pub(in crate::fieldbus) fn set_address(&mut self, address: &str) -> Result<(), String> {
+        self.address = address
+            .parse()
+            .map_err(|why: AddressError| why.to_string())?;
+        Ok(())
+    }
+
+    /// Reads the keys of a server.
+    pub(in crate::fieldbus) fn read(mut table: Table<'_>) -> Option<Self> {
+        let address = table.take("address");
+        let keys = Keys::take(&mut table);
+        let anonymous = table.take("anonymous");
+        let events = table.take("events");
+        if !keys.has_user() && anonymous.is_none() {
+            table.require_one_of(
+                &["user", "anonymous"],
+                "name the user that may log in, with password_file or password_env, or write \
+                 anonymous = true to let everybody in",
+            );
+        }
+        let whole = table.is_whole();
+        table.finish();
+
+        let read = address.as_ref().map_or(Some(ADDRESS), Address::read);
+        let security = keys
+            .security
+            .as_ref()
+            .map_or_else(|| Some(Policy::SECURE.to_vec()), read_policies);
+        let credentials = keys.read();
+        let allowed = anonymous.as_ref().map_or(Some(false), Value::boolean);
+        if let (Some(value), Some(false)) = (&anonymous, allowed)
+            && whole
+            && !keys.has_user()
+        {
+            value.wrong(
+                "nobody may log in",
+                "name a user with password_file or password_env, or write anonymous = true",
+            );
+        }
+        let events = events.map_or(Some(false), |value| value.boolean());
+        Some(Self {
+            address: read?,
+            security: security?,
+            credentials: credentials?,
+            anonymous: allowed?,
+            events: events?,
+        })
+    }
+}
+
+fn interval(value: &Value<'_>) -> Option<Nanos> {
+    let span = value.duration()?;
+    if span < SHORTEST {
+        value.wrong(
+            format!("{span} is shorter than OPC UA servers can count"),
+            format!("write at least \"{SHORTEST}\""),
+        );
+        return None;
+    }
+    Some(span)
+}
+
+/// One policy, or a list of them.
+fn read_policies(value: &Value<'_>) -> Option<Vec<Policy>> {
+    let choose = |value: &Value<'_>| value.choice("security policies", &Policy::NAMES);
+    if value.as_text().is_some() {
+        return choose(value).map(|policy| vec![policy]);
+    }
+    let list = value.list("write a list of policies, such as [\"Basic256Sha256\"]")?;
+    if list.is_empty() {
+        value.wrong(
+            "\"security\" names no policy, so nobody could connect",
+            "name at least one; \"None\" is the one without protection",
+        );
+        return None;
+    }
+    let read: Vec<Option<Policy>> = list.iter().map(choose).collect();
+    let mut read: Vec<Policy> = read.into_iter().collect::<Option<_>>()?;
+    let named = read.len();
+    read.sort_by_key(|policy| policy.name());
+    read.dedup();
+    if read.len() < named {
+        value.wrong("\"security\" names a policy twice", "name each once");
+        return None;
+    }
+    Some(read)
+}
+
+fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, NodeName>> {
+    let right = "write them as { \"name of a signal\" = \"ns=3;s=…\" }";
+    let table = value.table("nodes", right)?;
+    let mut nodes = BTreeMap::new();
+    let mut sound = true;
+    for (name, value) in table.all() {
+        let node = value.text("write a node id in quotes, such as \"ns=2;s=Motor.Speed\"");
+        let node: Option<NodeName> = node.and_then(|text| {
+            let parsed: Result<NodeName, super::NodeNameError> = text.parse();
+            parsed
+                .map_err(|error| value.wrong(error.what, error.right))
+                .ok()
+        });
+        match node {
+            Some(node) => drop(nodes.insert(name.to_owned(), node)),
+            None => sound = false,
+        }
+    }
+    sound.then_some(nodes)
+}
+
+fn read_pattern(value: &Value<'_>) -> Option<Pattern> {
+    let text = value.text("write a node id with {name} in it, such as \"ns=2;s={name}\"")?;
+    let pattern = Pattern(text.to_owned());
+    if !text.contains(Pattern::NAME) {
+        value.wrong(
+            format!("the pattern \"{}\" has no {}", shown(text), Pattern::NAME),
+            "write {name} where the name of the signal belongs, and {station} for that of its station",
+        );
+        return None;
+    }
+    // A name of letters alone: what is wrong now is the pattern's own fault.
+    if let Err(error) = pattern.node("name", "station") {
+        value.wrong(error.what, error.right);
+        return None;
+    }
+    Some(pattern)
+}

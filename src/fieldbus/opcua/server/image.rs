@@ -1,0 +1,220 @@
+//! Between the image and the nodes.
+
+use std::sync::Arc;
+
+use opcua::server::SubscriptionCache;
+use opcua::types::{DataValue, DateTime, NodeId, NumericRange, StatusCode, Variant};
+
+use crate::fieldbus::opcua::values::{self, Values};
+use crate::fieldbus::{Port, Role};
+use crate::signal::{Plan, Scale, Signal, SignalTable, Slot};
+use crate::time::Nanos;
+
+use super::manager::{Nodes, Watched};
+use super::space;
+
+/// All signals, as the image has them and as their nodes show them.
+pub(super) struct Image {
+    table: Arc<SignalTable>,
+    role: Role,
+    sends: Values,
+    receives: Values,
+    places: Vec<Place>,
+    frames: Vec<Box<[u8]>>,
+    nodes: Arc<Nodes>,
+    subscriptions: Arc<SubscriptionCache>,
+    watched: Watched,
+}
+
+/// A signal's nodes, and what they show.
+struct Place {
+    node: NodeId,
+    scaled: Option<(NodeId, Scale)>,
+    /// What the node shows; `None` before the first time.
+    shown: Option<(Slot, StatusCode)>,
+    /// Since when.
+    since: Nanos,
+    /// Whether a client has written it.
+    written: bool,
+}
+
+impl Image {
+    /// Nothing shown yet.
+    pub(super) fn new(
+        table: &Arc<SignalTable>,
+        role: Role,
+        port: &Port,
+        nodes: Arc<Nodes>,
+        subscriptions: Arc<SubscriptionCache>,
+        watched: Watched,
+    ) -> Self {
+        let (tx, rx) = role.areas();
+        let place = |signal: &Signal| Place {
+            node: space::node(&signal.name),
+            scaled: space::scaled(table, signal),
+            shown: None,
+            since: Nanos::ZERO,
+            written: false,
+        };
+        let mut receives = Values::new(table, rx);
+        // What no client has written yet is as if there were none.
+        let mut slots = vec![Slot::default(); table.signals.len()];
+        let frames = (0..port.stations()).map(|station| {
+            let plan = Plan::new(table, station, rx);
+            let mut frame = vec![0; port.sizes(station).1];
+            plan.fail_safe(&mut slots);
+            plan.encode(&slots, &mut frame);
+            receives.take(station, &frame);
+            frame.into()
+        });
+        let frames = frames.collect();
+        Self {
+            table: Arc::clone(table),
+            role,
+            sends: Values::new(table, tx),
+            receives,
+            places: table.signals.iter().map(place).collect(),
+            frames,
+            nodes,
+            subscriptions,
+            watched,
+        }
+    }
+
+    /// Takes the values of one list into the image, as one commit for each station that it touches.
+    pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, Slot)]) {
+        let mut touched = vec![false; self.frames.len()];
+        for &(signal, bits) in list {
+            self.receives.set(signal, bits);
+            let place = &mut self.places[signal];
+            place.written = true;
+            // The write itself has shown it.
+            place.shown = Some((bits, StatusCode::Good));
+            touched[self.table.signals[signal].station] = true;
+        }
+        for (station, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
+            let frame = &mut self.frames[station];
+            self.receives.give(station, frame);
+            port.received(station, now, frame);
+        }
+    }
+
+    /// Brings all nodes up to date. Pulses that every subscriber has had the time to see count as sent.
+    pub(super) fn show(&mut self, port: &mut Port, now: Nanos) {
+        if port.sends(now) {
+            self.show_what_is_sent(port, now);
+            for (index, signal) in self.table.signals.iter().enumerate() {
+                let is_sent = signal.area == self.role.areas().0;
+                if is_sent
+                    && let Some(span) = self.watched.span(index)
+                    && now - self.places[index].since >= span
+                {
+                    port.sent_part(signal.station, bytes(signal));
+                }
+            }
+        }
+        let stale = port.silence(now) > port.max_age();
+        for index in 0..self.places.len() {
+            if self.table.signals[index].area == self.role.areas().1 {
+                let status = match (self.places[index].written, stale) {
+                    (false, _) => StatusCode::BadWaitingForInitialData,
+                    (true, true) => StatusCode::UncertainLastUsableValue,
+                    (true, false) => StatusCode::Good,
+                };
+                self.put(now, index, self.receives.bits(index), status);
+            }
+        }
+    }
+
+    /// Brings the nodes up to date for a client that reads these signals now: pulses in them count as sent.
+    pub(super) fn show_to_reader(&mut self, port: &mut Port, now: Nanos, signals: &[usize]) {
+        if port.is_down(now) {
+            return;
+        }
+        self.show_what_is_sent(port, now);
+        for &index in signals {
+            let signal = &self.table.signals[index];
+            if signal.area == self.role.areas().0 {
+                port.sent_part(signal.station, bytes(signal));
+            }
+        }
+    }
+
+    fn show_what_is_sent(&mut self, port: &mut Port, now: Nanos) {
+        for station in 0..self.frames.len() {
+            self.sends.take(station, port.outgoing(station, now));
+            let status = quality(port, station, now);
+            for at in 0..self.sends.signals(station).len() {
+                let index = self.sends.signals(station)[at];
+                self.put(now, index, self.sends.bits(index), status);
+            }
+        }
+    }
+
+    /// Writes a value into the nodes of a signal if it is another than they show, and tells subscribers.
+    fn put(&mut self, now: Nanos, index: usize, bits: Slot, status: StatusCode) {
+        let place = &mut self.places[index];
+        if place.shown == Some((bits, status)) {
+            return;
+        }
+        if place.shown.is_none_or(|(before, _)| before != bits) {
+            place.since = now;
+        }
+        place.shown = Some((bits, status));
+        let place = &self.places[index];
+        let data_type = self.table.signals[index].data_type;
+        let raw = values::variant(data_type, bits);
+        let time = DateTime::now();
+        let value = |value: Variant| DataValue {
+            value: Some(value),
+            status: Some(status),
+            source_timestamp: Some(time),
+            server_timestamp: Some(time),
+            ..DataValue::default()
+        };
+        let scaled = place.scaled.as_ref().map(|(node, scale)| {
+            let real = scale.value(real(&raw));
+            (node, None::<&NumericRange>, value(Variant::Double(real)))
+        });
+        let all = std::iter::once((&place.node, None, value(raw.clone()))).chain(scaled);
+        let put = self.nodes.set_values(&self.subscriptions, all);
+        debug_assert!(put.is_ok(), "every signal has its nodes: {put:?}");
+    }
+}
+
+/// The bytes of a signal in its frame.
+fn bytes(signal: &Signal) -> std::ops::Range<usize> {
+    signal.byte..signal.byte + signal.data_type.size_bytes()
+}
+
+/// How far the values of the simulation can be relied on.
+fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
+    let age = port.tick_age(station, now);
+    match port.watchdog() {
+        _ if age == Nanos::MAX => StatusCode::BadWaitingForInitialData,
+        Some(limit) if age > limit => StatusCode::UncertainSubstituteValue,
+        None if age > port.max_age() => StatusCode::UncertainLastUsableValue,
+        _ => StatusCode::Good,
+    }
+}
+
+/// A raw value as a double.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "as everywhere that values are scaled"
+)]
+fn real(value: &Variant) -> f64 {
+    match *value {
+        Variant::SByte(value) => value.into(),
+        Variant::Byte(value) => value.into(),
+        Variant::Int16(value) => value.into(),
+        Variant::UInt16(value) => value.into(),
+        Variant::Int32(value) => value.into(),
+        Variant::UInt32(value) => value.into(),
+        Variant::Float(value) => value.into(),
+        Variant::Int64(value) => value as f64,
+        Variant::UInt64(value) => value as f64,
+        Variant::Double(value) => value,
+        _ => 0.0,
+    }
+}

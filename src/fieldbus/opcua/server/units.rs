@@ -1,0 +1,81 @@
+//! Engineering units, as OPC UA names them.
+
+use opcua::types::EUInformation;
+
+/// Where the numbers of units come from: UN/CEFACT, recommendation 20.
+const CEFACT: &str = "http://www.opcfoundation.org/UA/units/un/cefact";
+
+/// Units as people write them, and the three characters of their common code.
+const CODES: [(&str, &str); 36] = [
+    ("%", "P1"),
+    ("1/min", "RPM"),
+    ("A", "AMP"),
+    ("Hz", "HTZ"),
+    ("K", "KEL"),
+    ("L", "LTR"),
+    ("N", "NEW"),
+    ("Nm", "NU"),
+    ("Pa", "PAL"),
+    ("V", "VLT"),
+    ("W", "WTT"),
+    ("bar", "BAR"),
+    ("cm", "CMT"),
+    ("deg", "DD"),
+    ("g", "GRM"),
+    ("h", "HUR"),
+    ("kN", "B47"),
+    ("kW", "KWT"),
+    ("kg", "KGM"),
+    ("km/h", "KMH"),
+    ("l", "LTR"),
+    ("l/min", "L2"),
+    ("m", "MTR"),
+    ("m/min", "2X"),
+    ("m/s", "MTS"),
+    ("m/s²", "MSK"),
+    ("mA", "4K"),
+    ("mbar", "MBR"),
+    ("min", "MIN"),
+    ("mm", "MMT"),
+    ("mm/s", "C16"),
+    ("ms", "C26"),
+    ("rpm", "RPM"),
+    ("s", "SEC"),
+    ("°", "DD"),
+    ("°C", "CEL"),
+];
+
+/// The unit that people call `name`; one without a code goes by its name alone.
+pub(super) fn unit(name: &str) -> EUInformation {
+    let code = CODES.iter().find(|(known, _)| *known == name);
+    EUInformation {
+        namespace_uri: CEFACT.into(),
+        unit_id: code.map_or(-1, |(_, code)| number(code)),
+        display_name: name.into(),
+        description: name.into(),
+    }
+}
+
+/// A common code as a number: its characters are the digits.
+fn number(code: &str) -> i32 {
+    code.bytes()
+        .fold(0, |number, byte| number << 8 | i32::from(byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_have_the_numbers_that_opc_ua_gives_them() {
+        for (name, id) in [
+            ("mm", 5_066_068),
+            ("°C", 4_408_652),
+            ("s", 5_457_219),
+            ("%", 20_529),
+            ("furlong", -1),
+        ] {
+            assert_eq!(unit(name).unit_id, id, "{name}");
+        }
+    }
+}

@@ -1,0 +1,678 @@
+//! The OPC UA buses with asyncua, which others wrote, at the other end.
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    dead_code,
+    unused_macros,
+    clippy::float_cmp,
+    reason = "tests; they use a part of the rig"
+)]
+
+mod conformance;
+mod foreign;
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Stdio};
+use std::sync::Arc;
+
+use conformance::rig::{End, await_that};
+use foreign::Absent;
+use serde_json::{Value, json};
+use tickbus::driver::Code;
+use tickbus::fieldbus::LinkState;
+use tickbus::time::Monotonic;
+
+fn main() -> std::process::ExitCode {
+    foreign::main(&[
+        (
+            "the_client_reads_and_writes_an_asyncua_server",
+            reads_and_writes,
+        ),
+        ("the_client_comes_back_when_the_server_does", comes_back),
+        ("bad_quality_is_told_and_is_not_fresh", bad_quality),
+        ("types_that_differ_are_told_with_the_signal", wrong_types),
+        (
+            "nothing_is_written_into_a_server_that_was_not_named",
+            guarded,
+        ),
+        (
+            "an_unknown_certificate_is_refused_until_it_is_moved",
+            untrusted,
+        ),
+        ("a_wrong_password_is_told", wrong_password),
+        (
+            "an_endpoint_that_is_not_there_is_told_with_those_that_are",
+            no_endpoint,
+        ),
+        (
+            "asyncua_finds_reads_writes_and_subscribes_to_the_server",
+            serves,
+        ),
+        ("one_write_of_asyncua_is_one_commit", one_commit),
+        ("pulses_reach_a_subscriber_that_has_no_queue", pulses),
+        ("a_secured_server_lets_in_whom_it_knows", secured),
+        (
+            "a_server_that_asks_for_a_user_lets_nobody_else_in",
+            no_anonymous,
+        ),
+    ])
+}
+
+const SIGNALS: &str = r#"
+[[signal]]
+name    = "run"
+address = "%QX0.0"
+latch   = "rising"
+
+[[signal]]
+name      = "speed"
+address   = "%QW2"
+type      = "INT"
+fail_safe = -1
+
+[[signal]]
+name    = "torque"
+address = "%QD4"
+type    = "REAL"
+
+[[signal]]
+name    = "sensor"
+address = "%IX0.0"
+latch   = "rising"
+
+[[signal]]
+name    = "position"
+address = "%IW2"
+type    = "INT"
+unit    = "mm"
+scale   = { raw = [0, 27648], value = [0.0, 276.48] }
+
+[[signal]]
+name    = "temperature"
+address = "%ID4"
+type    = "REAL"
+unit    = "°C"
+
+[[signal]]
+name    = "count"
+address = "%IL8"
+type    = "ULINT"
+"#;
+
+/// A program of Python, spoken to by lines.
+struct Peer {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: BufReader<ChildStdout>,
+}
+
+impl Peer {
+    /// Starts it; gives the first line that it says, too.
+    fn start(script: &str, asked: &Value) -> Result<(Self, String), Absent> {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/peers")
+            .join(script);
+        let mut child = foreign::python_with("main", &["asyncua"])?
+            .arg(script)
+            .arg(asked.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        let stdin = child.stdin.take();
+        let mut stdout = BufReader::new(child.stdout.take().expect("a pipe"));
+        let mut line = String::new();
+        stdout.read_line(&mut line).expect("it speaks");
+        let peer = Self {
+            child,
+            stdin,
+            stdout,
+        };
+        Ok((peer, line.trim().to_owned()))
+    }
+
+    fn ready(script: &str, asked: &Value) -> Result<Self, Absent> {
+        let (peer, line) = Self::start(script, asked)?;
+        assert_eq!(line, "ready", "{script} {asked}");
+        Ok(peer)
+    }
+
+    #[track_caller]
+    fn ask(&mut self, line: &Value) -> Value {
+        let stdin = self.stdin.as_mut().expect("it lives");
+        writeln!(stdin, "{line}").expect("it listens");
+        let mut answer = String::new();
+        self.stdout.read_line(&mut answer).expect("it speaks");
+        serde_json::from_str(&answer).unwrap_or_else(|why| panic!("{line}: {answer}: {why}"))
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // The end of its stdin is the end of it.
+        drop(self.stdin.take());
+        let _ = self.child.wait();
+    }
+}
+
+/// A free port of this machine.
+fn free_address() -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    listener.local_addr().expect("it is bound")
+}
+
+/// The nodes of a PLC for `SIGNALS`.
+fn nodes() -> Value {
+    json!({
+        "run": ["Boolean", false], "speed": ["Int16", 7], "torque": ["Float", 1.5],
+        "sensor": ["Boolean", false], "position": ["Int16", 0], "temperature": ["Float", 0.0],
+        "count": ["UInt64", 0],
+    })
+}
+
+/// An asyncua server with those nodes.
+fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
+    let mut asked = json!({
+        "url": format!("opc.tcp://{address}"), "security": ["None"], "nodes": nodes(),
+    });
+    for (key, value) in more.as_object().into_iter().flatten() {
+        asked[key] = value.clone();
+    }
+    Peer::ready("opcua_server.py", &asked)
+}
+
+/// The identity of that server.
+const IDENTITY: &str = "urn:test:plc ACME PLC";
+
+struct Device {
+    end: End,
+    folder: tempfile::TempDir,
+}
+
+impl Device {
+    fn open(kind: &str, keys: &str) -> Self {
+        Self::open_in(tempfile::tempdir().expect("a folder"), kind, keys)
+    }
+
+    fn open_in(folder: tempfile::TempDir, kind: &str, keys: &str) -> Self {
+        let clock: Arc<Monotonic> = Monotonic::shared().expect("a thread");
+        let pki = folder.path().join("pki");
+        let text = format!(
+            "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"500ms\"\n\
+             reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{SIGNALS}",
+            pki.display().to_string()
+        );
+        let end = End::open(&text, &clock);
+        Self { end, folder }
+    }
+
+    fn client(address: SocketAddr, keys: &str) -> Self {
+        Self::open(
+            "opcua-client",
+            &format!("url = \"opc.tcp://{address}\"\n{keys}"),
+        )
+    }
+
+    /// A client without protection that may write.
+    fn plain(address: SocketAddr) -> Self {
+        Self::client(
+            address,
+            &format!("security = \"None\"\nwrite_to = \"{IDENTITY}\""),
+        )
+    }
+
+    fn pki(&self) -> PathBuf {
+        self.folder.path().join("pki")
+    }
+
+    #[track_caller]
+    fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
+        let mut reason = String::new();
+        let waited = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            await_that(what, || {
+                self.end.tick();
+                reason = self.end.link().reason;
+                std::thread::sleep(std::time::Duration::from_millis(1));
+                done(&mut self.end)
+            });
+        }));
+        assert!(waited.is_ok(), "in vain until {what}: {reason}");
+    }
+
+    #[track_caller]
+    fn until_reason(&mut self, words: &str) -> String {
+        let mut all = String::new();
+        self.until(words, |end| {
+            let reason = end.link().reason;
+            let said = reason.contains(words);
+            if said {
+                all = reason;
+            }
+            said
+        });
+        all
+    }
+
+    fn address(&self) -> SocketAddr {
+        let mut address = None;
+        await_that("it listens", || {
+            let text = self.end.driver.statistics();
+            let line = text.lines().find_map(|line| line.strip_prefix("address="));
+            address = line.map(|line| line.parse().expect("an address"));
+            address.is_some()
+        });
+        address.expect("it was waited for")
+    }
+}
+
+fn reads_and_writes() -> Result<(), Absent> {
+    let address = free_address();
+    let mut plc = plc(address, &json!({}))?;
+    let mut device = Device::plain(address);
+    device.until("the first values", |end| {
+        end.get("speed") == 7.0 && end.get("torque") == 1.5
+    });
+    assert_eq!(device.end.link().state, LinkState::Running);
+    plc.ask(&json!({"set": {"speed": -1234, "torque": 0.25, "run": true}}));
+    device.until("new values", |end| {
+        end.get("speed") == -1234.0 && end.get("torque") == 0.25 && end.get("run") == 1.0
+    });
+    device.end.set("position", 138.24);
+    device.end.set("temperature", 21.5);
+    device.end.set("sensor", 1.0);
+    for (name, value) in [
+        ("position", json!(13824)),
+        ("temperature", json!(21.5)),
+        ("sensor", json!(true)),
+    ] {
+        device.until("the PLC has it", |_| {
+            plc.ask(&json!({"get": name}))["value"] == value
+        });
+    }
+    assert_eq!(device.end.statistic("identity"), IDENTITY);
+    assert_eq!(device.end.statistic("writes"), "allowed");
+    assert_eq!(device.end.statistic("quality"), "good");
+    // A pulse that is over before the next cycle reaches the PLC as a level that was there.
+    for level in [0.0, 1.0, 0.0] {
+        device.end.set("sensor", level);
+        device.end.tick();
+    }
+    Ok(())
+}
+
+fn comes_back() -> Result<(), Absent> {
+    let address = free_address();
+    let first = plc(address, &json!({}))?;
+    let mut device = Device::plain(address);
+    device.until("values", |end| end.get("speed") == 7.0);
+    drop(first);
+    device.until("it is told", |end| end.link().state == LinkState::Failed);
+    device.until("fail-safe values", |end| {
+        end.tick().code == Code::Stale && end.get("speed") == -1.0
+    });
+    device.end.set("position", 1.0);
+    let mut second = plc(address, &json!({}))?;
+    second.ask(&json!({"set": {"speed": 8}}));
+    device.until("values again", |end| end.get("speed") == 8.0);
+    device.until("the PLC has the inputs again", |_| {
+        second.ask(&json!({"get": "position"}))["value"] == json!(100)
+    });
+    assert_eq!(device.end.link().state, LinkState::Running);
+    Ok(())
+}
+
+fn bad_quality() -> Result<(), Absent> {
+    let address = free_address();
+    let mut plc = plc(address, &json!({}))?;
+    let mut device = Device::plain(address);
+    device.until("values", |end| end.get("speed") == 7.0);
+    plc.ask(&json!({"status": {"speed": "BadDeviceFailure"}}));
+    let reason = device.until_reason("no good value of \"speed\"");
+    assert!(reason.contains("BadDeviceFailure"), "{reason}");
+    device.until("stale", |end| end.tick().code == Code::Stale);
+    assert_eq!(device.end.get("speed"), -1.0, "the fail-safe value");
+    assert_eq!(device.end.statistic("quality"), "bad: speed");
+    plc.ask(&json!({"status": {"speed": "UncertainLastUsableValue"}}));
+    device.until("values again", |end| end.get("speed") == 7.0);
+    device.until("it is told", |end| {
+        end.statistic("quality") == "uncertain: speed"
+    });
+    plc.ask(&json!({"set": {"speed": 9}}));
+    device.until("good again", |end| {
+        end.get("speed") == 9.0 && end.statistic("quality") == "good"
+    });
+    assert_eq!(device.end.link().state, LinkState::Running);
+    Ok(())
+}
+
+fn wrong_types() -> Result<(), Absent> {
+    let address = free_address();
+    let mut nodes = nodes();
+    nodes["speed"] = json!(["Double", 7.0]);
+    nodes["temperature"] = json!(["Int32", 7]);
+    nodes.as_object_mut().expect("a table").remove("torque");
+    let _plc = plc(address, &json!({"nodes": nodes}))?;
+    let mut device = Device::plain(address);
+    let reason = device.until_reason("speed");
+    for part in [
+        "\"speed\" is INT, which is Int16 in OPC UA, but ns=2;s=speed is Double on the server",
+        "\"temperature\" is REAL, which is Float in OPC UA, but ns=2;s=temperature is Int32",
+        "\"torque\" is ns=2;s=torque, which the server does not have",
+        "node_pattern",
+    ] {
+        assert!(reason.contains(part), "\"{part}\" in {reason}");
+    }
+    assert_eq!(device.end.link().cause.name(), "refused");
+    Ok(())
+}
+
+fn guarded() -> Result<(), Absent> {
+    let address = free_address();
+    let mut plc = plc(address, &json!({}))?;
+    let mut device = Device::client(address, "security = \"None\"");
+    device.end.set("position", 100.0);
+    device.until("values", |end| end.get("speed") == 7.0);
+    assert_eq!(device.end.statistic("writes"), "blocked");
+    assert_eq!(device.end.statistic("identity"), IDENTITY);
+    plc.ask(&json!({"set": {"speed": 8}}));
+    device.until("more values", |end| end.get("speed") == 8.0);
+    assert_eq!(plc.ask(&json!({"get": "position"}))["value"], json!(0));
+    Ok(())
+}
+
+fn untrusted() -> Result<(), Absent> {
+    let address = free_address();
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("secret"), "swordfish\n").expect("a file");
+    for security in ["Basic256Sha256", "Aes256_Sha256_RsaPss"] {
+        let mut plc = plc(
+            address,
+            &json!({"security": [security], "folder": folder.path(), "user": "rig",
+                    "password": "swordfish"}),
+        )?;
+        let secret = folder.path().join("secret");
+        let mut device = Device::client(
+            address,
+            &format!(
+                "security = \"{security}\"\nuser = \"rig\"\npassword_file = {:?}\nwrite_to = \"{IDENTITY}\"",
+                secret.display().to_string()
+            ),
+        );
+        let reason = device.until_reason("is not trusted");
+        let rejected: Vec<_> = files(&device.pki().join("rejected"));
+        assert_eq!(rejected.len(), 1, "{rejected:?}");
+        assert!(
+            reason.contains(&rejected[0].display().to_string()),
+            "{reason}"
+        );
+        let trusted = device.pki().join("trusted");
+        assert!(reason.contains(&trusted.display().to_string()), "{reason}");
+        let name = rejected[0].file_name().expect("a name");
+        std::fs::rename(&rejected[0], trusted.join(name)).expect("as the message says");
+        device.until("values", |end| end.get("speed") == 7.0);
+        device.end.set("position", 100.0);
+        device.until("the PLC has it", |_| {
+            plc.ask(&json!({"get": "position"}))["value"] == json!(10_000)
+        });
+        assert!(device.pki().join("own/tickbus-7.der").exists());
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            let key = device.pki().join("private/tickbus-7.pem");
+            let mode = std::fs::metadata(key)
+                .expect("it is there")
+                .permissions()
+                .mode();
+            assert_eq!(mode & 0o077, 0, "the key is for nobody else");
+        }
+    }
+    Ok(())
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(folder).expect("a folder");
+    files.map(|file| file.expect("a file").path()).collect()
+}
+
+fn wrong_password() -> Result<(), Absent> {
+    let address = free_address();
+    let folder = tempfile::tempdir().expect("a folder");
+    let _plc = plc(
+        address,
+        &json!({"security": ["Basic256Sha256"], "folder": folder.path(), "user": "rig",
+                "password": "swordfish"}),
+    )?;
+    let mut device = Device::client(
+        address,
+        "trust = \"any\"\nuser = \"rig\"\npassword_in_clear = \"herring\"",
+    );
+    device.until_reason("the server does not let user \"rig\" in");
+    assert_eq!(device.end.link().cause.name(), "refused");
+    let mut device = Device::client(
+        address,
+        "trust = \"any\"\nuser = \"rig\"\npassword_env = \"NO_SUCH_VARIABLE_TICKBUS\"",
+    );
+    device.until_reason("the environment variable NO_SUCH_VARIABLE_TICKBUS has no password");
+    Ok(())
+}
+
+fn no_endpoint() -> Result<(), Absent> {
+    let address = free_address();
+    let _plc = plc(address, &json!({}))?;
+    let mut device = Device::client(address, "");
+    let reason = device.until_reason("the server has no endpoint with");
+    assert!(
+        reason.contains(
+            "security = \"Basic256Sha256\" and mode = \"SignAndEncrypt\"; it has \"None\""
+        ),
+        "{reason}"
+    );
+    Ok(())
+}
+
+/// A server without protection, and an asyncua client of it.
+fn open_server() -> Result<(Device, Peer), Absent> {
+    let device = Device::open(
+        "opcua-server",
+        "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true\nevents = true\ncycle = \"5ms\"",
+    );
+    let url = format!("opc.tcp://{}", device.address());
+    let client = Peer::ready("opcua_client.py", &json!({"url": url}))?;
+    Ok((device, client))
+}
+
+fn serves() -> Result<(), Absent> {
+    let (mut device, mut client) = open_server()?;
+    assert_eq!(
+        client.ask(&json!({"browse": true}))["tree"]["Test rig"],
+        json!([
+            "run",
+            "speed",
+            "torque",
+            "sensor",
+            "position",
+            "temperature",
+            "count"
+        ])
+    );
+    let read = client.ask(&json!({"read": "speed"}));
+    assert_eq!(
+        (&read["value"], &read["type"], &read["status"]),
+        (
+            &json!(-1),
+            &json!("Int16"),
+            &json!("BadWaitingForInitialData")
+        ),
+        "nobody has written it"
+    );
+    let properties = client.ask(&json!({"properties": "temperature"}));
+    let unit = properties["EngineeringUnits"].as_str().expect("a unit");
+    assert!(unit.contains("4408652") && unit.contains("°C"), "{unit}");
+    let properties = client.ask(&json!({"properties": "position.scaled"}));
+    let range = properties["EURange"].as_str().expect("a range");
+    assert!(
+        range.contains("-327.68") && range.contains("327.67"),
+        "{range}"
+    );
+    assert!(properties["EngineeringUnits"].to_string().contains("mm"));
+
+    device.end.set("position", 138.24);
+    device.end.set("temperature", -3.5);
+    device.end.set("count", 5.0);
+    device.end.tick();
+    let nodes = json!(["position", "temperature", "sensor"]);
+    client.ask(&json!({"subscribe": [nodes, 10]}));
+    let read = client.ask(&json!({"read": "position"}));
+    assert_eq!(
+        (
+            &read["value"],
+            &read["type"],
+            &read["status"],
+            &read["source"]
+        ),
+        (&json!(13824), &json!("Int16"), &json!("Good"), &json!(true))
+    );
+    assert_eq!(
+        client.ask(&json!({"read": "position.scaled"}))["value"],
+        json!(138.24)
+    );
+    device.until("the change is reported", |_| {
+        let values = &client.ask(&json!({"changes": "temperature"}))["values"];
+        values
+            .as_array()
+            .is_some_and(|values| values.contains(&json!(-3.5)))
+    });
+
+    let statuses = client.ask(&json!({"write": {
+        "speed": ["Int16", 77], "run": ["Boolean", true], "torque": ["Double", 1.0],
+        "position": ["Int16", 1], "position.scaled": ["Double", 1.0], "nothing": ["Int16", 1],
+    }}));
+    assert_eq!(
+        statuses["statuses"],
+        json!([
+            "Good",
+            "Good",
+            "BadTypeMismatch",
+            "BadUserAccessDenied",
+            "BadNotWritable",
+            "BadNotWritable"
+        ])
+    );
+    device.until("the values", |end| {
+        end.get("speed") == 77.0 && end.get("run") == 1.0
+    });
+    assert_eq!(device.end.get("torque"), 0.0);
+    assert_eq!(device.end.link().state, LinkState::Running);
+    let read = client.ask(&json!({"read": "speed"}));
+    assert_eq!(
+        (&read["value"], &read["status"]),
+        (&json!(77), &json!("Good"))
+    );
+    // The subscription alone keeps the line alive: the client goes on asking for more.
+    for _ in 0..100 {
+        device.end.tick();
+        std::thread::sleep(std::time::Duration::from_millis(10));
+        assert_ne!(device.end.link().state, LinkState::Stale);
+    }
+    drop(client);
+    device.until_reason("closed its session");
+    device.until("stale", |end| end.tick().code == Code::Stale);
+    assert_eq!(device.end.get("speed"), -1.0, "the fail-safe value");
+    Ok(())
+}
+
+fn one_commit() -> Result<(), Absent> {
+    let (mut device, mut client) = open_server()?;
+    for round in 1..=50 {
+        let value = f64::from(round);
+        client.ask(&json!({"write": {"speed": ["Int16", round], "torque": ["Float", value]}}));
+        device.until("the values", |end| {
+            assert_eq!(end.get("speed").max(0.0), end.get("torque"), "a torn image");
+            end.get("speed") == value
+        });
+    }
+    assert_eq!(device.end.statistic("bus_cycles"), "50", "one each");
+    Ok(())
+}
+
+fn pulses() -> Result<(), Absent> {
+    let (mut device, mut client) = open_server()?;
+    device.end.tick();
+    client.ask(&json!({"subscribe": [["sensor"], 20]}));
+    for pulse in 0..10 {
+        for level in [1.0, 0.0] {
+            device.end.set("sensor", level);
+            device.end.tick();
+        }
+        let mut seen = Vec::new();
+        device.until("the pulse is reported, and its end", |_| {
+            let values = client.ask(&json!({"changes": "sensor"}))["values"].clone();
+            seen.extend(values.as_array().expect("a list").iter().cloned());
+            seen.ends_with(&[json!(true), json!(false)])
+        });
+        let rises = seen.iter().filter(|value| **value == json!(true)).count();
+        assert_eq!(rises, 1, "pulse {pulse}: {seen:?}");
+    }
+    Ok(())
+}
+
+fn secured() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let uri = "urn:test:client";
+    let made = json!({"certificate": folder.path(), "uri": uri});
+    drop(Peer::ready("opcua_client.py", &made)?);
+    let mut device = Device::open(
+        "opcua-server",
+        "address = \"127.0.0.1:0\"\nuser = \"plc\"\npassword_in_clear = \"swordfish\"\ncycle = \"5ms\"",
+    );
+    let url = format!("opc.tcp://{}", device.address());
+    let own = folder.path().display().to_string();
+    let theirs = device.pki().join("own/tickbus-7.der").display().to_string();
+    let asked = |policy: &str, password: &str| {
+        json!({"url": url, "uri": uri, "user": "plc", "password": password,
+               "security": format!("{policy},SignAndEncrypt,{own}/client.der,{own}/client.pem,{theirs}")})
+    };
+    let (_, refused) = Peer::start("opcua_client.py", &asked("Basic256Sha256", "swordfish"))?;
+    assert!(
+        refused.starts_with("refused"),
+        "an unknown certificate: {refused}"
+    );
+    let rejected = files(&device.pki().join("rejected"));
+    assert_eq!(rejected.len(), 1, "{rejected:?}");
+    let name = rejected[0].file_name().expect("a name");
+    std::fs::rename(&rejected[0], device.pki().join("trusted").join(name)).expect("it is there");
+
+    for policy in [
+        "Basic256Sha256",
+        "Aes128Sha256RsaOaep",
+        "Aes256Sha256RsaPss",
+    ] {
+        let (_, refused) = Peer::start("opcua_client.py", &asked(policy, "herring"))?;
+        assert!(
+            refused.starts_with("refused"),
+            "a wrong password: {refused}"
+        );
+        let mut client = Peer::ready("opcua_client.py", &asked(policy, "swordfish"))?;
+        client.ask(&json!({"write": {"speed": ["Int16", 77]}}));
+        device.until("the value", |end| end.get("speed") == 77.0);
+        client.ask(&json!({"write": {"speed": ["Int16", 78]}}));
+        device.until("the value", |end| end.get("speed") == 78.0);
+        drop(client);
+        device.until_reason("closed its session");
+    }
+    Ok(())
+}
+
+fn no_anonymous() -> Result<(), Absent> {
+    let device = Device::open(
+        "opcua-server",
+        "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nuser = \"plc\"\n\
+         password_in_clear = \"swordfish\"",
+    );
+    let url = format!("opc.tcp://{}", device.address());
+    let (_, line) = Peer::start("opcua_client.py", &json!({"url": url}))?;
+    assert!(line.starts_with("refused"), "{line}");
+    Ok(())
+}

@@ -1,0 +1,161 @@
+//! The OPC UA buses: the conformance suite, each of them as either end.
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    dead_code,
+    clippy::float_cmp,
+    reason = "tests; the values are small whole numbers, and the peers of TCP are used in part"
+)]
+
+mod conformance;
+mod peers;
+
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use conformance::rig::{Bus, Liar};
+use peers::own_address;
+use tickbus::time::Manual;
+
+conformance!(device_serves, crate::OpcUa::new("device"));
+conformance!(device_is_client, crate::OpcUa::new("controller"));
+
+/// A server and a client without protection, on an address of their own.
+struct OpcUa {
+    address: SocketAddr,
+    /// The role of the server.
+    server: &'static str,
+}
+
+impl OpcUa {
+    fn new(server: &'static str) -> Self {
+        Self {
+            address: own_address(),
+            server,
+        }
+    }
+}
+
+impl Bus for OpcUa {
+    fn fieldbus(&self, role: &str) -> String {
+        let Self { address, server } = self;
+        if role == *server {
+            format!(
+                "kind = \"opcua-server\"\naddress = \"{address}\"\nsecurity = \"None\"\nanonymous = true"
+            )
+        } else {
+            // The other end is called by its role.
+            format!(
+                "kind = \"opcua-client\"\nurl = \"opc.tcp://{address}\"\nsecurity = \"None\"\n\
+                 write_to = \"urn:tickbus:{server} tickbus\""
+            )
+        }
+    }
+
+    /// Whoever is there says what is no OPC UA.
+    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        let over = Arc::new(AtomicBool::new(false));
+        let address = self.address;
+        let listener = (self.server == "controller").then(|| {
+            let listener = TcpListener::bind(address).expect("its own address");
+            listener.set_nonblocking(true).expect("an option");
+            listener
+        });
+        let listens = listener.is_some();
+        let thread = std::thread::spawn({
+            let over = Arc::clone(&over);
+            move || {
+                while !over.load(Ordering::Relaxed) {
+                    let met = match &listener {
+                        Some(listener) => listener.accept().map(|met| met.0),
+                        None => TcpStream::connect(address),
+                    };
+                    match met {
+                        Ok(stream) => lie(stream),
+                        Err(_) => std::thread::yield_now(),
+                    }
+                }
+            }
+        });
+        let (cause, words) = if listens {
+            ("protocol", "does not answer as an OPC UA server")
+        } else {
+            // A server goes on waiting for somebody who can.
+            ("waiting", "nobody has written yet")
+        };
+        Liar {
+            _peer: Box::new(Ending {
+                over,
+                thread: Some(thread),
+            }),
+            cause,
+            words,
+        }
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            ("kind = \"opcua-client\"", "url"),
+            (
+                "kind = \"opcua-client\"\nurl = \"192.168.0.1:4840\"",
+                "does not begin with",
+            ),
+            (
+                "kind = \"opcua-client\"\nurl = \"opc.tcp://h\"\nsecurity = \"Basic256sha256\"",
+                "did you mean \"Basic256Sha256\"",
+            ),
+            (
+                "kind = \"opcua-client\"\nurl = \"opc.tcp://h\"\nuser = \"a\"",
+                "without a password",
+            ),
+            (
+                "kind = \"opcua-client\"\nurl = \"opc.tcp://h\"\nnode_pattern = \"ns=2;s=x\"",
+                "has no {name}",
+            ),
+            (
+                "kind = \"opcua-client\"\nurl = \"opc.tcp://h\"\nnodes = { \"t\" = \"ns=2;s=x\" }",
+                "no signal is called that",
+            ),
+            ("kind = \"opcua-server\"", "anonymous"),
+            (
+                "kind = \"opcua-server\"\nanonymous = false",
+                "nobody may log in",
+            ),
+            (
+                "kind = \"opcua-server\"\nanonymous = true\naddress = \"127.0.0.1\"",
+                "has no port",
+            ),
+            (
+                "kind = \"opcua-server\"\nanonymous = true\nsecurity = []",
+                "names no policy",
+            ),
+        ]
+    }
+}
+
+/// Says what is no OPC UA, until the other end has had enough.
+fn lie(mut stream: TcpStream) {
+    // If the other end is quicker to go, so be it.
+    let _ = stream.set_nonblocking(false);
+    let _ = stream.set_read_timeout(Some(std::time::Duration::from_millis(50)));
+    let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\n\r\n");
+    while matches!(stream.read(&mut [0; 4096]), Ok(count) if count > 0) {}
+}
+
+/// A thread that is told to end, and waited for.
+struct Ending {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("the peer did not panic");
+        }
+    }
+}

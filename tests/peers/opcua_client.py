@@ -1,0 +1,132 @@
+"""An OPC UA client of asyncua, for tests of tickbus as its server.
+
+Its one argument is JSON: {"url", "security": "Policy,Mode,own.der,own.pem,server.der" or null, "uri", "user",
+"password", "certificate"}; with "certificate" it only makes a certificate in that folder. It says "ready" when it
+has a session, or "refused WHY", then obeys a line of JSON from stdin at a time, and answers each with one:
+    {"browse": true}                 {"tree": {folder: [names]}}
+    {"read": node}                   {"value", "type", "status", "source"}
+    {"write": {node: [type, value]}} {"statuses": […]}, all in one Write
+    {"subscribe": [nodes, interval]} {}
+    {"changes": node}                {"values": […]} since the last time
+    {"properties": node}             {name: value as text}
+    {"stop": true}                   and at the end of stdin
+"""
+
+import asyncio
+import json
+import logging
+import socket
+import sys
+from pathlib import Path
+
+from asyncua import Client, ua
+from asyncua.crypto.cert_gen import setup_self_signed_certificate
+from cryptography.x509.oid import ExtendedKeyUsageOID
+
+
+class Changes:
+    def __init__(self):
+        self.of = {}
+
+    def datachange_notification(self, node, value, data):
+        self.of.setdefault(node.nodeid.Identifier, []).append(value)
+
+
+async def make_certificate(folder, uri):
+    folder = Path(folder)
+    await setup_self_signed_certificate(
+        folder / "client.pem", folder / "client.der", uri, socket.gethostname(),
+        [ExtendedKeyUsageOID.CLIENT_AUTH],
+        {"countryName": "EU", "stateOrProvinceName": "x", "localityName": "x", "organizationName": "ACME"},
+    )
+
+
+async def lines():
+    loop = asyncio.get_running_loop()
+    while True:
+        line = await loop.run_in_executor(None, sys.stdin.readline)
+        if not line:
+            return
+        yield json.loads(line)
+
+
+async def serve(client):
+    changes, subscription = Changes(), None
+
+    def node(name):
+        return client.get_node(ua.NodeId(name, 2))
+
+    async for line in lines():
+        answer = {}
+        if "browse" in line:
+            tree = {}
+            for top in await client.nodes.objects.get_children():
+                if top.nodeid.NamespaceIndex == 2:
+                    for child in [top] + await top.get_children():
+                        name = (await child.read_browse_name()).Name
+                        below = [(await one.read_browse_name()).Name for one in await child.get_children()]
+                        if below:
+                            tree[name] = below
+            answer["tree"] = tree
+        if "read" in line:
+            value = await node(line["read"]).read_data_value(raise_on_bad_status=False)
+            answer = {
+                "value": value.Value.Value if value.Value else None,
+                "type": value.Value.VariantType.name if value.Value else None,
+                "status": value.StatusCode.name,
+                "source": value.SourceTimestamp is not None,
+            }
+        if "write" in line:
+            names = list(line["write"])
+            values = [
+                ua.DataValue(ua.Variant(value, getattr(ua.VariantType, kind)))
+                for kind, value in line["write"].values()
+            ]
+            statuses = await client.uaclient.write_attributes(
+                [ua.NodeId(name, 2) for name in names], values
+            )
+            answer["statuses"] = [status.name for status in statuses]
+        if "subscribe" in line:
+            names, interval = line["subscribe"]
+            subscription = await client.create_subscription(interval, changes)
+            await subscription.subscribe_data_change(
+                [node(name) for name in names], queuesize=10, sampling_interval=0
+            )
+        if "changes" in line:
+            answer["values"] = changes.of.pop(line["changes"], [])
+        if "properties" in line:
+            for one in await node(line["properties"]).get_properties():
+                answer[(await one.read_browse_name()).Name] = str(await one.read_value())
+        if "stop" in line:
+            return
+        print(json.dumps(answer), flush=True)
+
+
+async def main():
+    asked = json.loads(sys.argv[1])
+    if asked.get("certificate"):
+        await make_certificate(asked["certificate"], asked["uri"])
+        print("ready", flush=True)
+        return
+    client = Client(asked["url"], timeout=5)
+    if asked.get("uri"):
+        client.application_uri = asked["uri"]
+    if asked.get("user"):
+        client.set_user(asked["user"])
+        client.set_password(asked["password"])
+    try:
+        if asked.get("security"):
+            await client.set_security_string(asked["security"])
+        await client.connect()
+    except Exception as error:
+        print(f"refused {type(error).__name__} {error}".replace("\n", " "), flush=True)
+        return
+    print("ready", flush=True)
+    try:
+        await serve(client)
+    finally:
+        await client.disconnect()
+
+
+logging.disable(logging.CRITICAL)
+asyncio.run(main())

@@ -10,10 +10,10 @@
 #![allow(missing_docs, reason = "a bench")]
 #![allow(unsafe_code, reason = "libmodbus is a library in C")]
 
-#[path = "modbus/libmodbus.rs"]
-mod libmodbus;
 #[path = "../tests/peers/descriptors.rs"]
 mod descriptors;
+#[path = "modbus/libmodbus.rs"]
+mod libmodbus;
 
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, Read, Write};
@@ -244,7 +244,9 @@ fn resident() -> f64 {
 fn crowd(extent: &Extent) {
     const INTERVAL: Duration = Duration::from_millis(100);
     // Both ends of each connection are in this process.
-    let count = extent.clients.min(descriptors::raise().saturating_sub(100) / 2);
+    let count = extent
+        .clients
+        .min(descriptors::raise().saturating_sub(100) / 2);
     let (driver, address) = device();
     let before = resident();
     let mut refused = 0_u32;

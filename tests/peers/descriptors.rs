@@ -14,7 +14,9 @@ pub fn raise() -> usize {
         Ok(()) => limit.maximum,
         Err(_) => limit.current,
     };
-    current.map_or(usize::MAX, |most| usize::try_from(most).unwrap_or(usize::MAX))
+    current.map_or(usize::MAX, |most| {
+        usize::try_from(most).unwrap_or(usize::MAX)
+    })
 }
 
 /// Nobody counts them.

@@ -6,7 +6,7 @@ use super::tcp::Address;
 use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
-use crate::signal::SignalTable;
+use crate::signal::{Signal, SignalTable, Station};
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -142,6 +142,15 @@ impl Options {
             Self::S7Server(options) => options.read_station(count, table),
             Self::S7Client(options) => options.read_station(count, table),
             Self::Loopback(_) | Self::Plugin(_) | Self::OpcuaClient(_) | Self::OpcuaServer(_) => {}
+        }
+    }
+
+    /// Where a signal of `station` lies, in the bus's own words; empty where those are its address.
+    pub fn place(&self, signal: &Signal, station: &Station) -> String {
+        match self {
+            Self::ModbusServer(options) => options.place(signal),
+            Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            _ => String::new(),
         }
     }
 

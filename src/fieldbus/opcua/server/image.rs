@@ -21,9 +21,14 @@ pub(super) struct Image {
     receives: Values,
     places: Vec<Place>,
     frames: Vec<Box<[u8]>>,
-    nodes: Arc<Nodes>,
-    subscriptions: Arc<SubscriptionCache>,
-    watched: Watched,
+    show: Show,
+}
+
+/// Where values are shown: the nodes of the crate's server, and who is told of them.
+pub(super) struct Show {
+    pub(super) nodes: Arc<Nodes>,
+    pub(super) subscriptions: Arc<SubscriptionCache>,
+    pub(super) watched: Watched,
 }
 
 /// A signal's nodes, and what they show.
@@ -40,14 +45,7 @@ struct Place {
 
 impl Image {
     /// Nothing shown yet.
-    pub(super) fn new(
-        table: &Arc<SignalTable>,
-        role: Role,
-        port: &Port,
-        nodes: Arc<Nodes>,
-        subscriptions: Arc<SubscriptionCache>,
-        watched: Watched,
-    ) -> Self {
+    pub(super) fn new(table: &Arc<SignalTable>, role: Role, port: &Port, show: Show) -> Self {
         let (tx, rx) = role.areas();
         let place = |signal: &Signal| Place {
             node: space::node(&signal.name),
@@ -75,10 +73,21 @@ impl Image {
             receives,
             places: table.signals.iter().map(place).collect(),
             frames,
-            nodes,
-            subscriptions,
-            watched,
+            show,
         }
+    }
+
+    /// Goes on with another server, which shows nothing yet.
+    pub(super) fn move_to(&mut self, show: Show) {
+        self.show = show;
+        for place in &mut self.places {
+            place.shown = None;
+        }
+    }
+
+    /// How many subscriptions to a node the server remembers, though nobody is there.
+    pub(super) fn left_behind(&self) -> usize {
+        self.show.watched.left_behind()
     }
 
     /// Takes the values of one list into the image, as one commit for each station that it touches.
@@ -106,7 +115,7 @@ impl Image {
             for (index, signal) in self.table.signals.iter().enumerate() {
                 let is_sent = signal.area == self.role.areas().0;
                 if is_sent
-                    && let Some(span) = self.watched.span(index)
+                    && let Some(span) = self.show.watched.span(index)
                     && now - self.places[index].since >= span
                 {
                     port.sent_part(signal.station, bytes(signal));
@@ -177,7 +186,7 @@ impl Image {
             (node, None::<&NumericRange>, value(Variant::Double(real)))
         });
         let all = std::iter::once((&place.node, None, value(raw.clone()))).chain(scaled);
-        let put = self.nodes.set_values(&self.subscriptions, all);
+        let put = self.show.nodes.set_values(&self.show.subscriptions, all);
         debug_assert!(put.is_ok(), "every signal has its nodes: {put:?}");
     }
 }

@@ -10,6 +10,7 @@
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
 //! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
+//! | [`axis`] | axes: their structures of command and feedback, profiles of motion, what a command means |
 //! | [`faults`] | wrong values and troubles of the line, when they are asked for |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
 //! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
@@ -17,6 +18,8 @@
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`driver`] | one device: configuration, open, exchange, statistics, close |
+//! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
+//! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | [`cli`] | the `tickbus` command |
@@ -24,12 +27,15 @@
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
+pub mod axis;
 pub mod cli;
 pub mod config;
 pub mod driver;
+pub mod export;
 pub mod faults;
 pub mod fieldbus;
 pub mod image;
+pub mod import;
 mod jni;
 pub mod os;
 pub mod plc;

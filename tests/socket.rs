@@ -8,27 +8,30 @@
 
 mod conformance;
 mod peers;
+#[path = "peers/socket.rs"]
+mod socket_peers;
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::time::Duration;
 
 use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, pass};
-use peers::{Alone, RECORD, Tcp, client, is_closed, leave, record};
+use peers::{client, is_closed, leave};
+use socket_peers::{Alone, RECORD, Tcp, record};
 use socket2::SockRef;
 use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;
 use tickbus::time::{Manual, Nanos};
 
-conformance!(cyclic, crate::Tcp::new("", ""));
+conformance!(cyclic, crate::socket_peers::Tcp::new("", ""));
 conformance!(
     on_change,
-    crate::Tcp::new("send = \"on-change\"", "send = \"on-change\"")
+    crate::socket_peers::Tcp::new("send = \"on-change\"", "send = \"on-change\"")
 );
-conformance!(reply, crate::Tcp::new("send = \"reply\"", ""));
+conformance!(reply, crate::socket_peers::Tcp::new("send = \"reply\"", ""));
 conformance!(
     device_connects,
-    crate::Tcp::new("role_tcp = \"connect\"", "role_tcp = \"listen\"")
+    crate::socket_peers::Tcp::new("role_tcp = \"connect\"", "role_tcp = \"listen\"")
 );
 
 #[test]

@@ -1,5 +1,7 @@
 //! `tickbus check FILE`: prints the signal table of a driver.cfg, or every mistake in it.
 
+mod axes;
+
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -9,7 +11,7 @@ use super::Outcome;
 use crate::config::{short_number, shown};
 use crate::driver::{Config, Timing};
 use crate::fieldbus::socket::{self, Sending, TcpRole};
-use crate::fieldbus::{Options, loopback, plugin};
+use crate::fieldbus::{Options, loopback, modbus, plugin, s7};
 use crate::record;
 use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
 use crate::time::Nanos;
@@ -90,6 +92,10 @@ fn report(config: &Config) -> String {
         );
     }
     out.push('\n');
+    if !config.axes.is_empty() {
+        out.push_str(&aligned(&axes::HEADINGS, config.axes.iter().map(axes::row)));
+        out.push('\n');
+    }
     out.push_str(&aligned(
         &HEADINGS,
         config
@@ -128,6 +134,10 @@ fn bus(options: &Options) -> String {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
+        Options::ModbusServer(options) => parts.extend(modbus_server(options)),
+        Options::ModbusClient(options) => parts.push(format!("TODO {}", options.line)),
+        Options::S7Server(options) => parts.extend(s7_server(options)),
+        Options::S7Client(options) => parts.extend(s7_client(options)),
         Options::OpcuaClient(options) => parts.push(format!("connects to {}", options.url)),
         Options::OpcuaServer(options) => parts.push(format!("listens on {}", options.address)),
     }
@@ -139,8 +149,12 @@ fn bus(options: &Options) -> String {
 
 fn socket(options: &socket::Options) -> Vec<String> {
     let address = &options.address;
+    let each: Vec<String> = options.stations.iter().map(ToString::to_string).collect();
     let mut parts = vec![
         match options.tcp {
+            TcpRole::Listen if !each.is_empty() => {
+                format!("listens on {}, one station each", each.join(" and "))
+            }
             TcpRole::Listen => format!("listens on {address}"),
             TcpRole::Connect => format!("connects to {address}"),
         },
@@ -153,6 +167,53 @@ fn socket(options: &socket::Options) -> Vec<String> {
     if options.min_interval > Nanos::ZERO {
         parts.push(format!("at most every {}", options.min_interval));
     }
+    if let socket::Message::Axis { .. } = options.message {
+        parts.push("one axis in each message".to_owned());
+    }
+    parts
+}
+
+fn modbus_server(options: &modbus::ServerOptions) -> Vec<String> {
+    let mut parts = vec![match &options.line {
+        modbus::Line::Tcp(address) => format!("listens on {address}"),
+        serial @ modbus::Line::Serial(_) => format!("listens on {serial}"),
+    }];
+    if let Some(offset) = options.map.window {
+        let table = modbus::Table::HoldingRegisters;
+        parts.push(format!("%I from {} on", modbus::Place { table, offset }));
+    }
+    parts
+}
+
+fn s7_server(options: &s7::ServerOptions) -> Vec<String> {
+    let mut parts = vec![format!("listens on {}", options.address)];
+    for block in &options.blocks {
+        let of = match &block.station {
+            Some(station) => format!(" of \"{}\"", shown(station)),
+            None => String::new(),
+        };
+        parts.push(format!(
+            "DB{} is {}{of} from byte {}",
+            block.number, block.area, block.offset
+        ));
+    }
+    parts
+}
+
+fn s7_client(options: &s7::ClientOptions) -> Vec<String> {
+    let mut parts = vec![
+        format!("connects to {}", options.address),
+        format!("TSAP {}", options.called),
+    ];
+    for places in &options.places {
+        for (area, place) in ["%I", "%Q"].iter().zip(places) {
+            parts.extend(place.map(|place| format!("{area} at {place}")));
+        }
+    }
+    parts.push(match &options.write_to {
+        Some(identity) => format!("writes into \"{}\" alone", shown(identity)),
+        None => "writes nothing".to_owned(),
+    });
     parts
 }
 

@@ -2,8 +2,11 @@
 //!
 //! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
 
+mod axes;
 mod check;
+mod export;
 mod host;
+mod import;
 mod mirror;
 mod plc;
 #[cfg(unix)]
@@ -25,7 +28,10 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Axes(axes::Arguments),
     Check(check::Arguments),
+    Export(export::Arguments),
+    Import(import::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     Report(report::Arguments),
@@ -66,7 +72,10 @@ pub fn main() -> ExitCode {
     // What happens to the line is told on stdout.
     crate::os::log_to_stderr(log::LevelFilter::Error);
     match arguments.command {
+        Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

@@ -12,7 +12,8 @@ use crate::time::Nanos;
 ///
 /// The programs are "rig" (the test rig), "mirror" (each %I byte comes back on the %Q byte of the same
 /// offset) and "reaction" (measures how long the machine takes to answer; its options are output, input,
-/// count, timeout, pause and tick). A path such as ./program.so hosts a program of your own, compiled by
+/// count, timeout, pause and tick), "charger" and "lathe" (the peeling line of plc/peeler; their options are hold and
+/// blocks, and of the lathe `peeling_speed` and thickness). A path such as ./program.so hosts a program of your own, compiled by
 /// iec2c (its options are addressing, alive and order); docs/own-plc-program.md tells how to build one.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {

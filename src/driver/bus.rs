@@ -4,6 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::fieldbus::loopback::{self, FreeLoopback, Mode, Peer, SteppedLoopback, private_link};
+use crate::fieldbus::modbus::{ModbusClient, ModbusServer};
+use crate::fieldbus::s7::{S7Client, S7Server};
 use crate::fieldbus::socket::Socket;
 use crate::fieldbus::{Bus, Free, Options, Role, plugin};
 use crate::plc;
@@ -46,10 +48,28 @@ pub(super) fn open(
         Options::Loopback(options) => open_loopback(config, options, clock),
         Options::Socket(options) => {
             let cycle = config.timing.cycle;
-            let socket = Socket::new(options, &config.table, config.role, cycle);
+            let socket = Socket::new(options, &config.table, config.role, cycle, &config.axes);
             Ok((Bus::Free(Box::new(socket)), None))
         }
+        Options::S7Server(options) => {
+            let server = S7Server::new(options, &config.table, config.role, &config.name);
+            Ok((Bus::Free(Box::new(server)), None))
+        }
+        Options::S7Client(options) => {
+            let cycle = config.timing.cycle;
+            let client = S7Client::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(client)), None))
+        }
         Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),
+        Options::ModbusServer(options) => {
+            let server = ModbusServer::new(options, &config.table, config.role, &config.name);
+            Ok((Bus::Free(Box::new(server)), None))
+        }
+        Options::ModbusClient(options) => {
+            let cycle = config.timing.cycle;
+            let client = ModbusClient::new(options, &config.table, config.role, cycle);
+            Ok((Bus::Free(Box::new(client)), None))
+        }
         Options::OpcuaClient(_) | Options::OpcuaServer(_) => {
             Ok((Bus::Free(open_opcua(config)?), None))
         }

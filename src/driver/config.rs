@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::layout;
+use crate::axis::{self, Axis};
 use crate::config::{Collector, Mistakes, Table, Value, load_text, read_text};
 use crate::faults::{self, Fault};
 use crate::fieldbus::{Options, Role};
 use crate::record;
-use crate::signal::{Addressing, SignalTable, Station, section};
+use crate::signal::{Addressing, SignalTable, Station};
 use crate::time::Nanos;
 
 /// Waits between attempts to reach the peer again, where a driver.cfg states none.
@@ -47,6 +48,8 @@ pub struct Config {
     pub addressing: Addressing,
     /// Its stations and signals.
     pub table: SignalTable,
+    /// Its axes, whose signals are in `table` with all others.
+    pub axes: Vec<Axis>,
     /// Cycle times and time-outs.
     pub timing: Timing,
     /// What the bus itself needs to know.
@@ -161,6 +164,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     let fieldbus = root.require("fieldbus", "write a [fieldbus] table with the kind of bus");
     let stations = root.take("station");
     let signals = root.take("signal");
+    let axes = root.take("axis");
     let faults = root.take("fault");
     let record = root.take("record");
 
@@ -170,7 +174,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     let addressing = driver
         .as_ref()
         .map_or(Addressing::Bytes, |driver| driver.addressing);
-    let fieldbus = fieldbus
+    let mut fieldbus = fieldbus
         .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
         .map(|table| read_fieldbus(table, asked));
     let replayed = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
@@ -183,24 +187,35 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     let signals = signals
         .map(|value| value.tables("[[signal]]"))
         .unwrap_or_default();
-    if signals.len() > layout::SIGNAL_LIMIT {
-        signals[layout::SIGNAL_LIMIT].wrong(
-            format!("there are {} signals", signals.len()),
-            format!("a driver has at most {}", layout::SIGNAL_LIMIT),
-        );
-        root.finish();
-        return None;
+    let axes = axes
+        .map(|value| value.tables("[[axis]]"))
+        .unwrap_or_default();
+    for (tables, limit, what) in [
+        (&signals, layout::SIGNAL_LIMIT, "signals"),
+        (&axes, layout::AXIS_LIMIT, "axes"),
+    ] {
+        if let Some(table) = tables.get(limit) {
+            table.wrong(
+                format!("there are {} {what}", tables.len()),
+                format!("a driver has at most {limit}"),
+            );
+            root.finish();
+            return None;
+        }
     }
-    layout::check_twins(&signals);
-    let sections: Vec<_> = signals
-        .into_iter()
-        .filter_map(|table| section::read(table, addressing))
-        .collect();
+    layout::check_twins(&signals, "signal");
+    layout::check_twins(&axes, "axis");
+    let (mut axes, sections) = layout::read_signals(signals, axes, addressing);
     let sizes = fieldbus
         .as_ref()
         .map(|fieldbus| fieldbus.sizes.clone())
         .unwrap_or_default();
-    let table = layout::lay_out(sections, declared, sizes);
+    let bus = fieldbus.as_mut().and_then(|fieldbus| fieldbus.bus.as_mut());
+    let table = layout::lay_out(sections, declared, sizes, bus);
+    let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
+    if let (Some(bus), Some(table)) = (bus, &table) {
+        bus.fit(table, &axes, root.collector());
+    }
     let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
     if table
         .as_ref()
@@ -212,6 +227,9 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
         );
     }
     root.finish();
+    if let Some(table) = &table {
+        axis::resolve(&mut axes, table);
+    }
     let faults = faults
         .map(|value| faults::read_sections(value.tables("[[fault]]"), table.as_ref()))
         .unwrap_or_default();
@@ -232,6 +250,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
         role: fieldbus.role,
         addressing,
         table: table?,
+        axes,
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
         faults,

@@ -54,6 +54,9 @@ impl Driver {
         if self.counters.ticks == 1 {
             self.first = (simulation_time, now);
         }
+        if let Some(reflexes) = &mut self.reflexes {
+            reflexes.sending(slots);
+        }
         if let Some(faults) = &mut self.faults {
             let tick = self.counters.ticks;
             faults.begin_tick(moment(self.first, simulation_time, now, tick), slots);
@@ -80,6 +83,9 @@ impl Driver {
                 Arrival { .. } => Code::Unchanged,
             };
             code = code.worse(station.status);
+        }
+        if let Some(reflexes) = &mut self.reflexes {
+            reflexes.received(slots);
         }
         if let Some(faults) = &mut self.faults {
             faults.received(slots);

@@ -2,7 +2,7 @@
 
 use crate::fieldbus::Role;
 use crate::image::{Directions, latched_bits};
-use crate::signal::{Area, Plan, SignalTable, Slot};
+use crate::signal::{Area, SignalTable, fail_safe_frame};
 
 /// Size in bytes of a station's area.
 pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
@@ -10,16 +10,6 @@ pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usi
         Area::Input => table.stations[station].input_bytes,
         Area::Output => table.stations[station].output_bytes,
     }
-}
-
-/// The frame that holds the fail-safe value of every signal.
-fn fail_safe_frame(table: &SignalTable, station: usize, area: Area) -> Box<[u8]> {
-    let plan = Plan::new(table, station, area);
-    let mut slots = vec![Slot::default(); table.signals.len()];
-    let mut frame = vec![0; area_bytes(table, station, area)];
-    plan.fail_safe(&mut slots);
-    plan.encode(&slots, &mut frame);
-    frame.into()
 }
 
 /// What the image of the end with `role` is made of, per station.

@@ -1,14 +1,19 @@
 //! Stations, and the rules that bind all signals of a driver.cfg together.
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 
+use crate::axis::{self, Axis};
 use crate::config::{Table, Value, did_you_mean, shown};
-use crate::signal::section::{NAME_LIMIT, STATION, Section};
-use crate::signal::{AREA_LIMIT, Area, SignalTable, Station};
+use crate::fieldbus::Options;
+use crate::signal::section::{self, NAME_LIMIT, STATION, Section};
+use crate::signal::{AREA_LIMIT, Addressing, Area, SignalTable, Station};
 
 /// The most signals of one driver.
 pub(super) const SIGNAL_LIMIT: usize = 100_000;
+
+/// The most axes of one driver; each is some fifteen signals.
+pub(super) const AXIS_LIMIT: usize = 2_000;
 
 /// The most stations of one driver.
 const STATION_LIMIT: usize = 256;
@@ -43,14 +48,41 @@ struct Declared<'a> {
     sizes: Sizes<'a>,
 }
 
+/// Reads the `[[signal]]` and the `[[axis]]` tables; signals come in the order of the file.
+pub(super) fn read_signals<'a>(
+    signals: Vec<Table<'a>>,
+    axes: Vec<Table<'a>>,
+    addressing: Addressing,
+) -> (Vec<Axis>, Vec<Section<'a>>) {
+    let mut all = Vec::new();
+    for table in signals {
+        let at = table.at();
+        all.extend(section::read(table, addressing).map(|section| (at, section)));
+    }
+    let mut read = Vec::new();
+    let mut places = axis::section::Places::default();
+    for (number, table) in axes.into_iter().enumerate() {
+        let at = table.at();
+        if let Some(axis) = axis::section::read(table, number, addressing, &mut places) {
+            read.push(axis.axis);
+            all.extend(axis.sections.into_iter().map(|section| (at, section)));
+        }
+    }
+    // Stable, so that the signals of one axis stay in their order.
+    all.sort_by_key(|(at, _)| *at);
+    (read, all.into_iter().map(|(_, section)| section).collect())
+}
+
 /// Lays the signals out over their stations and reports what does not go together.
 ///
-/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`. Answers with a table too
+/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`; `bus` reads its own keys out of the
+/// former. Answers with a table too
 /// when there were mistakes, as far as it makes sense.
 pub(super) fn lay_out<'a>(
     mut sections: Vec<Section<'a>>,
     declared: Option<Vec<Table<'a>>>,
     sizes: Sizes<'a>,
+    bus: Option<&mut Options>,
 ) -> Option<SignalTable> {
     let (stations, certain) = match declared {
         None => (
@@ -60,7 +92,7 @@ pub(super) fn lay_out<'a>(
             }],
             true,
         ),
-        Some(tables) => read_stations(tables, &sizes)?,
+        Some(tables) => read_stations(tables, &sizes, bus)?,
     };
     // A signal whose station is not known is left out of the rules about places.
     let mut placed = vec![true; sections.len()];
@@ -95,6 +127,7 @@ pub(super) fn lay_out<'a>(
 fn read_stations<'a>(
     tables: Vec<Table<'a>>,
     of_fieldbus: &Sizes<'a>,
+    mut bus: Option<&mut Options>,
 ) -> Option<(Vec<Declared<'a>>, bool)> {
     for (key, value) in [
         ("input_bytes", &of_fieldbus.input),
@@ -117,10 +150,17 @@ fn read_stations<'a>(
     let mut certain = true;
     let mut lines = HashMap::new();
     let mut stations = Vec::new();
+    let count = tables.len();
     for mut table in tables {
         let name = table.require("name", "give the station a name of its own");
         let sizes = Sizes::take(&mut table);
-        table.finish();
+        if let Some(bus) = &mut bus {
+            bus.read_station(count, &mut table);
+            table.finish();
+        } else {
+            // Which keys are right cannot be told without the bus kind.
+            table.finish_open();
+        }
         let label = name
             .as_ref()
             .and_then(|name| name.label(NAME_LIMIT, "give the station a name"));
@@ -193,8 +233,8 @@ fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -
     found
 }
 
-/// No name twice, whatever else is wrong with the signals.
-pub(super) fn check_twins(tables: &[Table<'_>]) {
+/// No name twice, whatever else is wrong with them; `what` they are, such as "signal".
+pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
     let mut first: HashMap<&str, Value<'_>> = HashMap::new();
     for table in tables {
         let Some((_, value)) = table.all().find(|(key, _)| *key == "name") else {
@@ -203,11 +243,11 @@ pub(super) fn check_twins(tables: &[Table<'_>]) {
         match value.as_text().map(|name| (name, first.entry(name))) {
             Some((name, Entry::Occupied(taken))) if !name.is_empty() => value.wrong(
                 format!(
-                    "the name \"{}\" is that of the signal on line {}",
+                    "the name \"{}\" is that of the {what} on line {}",
                     shown(name),
                     taken.get().line(),
                 ),
-                "give each signal a name of its own",
+                format!("give each {what} a name of its own"),
             ),
             Some((_, Entry::Vacant(free))) => {
                 free.insert(value);
@@ -217,8 +257,31 @@ pub(super) fn check_twins(tables: &[Table<'_>]) {
     }
 }
 
-/// No name that an edge count has.
+/// No name that an edge count has, or that a signal of an axis has.
 fn check_names(sections: &[Section<'_>]) {
+    let mut of_axes: HashMap<&str, &Section<'_>> = HashMap::new();
+    for section in sections
+        .iter()
+        .filter(|section| section.structure.is_some())
+    {
+        of_axes.insert(&section.signal.name, section);
+    }
+    for section in sections
+        .iter()
+        .filter(|section| section.structure.is_none())
+    {
+        let axis = of_axes.get(section.signal.name.as_str());
+        if let (Some(name), Some(axis)) = (&section.name, axis) {
+            name.wrong(
+                format!(
+                    "the name \"{}\" is that of a signal of the axis on line {}",
+                    shown(&section.signal.name),
+                    line_of(axis),
+                ),
+                "choose another",
+            );
+        }
+    }
     let latched: HashMap<&str, &Section<'_>> = sections
         .iter()
         .filter(|section| section.signal.latch.is_some())
@@ -252,8 +315,7 @@ fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usiz
             .map(|number| &sections[*number])
             .filter(|section| section.signal.area == area)
     };
-    let end = |section: &Section<'_>| section.signal.byte + section.signal.data_type.size_bytes();
-    let extent = in_area().map(end).max().unwrap_or(0);
+    let extent = in_area().map(Section::end).max().unwrap_or(0);
     let Some(value) = sizes.of(area) else {
         return extent;
     };
@@ -264,12 +326,19 @@ fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usiz
     else {
         return extent;
     };
-    for section in in_area().filter(|section| end(section) > stated) {
+    // An axis that does not fit is one mistake, not one per signal.
+    let mut told = HashSet::new();
+    for section in in_area().filter(|section| section.end() > stated) {
+        if let Some(structure) = section.structure
+            && !told.insert(structure.table)
+        {
+            continue;
+        }
         section.address.wrong(
             format!(
                 "{} ends at byte {}, but {area} has {stated} {} (line {})",
                 section.label(),
-                end(section) - 1,
+                section.end() - 1,
                 if stated == 1 { "byte" } else { "bytes" },
                 value.line(),
             ),
@@ -291,6 +360,8 @@ fn check_overlaps(sections: &[Section<'_>], placed: &[bool]) {
     let bits = |number: usize| sections[number].signal.address().bits();
     order.sort_by_key(|number| (group(*number), bits(*number).start, *number));
     let mut blamed = vec![false; sections.len()];
+    // An axis in the wrong place is one mistake in each area, not one per signal.
+    let mut told = HashSet::new();
     for one_area in order.chunk_by(|one, other| group(*one) == group(*other)) {
         let extent = one_area
             .iter()
@@ -301,7 +372,10 @@ fn check_overlaps(sections: &[Section<'_>], placed: &[bool]) {
         for &number in &one_area[1..] {
             if bits(number).start < bits(farthest).end {
                 let (first, later) = (number.min(farthest), number.max(farthest));
-                if !std::mem::replace(&mut blamed[later], true) {
+                let told = sections[later]
+                    .structure
+                    .is_some_and(|structure| !told.insert((structure.table, group(later))));
+                if !std::mem::replace(&mut blamed[later], true) && !told {
                     report_overlap(&sections[first], &sections[later], extent);
                 }
             }

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use crate::axis::Reflexes;
 use crate::faults::{Board, Faults};
-use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Stepped};
+use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
 use crate::plc;
 use crate::record::{Columns, Recorder, When};
@@ -35,6 +36,8 @@ pub struct Driver {
     /// Faults to inject; none for most drivers.
     pub(super) faults: Option<Box<Faults>>,
     pub(super) board: Arc<Board>,
+    /// What the axes need done on every tick; none for most drivers.
+    pub(super) reflexes: Option<Reflexes>,
     events: Consumer,
     program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
@@ -173,6 +176,10 @@ impl Driver {
             first: (Nanos::ZERO, Nanos::ZERO),
             faults: None,
             board,
+            // They are the machine's: a PLC has its own.
+            reflexes: (config.role == Role::Device)
+                .then(|| Reflexes::new(&config.axes))
+                .flatten(),
             events: tick.events,
             program,
             config,

@@ -11,8 +11,10 @@ mod role;
 mod troubles;
 
 pub mod loopback;
+pub mod modbus;
 pub mod opcua;
 pub mod plugin;
+pub mod s7;
 pub mod socket;
 pub mod tcp;
 

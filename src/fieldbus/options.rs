@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
-use super::{Role, loopback, opcua, plugin, socket};
-use crate::config::{Table, Value, did_you_mean, shown};
+use super::tcp::Address;
+use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
+use crate::axis::Axis;
+use crate::config::{Collector, Table, Value, did_you_mean, shown};
+use crate::signal::SignalTable;
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -25,10 +28,14 @@ pub const KINDS: [&str; 15] = [
 ];
 
 /// The bus kinds that this version has.
-const BUILT: [&str; 5] = [
+const BUILT: [&str; 9] = [
     "loopback",
     "socket",
     "plugin",
+    "modbus-server",
+    "modbus-client",
+    "s7-server",
+    "s7-client",
     "opcua-server",
     "opcua-client",
 ];
@@ -42,6 +49,14 @@ pub enum Options {
     Socket(socket::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
+    /// `kind = "modbus-server"`: clients of Modbus read and write the image.
+    ModbusServer(modbus::ServerOptions),
+    /// `kind = "modbus-client"`: reads and writes the tables of a Modbus server.
+    ModbusClient(modbus::ClientOptions),
+    /// `kind = "s7-server"`: clients of S7 communication read and write the image.
+    S7Server(s7::ServerOptions),
+    /// `kind = "s7-client"`: the memory of a CPU is read and written.
+    S7Client(s7::ClientOptions),
     /// `kind = "opcua-client"`: a PLC that is an OPC UA server.
     OpcuaClient(opcua::ClientOptions),
     /// `kind = "opcua-server"`: a server for PLCs that are OPC UA clients.
@@ -55,6 +70,10 @@ impl Options {
             Self::Loopback(_) => "loopback",
             Self::Socket(_) => "socket",
             Self::Plugin(_) => "plugin",
+            Self::ModbusServer(_) => "modbus-server",
+            Self::ModbusClient(_) => "modbus-client",
+            Self::S7Server(_) => "s7-server",
+            Self::S7Client(_) => "s7-client",
             Self::OpcuaClient(_) => "opcua-client",
             Self::OpcuaServer(_) => "opcua-server",
         }
@@ -66,6 +85,10 @@ impl Options {
             Self::Loopback(options) => options.events,
             Self::Socket(options) => options.events,
             Self::Plugin(options) => options.events,
+            Self::ModbusServer(options) => options.events,
+            Self::ModbusClient(options) => options.events,
+            Self::S7Server(options) => options.events,
+            Self::S7Client(options) => options.events,
             Self::OpcuaClient(options) => options.events,
             Self::OpcuaServer(options) => options.events,
         }
@@ -99,8 +122,37 @@ impl Options {
                 self.kind()
             )),
             Self::Socket(options) => options.set_address(address),
+            Self::ModbusServer(options) => options.line.set_address(address, |_| Ok(())),
+            Self::ModbusClient(options) => {
+                options.line.set_address(address, Address::check_dialled)
+            }
+            Self::S7Server(options) => options.set_address(address),
+            Self::S7Client(options) => options.set_address(address),
             Self::OpcuaClient(options) => options.set_address(address),
             Self::OpcuaServer(options) => options.set_address(address),
+        }
+    }
+
+    /// Reads the keys that the bus has in the next of `count` `[[station]]` tables.
+    pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        match self {
+            Self::ModbusServer(options) => options.stations.read_station(count, false, table),
+            Self::ModbusClient(options) => options.stations.read_station(count, true, table),
+            Self::Socket(options) => options.read_station(count, table),
+            Self::S7Server(options) => options.read_station(count, table),
+            Self::S7Client(options) => options.read_station(count, table),
+            Self::Loopback(_) | Self::Plugin(_) | Self::OpcuaClient(_) | Self::OpcuaServer(_) => {}
+        }
+    }
+
+    /// Reports what does not go together with the stations, signals and axes of the driver.
+    pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
+        match self {
+            Self::Socket(options) => options.fit(table, axes, collector),
+            Self::ModbusClient(options) => options.fit(table, collector),
+            Self::S7Server(options) => options.fit(table, collector),
+            Self::S7Client(options) => options.fit(table, collector),
+            _ => {}
         }
     }
 
@@ -116,7 +168,15 @@ impl Options {
         match known {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
+            Some("s7-server") => s7::ServerOptions::read(table).map(Self::S7Server),
+            Some("s7-client") => s7::ClientOptions::read(moved, table).map(Self::S7Client),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
+            Some("modbus-server") => {
+                modbus::ServerOptions::read(role, table).map(Self::ModbusServer)
+            }
+            Some("modbus-client") => {
+                modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
+            }
             Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
             Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
@@ -126,6 +186,18 @@ impl Options {
             }
         }
     }
+}
+
+/// Reads `events` of a bus that knows what was written: whether changes are reported as events, and whether every
+/// write is.
+pub(super) fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
+    if value.is_boolean() {
+        return value.boolean().map(|events| (events, false));
+    }
+    value.text(
+        "write true for every change, \"writes\" for every write, changed or not, or false",
+    )?;
+    value.choice("kinds of events", &[("writes", (true, true))])
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {

@@ -90,13 +90,18 @@ impl Port {
     /// Whether frames go out in the cycle at `now`. To be asked once a cycle, before
     /// [`outgoing`](Self::outgoing): an injected fault may swallow them, and what was to be sent is lost.
     pub fn sends(&mut self, now: Nanos) -> bool {
+        self.sends_of(0..self.stations(), now)
+    }
+
+    /// The same for a bus whose `stations` have a cycle of their own.
+    pub fn sends_of(&mut self, stations: Range<usize>, now: Nanos) -> bool {
         if self.is_down(now) {
             return false;
         }
         if !self.troubles.decides_to_lose_a_cycle() {
             return true;
         }
-        for station in 0..self.stations() {
+        for station in stations {
             self.outgoing(station, now);
             self.sent(station);
         }
@@ -158,13 +163,53 @@ impl Port {
         let times = match self.troubles.wires() {
             None => 1,
             Some(wires) => match wires.arrives(station, now, bytes) {
-                Fate::Lost | Fate::Held => 0,
+                Fate::Lost => {
+                    if let Some(changes) = self.changes.get_mut(station) {
+                        changes.forget();
+                    }
+                    0
+                }
+                Fate::Held => 0,
                 Fate::Passes(times) => times,
             },
         };
         for _ in 0..times {
             self.hand_in(station, now, bytes);
         }
+    }
+
+    /// Hands in a whole frame that arrived at `now` and of which the peer wrote these bits alone (bit n of byte k
+    /// is 8k + n). Where events are wanted, each signal within them is one, even if its value is the same.
+    ///
+    /// # Panics
+    ///
+    /// When the frame has not the station's size.
+    pub fn received_part(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        bytes: &[u8],
+        written: Range<usize>,
+    ) {
+        self.received_parts(station, now, bytes, [written]);
+    }
+
+    /// As [`received_part`](Self::received_part), for a peer that wrote several ranges of bits at once.
+    ///
+    /// # Panics
+    ///
+    /// When the frame has not the station's size.
+    pub fn received_parts(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        bytes: &[u8],
+        written: impl IntoIterator<Item = Range<usize>>,
+    ) {
+        if let Some(changes) = self.changes.get_mut(station) {
+            written.into_iter().for_each(|bits| changes.written(bits));
+        }
+        self.received(station, now, bytes);
     }
 
     fn hand_in(&mut self, station: usize, now: Nanos, bytes: &[u8]) {

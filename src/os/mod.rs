@@ -6,6 +6,7 @@ mod log;
 mod own_file;
 mod poll;
 mod poll_set;
+mod serial;
 #[cfg(unix)]
 mod shared_memory;
 
@@ -15,5 +16,8 @@ pub use log::log_to_stderr;
 pub use own_file::own_file;
 pub use poll::{Interest, Poller, Source};
 pub use poll_set::{PollSet, Ready};
+#[cfg(unix)]
+pub use serial::SerialPort;
+pub use serial::{Parity, SerialSettings};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;

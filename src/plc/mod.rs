@@ -10,17 +10,21 @@ use std::sync::Arc;
 use crate::signal::{Addressing, SignalTable};
 use crate::time::Nanos;
 
+mod axes;
 mod drum;
 mod hosted;
 mod mirror;
+mod peeler;
 mod reaction;
 
 pub mod blocks;
 pub mod rig;
 
+pub use axes::Axes;
 pub use drum::Drum;
 pub use hosted::Hosted;
 pub use mirror::Mirror;
+pub use peeler::{Charger, Lathe};
 pub use reaction::Reaction;
 pub use rig::{La1Code, Rig};
 
@@ -96,7 +100,13 @@ pub trait Report: Send + Sync + std::fmt::Debug {
 }
 
 /// The names that [`program`] knows.
-pub const PROGRAMS: [&str; 3] = [Rig::NAME, Mirror::NAME, Reaction::NAME];
+pub const PROGRAMS: [&str; 5] = [
+    Rig::NAME,
+    Mirror::NAME,
+    Reaction::NAME,
+    Charger::NAME,
+    Lathe::NAME,
+];
 
 /// Why [`program`] gave none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -142,6 +152,16 @@ pub enum ProgramError {
         /// The path of its file.
         program: String,
         /// What is wrong with it.
+        what: String,
+        /// What would be right.
+        right: String,
+    },
+    /// The program cannot work on the image of this driver.
+    #[error("the PLC program \"{program}\" {what}; {right}")]
+    Unfit {
+        /// The program.
+        program: String,
+        /// What it misses.
         what: String,
         /// What would be right.
         right: String,
@@ -209,6 +229,8 @@ pub fn program_beside(
         Rig::NAME => Ok(Box::new(Rig::from_options(options)?)),
         Mirror::NAME => Ok(Box::new(Mirror::new(options)?)),
         Reaction::NAME => Ok(Box::new(Reaction::from_options(options)?)),
+        Charger::NAME => Ok(Box::new(Charger::from_options(options)?)),
+        Lathe::NAME => Ok(Box::new(Lathe::from_options(options)?)),
         _ => Err(ProgramError::UnknownName {
             name: name.to_owned(),
         }),
@@ -265,8 +287,8 @@ mod tests {
     fn refusals_name_what_would_be_right() {
         assert_eq!(
             refusal("rigg", &[]),
-            "no PLC program is called \"rigg\"; the built-in programs are \"rig\", \"mirror\" \
-             and \"reaction\""
+            "no PLC program is called \"rigg\"; the built-in programs are \"rig\", \"mirror\", \
+             \"reaction\", \"charger\" and \"lathe\""
         );
         assert_eq!(
             refusal("mirror", &[("speed", "fast")]),

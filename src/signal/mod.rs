@@ -11,7 +11,7 @@ mod types;
 
 pub use address::{AREA_LIMIT, Address, AddressError, Addressing, Area, Width};
 pub use order::ByteOrder;
-pub use plan::{Conversions, Plan};
+pub use plan::{Conversions, Plan, fail_safe_frame};
 pub use scale::Scale;
 pub use slot::Slot;
 pub use table::{Latch, Signal, SignalTable, Station};

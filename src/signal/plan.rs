@@ -24,6 +24,16 @@ pub struct Conversions {
     pub not_a_number: u32,
 }
 
+/// The frame of `area` of the station with index `station` that holds the fail-safe value of every signal.
+pub fn fail_safe_frame(table: &SignalTable, station: usize, area: Area) -> Box<[u8]> {
+    let plan = Plan::new(table, station, area);
+    let mut slots = vec![Slot::default(); table.signals.len()];
+    let mut frame = vec![0; table.stations[station].bytes(area)];
+    plan.fail_safe(&mut slots);
+    plan.encode(&slots, &mut frame);
+    frame.into()
+}
+
 /// The way between slots and one frame (one area of one station).
 ///
 /// A raw number is (value − offset) / gain where the signal has a scale, the value itself where it

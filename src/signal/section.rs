@@ -25,9 +25,27 @@ pub struct Section<'a> {
     pub address: Value<'a>,
     /// The station that it names.
     pub station: Option<Value<'a>>,
+    /// The structure that it is one of many signals of.
+    pub structure: Option<Structure>,
+}
+
+/// A structure in the image that one table of the driver.cfg stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Structure {
+    /// Which table: the `[[axis]]` tables count from 0.
+    pub table: usize,
+    /// The first byte behind the structure, reserved ones included.
+    pub end: usize,
 }
 
 impl Section<'_> {
+    /// The first byte behind it, or behind the structure that it is a part of.
+    pub fn end(&self) -> usize {
+        let signal = &self.signal;
+        let own = signal.byte + signal.data_type.size_bytes();
+        self.structure.map_or(own, |structure| structure.end)
+    }
+
     /// The signal as a message names it.
     pub fn label(&self) -> String {
         let Signal { name, .. } = &self.signal;
@@ -130,6 +148,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         name: name.map(|(_, value)| value),
         address,
         station,
+        structure: None,
     })
 }
 
@@ -151,7 +170,7 @@ fn check_shapes(
 }
 
 /// A name: some printable characters, not one that tickbus keeps for itself.
-fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
+pub fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
     let name = value.label(NAME_LIMIT, "give the signal a name of its own")?;
     if name.starts_with("bus.") {
         value.wrong(
@@ -163,7 +182,8 @@ fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
     Some(name)
 }
 
-fn address_of(value: &Value<'_>, addressing: Addressing) -> Option<Address> {
+/// An address, such as `%QX1.0`.
+pub fn address_of(value: &Value<'_>, addressing: Addressing) -> Option<Address> {
     let text = value.text("write an address in quotes, such as \"%QX1.0\"")?;
     Address::parse(text, addressing)
         .map_err(|error| value.wrong(error.what, error.right))
@@ -290,7 +310,8 @@ fn fitting_hold(value: &Value<'_>, hold: Nanos, signal: &Signal, latched: bool) 
     None
 }
 
-fn dead_band_of(value: &Value<'_>) -> Option<f64> {
+/// A dead band: a number that is not negative.
+pub fn dead_band_of(value: &Value<'_>) -> Option<f64> {
     const RIGHT: &str = "write how far the value may move without being sent, such as 0.5";
     let number = value.number(RIGHT)?;
     if number < 0.0 {
@@ -314,7 +335,11 @@ fn fitting_dead_band(value: &Value<'_>, band: f64, data_type: DataType) -> Optio
     Some(band)
 }
 
-fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
+/// What is right where two numbers stand.
+const PAIR: &str = "write two numbers, such as [0, 27648]";
+
+/// A linear scale for raw values of `data_type`.
+pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     const SHAPE: &str = "write scale = { raw = [0, 27648], value = [0.0, 250.0] }";
     if data_type == DataType::Bool {
         value.wrong("a BOOL cannot be scaled", "remove \"scale\"");
@@ -325,7 +350,7 @@ fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     let engineering = table.require("value", SHAPE);
     table.finish();
     let (raw, engineering) = (raw?, engineering?);
-    let (raw_pair, pair) = (pair_of(&raw), pair_of(&engineering));
+    let (raw_pair, pair) = (pair_of(&raw, PAIR), pair_of(&engineering, PAIR));
     let raw_pair = raw_pair?;
     for (number, element) in &raw_pair {
         if !fits_raw(*number, data_type) {
@@ -370,15 +395,15 @@ fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     None
 }
 
-fn pair_of<'a>(value: &Value<'a>) -> Option<[(f64, Value<'a>); 2]> {
-    const SHAPE: &str = "write two numbers, such as [0, 27648]";
-    let list = value.list(SHAPE)?;
+/// A list of two numbers, each with where it stands; `right` says what one looks like.
+pub fn pair_of<'a>(value: &Value<'a>, right: &str) -> Option<[(f64, Value<'a>); 2]> {
+    let list = value.list(right)?;
     let length = list.len();
     let Ok([first, second]) = <[Value<'a>; 2]>::try_from(list) else {
-        value.wrong(format!("this list has {length} elements"), SHAPE);
+        value.wrong(format!("this list has {length} elements"), right);
         return None;
     };
-    let numbers = (first.number(SHAPE), second.number(SHAPE));
+    let numbers = (first.number(right), second.number(right));
     Some([(numbers.0?, first), (numbers.1?, second)])
 }
 

@@ -9,57 +9,90 @@ use super::Nanos;
 /// The shortest span that is told from others, in nanoseconds.
 const SHORTEST: u64 = 100;
 /// The longest: an hour. Longer ones count as this.
-const LONGEST: u64 = 3_600_000_000_000;
+const LONGEST: i64 = 3_600_000_000_000;
 /// Significant decimal digits of what is read out.
 const DIGITS: u8 = 2;
 
-/// A histogram of time spans, from 100 ns to an hour, good to 1 %.
+/// A histogram of time spans, from 100 ns to an hour, good to 1 %; their mean, their scatter and the shortest one are
+/// exact.
 ///
 /// Its size is fixed, some 15 kB; recording allocates nothing.
 #[derive(Clone, Debug)]
-pub struct Spans(Histogram<u32>);
+pub struct Spans {
+    histogram: Histogram<u32>,
+    shortest: Nanos,
+    mean: f64,
+    /// Sum of the squared distances from the mean, kept up as Welford does.
+    squares: f64,
+}
 
 impl Spans {
     /// An empty histogram.
     pub fn new() -> Self {
-        let histogram = Histogram::new_with_bounds(SHORTEST, LONGEST, DIGITS);
-        Self(histogram.expect("constant bounds that hdrhistogram takes"))
+        let histogram = Histogram::new_with_bounds(SHORTEST, LONGEST.unsigned_abs(), DIGITS);
+        Self {
+            histogram: histogram.expect("constant bounds that hdrhistogram takes"),
+            shortest: Nanos::MAX,
+            mean: 0.0,
+            squares: 0.0,
+        }
     }
 
     /// Counts one span; one below zero counts as zero.
     pub fn record(&mut self, span: Nanos) {
-        self.0.saturating_record(u64::try_from(span.0).unwrap_or(0));
+        let nanos = span.0.clamp(0, LONGEST);
+        self.histogram.saturating_record(nanos.unsigned_abs());
+        self.shortest = self.shortest.min(Nanos(nanos));
+        let off = as_float(nanos.unsigned_abs()) - self.mean;
+        self.mean += off / as_float(self.count());
+        self.squares += off * (as_float(nanos.unsigned_abs()) - self.mean);
     }
 
     /// How many spans were counted.
     pub fn count(&self) -> u64 {
-        self.0.len()
+        self.histogram.len()
     }
 
     /// The span that a share of all spans does not exceed: 0.5 gives the median. Zero if there are none.
     pub fn quantile(&self, share: f64) -> Nanos {
-        Nanos(i64::try_from(self.0.value_at_quantile(share)).unwrap_or(i64::MAX))
+        Nanos(i64::try_from(self.histogram.value_at_quantile(share)).unwrap_or(i64::MAX))
     }
 
     /// The mean in nanoseconds; zero if there are none.
     pub fn mean(&self) -> f64 {
-        self.0.mean()
+        self.mean
+    }
+
+    /// The standard deviation in nanoseconds; zero if there are none.
+    pub fn deviation(&self) -> f64 {
+        if self.count() == 0 {
+            return 0.0;
+        }
+        (self.squares / as_float(self.count())).sqrt()
+    }
+
+    /// The shortest span; zero if there are none.
+    pub fn shortest(&self) -> Nanos {
+        if self.count() == 0 {
+            return Nanos::ZERO;
+        }
+        self.shortest
     }
 
     /// The longest span.
     pub fn longest(&self) -> Nanos {
-        Nanos(i64::try_from(self.0.max()).unwrap_or(i64::MAX))
+        Nanos(i64::try_from(self.histogram.max()).unwrap_or(i64::MAX))
     }
 
     /// Each step of the histogram that has any spans: the longest that it takes, and how many there are.
     pub fn steps(&self) -> impl Iterator<Item = (Nanos, u64)> + '_ {
-        self.0.iter_recorded().map(|step| {
+        self.histogram.iter_recorded().map(|step| {
             let longest = i64::try_from(step.value_iterated_to()).unwrap_or(i64::MAX);
             (Nanos(longest), step.count_since_last_iteration())
         })
     }
 
-    /// Appends `key.count`, and if there are any, `key.p50_us`, `p90`, `p99`, `max` and `mean`, one
+    /// Appends `key.count`, and if there are any, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and `stdev`, one
     /// `key=value` a line, in microseconds.
     pub fn write(&self, key: &str, text: &mut String) {
         self.write_in(key, Nanos::from_micros(1), "_us", text);
@@ -80,6 +113,9 @@ impl Spans {
         let _ = writeln!(text, "{key}.max{suffix}={:.1}", units(self.longest()));
         let mean = self.mean() / 1e3 / unit.as_micros();
         let _ = writeln!(text, "{key}.mean{suffix}={mean:.1}");
+        let _ = writeln!(text, "{key}.min{suffix}={:.1}", units(self.shortest()));
+        let deviation = self.deviation() / 1e3 / unit.as_micros();
+        let _ = writeln!(text, "{key}.stdev{suffix}={deviation:.1}");
     }
 
     /// The distribution for people: twelve rows at most, each longer than the one before by the same factor,
@@ -116,6 +152,12 @@ impl Spans {
     }
 }
 
+/// Counts and spans here are far below 2^53.
+#[expect(clippy::cast_precision_loss, reason = "an hour has 3.6e12 nanoseconds")]
+fn as_float(number: u64) -> f64 {
+    number as f64
+}
+
 impl Default for Spans {
     fn default() -> Self {
         Self::new()
@@ -138,6 +180,31 @@ mod tests {
         }
         assert_eq!(spans.count(), 1000);
         assert_eq!(spans.steps().map(|(_, count)| count).sum::<u64>(), 1000);
+    }
+
+    #[test]
+    fn mean_scatter_and_the_shortest_are_exact() {
+        let mut spans = Spans::new();
+        assert_eq!(
+            (spans.shortest(), spans.mean(), spans.deviation()),
+            (Nanos::ZERO, 0.0, 0.0)
+        );
+        for micros in [9_999, 10_001, 10_000, 10_004] {
+            spans.record(Nanos::from_micros(micros));
+        }
+        assert_eq!(spans.shortest(), Nanos::from_micros(9_999));
+        assert!((spans.mean() - 10_001_000.0).abs() < 1e-3);
+        assert!(
+            (spans.deviation() - 3.5_f64.sqrt() * 1e3).abs() < 1e-3,
+            "{}",
+            spans.deviation()
+        );
+        let mut text = String::new();
+        spans.write("age", &mut text);
+        assert!(
+            text.contains("age.min_us=9999.0\nage.stdev_us=1.9\n"),
+            "{text}"
+        );
     }
 
     #[test]

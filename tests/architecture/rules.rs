@@ -8,6 +8,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["os"],
     &["config"],
     &["signal"],
+    &["axis"],
     &["faults"],
     &["image"],
     &["record"],
@@ -15,6 +16,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["plc"],
     &["fieldbus"],
     &["driver"],
+    &["export", "import"],
     &["testing"],
     &["jni", "cli"],
 ];

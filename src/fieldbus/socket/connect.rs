@@ -6,7 +6,7 @@ use crate::os::Poller;
 use crate::time::Stop;
 
 use super::connection::Connection;
-use super::{Comparison, Terms};
+use super::{Frames, Terms};
 
 /// Connects, and serves the connection until it ends or `stop` does.
 ///
@@ -16,7 +16,7 @@ use super::{Comparison, Terms};
 pub(super) fn connect(
     address: &Address,
     terms: Terms,
-    comparison: &mut Comparison,
+    frames: &mut Frames,
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
@@ -28,9 +28,13 @@ pub(super) fn connect(
         "connected with {peer}; waiting for its first record"
     ));
     let mut connection = Connection::new(stream, peer, terms, port)?;
+    frames.begin();
     let mut ready = (false, false);
     while !stop.is_stopped() {
-        connection.turn(ready, port, comparison)?;
+        connection.turn(ready, port, frames)?;
+        if let Some(news) = connection.news() {
+            port.running(&news);
+        }
         let mut sources = [connection.source()];
         poller
             .wait(

@@ -8,7 +8,7 @@ use crate::fieldbus::{BusError, Port};
 use crate::os::{Interest, Source};
 use crate::time::Nanos;
 
-use super::{Comparison, Session, Terms};
+use super::{Frames, Session, Terms};
 
 /// So many times the socket is read at most before something else is looked at.
 const READS: usize = 64;
@@ -19,7 +19,7 @@ pub(super) struct Connection {
     stream: TcpStream,
     peer: SocketAddr,
     session: Session,
-    /// Whether the port knows that the peer is there.
+    /// Whether it was told that the peer is there.
     announced: bool,
     /// How many skipped cycles the port knows of.
     skipped: u64,
@@ -82,17 +82,17 @@ impl Connection {
         &mut self,
         (readable, writable): (bool, bool),
         port: &mut Port,
-        comparison: &mut Comparison,
+        frames: &mut Frames,
     ) -> Result<(), BusError> {
         let now = port.clock().now();
         if readable {
-            self.read(now, port)?;
+            self.read(now, port, frames)?;
         }
-        self.send(now, writable, port, comparison)?;
+        self.send(now, writable, port, frames)?;
         self.session
             .check(now)
             .map_err(|fault| fault.of(self.peer))?;
-        self.report(now, port);
+        self.report(now, port, frames);
         Ok(())
     }
 
@@ -101,10 +101,14 @@ impl Connection {
     /// # Errors
     ///
     /// The peer has closed, or the connection broke.
-    pub(super) fn read_all(&mut self, port: &mut Port) -> Result<(), BusError> {
+    pub(super) fn read_all(
+        &mut self,
+        port: &mut Port,
+        frames: &mut Frames,
+    ) -> Result<(), BusError> {
         let now = port.clock().now();
         for _ in 0..READS {
-            if !self.read(now, port)? {
+            if !self.read(now, port, frames)? {
                 break;
             }
         }
@@ -112,7 +116,7 @@ impl Connection {
     }
 
     /// Reads once; tells whether there was anything.
-    fn read(&mut self, now: Nanos, port: &mut Port) -> Result<bool, BusError> {
+    fn read(&mut self, now: Nanos, port: &mut Port, frames: &mut Frames) -> Result<bool, BusError> {
         let count = match self.stream.read(self.session.space()) {
             Ok(0) => return Err(self.session.left().of(self.peer)),
             Ok(count) => count,
@@ -120,12 +124,10 @@ impl Connection {
             Err(error) => return Err(self.broken(&error)),
         };
         self.session.arrived(now, count);
-        while let Some(mut record) = self.session.take() {
-            for station in 0..port.stations() {
-                let (frame, rest) = record.split_at(port.sizes(station).1);
-                port.received(station, now, frame);
-                record = rest;
-            }
+        while let Some(record) = self.session.take() {
+            frames
+                .received(now, record, port)
+                .map_err(|what| BusError::Protocol(format!("of {}, {what}", self.peer)))?;
         }
         Ok(true)
     }
@@ -136,21 +138,16 @@ impl Connection {
         now: Nanos,
         writable: bool,
         port: &mut Port,
-        comparison: &mut Comparison,
+        frames: &mut Frames,
     ) -> Result<(), BusError> {
         let mut may_write = writable || self.session.to_write().is_empty();
         loop {
-            if let Some(mut space) = self.session.due(now)
-                && port.sends(now)
+            if let Some(space) = self.session.due(now)
+                && port.sends_of(frames.stations(), now)
             {
-                for station in 0..port.stations() {
-                    let frame = port.outgoing(station, now);
-                    let (place, rest) = space.split_at_mut(frame.len());
-                    place.copy_from_slice(frame);
-                    space = rest;
-                }
+                frames.fill(now, space, port);
                 self.session
-                    .made(now, |before, now| comparison.differ(before, now));
+                    .made(now, |before, now| frames.differ(before, now));
             }
             let rest = self.session.to_write();
             if rest.is_empty() || !may_write {
@@ -159,7 +156,7 @@ impl Connection {
             match self.stream.write(rest) {
                 Ok(count) => {
                     if self.session.wrote(count) {
-                        (0..port.stations()).for_each(|station| port.sent(station));
+                        frames.sent(port);
                     } else {
                         may_write = false;
                     }
@@ -170,17 +167,22 @@ impl Connection {
         }
     }
 
+    /// What is to be told of the connection, once: that the peer is there.
+    pub(super) fn news(&mut self) -> Option<String> {
+        if self.announced || !self.session.has_heard() {
+            return None;
+        }
+        self.announced = true;
+        Some(format!("connected with {}", self.peer))
+    }
+
     /// Lets the port know how the connection is doing.
-    fn report(&mut self, now: Nanos, port: &mut Port) {
-        for station in 0..port.stations() {
+    fn report(&mut self, now: Nanos, port: &mut Port, frames: &Frames) {
+        for station in frames.stations() {
             // Who has nothing to say is alive for as long as the connection stands.
             if port.sizes(station).1 == 0 {
                 port.touch(station, now);
             }
-        }
-        if !self.announced && self.session.has_heard() {
-            self.announced = true;
-            port.running(&format!("connected with {}", self.peer));
         }
         while self.skipped < self.session.skipped() {
             self.skipped += 1;

@@ -1,4 +1,4 @@
-//! The end that waits for connections and serves one at a time.
+//! The end that waits for connections: one peer at a time for each address that it listens on.
 
 use std::net::{SocketAddr, TcpListener};
 
@@ -8,46 +8,116 @@ use crate::os::{Interest, Poller, Source};
 use crate::time::{Nanos, Stop};
 
 use super::connection::Connection;
-use super::{Comparison, Terms};
+use super::lines::Lines;
+use super::{Frames, Terms};
 
 /// For how long nobody is accepted beside the served one after the system could not.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// Serves one client after the other until `stop`. The listener stays while clients come and go.
+/// What is served at one address.
+#[derive(Debug)]
+pub(super) struct Place<'a> {
+    pub(super) address: &'a Address,
+    /// The name of its station; empty where one address serves all.
+    pub(super) name: String,
+    pub(super) terms: Terms,
+    pub(super) frames: &'a mut Frames,
+}
+
+/// Serves one client after the other at each of the `places` until `stop`. The listeners stay while clients come
+/// and go.
 ///
 /// # Errors
 ///
-/// The address cannot be listened on, or the system gives no more sockets.
-pub(super) fn listen(
-    address: &Address,
-    terms: Terms,
-    comparison: &mut Comparison,
-    port: &mut Port,
-    stop: &Stop,
-) -> Result<(), BusError> {
-    let Some((listener, bound)) = tcp::listen(address, port, stop)? else {
-        return Ok(());
-    };
-    let mut server = Server {
-        listener,
-        waiting: format!("listening on {bound}"),
-        terms,
-        served: None,
-        deaf_until: Nanos(i64::MIN),
-        told: false,
-    };
-    port.opening(&server.waiting);
+/// An address cannot be listened on, or the system gives no more sockets.
+pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+    let mut lines = Lines::new(places.iter().map(|place| place.name.clone()));
+    let mut servers = Vec::new();
+    for (line, place) in places.into_iter().enumerate() {
+        let Some((listener, bound)) = tcp::listen(place.address, port, stop)? else {
+            return Ok(());
+        };
+        servers.push(Server {
+            line,
+            listener,
+            bound,
+            waiting: format!("listening on {bound}"),
+            terms: place.terms,
+            frames: place.frames,
+            served: None,
+            deaf_until: Nanos(i64::MIN),
+            told: false,
+        });
+    }
+    let bound: Vec<String> = servers
+        .iter()
+        .map(|server| server.bound.to_string())
+        .collect();
+    port.tell("address", &bound.join(" "));
+    for server in &servers {
+        lines.opening(server.line, &server.waiting, port);
+    }
     let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
     while !stop.is_stopped() {
-        server.turn(&mut poller, comparison, port)?;
+        turn(&mut servers, &mut lines, &mut poller, port)?;
     }
     Ok(())
 }
 
-struct Server {
+/// Waits for all servers, and lets each do what there is to do.
+fn turn(
+    servers: &mut [Server<'_>],
+    lines: &mut Lines,
+    poller: &mut Poller,
+    port: &mut Port,
+) -> Result<(), BusError> {
+    let now = port.clock().now();
+    let mut deadline = Nanos::MAX;
+    let mut sources = Vec::with_capacity(2 * servers.len());
+    for server in &*servers {
+        if let Some(served) = &server.served {
+            deadline = deadline.min(served.deadline()).min(port.due());
+            sources.push(served.source());
+        }
+        if server.is_deaf(now) {
+            deadline = deadline.min(server.deaf_until);
+        } else {
+            sources.push(Source::new(&server.listener, Interest::Read));
+        }
+    }
+    poller
+        .wait(&**port.clock(), deadline, &mut sources)
+        .map_err(|error| no_wait(&error))?;
+    let mut ready = sources
+        .iter()
+        .map(|source| (source.is_readable(), source.is_writable()));
+    let ready: Vec<(Option<(bool, bool)>, bool)> = servers
+        .iter()
+        .map(|server| {
+            let served = server.served.as_ref().and_then(|_| ready.next());
+            let knocked = !server.is_deaf(now) && ready.next().is_some_and(|ready| ready.0);
+            (served, knocked)
+        })
+        .collect();
+    for (server, (ready, knocked)) in servers.iter_mut().zip(ready) {
+        if let Some(ready) = ready {
+            server.serve(ready, knocked, lines, port);
+        }
+        if knocked {
+            server.accept(lines, port)?;
+        }
+    }
+    Ok(())
+}
+
+struct Server<'a> {
+    /// Its number among the lines.
+    line: usize,
     listener: TcpListener,
+    bound: SocketAddr,
     waiting: String,
     terms: Terms,
+    frames: &'a mut Frames,
     served: Option<Connection>,
     /// Until when nobody is accepted beside the served one, after the system could not.
     deaf_until: Nanos,
@@ -55,53 +125,35 @@ struct Server {
     told: bool,
 }
 
-impl Server {
-    fn turn(
-        &mut self,
-        poller: &mut Poller,
-        comparison: &mut Comparison,
-        port: &mut Port,
-    ) -> Result<(), BusError> {
-        let knocked = match &mut self.served {
-            None => {
-                let mut sources = [Source::new(&self.listener, Interest::Read)];
-                poller
-                    .wait(&**port.clock(), Nanos::MAX, &mut sources)
-                    .map_err(|error| no_wait(&error))?;
-                sources[0].is_readable()
-            }
-            Some(served) => {
-                let clock = port.clock();
-                let mut deadline = served.deadline().min(port.due());
-                let mut sources = [served.source(), Source::new(&self.listener, Interest::Read)];
-                let mut sources = &mut sources[..];
-                if clock.now() < self.deaf_until {
-                    deadline = deadline.min(self.deaf_until);
-                    sources = &mut sources[..1];
-                }
-                poller
-                    .wait(&**clock, deadline, sources)
-                    .map_err(|error| no_wait(&error))?;
-                let ready = (sources[0].is_readable(), sources[0].is_writable());
-                let knocked = sources.get(1).is_some_and(Source::is_readable);
-                let mut turned = served.turn(ready, port, comparison);
-                if turned.is_ok() && knocked {
-                    // Whoever knocks may be the served one, back again: all of its farewell has to be
-                    // read before the newcomer is judged.
-                    turned = served.read_all(port);
-                }
-                if let Err(error) = turned {
-                    self.served = None;
-                    port.lost(&error, &self.waiting);
-                }
-                knocked
-            }
+impl Server<'_> {
+    fn is_deaf(&self, now: Nanos) -> bool {
+        self.served.is_some() && now < self.deaf_until
+    }
+
+    /// Lets the connection do what there is to do.
+    fn serve(&mut self, ready: (bool, bool), knocked: bool, lines: &mut Lines, port: &mut Port) {
+        let Some(served) = &mut self.served else {
+            return;
         };
-        if knocked { self.accept(port) } else { Ok(()) }
+        let mut turned = served.turn(ready, port, self.frames);
+        if turned.is_ok()
+            && let Some(news) = served.news()
+        {
+            lines.running(self.line, &news, port);
+        }
+        if turned.is_ok() && knocked {
+            // Whoever knocks may be the served one, back again: all of its farewell has to be
+            // read before the newcomer is judged.
+            turned = served.read_all(port, self.frames);
+        }
+        if let Err(error) = turned {
+            self.served = None;
+            lines.lost(self.line, &error, &self.waiting, port);
+        }
     }
 
     /// Takes the next client from the queue: serves it, or turns it away.
-    fn accept(&mut self, port: &mut Port) -> Result<(), BusError> {
+    fn accept(&mut self, lines: &mut Lines, port: &mut Port) -> Result<(), BusError> {
         let now = port.clock().now();
         let (stream, peer) = match self.listener.accept() {
             Ok(accepted) => accepted,
@@ -133,13 +185,13 @@ impl Server {
                 silence.rounded()
             ));
             self.served = None;
-            port.lost(&error, &format!("{peer} takes its place"));
+            lines.lost(self.line, &error, &format!("{peer} takes its place"), port);
         }
         match Connection::new(stream, peer, self.terms, port) {
             Ok(connection) => {
-                port.opening(&format!(
-                    "{peer} has connected; waiting for its first record"
-                ));
+                let reason = format!("{peer} has connected; waiting for its first record");
+                lines.opening(self.line, &reason, port);
+                self.frames.begin();
                 self.served = Some(connection);
                 self.told = false;
             }

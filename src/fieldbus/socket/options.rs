@@ -1,8 +1,10 @@
 //! What a driver.cfg says to the socket bus.
 
-use crate::config::{Table, Value};
+use crate::axis::Axis;
+use crate::config::{Collector, Table, Value};
 use crate::fieldbus::Role;
 use crate::fieldbus::tcp::{Address, AddressError};
+use crate::signal::SignalTable;
 use crate::time::Nanos;
 
 use super::Sending;
@@ -19,11 +21,33 @@ pub enum TcpRole {
     Connect,
 }
 
+/// What one record or message has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Message {
+    /// The whole image of one direction.
+    #[default]
+    Image,
+    /// One axis, behind its number.
+    Axis {
+        /// Where the file says so, as a byte offset.
+        at: usize,
+    },
+}
+
+/// The most stations that have an address each: as many sockets as a bus waits for.
+const STATIONS: usize = 3;
+
 /// What a driver.cfg says to the socket bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Where to listen, or what to connect to.
     pub address: Address,
+    /// Where to listen for the peer of each station; empty where one peer has them all.
+    pub stations: Vec<Address>,
+    /// How many `[[station]]` tables were read.
+    tables: usize,
+    /// What one record or message has.
+    pub message: Message,
     /// Who makes the connection.
     pub tcp: TcpRole,
     /// When a record goes out.
@@ -45,11 +69,16 @@ impl Options {
             .parse()
             .map_err(|why: AddressError| why.to_string())?;
         check_port(&address, self.tcp).map_err(|why| why.to_string())?;
+        if !self.stations.is_empty() {
+            return Err(format!(
+                "each station has an address of its own; write \"{address}\" into its [[station]]"
+            ));
+        }
         self.address = address;
         Ok(())
     }
 
-    /// Reads `address`, `role_tcp`, `send`, `min_interval` and `events`. `moved` says that
+    /// Reads `address`, `role_tcp`, `send`, `min_interval`, `events` and `message`. `moved` says that
     /// [`set_address`](Self::set_address) follows.
     pub(in crate::fieldbus) fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
         let address = table.take("address");
@@ -57,6 +86,7 @@ impl Options {
         let send = table.take("send");
         let min_interval = table.take("min_interval");
         let events = table.take("events");
+        let message = table.take("message");
         let whole = table.is_whole();
         table.finish();
 
@@ -94,13 +124,76 @@ impl Options {
             );
         }
         let events = events.map_or(Some(false), |value| value.boolean());
+        let message = message.map_or(Some(Message::Image), |value| {
+            let axis = Message::Axis { at: value.at() };
+            value.choice("messages", &[("image", Message::Image), ("axis", axis)])
+        });
         Some(Self {
             address: read?,
+            stations: Vec::new(),
+            tables: 0,
+            message: message?,
             tcp: tcp?,
             sending: sending?,
             min_interval: least?,
             events: events?,
         })
+    }
+}
+
+impl Options {
+    /// Reads `address` in the next of `count` `[[station]]` tables.
+    pub(in crate::fieldbus) fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        const ALL: &str = "give each station an address, or none of them";
+        self.tables += 1;
+        let Some(value) = table.take("address") else {
+            if !self.stations.is_empty() {
+                table.wrong("this [[station]] has no \"address\", and others have", ALL);
+            }
+            return;
+        };
+        if self.stations.is_empty() && self.tables > 1 {
+            value.wrong("this station has an \"address\", and others have none", ALL);
+        } else if self.tcp == TcpRole::Connect {
+            value.wrong(
+                "a station has an \"address\", but this end connects",
+                "only an end that listens serves several peers; write a driver.cfg for each PLC",
+            );
+        } else if count > STATIONS {
+            value.wrong(
+                format!("there are {count} stations"),
+                format!("at most {STATIONS} have an address each; write several driver.cfg"),
+            );
+        }
+        self.stations.extend(Address::read(&value));
+    }
+
+    /// Reports what does not go together with the stations and axes of the driver.
+    pub(in crate::fieldbus) fn fit(
+        &self,
+        table: &SignalTable,
+        axes: &[Axis],
+        collector: &Collector<'_>,
+    ) {
+        let Message::Axis { at } = self.message else {
+            return;
+        };
+        if axes.is_empty() {
+            collector.report(
+                at,
+                "message = \"axis\", but there is no axis",
+                "write [[axis]] tables, or remove it",
+            );
+        } else if table.stations.len() > 1 {
+            collector.report(
+                at,
+                format!(
+                    "message = \"axis\", but there are {} stations",
+                    table.stations.len()
+                ),
+                "write a driver.cfg for each of them",
+            );
+        }
     }
 }
 

@@ -229,13 +229,12 @@ fn fields(options: &ClientOptions, line: Line<'_>) -> Result<Vec<Field>, String>
     }
     let mut taken: HashMap<NodeName, &str> = HashMap::new();
     let field = |signal: &'_ crate::signal::Signal| {
-        let node = match options.nodes.get(&signal.name) {
-            Some(node) => node.clone(),
-            None => {
-                let station = &line.table.stations[signal.station].name;
-                let made = options.node_pattern.node(&signal.name, station);
-                made.map_err(|error| format!("signal \"{}\": {error}", signal.name))?
-            }
+        let node = if let Some(node) = options.nodes.get(&signal.name) {
+            node.clone()
+        } else {
+            let station = &line.table.stations[signal.station].name;
+            let made = options.node_pattern.node(&signal.name, station);
+            made.map_err(|error| format!("signal \"{}\": {error}", signal.name))?
         };
         Ok(Field {
             name: signal.name.clone(),

@@ -6,6 +6,7 @@ import java.util.Map;
 import java.util.function.Supplier;
 import tickbus.simulator.control.ControlTableException;
 import tickbus.simulator.control.TransferFunctions;
+import tickbus.simulator.peeler.Peeler;
 import tickbus.simulator.rig.Rig;
 import tickbus.simulator.text.Durations;
 
@@ -23,7 +24,7 @@ public final class Main {
 
               --drivers DIR    the DeviceDriver folder: driver jars, and one .cfg file per driver
               --control FILE   control table that connects hardware components and machine
-              --machine NAME   rig (default), or none: only link drivers with one another
+              --machine NAME   rig (default), peeler, or none: only link drivers with one another
               --step TIME      simulation step size (default 2ms)
               --mode MODE      real-time (default), or best-effort: as fast as possible
               --duration TIME  how much simulation time to run (default: until Ctrl-C)
@@ -36,7 +37,8 @@ public final class Main {
             Transfer functions:
             """;
 
-    private static final Map<String, Supplier<Machine>> MACHINES = Map.of("rig", Rig::new, "none", NoMachine::new);
+    private static final Map<String, Supplier<Machine>> MACHINES = Map.of("rig", Rig::new, "peeler", Peeler::new,
+            "none", NoMachine::new);
 
     private Main() {
     }

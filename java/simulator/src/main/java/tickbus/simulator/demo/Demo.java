@@ -111,7 +111,7 @@ public final class Demo {
     }
 
     static int run(DemoOptions options, Opener opener, PlcMaker plc, PrintStream out, PrintStream err) {
-        Display display = out == System.out && TerminalDisplay.fits()
+        Display display = out == System.out && Screen.fits()
                 ? new TerminalDisplay(out, TimeSource.system(), options.cycles())
                 : new LogDisplay(out);
         return run(options, opener, plc, display, out, err);

@@ -5,12 +5,13 @@ import java.io.PrintStream;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.stream.Collectors;
 
 /** The page about the run, which {@code tickbus report} makes of the driver's recording once that is whole. */
-final class HtmlPage {
+public final class HtmlPage {
     /** The PLC's output that has the number of its step. */
     private static final String STEPS = "Step";
 
@@ -22,9 +23,20 @@ final class HtmlPage {
 
     /** Keeps the statistics of the driver for the page: they are gone when it is closed. */
     static void keepStatistics(DemoOptions options, Map<String, String> statistics) throws IOException {
+        keepStatistics(statistics(options), statistics);
+    }
+
+    /**
+     * Keeps the statistics of a driver for a page.
+     *
+     * @param file where
+     * @param statistics as the driver tells them
+     * @throws IOException if the file cannot be written
+     */
+    public static void keepStatistics(Path file, Map<String, String> statistics) throws IOException {
         String lines = statistics.entrySet().stream().map(entry -> entry.getKey() + "=" + entry.getValue() + "\n")
                 .collect(Collectors.joining());
-        Files.writeString(statistics(options), lines);
+        Files.writeString(file, lines);
     }
 
     /**
@@ -36,15 +48,30 @@ final class HtmlPage {
      */
     static String make(DemoOptions options, PrintStream out) {
         Path page = options.report().resolveSibling("report.html");
-        List<String> command = List.of(options.plc().toString(), "report", options.recording().toString(), "--out",
-                page.toString(), "--steps", STEPS, "--fault", FAULT, "--stats", statistics(options).toString(),
-                "--text", options.report().toString());
+        String trouble = make(options.plc(), List.of(options.recording().toString(), "--out", page.toString(), "--steps",
+                STEPS, "--fault", FAULT, "--stats", statistics(options).toString(), "--text",
+                options.report().toString()));
+        if (trouble == null) {
+            out.println("demo: page=" + page);
+        }
+        return trouble;
+    }
+
+    /**
+     * Makes a page.
+     *
+     * @param tickbus the tickbus command
+     * @param arguments what follows {@code tickbus report}
+     * @return what went wrong, null if nothing did
+     */
+    public static String make(Path tickbus, List<String> arguments) {
+        List<String> command = new ArrayList<>(List.of(tickbus.toString(), "report"));
+        command.addAll(arguments);
         try {
             Process process = new ProcessBuilder(command).redirectErrorStream(true).start();
             process.getOutputStream().close();
             String told = new String(process.getInputStream().readAllBytes(), StandardCharsets.UTF_8).strip();
             if (process.waitFor() == 0) {
-                out.println("demo: page=" + page);
                 return null;
             }
             return "the page about the run could not be made: " + told.replace("\n", "; ");

@@ -4,7 +4,7 @@ import java.util.List;
 import java.util.Map;
 
 /** The PLC at the other end of the link, as far as the demo has its hands on it and can look into it. */
-interface Plc extends AutoCloseable {
+public interface Plc extends AutoCloseable {
     /**
      * What the PLC had counted at one moment of its present life, that is since it was switched on.
      *
@@ -18,7 +18,11 @@ interface Plc extends AutoCloseable {
         static final Counts NONE = new Counts(-1, Map.of(), Long.MIN_VALUE);
     }
 
-    /** Whether the demo can take its power and give it back. */
+    /**
+     * Whether the demo can take its power and give it back.
+     *
+     * @return false if it is out of the demo's reach
+     */
     boolean restartable();
 
     /**
@@ -31,16 +35,32 @@ interface Plc extends AutoCloseable {
     /** Takes its power away, without a warning; on return it is dead. */
     void kill();
 
-    /** The newest counts of the present life. */
+    /**
+     * The newest counts of the present life.
+     *
+     * @return as told last
+     */
     Counts counts();
 
-    /** What it has told since the last call, for people. */
+    /**
+     * What it has told since the last call, for people.
+     *
+     * @return lines
+     */
     List<String> news();
 
-    /** How much longer than it should it was silent, at the most, in all its lives; 0 if it tells nothing regularly. */
+    /**
+     * How much longer than it should it was silent, at the most, in all its lives.
+     *
+     * @return nanoseconds, 0 if it tells nothing regularly
+     */
     long longestSilenceNanos();
 
-    /** Which one it is, for people: such as {@code process 4711}. */
+    /**
+     * Which one it is, for people.
+     *
+     * @return such as {@code process 4711}
+     */
     String name();
 
     /**

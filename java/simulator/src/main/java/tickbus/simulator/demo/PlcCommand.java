@@ -7,8 +7,8 @@ import java.util.concurrent.locks.LockSupport;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.text.Durations;
 
-/** How the PLC program is run as a process: which command, and where it connects to. */
-final class PlcCommand {
+/** How a PLC program is run as a process: which command, and where it connects to. */
+public final class PlcCommand {
     private static final String PROGRAM = "rig";
 
     /** How often the process tells its counts. */
@@ -27,12 +27,26 @@ final class PlcCommand {
     static Plc process(DemoOptions options, ControlInterfaceDeviceDriver driver) {
         Path cfg = DeviceDriverFolder.scan(options.drivers()).configurations().get(driver.id());
         Path log = options.report().resolveSibling("plc.log");
-        return new PlcProcess(() -> command(options.plc(), cfg, address(driver)),
-                STATISTICS_NANOS, log);
+        return process(options.plc(), PROGRAM, cfg, driver, log);
     }
 
-    private static List<String> command(Path executable, Path cfg, String address) {
-        return List.of(executable.toString(), "plc", PROGRAM, "--config", cfg.toString(), "--address", address,
+    /**
+     * A PLC program as a process that connects to a driver.
+     *
+     * @param executable the tickbus command
+     * @param program the program's name
+     * @param cfg the driver's configuration file, which serves both ends
+     * @param driver the driver, which must be listening by the time that the process starts
+     * @param log gets the process's standard error
+     * @return the process, not started yet
+     */
+    public static PlcProcess process(Path executable, String program, Path cfg, ControlInterfaceDeviceDriver driver,
+            Path log) {
+        return new PlcProcess(() -> command(executable, program, cfg, address(driver)), STATISTICS_NANOS, log);
+    }
+
+    private static List<String> command(Path executable, String program, Path cfg, String address) {
+        return List.of(executable.toString(), "plc", program, "--config", cfg.toString(), "--address", address,
                 "--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
     }
 

@@ -25,7 +25,7 @@ import java.util.function.Supplier;
  * <p>The process ends with {@link #close}; with the JVM, on whatever way that is told to end; and, should the JVM
  * itself be killed, no later than the time that its own command line gives it, since then nobody is left to end it.
  */
-final class PlcProcess implements Plc {
+public final class PlcProcess implements Plc {
     private static final long SECONDS_TO_DIE = 5;
     private static final int LAST_WORDS = 5;
 
@@ -104,7 +104,7 @@ final class PlcProcess implements Plc {
      * @param intervalNanos how often it prints its statistics
      * @param log gets its standard error; emptied now, added to by each life
      */
-    PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
+    public PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
         this.command = command;
         this.intervalNanos = intervalNanos;
         this.log = log;
@@ -155,6 +155,16 @@ final class PlcProcess implements Plc {
     public Counts counts() {
         Life now = life;
         return now == null ? Counts.NONE : now.counts();
+    }
+
+    /**
+     * The statistics that it printed last, in its present life.
+     *
+     * @return keys and values; empty if it has printed none yet
+     */
+    public Map<String, String> statistics() {
+        Life now = life;
+        return now == null ? Map.of() : now.block;
     }
 
     @Override

@@ -7,7 +7,7 @@ import tickbus.simulator.TimeSource;
  * comes much too late, or the PLC's regular statistics do. Data that are stale for that reason say nothing about the
  * link.
  */
-final class Stalls {
+public final class Stalls {
     /** Half of the least max_age: who stood still for so long may have made the other end's data stale. */
     private static final long LONG_NANOS = 125_000_000L;
 
@@ -17,13 +17,19 @@ final class Stalls {
     private boolean counting;
     private long longest;
 
-    Stalls(TimeSource time, long stepNanos) {
+    /**
+     * Nothing has stood still yet.
+     *
+     * @param time the clock
+     * @param stepNanos how often {@link #look} is called
+     */
+    public Stalls(TimeSource time, long stepNanos) {
         this.time = time;
         this.stepNanos = stepNanos;
     }
 
     /** Looks at the clock; once a tick, in real-time mode. */
-    void look() {
+    public void look() {
         long now = time.nanoTime();
         if (counting) {
             longest = Math.max(longest, now - last - stepNanos);
@@ -33,17 +39,25 @@ final class Stalls {
     }
 
     /** The pause before the next tick is meant. */
-    void pause() {
+    public void pause() {
         counting = false;
     }
 
-    /** The other end was silent for so much longer than it should be. */
-    void silent(long nanos) {
+    /**
+     * The other end was silent for longer than it should be.
+     *
+     * @param nanos for how much longer
+     */
+    public void silent(long nanos) {
         longest = Math.max(longest, nanos);
     }
 
-    /** The longest one, 0 if none was long enough to matter. */
-    long longestNanos() {
+    /**
+     * The longest one.
+     *
+     * @return nanoseconds; 0 if none was long enough to matter
+     */
+    public long longestNanos() {
         return longest < LONG_NANOS ? 0 : longest;
     }
 }

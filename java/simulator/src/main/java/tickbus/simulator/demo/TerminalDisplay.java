@@ -1,9 +1,7 @@
 package tickbus.simulator.demo;
 
 import java.io.PrintStream;
-import java.util.ArrayDeque;
 import java.util.ArrayList;
-import java.util.Deque;
 import java.util.List;
 import java.util.Locale;
 import tickbus.simulator.TimeSource;
@@ -15,51 +13,24 @@ import tickbus.simulator.text.Durations;
 
 /** A few lines on a terminal, redrawn in place some times a second. */
 final class TerminalDisplay implements Display {
-    private static final long REDRAW_NANOS = 200_000_000L;
-    private static final int SHOWN_EVENTS = 6;
-    private static final int BAR = 24;
-    private static final int WIDTH = 79;
 
     /** What a step takes, roughly; only for the bar. */
     private static final double STEP_NANOS = 0.8e9;
 
-    private final PrintStream out;
-    private final TimeSource time;
+    private final Screen screen;
     private final int cycles;
-    private final Deque<String> events = new ArrayDeque<>();
-    private long nextDraw;
-    private int drawn;
     private Watcher watcher;
     private Operator operator;
     private Plc plc;
 
     TerminalDisplay(PrintStream out, TimeSource time, int cycles) {
-        this.out = out;
-        this.time = time;
+        screen = new Screen(out, time);
         this.cycles = cycles;
-        nextDraw = time.nanoTime();
-    }
-
-    /** Whether standard output is a terminal that can be redrawn. */
-    static boolean fits() {
-        String term = System.getenv("TERM");
-        if (System.console() == null || term == null || term.equals("dumb") || System.getenv("CI") != null) {
-            return false;
-        }
-        try {
-            // From JDK 22 on there is a console even where there is no terminal, and this method to ask it.
-            return (Boolean) java.io.Console.class.getMethod("isTerminal").invoke(System.console());
-        } catch (ReflectiveOperationException e) {
-            return true;
-        }
     }
 
     @Override
     public void event(Timeline.Event event) {
-        events.add(event.line());
-        if (events.size() > SHOWN_EVENTS) {
-            events.remove();
-        }
+        screen.event(event.line());
     }
 
     @Override
@@ -67,33 +38,17 @@ final class TerminalDisplay implements Display {
         this.watcher = watcher;
         this.operator = operator;
         this.plc = plc;
-        long now = time.nanoTime();
-        if (now - nextDraw >= 0) {
-            nextDraw = now + REDRAW_NANOS;
-            draw();
+        if (screen.due()) {
+            screen.draw(lines());
         }
     }
 
     @Override
     public void end() {
         if (watcher != null) {
-            draw();
+            screen.draw(lines());
         }
-        out.flush();
-    }
-
-    private void draw() {
-        StringBuilder text = new StringBuilder();
-        if (drawn > 0) {
-            text.append("\u001b[").append(drawn).append('A');
-        }
-        List<String> lines = lines();
-        for (String line : lines) {
-            text.append(line, 0, Math.min(line.length(), WIDTH)).append("\u001b[K\n");
-        }
-        drawn = lines.size();
-        out.print(text);
-        out.flush();
+        screen.flush();
     }
 
     private List<String> lines() {
@@ -102,9 +57,9 @@ final class TerminalDisplay implements Display {
         lines.add("tickbus demo " + Durations.seconds(watcher.simulator().simulationNanos()) + " s   "
                 + operator.stage());
         lines.add(text("phase   %-10s step %d  %s", watcher.phaseName(), watcher.step(), watcher.stepName()));
-        lines.add(text("cycle   %d of %d     %s", Math.min(watcher.cycles() + 1, cycles), cycles, bar(progress())));
+        lines.add(text("cycle   %d of %d     %s", Math.min(watcher.cycles() + 1, cycles), cycles, Screen.bar(progress())));
         for (Lift lift : Lift.values()) {
-            lines.add(text("%s     %s %6.1f mm  beam %s  cup %s", lift, bar(rig.position(lift) / Geometry.STROKE),
+            lines.add(text("%s     %s %6.1f mm  beam %s  cup %s", lift, Screen.bar(rig.position(lift) / Geometry.STROKE),
                     rig.position(lift), rig.beamBlocked(lift) ? "dark" : "free", cup(rig, lift)));
         }
         lines.add("lamp    " + (rig.lamp() ? "ON " : "off") + "   wheel 1 " + (rig.homed(1) ? "at index" : "between ")
@@ -116,11 +71,6 @@ final class TerminalDisplay implements Display {
         lines.add(text("data    %-9s age %s   ticks %d, stale %d, late %d", watcher.statusName(), age(),
                 watcher.simulator().ticks(), watcher.staleTicksAtStart() + watcher.staleTicksInOutage(),
                 watcher.simulator().lateTicks()));
-        lines.add("");
-        lines.addAll(events);
-        while (lines.size() < drawn) {
-            lines.add("");
-        }
         return lines;
     }
 
@@ -162,10 +112,5 @@ final class TerminalDisplay implements Display {
 
     private static String light(String name, boolean on) {
         return (on ? "(" + name.toUpperCase(Locale.ROOT) + ")" : " " + name.toLowerCase(Locale.ROOT) + " ") + "  ";
-    }
-
-    private static String bar(double part) {
-        int full = (int) Math.round(Math.max(0, Math.min(1, part)) * BAR);
-        return "[" + "#".repeat(full) + ".".repeat(BAR - full) + "]";
     }
 }

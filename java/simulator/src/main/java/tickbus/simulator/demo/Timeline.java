@@ -7,10 +7,21 @@ import java.util.function.Consumer;
 import tickbus.simulator.text.Durations;
 
 /** What happened, and when in simulation time. */
-final class Timeline {
-    /** One happening; {@code who} is the actor, such as operator, PLC, rig. */
-    record Event(long nanos, String who, String text) {
-        String line() {
+public final class Timeline {
+    /**
+     * One happening.
+     *
+     * @param nanos simulation time
+     * @param who the actor, such as operator, PLC, rig
+     * @param text what happened
+     */
+    public record Event(long nanos, String who, String text) {
+        /**
+         * For people.
+         *
+         * @return one line
+         */
+        public String line() {
             return String.format("%s s  %-8s  %s", Durations.seconds(nanos), who, text);
         }
     }
@@ -18,17 +29,34 @@ final class Timeline {
     private final List<Event> events = new ArrayList<>();
     private final Consumer<Event> listener;
 
-    Timeline(Consumer<Event> listener) {
+    /**
+     * An empty one.
+     *
+     * @param listener told of each event at once
+     */
+    public Timeline(Consumer<Event> listener) {
         this.listener = listener;
     }
 
-    void add(long nanos, String who, String text) {
+    /**
+     * Something happened.
+     *
+     * @param nanos simulation time
+     * @param who the actor
+     * @param text what happened
+     */
+    public void add(long nanos, String who, String text) {
         Event event = new Event(nanos, who, text);
         events.add(event);
         listener.accept(event);
     }
 
-    List<Event> events() {
+    /**
+     * All that happened.
+     *
+     * @return in the order in which it was told
+     */
+    public List<Event> events() {
         return Collections.unmodifiableList(events);
     }
 }

@@ -6,20 +6,17 @@ import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.io.ByteArrayOutputStream;
 import java.io.IOException;
-import java.io.OutputStream;
 import java.io.PrintStream;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
-import java.util.jar.Attributes;
-import java.util.jar.JarOutputStream;
-import java.util.jar.Manifest;
 import org.junit.jupiter.api.BeforeEach;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
+import tickbus.simulator.DriverFolder;
 
 /**
  * The whole way: simulator, drop-in driver, native library, loopback, the built-in PLC program. First as it
@@ -36,17 +33,9 @@ class DemoTest {
     private Path table;
     private String output;
 
-    /** The driver's classes are on the test's class path; the folder's jar only has to name them. */
     @BeforeEach
     void fill() throws IOException {
-        Manifest manifest = new Manifest();
-        manifest.getMainAttributes().put(Attributes.Name.MANIFEST_VERSION, "1.0");
-        manifest.getMainAttributes().putValue("Device-Driver-Class", "DeviceDrivers.FieldbusDriver");
-        Files.createDirectories(folder.resolve("drivers"));
-        try (OutputStream file = Files.newOutputStream(folder.resolve("drivers/driver.jar"));
-                JarOutputStream jar = new JarOutputStream(file, manifest)) {
-            jar.finish();
-        }
+        DriverFolder.make(folder.resolve("drivers"));
         table = TABLE;
     }
 
@@ -60,9 +49,7 @@ class DemoTest {
         String anyPort = cfg.replace("\"127.0.0.1:20030\"", "\"127.0.0.1:0\"");
         assertNotEquals(cfg, anyPort);
         Files.writeString(folder.resolve("drivers/driver.cfg"), anyPort);
-        boolean windows = System.getProperty("os.name").startsWith("Windows");
-        Path plc = Path.of(System.getProperty("tickbus.native.dir"), windows ? "tickbus.exe" : "tickbus");
-        return demo("--plc", plc.toString());
+        return demo("--plc", DriverFolder.tickbus().toString());
     }
 
     private int demo() {

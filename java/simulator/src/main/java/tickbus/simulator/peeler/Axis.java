@@ -1,0 +1,309 @@
+package tickbus.simulator.peeler;
+
+import tickbus.simulator.motion.Drive;
+
+/**
+ * One axis: what it does with the commands of its PLC, and what it tells back.
+ *
+ * <p>A command begins with the rising edge of Execute while Enable is on, and takes bits and values as they are then;
+ * the next one can only begin after Execute has fallen. It clears InPosition. Without Enable nothing moves, and what was
+ * under way is forgotten.
+ *
+ * <ul>
+ *   <li><b>Position</b>, no other bit: to the target, in a trapezoid or triangle of speed. A target beyond an end
+ *       position leads to that.
+ *   <li><b>Speed</b>, SpeedControl: towards the target for as long as the bit is on; brakes when it falls, and before an
+ *       end position. A new command meanwhile changes the speed without a stop.
+ *   <li><b>Torque</b>, for axes of that kind: Tracking closes, TorqueControl opens, with nominal speed, until something
+ *       is in the way; neither is a loss of power, and stops.
+ *   <li><b>Tracking</b>: follows other axes as the machine tells, for as long as the bit is on.
+ * </ul>
+ */
+final class Axis {
+    /** Why a command was not carried out, or not as it was meant. */
+    enum Refusal {
+        /** It was carried out. */
+        NONE,
+        /** The target lies beyond an end position: the axis stopped there. */
+        BEYOND_END,
+        /** Speed, acceleration or deceleration is not above 0. */
+        NO_SPEED,
+        /** This kind of axis has no such command. */
+        NO_SUCH_COMMAND
+    }
+
+    private enum Mode { IDLE, POSITION, SPEED, STOPPING, TORQUE, TRACKING }
+
+    /** Of what opens and closes, in millimetres per second. */
+    private static final double CLAMP_SPEED = 400;
+
+    private static final double GATE_SPEED = 200;
+
+    /** From here on, what opens and closes is a gate, in millimetres of stroke. */
+    private static final double LONGEST_GATE = 100;
+
+    /** How near a tracking axis is to where it should be, in its unit, when it is in position. */
+    private static final double TOLERANCE = 0.05;
+
+    private final AxisName name;
+    private final AxisCommand command = new AxisCommand();
+    private final Drive drive;
+    private Mode mode = Mode.IDLE;
+    private boolean executed;
+    private boolean inPosition;
+    private boolean healthy = true;
+    private Refusal refusal = Refusal.NONE;
+    private int commands;
+    /** Values of the command that is carried out, where they are needed later. */
+    private double offset;
+    private double limit;
+    private double torque;
+    private double deceleration = 1;
+    private int direction;
+    /** Something that stands in the way downwards; the lower end if nothing does. */
+    private double obstacle;
+    private boolean met;
+    /** Speed of a motion that is not the drive's own. */
+    private double pushed;
+
+    Axis(AxisName name) {
+        this.name = name;
+        this.drive = new Drive(name.home());
+        this.obstacle = name.low();
+    }
+
+    AxisName name() {
+        return name;
+    }
+
+    AxisCommand command() {
+        return command;
+    }
+
+    double position() {
+        return drive.position();
+    }
+
+    /** Signed speed. */
+    double velocity() {
+        return mode == Mode.TORQUE || mode == Mode.TRACKING ? pushed : drive.velocity();
+    }
+
+    boolean inPosition() {
+        return inPosition;
+    }
+
+    boolean healthy() {
+        return healthy;
+    }
+
+    Refusal refusal() {
+        return refusal;
+    }
+
+    /** What it does, as a word: see {@link AxisStatus}. */
+    int status() {
+        return AxisStatus.READY.when(command.enable() && healthy) | AxisStatus.MOVING.when(velocity() != 0)
+                | AxisStatus.IN_POSITION.when(inPosition) | AxisStatus.LOW_END.when(position() <= name.low())
+                | AxisStatus.HIGH_END.when(position() >= name.high())
+                | AxisStatus.JOGGING.when(mode == Mode.SPEED || mode == Mode.STOPPING)
+                | AxisStatus.TRACKING.when(mode == Mode.TRACKING) | AxisStatus.PRESSURE.when(pressed())
+                | AxisStatus.MET.when(met) | AxisStatus.REFUSED.when(refusal != Refusal.NONE);
+    }
+
+    private boolean pressed() {
+        return mode == Mode.TORQUE && direction != 0 && torque > 0;
+    }
+
+    /** What is wrong, as a number: that of the refusal, or 4 while the axis has failed. */
+    int error() {
+        return healthy ? refusal.ordinal() : Refusal.values().length;
+    }
+
+    /** Commands begun so far. */
+    int commands() {
+        return commands;
+    }
+
+    /** Whether it presses against what is in its way. */
+    boolean presses() {
+        return met && (name.kind() != AxisKind.TORQUE || mode == Mode.TORQUE && direction < 0 && torque > 0);
+    }
+
+    /** The pressure in percent, while it presses. */
+    double pressure() {
+        return presses() ? torque : 0;
+    }
+
+    boolean tracks() {
+        return mode == Mode.TRACKING;
+    }
+
+    /** Offset of the tracking command. */
+    double offset() {
+        return offset;
+    }
+
+    /** Torque of the last command; of the knife, the thickness in millimetres. */
+    double torque() {
+        return torque;
+    }
+
+    boolean standsAt(double place) {
+        return Math.abs(position() - place) <= 1;
+    }
+
+    /** A fault of the axis begins or ends; while there is one it does not move. */
+    void fail(boolean failed) {
+        healthy = !failed;
+    }
+
+    /** Until further notice it cannot go below this; the lower end if there is nothing. */
+    void meets(double place) {
+        obstacle = Math.max(place, name.low());
+        if (position() > obstacle + TOLERANCE) {
+            met = false;
+        }
+    }
+
+    void step(long nanos) {
+        boolean edge = command.execute() && !executed;
+        executed = command.execute();
+        if (!command.enable() || !healthy) {
+            stop();
+            return;
+        }
+        if (edge) {
+            begin();
+        } else {
+            holdOn();
+        }
+        if (mode == Mode.TORQUE) {
+            push(nanos);
+        } else if (mode != Mode.TRACKING) {
+            move(nanos, edge);
+        }
+    }
+
+    private void stop() {
+        if (mode == Mode.POSITION && drive.moving()) {
+            inPosition = false;
+        }
+        drive.halt();
+        pushed = 0;
+        mode = Mode.IDLE;
+    }
+
+    private void begin() {
+        commands++;
+        inPosition = false;
+        drive.jerk(command.jerk());
+        refusal = Refusal.NONE;
+        if (name.kind() == AxisKind.TORQUE) {
+            torque = command.torque();
+            direction = command.tracking() == command.torqueControl() ? 0 : command.tracking() ? -1 : 1;
+            mode = Mode.TORQUE;
+        } else if (command.speedControl()) {
+            turn();
+        } else if (command.tracking() || command.torqueControl()) {
+            track();
+        } else if (!command.movable()) {
+            refuse(Refusal.NO_SPEED);
+        } else {
+            double target = Math.max(name.low(), Math.min(name.high(), command.target()));
+            refusal = target == command.target() ? Refusal.NONE : Refusal.BEYOND_END;
+            drive.moveTo(target, command.speed(), command.acceleration(), command.deceleration());
+            mode = Mode.POSITION;
+        }
+    }
+
+    private void turn() {
+        if (!command.movable()) {
+            refuse(Refusal.NO_SPEED);
+            return;
+        }
+        deceleration = command.deceleration();
+        boolean up = command.target() >= position();
+        double end = up ? name.high() : name.low();
+        if (Double.isInfinite(end)) {
+            drive.runAt(up ? command.speed() : -command.speed(), command.acceleration(), deceleration);
+        } else {
+            drive.moveTo(end, command.speed(), command.acceleration(), deceleration);
+        }
+        mode = Mode.SPEED;
+    }
+
+    private void track() {
+        if (name.kind() != AxisKind.TRACKING || command.torqueControl()) {
+            refuse(Refusal.NO_SUCH_COMMAND);
+            return;
+        }
+        drive.halt();
+        offset = command.target();
+        limit = command.speed();
+        torque = command.torque();
+        mode = Mode.TRACKING;
+    }
+
+    private void refuse(Refusal why) {
+        refusal = why;
+        stop();
+    }
+
+    /** Commands that last as long as their bit is on. */
+    private void holdOn() {
+        if (mode == Mode.SPEED && !command.speedControl()) {
+            drive.runAt(0, deceleration, deceleration);
+            mode = Mode.STOPPING;
+        } else if (mode == Mode.TRACKING && !command.tracking()) {
+            stop();
+        } else if (mode == Mode.TORQUE && !command.tracking() && !command.torqueControl()) {
+            direction = 0;
+        }
+    }
+
+    /** InPosition is shown off for one step at least, even by a command to where the axis stands already. */
+    private void move(long nanos, boolean begun) {
+        drive.advance(nanos);
+        if (drive.position() <= obstacle && drive.velocity() <= 0 && obstacle > name.low()) {
+            drive.haltAt(obstacle);
+            met = true;
+        }
+        if (mode != Mode.IDLE && !drive.moving() && !begun) {
+            inPosition = true;
+            mode = Mode.IDLE;
+        }
+    }
+
+    private void push(long nanos) {
+        double speed = name.high() > LONGEST_GATE ? CLAMP_SPEED : GATE_SPEED;
+        double before = position();
+        double way = torque > 0 ? direction * speed * nanos * 1e-9 : 0;
+        double place = Math.max(obstacle, Math.min(name.high(), before + way));
+        if (way == 0) {
+            place = before;
+        }
+        drive.haltAt(place);
+        pushed = place == before ? 0 : direction * speed;
+        met = place == obstacle && obstacle > name.low();
+    }
+
+    /** A tracking axis goes where it should be, no faster than its command says; 0 sets no limit. */
+    void trackTo(double place, long nanos) {
+        double seconds = nanos * 1e-9;
+        double before = position();
+        double target = Math.max(name.low(), Math.min(name.high(), place));
+        double most = limit > 0 ? limit * seconds : Double.POSITIVE_INFINITY;
+        double way = Math.max(-most, Math.min(most, target - before));
+        drive.haltAt(before + way);
+        pushed = seconds > 0 ? way / seconds : 0;
+        inPosition = Math.abs(position() - target) <= TOLERANCE;
+    }
+
+    /** A tracking axis turns at a speed for a time. */
+    void trackAt(double velocity, long nanos) {
+        drive.haltAt(position() + velocity * nanos * 1e-9);
+        pushed = velocity;
+        inPosition = true;
+    }
+}

@@ -1,0 +1,70 @@
+//! Commands that a PLC gives by their number: the table is on the simulator's side.
+
+/// What a command makes an axis do, as the bits of its command structure say it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// Moves to the target position. No bit.
+    #[default]
+    Position,
+    /// Runs towards the target position for as long as `SpeedControl` is on.
+    Speed,
+    /// Closes with a pressure: the bit that is `Tracking` on other axes.
+    Close,
+    /// Opens with a pressure: the bit `TorqueControl`.
+    Open,
+    /// Follows for as long as `Tracking` is on.
+    Tracking,
+}
+
+impl Mode {
+    /// All of them, with their names in a driver.cfg.
+    pub const ALL: [(&'static str, Self); 5] = [
+        ("position", Self::Position),
+        ("speed", Self::Speed),
+        ("close", Self::Close),
+        ("open", Self::Open),
+        ("tracking", Self::Tracking),
+    ];
+
+    /// Its name in a driver.cfg.
+    pub fn name(self) -> &'static str {
+        let found = Self::ALL.into_iter().find(|(_, mode)| *mode == self);
+        found.map_or("", |(name, _)| name)
+    }
+
+    /// The bits `Tracking`, `TorqueControl` and `SpeedControl`.
+    pub const fn bits(self) -> [bool; 3] {
+        match self {
+            Self::Position => [false, false, false],
+            Self::Close | Self::Tracking => [true, false, false],
+            Self::Open => [false, true, false],
+            Self::Speed => [false, false, true],
+        }
+    }
+}
+
+/// The numbers of a command: `TargetPosition`, `Speed`, `Acceleration`, `Deceleration` and `Torque`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion<T> {
+    /// Where to; with tracking the offset.
+    pub position: T,
+    /// How fast at most.
+    pub speed: T,
+    /// How fast to get there.
+    pub acceleration: T,
+    /// How fast to stop.
+    pub deceleration: T,
+    /// The pressure; to a knife carriage the thickness of the veneer.
+    pub torque: T,
+}
+
+/// One command of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// What the PLC calls it; never 0, which is no command.
+    pub number: u16,
+    /// What it makes the axis do.
+    pub mode: Mode,
+    /// Its numbers. Those that are not stated come from the PLC.
+    pub motion: Motion<Option<f64>>,
+}

@@ -1,0 +1,472 @@
+//! What a command means to an axis: one drive, stepped through time.
+
+use super::{Limits, Motion, Profile};
+
+/// How near to its target an axis counts as there, in its unit.
+const THERE: f64 = 1e-9;
+
+/// What the PLC asks of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "the bits of the structure, one by one"
+)]
+pub struct Demand {
+    /// Its rising edge gives a command.
+    pub execute: bool,
+    /// Follow, or close.
+    pub tracking: bool,
+    /// Open.
+    pub torque_control: bool,
+    /// Run.
+    pub speed_control: bool,
+    /// Without it nothing moves.
+    pub enable: bool,
+    /// The numbers.
+    pub motion: Motion<f64>,
+    /// How fast the acceleration may change; 0 lets it jump.
+    pub jerk: f64,
+}
+
+/// What an axis tells the PLC.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Feedback {
+    /// The axis is doing well.
+    pub healthy: bool,
+    /// The target of the last command is reached.
+    pub in_position: bool,
+    /// Where it is.
+    pub position: f64,
+    /// How fast it moves, with its sign.
+    pub speed: f64,
+    /// Bit 0 ready (enabled and healthy), 1 moving, 2 in position, 3 at the lower limit, 4 at the upper one, 5 runs at a
+    /// speed, 6 tracking, 7 opening or closing.
+    pub status: u16,
+    /// 0, or why the last command was not followed: one of the codes of this type.
+    pub error: u16,
+}
+
+impl Feedback {
+    /// The target was beyond the limits; the axis went as far as it could.
+    pub const BEYOND: u16 = 1;
+    /// The numbers of the command make no sense: no speed, or no acceleration.
+    pub const NONSENSE: u16 = 2;
+    /// The axis is broken.
+    pub const UNHEALTHY: u16 = 4;
+    /// Execute rose without Enable.
+    pub const NOT_ENABLED: u16 = 7;
+}
+
+/// One simulated axis with an ideal drive.
+///
+/// A command begins with the rising edge of `Execute` while `Enable` is on. A move that begins at a standstill follows
+/// its [`Profile`]; one that takes over from another motion brakes and turns as fast as it may, without a limit of
+/// jerk.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    limits: Option<[f64; 2]>,
+    /// A test breaks it by this.
+    pub healthy: bool,
+    position: f64,
+    speed: f64,
+    in_position: bool,
+    executed: bool,
+    doing: Doing,
+    /// The numbers of the command that is active.
+    motion: Motion<f64>,
+    error: u16,
+}
+
+#[derive(Clone, Debug)]
+enum Doing {
+    Nothing,
+    /// Follows a profile, from a position in a direction, since so many seconds.
+    Profile {
+        profile: Box<Profile>,
+        from: f64,
+        sign: f64,
+        since: f64,
+        target: f64,
+    },
+    /// Goes to a target from any speed.
+    Chase {
+        target: f64,
+    },
+    Run {
+        speed: f64,
+    },
+    Squeeze {
+        speed: f64,
+    },
+    Follow,
+}
+
+/// How fast an axis opens and closes that is moved by its pressure alone.
+const SQUEEZE: f64 = 400.0;
+
+impl Drive {
+    /// An axis at rest.
+    pub fn new(position: f64, limits: Option<[f64; 2]>) -> Self {
+        Self {
+            limits,
+            healthy: true,
+            position,
+            speed: 0.0,
+            in_position: false,
+            executed: false,
+            doing: Doing::Nothing,
+            motion: Motion::default(),
+            error: 0,
+        }
+    }
+
+    /// Goes on for `seconds` as `demand` says; `follows` is what an axis that tracks has to be at, and `stop` keeps
+    /// one that closes from going below it.
+    pub fn step(&mut self, seconds: f64, demand: &Demand, follows: f64, stop: f64) -> Feedback {
+        let rises = demand.execute && !self.executed;
+        self.executed = demand.execute;
+        if !demand.enable || !self.healthy {
+            if rises {
+                self.error = if self.healthy {
+                    Feedback::NOT_ENABLED
+                } else {
+                    Feedback::UNHEALTHY
+                };
+            }
+            self.doing = Doing::Nothing;
+            self.speed = 0.0;
+            return self.feedback(demand.enable);
+        }
+        if rises {
+            self.begin(demand);
+        }
+        match self.doing {
+            Doing::Run { .. } if !demand.speed_control => self.doing = Doing::Run { speed: 0.0 },
+            Doing::Follow if !demand.tracking => self.doing = Doing::Run { speed: 0.0 },
+            Doing::Squeeze { .. } if !demand.tracking && !demand.torque_control => {
+                self.doing = Doing::Nothing;
+                self.speed = 0.0;
+            }
+            _ => {}
+        }
+        self.go(seconds, follows, stop);
+        self.feedback(true)
+    }
+
+    /// Takes a new command.
+    fn begin(&mut self, demand: &Demand) {
+        self.in_position = false;
+        self.error = 0;
+        self.motion = demand.motion;
+        let motion = &demand.motion;
+        let [low, high] = self.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let limits = Limits {
+            speed: motion.speed.abs(),
+            acceleration: motion.acceleration.abs(),
+            deceleration: motion.deceleration.abs(),
+            jerk: (demand.jerk > 0.0).then_some(demand.jerk),
+        };
+        let squeeze = demand.torque_control || (demand.tracking && motion.speed <= 0.0);
+        if !squeeze && !demand.tracking && !limits.make_sense() {
+            self.error = Feedback::NONSENSE;
+            self.doing = Doing::Run { speed: 0.0 };
+            return;
+        }
+        let way = motion.position - self.position;
+        if demand.torque_control {
+            self.doing = Doing::Squeeze { speed: SQUEEZE };
+        } else if squeeze {
+            self.doing = Doing::Squeeze { speed: -SQUEEZE };
+        } else if demand.tracking {
+            self.doing = Doing::Follow;
+        } else if demand.speed_control {
+            let speed = limits.speed.copysign(way);
+            self.doing = Doing::Run { speed };
+        } else {
+            let target = motion.position.clamp(low, high);
+            if target.total_cmp(&motion.position).is_ne() {
+                self.error = Feedback::BEYOND;
+            }
+            let way = target - self.position;
+            let profile = Profile::new(way.abs(), &limits);
+            self.doing = match profile {
+                Some(profile) if self.speed.abs() < THERE => Doing::Profile {
+                    profile: Box::new(profile),
+                    from: self.position,
+                    sign: 1.0_f64.copysign(way),
+                    since: 0.0,
+                    target,
+                },
+                _ => Doing::Chase { target },
+            };
+        }
+    }
+
+    fn go(&mut self, seconds: f64, follows: f64, stop: f64) {
+        let [low, high] = self.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let before = self.position;
+        match &mut self.doing {
+            Doing::Nothing => {}
+            Doing::Profile {
+                profile,
+                from,
+                sign,
+                since,
+                target,
+            } => {
+                *since += seconds;
+                let state = profile.at(*since);
+                self.position = *from + *sign * state.distance;
+                self.speed = *sign * state.speed;
+                if *since >= profile.duration() {
+                    self.position = *target;
+                    self.arrive();
+                }
+            }
+            Doing::Chase { target } => {
+                let target = *target;
+                let way = target - self.position;
+                let brake = self.motion.deceleration.abs();
+                // As fast as it may be and still come to a halt there.
+                let safe = (2.0 * brake * way.abs())
+                    .sqrt()
+                    .min(self.motion.speed.abs());
+                self.ramp(safe.copysign(way), seconds);
+                let moved = self.speed * seconds;
+                if moved * way >= 0.0 && moved.abs() >= way.abs() {
+                    self.position = target;
+                    self.arrive();
+                } else {
+                    self.position += moved;
+                }
+            }
+            Doing::Run { speed } => {
+                let speed = *speed;
+                self.ramp(speed, seconds);
+                self.position += self.speed * seconds;
+                if speed == 0.0 && self.speed == 0.0 {
+                    self.arrive();
+                }
+            }
+            Doing::Squeeze { speed } => {
+                self.position += *speed * seconds;
+                self.position = self.position.max(stop);
+            }
+            Doing::Follow => {
+                let most = self.motion.speed.abs() * seconds;
+                self.position += (follows - self.position).clamp(-most, most);
+            }
+        }
+        let free = self.position;
+        self.position = free.clamp(low, high);
+        match self.doing {
+            Doing::Squeeze { .. } | Doing::Follow if seconds > 0.0 => {
+                self.speed = (self.position - before) / seconds;
+            }
+            Doing::Run { .. } if free.total_cmp(&self.position).is_ne() => {
+                self.arrive();
+            }
+            _ => {}
+        }
+    }
+
+    /// Changes the speed towards `wanted` as fast as the command allows.
+    fn ramp(&mut self, wanted: f64, seconds: f64) {
+        let faster = wanted.abs() > self.speed.abs() && wanted * self.speed >= 0.0;
+        let rate = if faster {
+            self.motion.acceleration
+        } else {
+            self.motion.deceleration
+        };
+        let most = rate.abs() * seconds;
+        self.speed += (wanted - self.speed).clamp(-most, most);
+    }
+
+    fn arrive(&mut self) {
+        self.speed = 0.0;
+        self.in_position = true;
+        self.doing = Doing::Nothing;
+    }
+
+    fn feedback(&self, enabled: bool) -> Feedback {
+        let bit = |on: bool, bit: u16| u16::from(on) << bit;
+        let at =
+            |limit: Option<f64>| limit.is_some_and(|limit| (self.position - limit).abs() < THERE);
+        Feedback {
+            healthy: self.healthy,
+            in_position: self.in_position,
+            position: self.position,
+            speed: self.speed,
+            status: bit(enabled && self.healthy, 0)
+                | bit(self.speed != 0.0, 1)
+                | bit(self.in_position, 2)
+                | bit(at(self.limits.map(|[low, _]| low)), 3)
+                | bit(at(self.limits.map(|[_, high]| high)), 4)
+                | bit(matches!(self.doing, Doing::Run { .. }), 5)
+                | bit(matches!(self.doing, Doing::Follow), 6)
+                | bit(matches!(self.doing, Doing::Squeeze { .. }), 7),
+            error: self.error,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCAN: f64 = 0.01;
+
+    fn demand(position: f64) -> Demand {
+        Demand {
+            execute: true,
+            enable: true,
+            motion: Motion {
+                position,
+                speed: 100.0,
+                acceleration: 1_000.0,
+                deceleration: 1_000.0,
+                torque: 0.0,
+            },
+            ..Demand::default()
+        }
+    }
+
+    /// Steps until the axis is in position; gives the seconds that it took.
+    fn arrives(drive: &mut Drive, demand: &Demand) -> f64 {
+        for step in 1..10_000 {
+            if drive.step(SCAN, demand, 0.0, 0.0).in_position {
+                return f64::from(step) * SCAN;
+            }
+        }
+        panic!("never there: {drive:?}");
+    }
+
+    #[test]
+    fn a_position_command_takes_the_time_of_its_profile_and_ends_in_position() {
+        let mut drive = Drive::new(50.0, Some([0.0, 400.0]));
+        let seconds = arrives(&mut drive, &demand(250.0));
+        assert!(
+            (2.1 - SCAN..=2.1 + 2.0 * SCAN).contains(&seconds),
+            "{seconds}"
+        );
+        let done = drive.step(SCAN, &demand(0.0), 0.0, 0.0);
+        assert!(
+            done.in_position && done.position.total_cmp(&250.0).is_eq(),
+            "Execute is still on: no new command; {done:?}"
+        );
+    }
+
+    #[test]
+    fn nothing_moves_without_enable_and_a_command_is_gone_with_it() {
+        let mut drive = Drive::new(0.0, None);
+        let off = Demand {
+            enable: false,
+            ..demand(10.0)
+        };
+        let told = drive.step(SCAN, &off, 0.0, 0.0);
+        assert_eq!((told.position, told.error), (0.0, Feedback::NOT_ENABLED));
+        for _ in 0..20 {
+            assert!(drive.step(SCAN, &demand(10.0), 0.0, 0.0).position.abs() <= 0.0);
+        }
+        let ready = Demand {
+            execute: false,
+            ..demand(10.0)
+        };
+        drive.step(SCAN, &ready, 0.0, 0.0);
+        arrives(&mut drive, &demand(10.0));
+    }
+
+    #[test]
+    fn a_command_in_mid_move_brakes_turns_and_arrives() {
+        let mut drive = Drive::new(0.0, Some([0.0, 400.0]));
+        for _ in 0..50 {
+            drive.step(SCAN, &demand(300.0), 0.0, 0.0);
+        }
+        let back = demand(10.0);
+        drive.step(
+            SCAN,
+            &Demand {
+                execute: false,
+                ..back
+            },
+            0.0,
+            0.0,
+        );
+        let began = drive.step(SCAN, &back, 0.0, 0.0);
+        assert!(began.speed > 0.0, "no jump in its speed: {began:?}");
+        arrives(&mut drive, &back);
+        assert!(drive.position.total_cmp(&10.0).is_eq());
+    }
+
+    #[test]
+    fn a_jog_runs_for_as_long_as_its_bit_and_ends_at_the_limit() {
+        let mut drive = Drive::new(0.0, Some([0.0, 100.0]));
+        let jog = Demand {
+            speed_control: true,
+            ..demand(1e9)
+        };
+        for _ in 0..30 {
+            drive.step(SCAN, &jog, 0.0, 0.0);
+        }
+        let stop = Demand {
+            execute: false,
+            speed_control: false,
+            ..jog
+        };
+        arrives(&mut drive, &stop);
+        assert!((30.0..40.0).contains(&drive.position), "{drive:?}");
+        arrives(&mut drive, &jog);
+        assert!(drive.position.total_cmp(&100.0).is_eq());
+    }
+
+    #[test]
+    fn a_clamp_closes_on_what_is_there_and_opens_to_its_end() {
+        let mut drive = Drive::new(800.0, Some([0.0, 800.0]));
+        let close = Demand {
+            execute: true,
+            enable: true,
+            tracking: true,
+            ..Demand::default()
+        };
+        let mut told = Feedback::default();
+        for _ in 0..100 {
+            told = drive.step(SCAN, &close, 0.0, 650.0);
+        }
+        assert_eq!((told.position, told.speed), (650.0, 0.0));
+        let open = Demand {
+            execute: false,
+            tracking: false,
+            torque_control: true,
+            ..close
+        };
+        drive.step(SCAN, &open, 0.0, 650.0);
+        let open = Demand {
+            execute: true,
+            ..open
+        };
+        for _ in 0..100 {
+            told = drive.step(SCAN, &open, 0.0, 0.0);
+        }
+        assert_eq!((told.position, told.speed), (800.0, 0.0));
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_command_is_told() {
+        let mut drive = Drive::new(0.0, Some([0.0, 100.0]));
+        let none = Demand {
+            motion: Motion {
+                position: 10.0,
+                ..Motion::default()
+            },
+            ..demand(0.0)
+        };
+        assert_eq!(drive.step(SCAN, &none, 0.0, 0.0).error, Feedback::NONSENSE);
+        drive.step(SCAN, &Demand::default(), 0.0, 0.0);
+        assert_eq!(
+            drive.step(SCAN, &demand(101.0), 0.0, 0.0).error,
+            Feedback::BEYOND
+        );
+        drive.healthy = false;
+        assert!(!drive.step(SCAN, &demand(101.0), 0.0, 0.0).healthy);
+    }
+}

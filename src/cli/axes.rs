@@ -1,0 +1,40 @@
+//! `tickbus axes FILE`: the axes of a machine without a simulator, for commissioning.
+
+use std::path::PathBuf;
+
+use super::Outcome;
+use super::host::{self, Job, span};
+use crate::driver::{Asked, Config};
+use crate::fieldbus::Role;
+use crate::plc::Axes;
+use crate::time::Nanos;
+
+/// Stand in for the machine: every [[axis]] of FILE is an ideal drive that follows its commands.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The driver.cfg of the device.
+    file: PathBuf,
+
+    /// How often the drives go on.
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = span)]
+    tick: Nanos,
+
+    #[command(flatten)]
+    host: host::Hosting,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let role = Role::Device;
+    let asked = Asked { role, moved: true };
+    // What is wrong with the file is told by the host, who reads it, too.
+    let config = Config::load_as(&arguments.file, Some(asked));
+    let axes = config.map(|config| config.axes).unwrap_or_default();
+    let job = Job {
+        title: "axes",
+        file: &arguments.file,
+        role,
+        program: Box::new(Axes::new(&axes)),
+        interval: arguments.tick,
+    };
+    host::run(job, &arguments.host)
+}

@@ -1,0 +1,190 @@
+//! Records over TCP: `TSEND_C` and `TRCV_C` on one connection.
+
+use std::net::IpAddr;
+
+use super::Plan;
+use super::link::{Body, time};
+use crate::fieldbus::socket::{Options, TcpRole};
+use crate::fieldbus::tcp::Host;
+use crate::time::Nanos;
+
+/// The cycle of the socket bus, where a driver.cfg states none.
+const CYCLE: Nanos = Nanos::from_millis(10);
+
+/// What stands for the address of the simulator's computer while nobody has put in the right one.
+const SOMEBODY: [u8; 4] = [192, 168, 0, 20];
+
+/// The longest record that every CPU takes.
+const LONGEST: usize = 8192;
+
+pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) -> Body {
+    let (sent, received) = (plan.outputs.record.bytes, plan.inputs.record.bytes);
+    if sent.max(received) > LONGEST {
+        notes.push(format!(
+            "a record has {} bytes; an S7-1200 sends and receives at most {LONGEST}",
+            sent.max(received)
+        ));
+    }
+    let mut variables = vec![
+        "Connection : TCON_IP_v4;".to_owned(),
+        "Is_prepared : Bool;".to_owned(),
+    ];
+    let mut code = connection(options, notes);
+    let prefix = &plan.prefix;
+    code.extend([
+        format!("IF NOT \"{prefix}\".Simulated THEN"),
+        format!("   \"{prefix}\".Received := 0;"),
+        format!("   \"{prefix}\".Sent := 0;"),
+        "END_IF;".to_owned(),
+    ]);
+    let cycle = plan.config.timing.cycle.unwrap_or(CYCLE);
+    let mut add = |lines: &[&str]| code.extend(lines.iter().map(|line| (*line).to_owned()));
+    if received > 0 {
+        variables.extend([
+            "Receive : TRCV_C;".to_owned(),
+            format!("Incoming : \"{}\";", plan.inputs.type_name),
+            "Silence : TON_TIME;".to_owned(),
+        ]);
+        add(&[
+            "",
+            &format!("// A record is complete with {received} bytes, however TCP cuts the stream."),
+            "#Receive(EN_R := TRUE,",
+            &format!("         CONT := \"{prefix}\".Simulated,"),
+            &format!("         LEN := {received},"),
+            "         CONNECT := #Connection,",
+            "         DATA := #Incoming);",
+            "IF #Receive.DONE THEN",
+            &format!("   \"{}\".Image := #Incoming;", plan.inputs.block),
+            &format!("   \"{prefix}\".Received := \"{prefix}\".Received + 1;"),
+            "END_IF;",
+            "IF #Receive.ERROR THEN",
+            &format!("   \"{prefix}\".Errors := \"{prefix}\".Errors + 1;"),
+            &format!("   \"{prefix}\".Last_error := #Receive.STATUS;"),
+            "END_IF;",
+            &format!(
+                "#Silence(IN := \"{prefix}\".Simulated AND NOT #Receive.DONE, PT := {});",
+                time(plan.config.timing.max_age)
+            ),
+            &format!(
+                "\"{prefix}\".Alive := \"{prefix}\".Simulated AND \"{prefix}\".Received > 0 AND NOT #Silence.Q;"
+            ),
+        ]);
+    }
+    if sent > 0 {
+        variables.extend([
+            "Send : TSEND_C;".to_owned(),
+            format!("Outgoing : \"{}\";", plan.outputs.type_name),
+            "Clock : TON_TIME;".to_owned(),
+            "Is_due : Bool;".to_owned(),
+            "Is_busy : Bool;".to_owned(),
+        ]);
+        add(&[
+            "",
+            "// A record goes out in each cycle. What is being sent must not change until it is gone.",
+            &format!("#Clock(IN := NOT #Clock.Q, PT := {});", time(cycle)),
+            "IF #Clock.Q THEN",
+            "   #Is_due := TRUE;",
+            "END_IF;",
+            "IF NOT #Is_busy THEN",
+            &format!("   #Outgoing := \"{}\".Image;", plan.outputs.block),
+            "END_IF;",
+            "#Send(REQ := #Is_due AND NOT #Is_busy,",
+            &format!("      CONT := \"{prefix}\".Simulated,"),
+            &format!("      LEN := {sent},"),
+            "      CONNECT := #Connection,",
+            "      DATA := #Outgoing);",
+            "#Is_busy := #Send.BUSY;",
+            "IF #Send.BUSY OR #Send.DONE OR #Send.ERROR THEN",
+            "   #Is_due := FALSE;",
+            "END_IF;",
+            "IF #Send.DONE THEN",
+            &format!("   \"{prefix}\".Sent := \"{prefix}\".Sent + 1;"),
+            "END_IF;",
+            "IF #Send.ERROR THEN",
+            &format!("   \"{prefix}\".Errors := \"{prefix}\".Errors + 1;"),
+            &format!("   \"{prefix}\".Last_error := #Send.STATUS;"),
+            "END_IF;",
+        ]);
+    }
+    Body {
+        what: format!(
+            "Records over TCP: {sent} bytes to the simulation every {cycle}, {received} bytes from it."
+        ),
+        variables,
+        temporary: Vec::new(),
+        code,
+    }
+}
+
+fn connection(options: &Options, notes: &mut Vec<String>) -> Vec<String> {
+    let port = options.address.port;
+    let plc_dials = options.tcp == TcpRole::Listen;
+    let (address, remark) = match (&options.address.host, plc_dials) {
+        (_, false) => ([0; 4], "the simulation's driver connects: any address"),
+        (Host::Ip(IpAddr::V4(ip)), true) if !ip.is_unspecified() && !ip.is_loopback() => {
+            (ip.octets(), "the simulator's computer, as in driver.cfg")
+        }
+        _ => {
+            notes.push(format!(
+                "driver.cfg listens on {}, which is no address that a PLC can dial: the source has {} in its place; put in \
+                 that of the simulator's computer, and let the driver listen on \"0.0.0.0:{port}\"",
+                options.address,
+                SOMEBODY.map(|byte| byte.to_string()).join(".")
+            ));
+            (SOMEBODY, "put the address of the simulator's computer here")
+        }
+    };
+    let mut code = vec![
+        "// Both blocks share the connection: they name the same description, with the same ID."
+            .to_owned(),
+        "IF NOT #Is_prepared THEN".to_owned(),
+        "   #Connection.InterfaceId := 64;   // the first PROFINET interface of the CPU".to_owned(),
+        "   #Connection.ID := 1;   // not used by another connection of this CPU".to_owned(),
+        "   #Connection.ConnectionType := 16#0B;   // TCP".to_owned(),
+        format!(
+            "   #Connection.ActiveEstablished := {};   // {}",
+            if plc_dials { "TRUE" } else { "FALSE" },
+            if plc_dials {
+                "the PLC dials"
+            } else {
+                "the PLC waits"
+            }
+        ),
+    ];
+    for (number, byte) in address.iter().enumerate() {
+        let remark = if number == 0 {
+            format!("   // {remark}")
+        } else {
+            String::new()
+        };
+        code.push(format!(
+            "   #Connection.RemoteAddress.ADDR[{}] := {byte};{remark}",
+            number + 1
+        ));
+    }
+    let (remote, local) = if plc_dials { (port, 0) } else { (0, port) };
+    code.extend([
+        format!("   #Connection.RemotePort := {remote};"),
+        format!("   #Connection.LocalPort := {local};"),
+        "   #Is_prepared := TRUE;".to_owned(),
+        "END_IF;".to_owned(),
+    ]);
+    code
+}
+
+pub(super) fn steps(options: &Options) -> Vec<String> {
+    let mut steps = vec![
+        "In the link source, check InterfaceId (the hardware identifier of the interface, 64 on most CPUs), ID and \
+         address."
+            .to_owned(),
+    ];
+    steps.push(
+        "Let OB1 run more often than the driver's cycle: one record is taken in each call, and what comes faster than it \
+         is taken grows old in the buffers."
+            .to_owned(),
+    );
+    if options.tcp == TcpRole::Listen {
+        steps.push("Let the firewall of the simulator's computer pass the port.".to_owned());
+    }
+    steps
+}

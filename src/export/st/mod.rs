@@ -1,0 +1,124 @@
+//! Structured Text: for CODESYS, and for `OpenPLC` and others that compile with `iec2c`.
+//!
+//! Both get the records as 16-bit registers, as Modbus carries them, and copy between these and one variable for each
+//! signal.
+
+pub(super) mod codesys;
+pub(super) mod openplc;
+mod registers;
+
+use std::fmt::Write as _;
+
+use super::head;
+use super::names::Names;
+use super::record::{Place, Record};
+use crate::driver::Config;
+use crate::signal::{Area, DataType, Width};
+
+/// Names that the sources use for themselves.
+const TAKEN: [&str; 6] = ["Simulated", "In", "Out", "bits_32", "bits_64", "Hardware"];
+
+/// Both records; no two signals have one name, whatever their direction.
+fn records(config: &Config) -> [Record<'_>; 2] {
+    let mut names = Names::default();
+    for name in TAKEN {
+        names.give(name);
+    }
+    [Area::Input, Area::Output].map(|area| Record::of(&config.table, area, &mut names))
+}
+
+/// Adds a line.
+fn add(text: &mut String, content: &str) {
+    writeln!(text, "{content}").expect("a String takes all");
+}
+
+/// The variables that the statements for a record of outputs need.
+fn temporaries(outputs: &Record<'_>) -> Vec<&'static str> {
+    let has = |width| {
+        outputs
+            .places
+            .iter()
+            .any(|place| place.data_type().width() == width)
+    };
+    let all = [
+        (Width::Double, "bits_32 : DWORD;"),
+        (Width::Long, "bits_64 : LWORD;"),
+    ];
+    all.into_iter()
+        .filter(|(width, _)| has(*width))
+        .map(|(_, line)| line)
+        .collect()
+}
+
+/// A comment of IEC 61131-3.
+fn comment(text: &str) -> String {
+    // Comments do not nest everywhere.
+    let text = text.replace("(*", "( *").replace("*)", "* )");
+    format!("(* {text} *)")
+}
+
+/// The head of a source.
+fn source(config: &Config, what: &str, editor: &str, compiled: &str) -> String {
+    let mut lines = head(config, what, editor, compiled);
+    lines.extend(Record::stations(&config.table));
+    let mut text = String::new();
+    for line in lines {
+        text.push_str(&comment(&line));
+        text.push('\n');
+    }
+    text.push('\n');
+    text
+}
+
+/// What is to be known about a signal's variable.
+fn remark(place: &Place<'_>, input: bool) -> String {
+    let mut text = place.remark();
+    if place.data_type() == DataType::Lreal {
+        text.push_str(", the bits of an LREAL");
+    }
+    // Where a Modbus client that reads single signals finds it: offsets on the wire.
+    let table = match (place.data_type(), input) {
+        (DataType::Bool, true) => format!(
+            "discrete input {}",
+            place.byte * 8 + usize::from(place.bit())
+        ),
+        (DataType::Bool, false) => format!("coil {}", place.byte * 8 + usize::from(place.bit())),
+        (_, true) => format!("input register {}", place.byte / 2),
+        (_, false) => format!("holding register {}", place.byte / 2),
+    };
+    format!("{text}; Modbus: {table}")
+}
+
+/// The statements that bring the inputs, and those that take the outputs, with these ways to write registers.
+fn copies(
+    [inputs, outputs]: &[Record<'_>; 2],
+    variable: &dyn Fn(&str) -> String,
+    incoming: registers::Register<'_>,
+    outgoing: registers::Register<'_>,
+) -> [Vec<String>; 2] {
+    let bring = inputs
+        .places
+        .iter()
+        .map(|place| {
+            format!(
+                "{} := {};",
+                variable(&place.name),
+                registers::value(place, incoming)
+            )
+        })
+        .collect();
+    let mut used: Vec<usize> = outputs
+        .places
+        .iter()
+        .flat_map(|place| place.byte / 2..=(place.end() - 1) / 2)
+        .collect();
+    used.dedup();
+    let mut take: Vec<String> = used
+        .iter()
+        .map(|register| format!("{} := WORD#16#0000;", outgoing(*register)))
+        .collect();
+    for place in &outputs.places {
+        take.extend(registers::put(place, &variable(&place.name), outgoing));
+    }
+    [bring, take]
+}

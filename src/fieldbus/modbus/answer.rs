@@ -1,0 +1,242 @@
+//! The server's half of the codec: a request's PDU in, its effect on the tables, the answer's PDU out.
+//!
+//! The checks and their order are those of the state diagrams in the Modbus Application Protocol V1.1b3:
+//! function, quantity and value, address.
+
+use std::ops::Range;
+
+use super::function::{
+    EXCEPTION_BIT, READ_BITS, READ_REGISTERS, READ_WRITE_REGISTERS, WRITE_BITS, WRITE_REGISTERS,
+};
+use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
+
+/// What a request did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Done {
+    /// The bits of the frame that clients write which it wrote.
+    pub wrote: Option<Range<usize>>,
+    /// The bytes of the frame that this end writes which the answer carries.
+    pub read: Option<Range<usize>>,
+    /// Why it was refused, if it was; then it did nothing.
+    pub refused: Option<Exception>,
+}
+
+/// Answers the request `pdu`, and appends the answer's PDU to `reply`.
+///
+/// # Panics
+///
+/// When the PDU has not even a function code: that is the framing's business.
+pub fn answer(
+    pdu: &[u8],
+    tables: &mut Tables<'_>,
+    identification: &Identification,
+    reply: &mut Vec<u8>,
+) -> Done {
+    let (&code, data) = pdu.split_first().expect("a PDU has a function code");
+    let begin = reply.len();
+    let answered = match Function::of(code) {
+        None => Err(Exception::ILLEGAL_FUNCTION),
+        Some(function) => {
+            if function != Function::DeviceIdentification {
+                reply.push(code);
+            }
+            act(function, data, tables, identification, reply)
+        }
+    };
+    answered.unwrap_or_else(|exception| {
+        reply.truncate(begin);
+        refuse(code, exception, reply);
+        Done {
+            refused: Some(exception),
+            ..Done::default()
+        }
+    })
+}
+
+/// Appends the PDU that refuses a request with this function code.
+pub fn refuse(code: u8, exception: Exception, reply: &mut Vec<u8>) {
+    reply.extend_from_slice(&[code | EXCEPTION_BIT, exception.0]);
+}
+
+fn act(
+    function: Function,
+    data: &[u8],
+    tables: &mut Tables<'_>,
+    identification: &Identification,
+    reply: &mut Vec<u8>,
+) -> Result<Done, Exception> {
+    match function {
+        Function::ReadCoils => read(Table::Coils, READ_BITS, data, tables, reply),
+        Function::ReadDiscreteInputs => read(Table::DiscreteInputs, READ_BITS, data, tables, reply),
+        Function::ReadHoldingRegisters => {
+            read(Table::HoldingRegisters, READ_REGISTERS, data, tables, reply)
+        }
+        Function::ReadInputRegisters => {
+            read(Table::InputRegisters, READ_REGISTERS, data, tables, reply)
+        }
+        Function::WriteCoil => {
+            let [first, value] = words(data)?;
+            let bits = match value {
+                0x0000 => [0],
+                0xFF00 => [1],
+                _ => return Err(Exception::ILLEGAL_DATA_VALUE),
+            };
+            let wrote = write_bits(Span { first, count: 1 }, &bits, tables)?;
+            reply.extend_from_slice(data);
+            Ok(wrote)
+        }
+        Function::WriteRegister => {
+            let [first, _] = words(data)?;
+            let wrote = write_registers(Span { first, count: 1 }, &data[2..], tables)?;
+            reply.extend_from_slice(data);
+            Ok(wrote)
+        }
+        Function::WriteCoils => {
+            let (span, values) = many(data)?;
+            let fits = (1..=WRITE_BITS).contains(&span.count);
+            if !fits || values.len() != span.count.div_ceil(8) {
+                return Err(Exception::ILLEGAL_DATA_VALUE);
+            }
+            let wrote = write_bits(span, values, tables)?;
+            reply.extend_from_slice(&data[..4]);
+            Ok(wrote)
+        }
+        Function::WriteRegisters => {
+            let (span, values) = many(data)?;
+            let fits = (1..=WRITE_REGISTERS).contains(&span.count);
+            if !fits || values.len() != span.count * 2 {
+                return Err(Exception::ILLEGAL_DATA_VALUE);
+            }
+            let wrote = write_registers(span, values, tables)?;
+            reply.extend_from_slice(&data[..4]);
+            Ok(wrote)
+        }
+        Function::MaskWriteRegister => {
+            let [first, ..] = words::<3>(data)?;
+            let (and, or) = ([data[2], data[3]], [data[4], data[5]]);
+            let span = Span { first, count: 1 };
+            let wrote = tables.write(Table::HoldingRegisters, span, |frame, bit| {
+                let register = &mut frame[bit / 8..bit / 8 + 2];
+                for (byte, (and, or)) in register.iter_mut().zip(and.into_iter().zip(or)) {
+                    *byte = (*byte & and) | (or & !and);
+                }
+            })?;
+            reply.extend_from_slice(data);
+            Ok(Done {
+                wrote: Some(wrote),
+                ..Done::default()
+            })
+        }
+        Function::ReadWriteRegisters => read_write(data, tables, reply),
+        Function::DeviceIdentification => {
+            identification.answer(data, reply)?;
+            Ok(Done::default())
+        }
+    }
+}
+
+/// All of the data as words.
+fn words<const N: usize>(data: &[u8]) -> Result<[usize; N], Exception> {
+    if data.len() != 2 * N {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    }
+    Ok(std::array::from_fn(|index| word(data, 2 * index)))
+}
+
+fn word(data: &[u8], at: usize) -> usize {
+    usize::from(u16::from_be_bytes([data[at], data[at + 1]]))
+}
+
+/// The data of a request that writes several elements: which, and as many bytes of values as it counts.
+fn many(data: &[u8]) -> Result<(Span, &[u8]), Exception> {
+    let Some((head, values)) = data.split_first_chunk::<5>() else {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    };
+    if values.len() != usize::from(head[4]) {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    }
+    let (first, count) = (word(head, 0), word(head, 2));
+    Ok((Span { first, count }, values))
+}
+
+fn read(
+    table: Table,
+    most: usize,
+    data: &[u8],
+    tables: &Tables<'_>,
+    reply: &mut Vec<u8>,
+) -> Result<Done, Exception> {
+    let [first, count] = words(data)?;
+    if !(1..=most).contains(&count) {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    }
+    let read = read_counted(table, Span { first, count }, tables, reply)?;
+    Ok(Done {
+        read,
+        ..Done::default()
+    })
+}
+
+/// Appends elements behind the number of their bytes.
+fn read_counted(
+    table: Table,
+    span: Span,
+    tables: &Tables<'_>,
+    reply: &mut Vec<u8>,
+) -> Result<Option<Range<usize>>, Exception> {
+    let bytes = (span.count * table.width()).div_ceil(8);
+    reply.push(u8::try_from(bytes).expect("the limits keep it below"));
+    tables.read(table, span, reply)
+}
+
+fn write_bits(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
+    let wrote = tables.write(Table::Coils, span, |frame, bit| {
+        put_bits(values, span.count, frame, bit);
+    })?;
+    Ok(Done {
+        wrote: Some(wrote),
+        ..Done::default()
+    })
+}
+
+fn write_registers(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
+    let wrote = tables.write(Table::HoldingRegisters, span, |frame, bit| {
+        frame[bit / 8..][..values.len()].copy_from_slice(values);
+    })?;
+    Ok(Done {
+        wrote: Some(wrote),
+        ..Done::default()
+    })
+}
+
+fn read_write(
+    data: &[u8],
+    tables: &mut Tables<'_>,
+    reply: &mut Vec<u8>,
+) -> Result<Done, Exception> {
+    let Some((head, values)) = data.split_first_chunk::<9>() else {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    };
+    let reads = Span {
+        first: word(head, 0),
+        count: word(head, 2),
+    };
+    let writes = Span {
+        first: word(head, 4),
+        count: word(head, 6),
+    };
+    let fits = (1..=READ_REGISTERS).contains(&reads.count)
+        && (1..=READ_WRITE_REGISTERS).contains(&writes.count);
+    let counted = usize::from(head[8]);
+    if !fits || counted != writes.count * 2 || values.len() != counted {
+        return Err(Exception::ILLEGAL_DATA_VALUE);
+    }
+    // Nothing is written when there is nothing to read.
+    tables.check_read(Table::HoldingRegisters, reads)?;
+    let wrote = write_registers(writes, values, tables)?;
+    let read = read_counted(Table::HoldingRegisters, reads, tables, reply)?;
+    Ok(Done { read, ..wrote })
+}
+
+#[cfg(test)]
+mod tests;

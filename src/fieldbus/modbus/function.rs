@@ -1,0 +1,139 @@
+//! Function codes and exception codes, as the Modbus Application Protocol V1.1b3 numbers them.
+
+use std::fmt;
+
+/// The longest PDU: function code and data, in bytes.
+pub const PDU_LIMIT: usize = 253;
+
+/// Set in the function code of an answer that is an exception.
+pub(super) const EXCEPTION_BIT: u8 = 0x80;
+
+/// Most coils or discrete inputs that one request reads.
+pub(super) const READ_BITS: usize = 2000;
+/// Most registers that one request reads.
+pub(super) const READ_REGISTERS: usize = 125;
+/// Most coils that one request writes.
+pub(super) const WRITE_BITS: usize = 1968;
+/// Most registers that one request writes.
+pub(super) const WRITE_REGISTERS: usize = 123;
+/// Most registers that a request writes which reads others, too.
+pub(super) const READ_WRITE_REGISTERS: usize = 121;
+
+/// A function that both ends know here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Function {
+    /// Read coils.
+    ReadCoils = 1,
+    /// Read discrete inputs.
+    ReadDiscreteInputs = 2,
+    /// Read holding registers.
+    ReadHoldingRegisters = 3,
+    /// Read input registers.
+    ReadInputRegisters = 4,
+    /// Write one coil.
+    WriteCoil = 5,
+    /// Write one register.
+    WriteRegister = 6,
+    /// Write coils in a row.
+    WriteCoils = 15,
+    /// Write registers in a row.
+    WriteRegisters = 16,
+    /// Set and clear single bits of a register.
+    MaskWriteRegister = 22,
+    /// Write registers, then read registers.
+    ReadWriteRegisters = 23,
+    /// Encapsulated interface; of its kinds here the reading of the device identification alone.
+    DeviceIdentification = 43,
+}
+
+impl Function {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::ReadCoils,
+        Self::ReadDiscreteInputs,
+        Self::ReadHoldingRegisters,
+        Self::ReadInputRegisters,
+        Self::WriteCoil,
+        Self::WriteRegister,
+        Self::WriteCoils,
+        Self::WriteRegisters,
+        Self::MaskWriteRegister,
+        Self::ReadWriteRegisters,
+        Self::DeviceIdentification,
+    ];
+
+    /// Its number in the first byte of a PDU.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+
+    /// The function with this number.
+    pub fn of(code: u8) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|function| function.code() == code)
+    }
+
+    /// Whether it changes the server's tables: what a broadcast may ask for.
+    pub const fn writes(self) -> bool {
+        matches!(
+            self,
+            Self::WriteCoil
+                | Self::WriteRegister
+                | Self::WriteCoils
+                | Self::WriteRegisters
+                | Self::MaskWriteRegister
+                | Self::ReadWriteRegisters
+        )
+    }
+}
+
+/// Why a server refuses a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Exception(pub u8);
+
+impl Exception {
+    /// The function code is not known.
+    pub const ILLEGAL_FUNCTION: Self = Self(1);
+    /// The place, or the last of the places asked for, is not there.
+    pub const ILLEGAL_DATA_ADDRESS: Self = Self(2);
+    /// A quantity or value that the function does not allow, or a request of the wrong length.
+    pub const ILLEGAL_DATA_VALUE: Self = Self(3);
+    /// The server failed at it.
+    pub const SERVER_DEVICE_FAILURE: Self = Self(4);
+    /// It will take its time.
+    pub const ACKNOWLEDGE: Self = Self(5);
+    /// It is busy; the same may be asked again.
+    pub const SERVER_DEVICE_BUSY: Self = Self(6);
+    /// A gateway has no way to the unit.
+    pub const GATEWAY_PATH_UNAVAILABLE: Self = Self(0x0A);
+    /// The unit behind a gateway does not answer.
+    pub const GATEWAY_TARGET_FAILED: Self = Self(0x0B);
+
+    /// Its name in the standard; empty where that has none.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ILLEGAL_FUNCTION => "illegal function",
+            Self::ILLEGAL_DATA_ADDRESS => "illegal data address",
+            Self::ILLEGAL_DATA_VALUE => "illegal data value",
+            Self::SERVER_DEVICE_FAILURE => "server device failure",
+            Self::ACKNOWLEDGE => "acknowledge",
+            Self::SERVER_DEVICE_BUSY => "server device busy",
+            Self(8) => "memory parity error",
+            Self::GATEWAY_PATH_UNAVAILABLE => "gateway path unavailable",
+            Self::GATEWAY_TARGET_FAILED => "gateway target device failed to respond",
+            Self(_) => "",
+        }
+    }
+}
+
+impl fmt::Display for Exception {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "exception {:02X}", self.0)?;
+        match self.name() {
+            "" => Ok(()),
+            name => write!(f, " ({name})"),
+        }
+    }
+}

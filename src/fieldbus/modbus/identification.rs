@@ -1,0 +1,148 @@
+//! What a device says of itself: function 43, kind 14.
+
+use super::{Exception, PDU_LIMIT};
+
+/// The kind of encapsulated interface that reads the device identification.
+pub(super) const READ_DEVICE_IDENTIFICATION: u8 = 14;
+
+/// The three objects that every device has, as a stream and one by one.
+const CONFORMITY: u8 = 0x81;
+
+/// The first bytes of an answer: function, kind, access, conformity, more follows, next object, number of objects.
+const HEADER: usize = 7;
+
+/// The longest text of an object, such that it fits into an answer.
+const TEXT_LIMIT: usize = PDU_LIMIT - HEADER - 2;
+
+/// What a device says of itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Identification {
+    /// Vendor's name, product code, and major and minor revision.
+    pub objects: [String; 3],
+}
+
+impl Identification {
+    /// What the driver called `name` says.
+    ///
+    /// It gives no revision: who is allowed to write to this driver shall not lose that by an update of tickbus.
+    pub fn of_driver(name: &str) -> Self {
+        let ascii = |c: char| if matches!(c, ' '..='~') { c } else { '?' };
+        let name = name.chars().map(ascii).take(TEXT_LIMIT).collect();
+        Self {
+            objects: ["tickbus".to_owned(), name, String::new()],
+        }
+    }
+
+    /// All of it in one line: vendor, product, revision.
+    pub fn line(&self) -> String {
+        let texts = self.objects.iter().map(|text| text.trim());
+        let texts: Vec<&str> = texts.filter(|text| !text.is_empty()).collect();
+        texts.join(" ")
+    }
+
+    /// Answers a request, of which `data` is what follows the function code.
+    ///
+    /// # Errors
+    ///
+    /// The kind of interface is another one, the way of access is none, or there is no such object.
+    pub(super) fn answer(&self, data: &[u8], reply: &mut Vec<u8>) -> Result<(), Exception> {
+        let (&kind, data) = data.split_first().ok_or(Exception::ILLEGAL_DATA_VALUE)?;
+        if kind != READ_DEVICE_IDENTIFICATION {
+            return Err(Exception::ILLEGAL_FUNCTION);
+        }
+        let &[access, object] = data else {
+            return Err(Exception::ILLEGAL_DATA_VALUE);
+        };
+        let first = usize::from(object);
+        let single = match access {
+            // Whoever asks for more than there is gets what there is.
+            1..=3 => false,
+            4 => true,
+            _ => return Err(Exception::ILLEGAL_DATA_VALUE),
+        };
+        let first = match (first < self.objects.len(), single) {
+            (true, _) => first,
+            (false, true) => return Err(Exception::ILLEGAL_DATA_ADDRESS),
+            // A stream from an object that is not there begins at the beginning.
+            (false, false) => 0,
+        };
+        let wanted = if single {
+            1
+        } else {
+            self.objects.len() - first
+        };
+        let begin = reply.len();
+        reply.extend_from_slice(&[
+            super::Function::DeviceIdentification.code(),
+            kind,
+            access,
+            CONFORMITY,
+            0,
+            0,
+            0,
+        ]);
+        let mut count = 0;
+        for (id, text) in (0_u8..).zip(&self.objects).skip(first).take(wanted) {
+            let text = &text.as_bytes()[..text.len().min(TEXT_LIMIT)];
+            if reply.len() - begin + 2 + text.len() > PDU_LIMIT {
+                // More follows, from this one on.
+                reply[begin + 4..begin + 6].copy_from_slice(&[0xFF, id]);
+                break;
+            }
+            count += 1;
+            reply.push(id);
+            reply.push(u8::try_from(text.len()).expect("shorter than a PDU"));
+            reply.extend_from_slice(text);
+        }
+        reply[begin + 6] = count;
+        Ok(())
+    }
+
+    /// Takes over the objects of an answer, of which `data` is what follows the function code; gives the object
+    /// to ask for next, if more follow. `None` when the answer is malformed.
+    pub(super) fn take(&mut self, data: &[u8]) -> Option<Option<u8>> {
+        let &[
+            READ_DEVICE_IDENTIFICATION,
+            _,
+            _,
+            more,
+            next,
+            count,
+            ref objects @ ..,
+        ] = data
+        else {
+            return None;
+        };
+        let mut rest = objects;
+        for _ in 0..count {
+            let (&[id, length], after) = rest.split_first_chunk::<2>()?;
+            let (text, after) = after.split_at_checked(usize::from(length))?;
+            rest = after;
+            if let Some(object) = self.objects.get_mut(usize::from(id)) {
+                // One line of printable characters, whatever the device says.
+                let printable = |byte: &u8| {
+                    if matches!(byte, b' '..=b'~') {
+                        char::from(*byte)
+                    } else {
+                        '?'
+                    }
+                };
+                *object = text.iter().map(printable).collect();
+            }
+        }
+        rest.is_empty().then_some((more == 0xFF).then_some(next))
+    }
+}
+
+/// How long an answer's PDU is, as far as that can be told from its beginning.
+pub(super) fn length(beginning: &[u8]) -> Option<usize> {
+    if beginning.first()? & super::function::EXCEPTION_BIT != 0 {
+        return Some(2);
+    }
+    let count = *beginning.get(HEADER - 1)?;
+    let mut end = HEADER;
+    for _ in 0..count {
+        end += 2 + usize::from(*beginning.get(end + 1)?);
+    }
+    Some(end)
+}

@@ -1,0 +1,168 @@
+//! The units of a server on a serial line.
+
+use std::io::{Read as _, Write as _};
+
+use crate::fieldbus::modbus::Function;
+use crate::fieldbus::modbus::line::Serial;
+use crate::fieldbus::modbus::rtu::{self, Framer};
+use crate::fieldbus::modbus::serial::{gone, open};
+use crate::fieldbus::tcp::{is_for_later, no_wait};
+use crate::fieldbus::{BusError, Port};
+use crate::os::{Interest, Poller, SerialPort, Source};
+use crate::time::{Nanos, Stop};
+
+use super::units::{Carried, UnitSet};
+
+/// The unit that is everyone.
+const BROADCAST: u8 = 0;
+
+/// Serves the units until `stop`.
+///
+/// # Errors
+///
+/// The serial port is not there, or is gone.
+pub(super) fn serve(
+    line: &Serial,
+    units: &mut UnitSet,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<(), BusError> {
+    let serial = open(line)?;
+    port.tell("device", &line.device);
+    port.opening(&format!("listening on {}", line.device));
+    let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
+    let mut server = Server {
+        line,
+        serial,
+        units,
+        framer: Framer::new(line.silence),
+        reply: Vec::new(),
+        written: 0,
+        carried: None,
+    };
+    while !stop.is_stopped() {
+        server.turn(&mut poller, port)?;
+    }
+    Ok(())
+}
+
+struct Server<'a> {
+    line: &'a Serial,
+    serial: SerialPort,
+    units: &'a mut UnitSet,
+    framer: Framer,
+    /// The answer that is under way, and how much of it the system has taken.
+    reply: Vec<u8>,
+    written: usize,
+    carried: Option<Carried>,
+}
+
+impl Server<'_> {
+    fn turn(&mut self, poller: &mut Poller, port: &mut Port) -> Result<(), BusError> {
+        let interest = if self.written < self.reply.len() {
+            Interest::ReadWrite
+        } else {
+            Interest::Read
+        };
+        let mut sources = [Source::new(&self.serial, interest)];
+        let clock = port.clock();
+        let now = clock.now();
+        // One more than the limit of age is stale.
+        let age = port.silence(now);
+        let stale = if age <= port.max_age() {
+            now + (port.max_age() - age) + Nanos(1)
+        } else {
+            Nanos::MAX
+        };
+        let deadline = self.framer.deadline().min(port.due()).min(stale);
+        poller
+            .wait(&**clock, deadline, &mut sources)
+            .map_err(|error| no_wait(&error))?;
+        let (readable, writable) = (sources[0].is_readable(), sources[0].is_writable());
+        let now = port.clock().now();
+        if readable {
+            self.read(now, port)?;
+        }
+        self.attend(now, port);
+        if writable || interest == Interest::Read {
+            self.write(port)?;
+        }
+        port.observe(now);
+        Ok(())
+    }
+
+    fn read(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let mut bytes = [0; rtu::ADU_LIMIT];
+        let count = match self.serial.read(&mut bytes) {
+            Ok(0) => return Err(gone(self.line, "it was closed")),
+            Ok(count) => count,
+            Err(error) if is_for_later(&error) => return Ok(()),
+            Err(error) => return Err(gone(self.line, &error)),
+        };
+        // Silence may have ended a telegram before these came.
+        self.attend(now, port);
+        self.framer.arrived(now, &bytes[..count]);
+        Ok(())
+    }
+
+    /// Answers the telegram that silence has ended, if it has and is for a unit here.
+    fn attend(&mut self, now: Nanos, port: &mut Port) {
+        let Self {
+            units,
+            framer,
+            reply,
+            written,
+            carried,
+            ..
+        } = self;
+        framer.take(now, |telegram| {
+            let Some((number, pdu)) = telegram.and_then(rtu::parse) else {
+                port.count("modbus-server.damaged");
+                return;
+            };
+            if port.is_down(now) {
+                return;
+            }
+            // Whoever asks anew no longer waits for the last answer.
+            reply.clear();
+            *written = 0;
+            *carried = None;
+            if number == BROADCAST {
+                if Function::of(pdu[0]).is_some_and(Function::writes) {
+                    let mut nobody_hears = Vec::new();
+                    for station in 0..units.len() {
+                        units.answer(station, now, pdu, &mut nobody_hears, port);
+                    }
+                    port.running("a client is talking");
+                }
+                return;
+            }
+            // On a line with others the silence of those who are not meant is the rule.
+            let Some(station) = units.station(number) else {
+                port.count("modbus-server.unknown_unit");
+                return;
+            };
+            *carried = rtu::append(number, reply, |reply| {
+                units.answer(station, now, pdu, reply, port)
+            });
+            port.running("a client is talking");
+        });
+    }
+
+    fn write(&mut self, port: &mut Port) -> Result<(), BusError> {
+        if self.written == self.reply.len() {
+            return Ok(());
+        }
+        match self.serial.write(&self.reply[self.written..]) {
+            Ok(count) => self.written += count,
+            Err(error) if is_for_later(&error) => return Ok(()),
+            Err(error) => return Err(gone(self.line, &error)),
+        }
+        if self.written == self.reply.len()
+            && let Some(carried) = self.carried.take()
+        {
+            self.units.carried(carried, port);
+        }
+        Ok(())
+    }
+}

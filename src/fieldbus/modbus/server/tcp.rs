@@ -1,0 +1,77 @@
+//! The units of a server over Modbus TCP.
+
+use crate::fieldbus::modbus::mbap::{self, ADU_LIMIT, Telegram};
+use crate::fieldbus::modbus::{Exception, refuse};
+use crate::fieldbus::tcp::{Limits, Service};
+use crate::fieldbus::{BusError, Port};
+use crate::time::Nanos;
+
+use super::units::{Carried, UnitSet};
+
+/// So many answers of a client are remembered at most until it has them.
+const REMEMBERED: usize = 64;
+
+/// The protocol as the server for many clients speaks it.
+#[derive(Debug)]
+pub(super) struct TcpService<'a> {
+    pub(super) units: &'a mut UnitSet,
+    pub(super) clients: usize,
+    pub(super) patience: Nanos,
+}
+
+impl Service for TcpService<'_> {
+    /// What is under way to it.
+    type Client = Vec<Carried>;
+
+    fn limits(&self) -> Limits {
+        Limits {
+            telegram: ADU_LIMIT,
+            clients: self.clients,
+            patience: self.patience,
+        }
+    }
+
+    fn welcome(&mut self, _now: Nanos) -> Vec<Carried> {
+        Vec::new()
+    }
+
+    fn telegram(
+        &mut self,
+        client: &mut Vec<Carried>,
+        now: Nanos,
+        bytes: &[u8],
+        reply: &mut Vec<u8>,
+        port: &mut Port,
+    ) -> Result<usize, BusError> {
+        let parsed = Telegram::parse(bytes);
+        let parsed = parsed.map_err(|error| BusError::Protocol(error.to_string()))?;
+        let Some((telegram, length)) = parsed else {
+            return Ok(0);
+        };
+        let Telegram {
+            transaction,
+            unit,
+            pdu,
+        } = telegram;
+        let carried = mbap::append(transaction, unit, reply, |reply| {
+            if let Some(station) = self.units.station(unit) {
+                return self.units.answer(station, now, pdu, reply, port);
+            }
+            port.count("modbus-server.unknown_unit");
+            refuse(pdu[0], Exception::GATEWAY_TARGET_FAILED, reply);
+            None
+        });
+        if let Some(carried) = carried
+            && client.len() < REMEMBERED
+        {
+            client.push(carried);
+        }
+        Ok(length)
+    }
+
+    fn replied(&mut self, client: &mut Vec<Carried>, port: &mut Port) {
+        for carried in client.drain(..) {
+            self.units.carried(carried, port);
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Serial ports.
+
+use std::fmt;
+
+/// What guards each character.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Parity {
+    /// An even number of ones.
+    Even,
+    /// An odd number of ones.
+    Odd,
+    /// Nothing.
+    None,
+}
+
+/// How a serial port is set: eight bits a character, no flow control, and this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SerialSettings {
+    /// Bits per second.
+    pub baud: u32,
+    /// What guards each character.
+    pub parity: Parity,
+    /// Two stop bits; else one.
+    pub two_stop_bits: bool,
+}
+
+impl fmt::Display for SerialSettings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let parity = match self.parity {
+            Parity::Even => 'E',
+            Parity::Odd => 'O',
+            Parity::None => 'N',
+        };
+        let stop_bits = if self.two_stop_bits { 2 } else { 1 };
+        write!(f, "{} baud, 8{parity}{stop_bits}", self.baud)
+    }
+}
+
+#[cfg(unix)]
+pub use unix::SerialPort;
+
+#[cfg(unix)]
+mod unix {
+    use std::fs::File;
+    use std::io::{self, Read, Write};
+    use std::path::Path;
+
+    use rustix::fd::{AsFd, BorrowedFd};
+    use rustix::fs::{Mode, OFlags, open};
+    use rustix::termios::{
+        ControlModes, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector,
+        SpecialCodeIndex, ioctl_tiocexcl, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
+    };
+
+    use super::{Parity, SerialSettings};
+
+    /// An open serial port. Reading and writing never wait; it can be waited for with a
+    /// [`Poller`](crate::os::Poller).
+    #[derive(Debug)]
+    pub struct SerialPort(File);
+
+    impl SerialPort {
+        /// Opens the port that the system calls `device`, for this process alone.
+        ///
+        /// # Errors
+        ///
+        /// It is not there, is none, is another program's, or cannot be set so.
+        pub fn open(device: &Path, settings: SerialSettings) -> io::Result<Self> {
+            let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+            let port = open(device, flags, Mode::empty())?;
+            let mut attributes = tcgetattr(&port)?;
+            attributes.make_raw();
+            attributes.input_modes |= InputModes::IGNBRK;
+            attributes.input_modes -= InputModes::INPCK | InputModes::IXON | InputModes::IXOFF;
+            attributes.output_modes -= OutputModes::OPOST;
+            attributes.local_modes -= LocalModes::ECHO | LocalModes::ICANON | LocalModes::ISIG;
+            let control = &mut attributes.control_modes;
+            *control -= ControlModes::CSIZE
+                | ControlModes::PARENB
+                | ControlModes::PARODD
+                | ControlModes::CSTOPB
+                | ControlModes::CRTSCTS;
+            *control |= ControlModes::CS8 | ControlModes::CREAD | ControlModes::CLOCAL;
+            *control |= match settings.parity {
+                Parity::Even => ControlModes::PARENB,
+                Parity::Odd => ControlModes::PARENB | ControlModes::PARODD,
+                Parity::None => ControlModes::empty(),
+            };
+            if settings.parity != Parity::None {
+                // A character with the wrong parity comes as a zero, and the checksum finds it.
+                attributes.input_modes |= InputModes::INPCK;
+            }
+            if settings.two_stop_bits {
+                attributes.control_modes |= ControlModes::CSTOPB;
+            }
+            attributes.special_codes[SpecialCodeIndex::VMIN] = 1;
+            attributes.special_codes[SpecialCodeIndex::VTIME] = 0;
+            attributes.set_speed(settings.baud)?;
+            tcsetattr(&port, OptionalActions::Now, &attributes)?;
+            ioctl_tiocexcl(&port)?;
+            tcflush(&port, QueueSelector::IOFlush)?;
+            Ok(Self(File::from(port)))
+        }
+    }
+
+    impl Read for SerialPort {
+        /// Reads what has come; [`WouldBlock`](io::ErrorKind::WouldBlock) when nothing has, 0 when the port is
+        /// gone.
+        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+            self.0.read(bytes)
+        }
+    }
+
+    impl Write for SerialPort {
+        /// Writes as much as there is room for.
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.0.flush()
+        }
+    }
+
+    impl Drop for SerialPort {
+        fn drop(&mut self) {
+            // Where another program has it open, too, it would stay so.
+            let _ = ioctl_tiocnxcl(&self.0);
+        }
+    }
+
+    impl AsFd for SerialPort {
+        fn as_fd(&self) -> BorrowedFd<'_> {
+            self.0.as_fd()
+        }
+    }
+}

@@ -1,0 +1,651 @@
+//! The Modbus buses with ends that others wrote: pymodbus as client and as server, mbpoll, and tshark as a
+//! judge of what our server sends.
+#![allow(missing_docs, clippy::float_cmp, reason = "a test")]
+
+mod foreign;
+#[cfg(unix)]
+#[path = "peers/pty.rs"]
+mod pty;
+
+use std::fmt::Write as _;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use foreign::Absent;
+use tickbus::driver::{Config, Driver};
+use tickbus::fieldbus::LinkState;
+use tickbus::signal::Slot;
+use tickbus::time::{Monotonic, Nanos};
+
+/// Bytes of %I and of %Q.
+const BYTES: usize = 64;
+
+fn main() -> ExitCode {
+    foreign::main(&[
+        ("pymodbus_drives_our_server", pymodbus_drives_our_server),
+        ("pymodbus_meets_units_and_gateways", pymodbus_meets_units),
+        ("our_client_drives_pymodbus", our_client_drives_pymodbus),
+        (
+            "our_client_writes_only_into_the_device_that_was_named",
+            our_client_writes_only_where_it_may,
+        ),
+        (
+            "our_client_reads_inputs_of_pymodbus",
+            our_client_reads_inputs,
+        ),
+        ("mbpoll_reads_and_writes_our_server", mbpoll_over_tcp),
+        #[cfg(unix)]
+        (
+            "pymodbus_drives_our_server_on_a_serial_line",
+            pymodbus_drives_our_server_on_a_line,
+        ),
+        #[cfg(unix)]
+        (
+            "our_client_drives_pymodbus_on_a_serial_line",
+            our_client_drives_pymodbus_on_a_line,
+        ),
+        #[cfg(unix)]
+        (
+            "mbpoll_reads_and_writes_our_server_on_a_serial_line",
+            mbpoll_on_a_line,
+        ),
+        (
+            "tshark_finds_no_malformed_packet_of_our_server",
+            tshark_finds_nothing,
+        ),
+    ])
+}
+
+/// A driver on the system's clock, which mirrors each byte of %Q on the byte of %I at the same offset.
+struct Machine {
+    driver: Driver,
+    slots: Vec<Slot>,
+}
+
+impl Machine {
+    fn open(fieldbus: &str, signals: &str) -> Self {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"Cell 4\"\n[fieldbus]\n{fieldbus}\nreconnect = [\"50ms\"]\n{signals}"
+        );
+        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let clock = Monotonic::shared().expect("a thread");
+        let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+        let slots = driver.initial_slots();
+        Self { driver, slots }
+    }
+
+    fn index(&self, name: &str) -> usize {
+        let table = &self.driver.config().table;
+        let found = table.position(name);
+        found.unwrap_or_else(|| panic!("no signal {name}"))
+    }
+
+    fn get(&self, name: &str) -> f64 {
+        self.slots[self.index(name)].real()
+    }
+
+    fn set(&mut self, name: &str, value: f64) {
+        let index = self.index(name);
+        self.slots[index] = Slot::from_real(value);
+    }
+
+    fn tick(&mut self) {
+        self.driver.exchange(Nanos::ZERO, &mut self.slots);
+    }
+
+    /// A tick that brings the bytes `q N` back on `i N`.
+    fn mirror(&mut self) {
+        self.tick();
+        for index in 0..self.slots.len() {
+            let name = self.driver.config().table.signals[index].name.clone();
+            if let Some(number) = name.strip_prefix("i ") {
+                let value = self.get(&format!("q {number}"));
+                self.slots[index] = Slot::from_real(value);
+            }
+        }
+        self.tick();
+    }
+
+    #[track_caller]
+    fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+        let limit = Instant::now() + Duration::from_secs(20);
+        while !done(self) {
+            let reason = self.driver.link().reason;
+            assert!(
+                Instant::now() < limit,
+                "waited in vain until {what}: {reason}"
+            );
+            self.tick();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn statistic(&self, key: &str) -> Option<String> {
+        let text = self.driver.statistics();
+        let line = text
+            .lines()
+            .find_map(|line| line.strip_prefix(&format!("{key}=")));
+        line.map(str::to_owned)
+    }
+
+    /// Where it listens.
+    fn address(&mut self) -> SocketAddr {
+        self.until("it listens", |machine| {
+            machine.statistic("address").is_some()
+        });
+        let address = self.statistic("address").expect("it was waited for");
+        address.parse().expect("an address")
+    }
+
+    /// Ticks until the program at the other end ends; gives what it printed.
+    #[track_caller]
+    fn mirror_until_the_end_of(&mut self, mut command: Command) -> String {
+        let mut child = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        let limit = Instant::now() + Duration::from_secs(60);
+        let status = loop {
+            if let Some(status) = child.try_wait().expect("it is ours") {
+                break status;
+            }
+            if Instant::now() > limit {
+                let _ = child.kill();
+            }
+            self.mirror();
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        let mut told = String::new();
+        for pipe in [
+            child
+                .stdout
+                .take()
+                .map(|pipe| Box::new(pipe) as Box<dyn std::io::Read>),
+            child.stderr.take().map(|pipe| Box::new(pipe) as _),
+        ] {
+            let _ = pipe.expect("a pipe").read_to_string(&mut told);
+        }
+        assert!(status.success(), "{told}");
+        told
+    }
+}
+
+/// A byte each way at every offset but some of %Q, where REALs in two orders lie.
+fn signals() -> String {
+    let mut text = format!("input_bytes = {BYTES}\noutput_bytes = {BYTES}\n");
+    for byte in 0..BYTES {
+        let _ = write!(
+            text,
+            "[[signal]]\nname = \"i {byte}\"\naddress = \"%IB{byte}\"\n"
+        );
+        if !(20..28).contains(&byte) {
+            let _ = write!(
+                text,
+                "[[signal]]\nname = \"q {byte}\"\naddress = \"%QB{byte}\"\n"
+            );
+        }
+    }
+    text.push_str(
+        "[[signal]]\nname = \"abcd\"\naddress = \"%QD20\"\ntype = \"REAL\"\n\
+         [[signal]]\nname = \"cdab\"\naddress = \"%QD24\"\ntype = \"REAL\"\norder = \"CDAB\"\n",
+    );
+    // What lies under the REALs is mirrored from byte 0.
+    for byte in 20..28 {
+        text = text.replace(&format!("\"i {byte}\""), &format!("\"in {byte}\""));
+    }
+    text
+}
+
+fn pymodbus(script: &str) -> Result<Command, Absent> {
+    let mut python = foreign::python_with("main", &["pymodbus", "serial"])?;
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/");
+    python.arg(format!("{folder}{script}"));
+    Ok(python)
+}
+
+fn pymodbus_drives_our_server() -> Result<(), Absent> {
+    let mut client = pymodbus("modbus_client.py")?;
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let mut machine = Machine::open(server, &signals());
+    let address = machine.address();
+    client.args([
+        "tcp",
+        &address.ip().to_string(),
+        &address.port().to_string(),
+    ]);
+    let told = machine.mirror_until_the_end_of(client);
+    assert!(told.contains("modbus_client: ok checks="), "{told}");
+    machine.until("the last write is through", |machine| {
+        machine.get("cdab") != 0.0
+    });
+    assert_eq!((machine.get("abcd"), machine.get("cdab")), (1234.5, -0.125));
+    assert_eq!(
+        machine
+            .statistic("modbus-server.illegal_function")
+            .as_deref(),
+        Some("4")
+    );
+    Ok(())
+}
+
+fn pymodbus_meets_units() -> Result<(), Absent> {
+    let mut python = foreign::python_with("main", &["pymodbus"])?;
+    let mut text = String::new();
+    for (name, unit) in [("press", 3), ("oven", 7)] {
+        let _ = write!(text, "[[station]]\nname = \"{name}\"\nunit = {unit}\n");
+    }
+    for name in ["press", "oven"] {
+        let _ = write!(
+            text,
+            "[[signal]]\nname = \"{name} out\"\nstation = \"{name}\"\naddress = \"%QW0\"\n"
+        );
+    }
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let mut machine = Machine::open(server, &text);
+    let address = machine.address();
+    python.args([
+        "-c",
+        "import sys\n\
+         from pymodbus.client import ModbusTcpClient\n\
+         client = ModbusTcpClient('127.0.0.1', port=int(sys.argv[1]), retries=0)\n\
+         client.connect()\n\
+         assert not client.write_register(0, 33, device_id=3).isError()\n\
+         assert not client.write_register(0, 77, device_id=7).isError()\n\
+         assert client.read_holding_registers(0, device_id=3).registers == [33]\n\
+         for unit in (0, 1, 255):\n\
+         \x20   assert client.read_holding_registers(0, device_id=unit).exception_code == 0x0B\n\
+         print('ok')\n",
+        &address.port().to_string(),
+    ]);
+    machine.mirror_until_the_end_of(python);
+    machine.until("both have theirs", |machine| {
+        machine.get("oven out") == 77.0
+    });
+    assert_eq!(machine.get("press out"), 33.0);
+    Ok(())
+}
+
+/// A running server of pymodbus, which ends when it is dropped.
+struct Server(Child);
+
+impl Server {
+    fn start(arguments: &[&str]) -> Result<Self, Absent> {
+        let mut child = pymodbus("modbus_server.py")?
+            .args(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let told = child.stdout.take().expect("a pipe");
+        let first = BufReader::new(told).lines().next();
+        let first = first.expect("it prints").expect("UTF-8");
+        assert_eq!(first, "modbus_server: ready");
+        Ok(Self(child))
+    }
+
+    fn tcp() -> Result<(Self, SocketAddr), Absent> {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = listener.local_addr().expect("it is bound");
+        drop(listener);
+        let (ip, port) = (address.ip().to_string(), address.port().to_string());
+        Ok((Self::start(&["tcp", &ip, &port])?, address))
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Words each way, so many that no request takes them all.
+fn words(count: usize) -> String {
+    let mut text = String::new();
+    for word in 0..count {
+        let byte = 2 * word;
+        let _ = write!(
+            text,
+            "[[signal]]\nname = \"i {word}\"\naddress = \"%IW{byte}\"\n\
+             [[signal]]\nname = \"q {word}\"\naddress = \"%QW{byte}\"\n"
+        );
+    }
+    text
+}
+
+/// Lets values go out and come back, where %I and %Q lie at the same place.
+#[track_caller]
+fn loop_through(fieldbus: &str, count: usize) -> Machine {
+    let mut machine = Machine::open(fieldbus, &words(count));
+    for round in 1..=3 {
+        for word in 0..count {
+            let value = (word * 7 + round * 1000) % 65536;
+            machine.set(
+                &format!("i {word}"),
+                f64::from(u32::try_from(value).expect("small")),
+            );
+        }
+        machine.until("all values are back", |machine| {
+            (0..count)
+                .all(|word| machine.get(&format!("i {word}")) == machine.get(&format!("q {word}")))
+        });
+    }
+    assert_eq!(machine.driver.link().state, LinkState::Running);
+    assert_eq!(machine.statistic("writes").as_deref(), Some("allowed"));
+    machine
+}
+
+const ALLOWED: &str = "write_to = \"ACME PLC 7 1.2\"";
+
+fn our_client_drives_pymodbus() -> Result<(), Absent> {
+    let (server, address) = Server::tcp()?;
+    let client = format!("kind = \"modbus-client\"\naddress = \"{address}\"\n{ALLOWED}\n");
+    // Functions 23; 16 and 3; 15 and 1; and more than one request takes.
+    for (keys, count) in [
+        ("inputs = \"offset:0\"", 64),
+        ("inputs = \"offset:0\"\nread_write = false", 64),
+        ("inputs = \"offset:1000\"\noutputs = \"401001\"", 300),
+        ("inputs = \"coil:17\"\noutputs = \"0x00017\"", 10),
+        ("inputs = \"coil offset:8\"\noutputs = \"coil:9\"", 200),
+        (
+            "inputs = [{ at = \"coil:1\", bytes = 2 }, { at = \"4x00501\" }]\n\
+             outputs = [{ at = \"coil:1\", bytes = 2 }, { at = \"offset:500\" }]",
+            20,
+        ),
+    ] {
+        let machine = loop_through(&format!("{client}{keys}"), count);
+        machine.driver.close();
+    }
+    // The server dies and comes back.
+    let mut machine = loop_through(&format!("{client}inputs = \"offset:0\""), 4);
+    drop(server);
+    machine.until("the line is lost", |machine| {
+        machine.driver.link().state != LinkState::Running
+    });
+    let (ip, port) = (address.ip().to_string(), address.port().to_string());
+    let _server = Server::start(&["tcp", &ip, &port])?;
+    machine.set("i 0", 99.0);
+    machine.until("the value is back", |machine| machine.get("q 0") == 99.0);
+    Ok(())
+}
+
+fn our_client_writes_only_where_it_may() -> Result<(), Absent> {
+    let (_server, address) = Server::tcp()?;
+    for write_to in ["", "write_to = \"ACME PLC 7\""] {
+        let fieldbus = format!(
+            "kind = \"modbus-client\"\naddress = \"{address}\"\ninputs = \"offset:0\"\n{write_to}"
+        );
+        let mut machine = Machine::open(&fieldbus, &words(2));
+        machine.set("i 0", 5.0);
+        machine.until("it runs", |machine| {
+            machine
+                .statistic("bus_cycles")
+                .is_some_and(|cycles| cycles != "0" && cycles.len() > 1)
+        });
+        assert_eq!(machine.get("q 0"), 0.0, "nothing was written");
+        assert_eq!(
+            machine.statistic("identity").as_deref(),
+            Some("ACME PLC 7 1.2")
+        );
+        assert_eq!(machine.statistic("writes").as_deref(), Some("blocked"));
+    }
+    Ok(())
+}
+
+fn our_client_reads_inputs() -> Result<(), Absent> {
+    let (_server, address) = Server::tcp()?;
+    let client =
+        format!("kind = \"modbus-client\"\nrole = \"controller\"\naddress = \"{address}\"\n");
+    let mut registers = Machine::open(&client, &words(300));
+    registers.until("input registers come", |machine| {
+        machine.get("i 299") == 2093.0
+    });
+    let keys = format!("{client}inputs = \"discrete-input:1\"\n");
+    let mut bits = Machine::open(&keys, "[[signal]]\nname = \"i\"\naddress = \"%IW0\"\n");
+    // Every third bit, from bit 0 of byte 0 on.
+    bits.until("discrete inputs come", |machine| {
+        machine.get("i") == f64::from(0b0100_1001_1001_0010_u16)
+    });
+    let keys = format!("{client}inputs = \"input-register:2047\"\n");
+    let mut beyond = Machine::open(&keys, &words(3));
+    beyond.until("it says what was refused", |machine| {
+        machine.driver.link().cause.name() == "refused"
+    });
+    let reason = beyond.driver.link().reason;
+    let expected = "refused to read input-register offset:2046 (3x02047) to 2048 (function 4): exception 02 \
+                    (illegal data address); correct \"inputs\"";
+    assert!(reason.contains(expected), "{reason}");
+    Ok(())
+}
+
+/// Runs mbpoll once; gives what it says.
+fn mbpoll(machine: &mut Machine, arguments: &[&str]) -> Result<String, Absent> {
+    let mut mbpoll = foreign::command("mbpoll", "mbpoll")?;
+    mbpoll.args(["-1", "-q"]).args(arguments);
+    Ok(machine.mirror_until_the_end_of(mbpoll))
+}
+
+fn mbpoll_over_tcp() -> Result<(), Absent> {
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let mut machine = Machine::open(server, &signals());
+    let port = machine.address().port().to_string();
+    let tcp = ["-m", "tcp", "-p", port.as_str()];
+    mbpoll_everything(&mut machine, &tcp, "127.0.0.1")
+}
+
+fn mbpoll_everything(machine: &mut Machine, mode: &[&str], host: &str) -> Result<(), Absent> {
+    let run =
+        |machine: &mut Machine, arguments: &[&str]| mbpoll(machine, &[mode, arguments].concat());
+    run(machine, &["-t", "4", "-r", "1", host, "258", "772"])?;
+    let told = run(machine, &["-t", "4", "-r", "1", "-c", "2", host])?;
+    assert!(
+        told.contains("[1]: \t258") && told.contains("[2]: \t772"),
+        "{told}"
+    );
+    machine.until("the machine has it", |machine| machine.get("q 3") == 4.0);
+    let told = run(machine, &["-t", "3", "-r", "1", "-c", "2", host])?;
+    assert!(
+        told.contains("[1]: \t258") && told.contains("[2]: \t772"),
+        "{told}"
+    );
+    run(machine, &["-t", "0", "-r", "65", host, "1", "0", "1"])?;
+    let told = run(machine, &["-t", "0", "-r", "65", "-c", "3", host])?;
+    assert!(
+        told.contains("[65]: \t1") && told.contains("[66]: \t0"),
+        "{told}"
+    );
+    machine.until("the machine has it", |machine| machine.get("q 8") == 5.0);
+    let told = run(machine, &["-t", "1", "-r", "65", "-c", "3", host])?;
+    assert!(told.contains("[67]: \t1"), "{told}");
+    // A REAL with its words swapped, as mbpoll has it by default, and with -B big-endian.
+    run(machine, &["-t", "4:float", "-r", "13", host, "1.5"])?;
+    run(machine, &["-t", "4:float", "-B", "-r", "11", host, "2.5"])?;
+    machine.until("the machine has both", |machine| machine.get("abcd") == 2.5);
+    assert_eq!(machine.get("cdab"), 1.5);
+    Ok(())
+}
+
+#[cfg(unix)]
+fn pymodbus_drives_our_server_on_a_line() -> Result<(), Absent> {
+    let mut client = pymodbus("modbus_client.py")?;
+    let line = pty::Line::new();
+    let mut machine = Machine::open(&serial("server", line.end(0)), &signals());
+    machine.until("it listens", |machine| {
+        machine.statistic("device").is_some()
+    });
+    client.arg("rtu").arg(line.end(1));
+    let told = machine.mirror_until_the_end_of(client);
+    assert!(told.contains("modbus_client: ok checks="), "{told}");
+    assert_eq!(machine.get("abcd"), 1234.5);
+    Ok(())
+}
+
+#[cfg(unix)]
+fn serial(end: &str, device: &std::path::Path) -> String {
+    let device = device.display();
+    format!(
+        "kind = \"modbus-{end}\"\ndevice = \"{device}\"\nbaud = 115200\nparity = \"none\"\nstop_bits = 1\n"
+    )
+}
+
+#[cfg(unix)]
+fn our_client_drives_pymodbus_on_a_line() -> Result<(), Absent> {
+    let line = pty::Line::new();
+    let device = line.end(1).display().to_string();
+    let _server = Server::start(&["rtu", &device])?;
+    let client = format!("{}{ALLOWED}\n", serial("client", line.end(0)));
+    for (keys, count) in [
+        ("inputs = \"offset:0\"", 64),
+        ("inputs = \"offset:0\"\nread_write = false", 150),
+        ("inputs = \"coil:1\"\noutputs = \"coil:1\"", 10),
+    ] {
+        let machine = loop_through(&format!("{client}{keys}"), count);
+        machine.driver.close();
+    }
+    Ok(())
+}
+
+#[cfg(unix)]
+fn mbpoll_on_a_line() -> Result<(), Absent> {
+    let line = pty::Line::new();
+    let mut machine = Machine::open(&serial("server", line.end(0)), &signals());
+    machine.until("it listens", |machine| {
+        machine.statistic("device").is_some()
+    });
+    let device = line.end(1).display().to_string();
+    let rtu = ["-m", "rtu", "-b", "115200", "-P", "none"];
+    mbpoll_everything(&mut machine, &rtu, &device)
+}
+
+/// One PDU to the server, and its answer, both with their headers.
+fn ask(stream: &mut TcpStream, transaction: u16, pdu: &[u8]) -> (Vec<u8>, Vec<u8>) {
+    let mut request = transaction.to_be_bytes().to_vec();
+    let length = u16::try_from(pdu.len() + 1).expect("it is short");
+    request.extend([0, 0]);
+    request.extend(length.to_be_bytes());
+    request.push(1);
+    request.extend(pdu);
+    stream.write_all(&request).expect("the server reads");
+    let mut answer = vec![0; 6];
+    stream.read_exact(&mut answer).expect("a header");
+    let length = usize::from(u16::from_be_bytes([answer[4], answer[5]]));
+    answer.resize(6 + length, 0);
+    stream.read_exact(&mut answer[6..]).expect("an answer");
+    (request, answer)
+}
+
+/// Every function, answered and refused, as a capture that tshark reads.
+fn tshark_finds_nothing() -> Result<(), Absent> {
+    let mut tshark = foreign::command("tshark", "tshark")?;
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let mut machine = Machine::open(server, &signals());
+    let mut stream = TcpStream::connect(machine.address()).expect("it listens");
+    let requests: [&[u8]; 19] = [
+        &[1, 0, 3, 0, 19],
+        &[2, 0, 0, 0, 100],
+        &[3, 0, 0, 0, 32],
+        &[4, 0, 0, 0, 32],
+        &[5, 0, 9, 0xFF, 0],
+        &[6, 0, 1, 0xAB, 0xCD],
+        &[15, 0, 3, 0, 10, 2, 0xFF, 3],
+        &[16, 0, 0, 0, 2, 4, 1, 2, 3, 4],
+        &[22, 0, 1, 0, 0xF2, 0, 0x25],
+        &[23, 0, 0, 0, 4, 0, 0, 0, 1, 2, 7, 8],
+        &[43, 14, 1, 0],
+        &[43, 14, 4, 1],
+        &[1, 2, 0, 0, 1],
+        &[3, 0, 0, 0, 0],
+        &[4, 0, 0, 1, 0],
+        &[16, 0, 31, 0, 2, 4, 1, 2, 3, 4],
+        &[23, 0, 99, 0, 4, 0, 0, 0, 1, 2, 7, 8],
+        &[7],
+        &[43, 14, 4, 9],
+    ];
+    let mut capture = Capture::default();
+    for (transaction, pdu) in (1..).zip(requests) {
+        let (request, answer) = ask(&mut stream, transaction, pdu);
+        capture.sent(true, &request);
+        capture.sent(false, &answer);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("modbus.pcap");
+    std::fs::write(&file, capture.file()).expect("it is written");
+    let output = tshark
+        .arg("-r")
+        .arg(&file)
+        .args(["-d", "tcp.port==502,mbtcp", "-V"])
+        .output()
+        .expect("it runs");
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let frames = told.matches("Modbus/TCP").count();
+    assert_eq!(frames, 2 * requests.len(), "{told}");
+    for bad in ["Malformed", "Expert Info (Error", "Expert Info (Warning"] {
+        let lines: Vec<&str> = told.lines().filter(|line| line.contains(bad)).collect();
+        assert!(lines.is_empty(), "{lines:#?}");
+    }
+    assert!(told.contains("Object String Value: Cell 4"), "{told}");
+    Ok(())
+}
+
+/// One TCP connection as a file of packets: Ethernet frames with IPv4 and TCP headers around what was sent.
+#[derive(Default)]
+struct Capture {
+    packets: Vec<u8>,
+    count: u32,
+    /// Bytes sent so far by the client and by the server.
+    sent: [u32; 2],
+}
+
+impl Capture {
+    fn sent(&mut self, by_client: bool, bytes: &[u8]) {
+        let (own, other) = if by_client { (0, 1) } else { (1, 0) };
+        let ports = [40_000_u16, 502];
+        let length = u16::try_from(40 + bytes.len()).expect("it is short");
+        let mut packet = vec![2, 0, 0, 0, 0, 2, 2, 0, 0, 0, 0, 1, 8, 0];
+        let mut ip = vec![0x45, 0];
+        ip.extend(length.to_be_bytes());
+        ip.extend([0, 0, 0x40, 0, 64, 6, 0, 0]);
+        let hosts = [[10, 0, 0, 1], [10, 0, 0, 2]];
+        ip.extend([hosts[own], hosts[other]].concat());
+        let words = ip
+            .chunks(2)
+            .map(|pair| u32::from(pair[0]) << 8 | u32::from(pair[1]));
+        let sum = words.sum::<u32>();
+        let sum = !u16::try_from((sum & 0xFFFF) + (sum >> 16)).expect("it fits");
+        ip[10..12].copy_from_slice(&sum.to_be_bytes());
+        packet.extend(ip);
+        packet.extend(ports[own].to_be_bytes());
+        packet.extend(ports[other].to_be_bytes());
+        packet.extend((1 + self.sent[own]).to_be_bytes());
+        packet.extend((1 + self.sent[other]).to_be_bytes());
+        packet.extend([0x50, 0x18, 0x20, 0, 0, 0, 0, 0]);
+        packet.extend(bytes);
+        self.sent[own] += u32::try_from(bytes.len()).expect("it is short");
+        let size = u32::try_from(packet.len()).expect("it is short");
+        for word in [1, self.count, size, size] {
+            self.packets.extend(word.to_le_bytes());
+        }
+        self.count += 1;
+        self.packets.extend(packet);
+    }
+
+    fn file(&self) -> Vec<u8> {
+        let mut file = Vec::new();
+        for word in [0xA1B2_C3D4_u32, 0x0004_0002, 0, 0, 0xFFFF, 1] {
+            file.extend(word.to_le_bytes());
+        }
+        file.extend(&self.packets);
+        file
+    }
+}

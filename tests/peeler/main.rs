@@ -1,0 +1,130 @@
+//! The programs "charger" and "lathe" against a small peeling line in Rust, byte by byte, on simulation time.
+
+mod line;
+mod plant;
+
+use line::Line;
+use tickbus::plc::Report;
+
+/// The number behind `key=` in a report.
+fn told(report: &dyn Report, key: &str) -> f64 {
+    let mut text = String::new();
+    report.write(&mut text);
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix(&format!("{key}=")));
+    let line = line.unwrap_or_else(|| panic!("{key} in\n{text}"));
+    line.parse().expect("a number")
+}
+
+/// The same as a count.
+fn counted(report: &dyn Report, key: &str) -> u32 {
+    let number = told(report, key);
+    (0..1_000)
+        .find(|count| f64::from(*count) >= number)
+        .expect("a small number")
+}
+
+#[test]
+fn both_programs_peel_block_after_block() {
+    let mut line = Line::new(&[], &[]);
+    line.until("three cores", 300.0, |line| line.plant.cores == 3);
+    let (charger, lathe) = (line.report(0), line.report(1));
+    assert_eq!(counted(&*charger, "peeler.faults"), 0);
+    assert_eq!(counted(&*lathe, "peeler.faults"), 0);
+    line.seconds(3.0);
+    assert_eq!(counted(&*lathe, "peeler.blocks"), 3);
+    assert!(told(&*charger, "peeler.blocks") >= 3.0);
+    assert!(
+        line.plant.veneer > 3.0 * 20_000.0,
+        "{} mm of veneer",
+        line.plant.veneer
+    );
+}
+
+#[test]
+fn an_acknowledge_gives_many_commands_a_second_where_holding_gives_two() {
+    let rotation = "peeler.commands_per_s.spindle rotation";
+    let hold = [("hold", "500ms")];
+    let mut held = Line::new(&hold, &hold);
+    held.until("a core", 150.0, |line| line.plant.cores == 1);
+    let mut quick = Line::new(&[], &[]);
+    quick.until("a core", 150.0, |line| line.plant.cores == 1);
+    let (held, quick) = (held.report(1), quick.report(1));
+    assert!(told(&*held, rotation) <= 2.0);
+    assert!(told(&*quick, rotation) >= 10.0, "{}", quick.summary());
+    // What the rate is good for: the speed of the veneer.
+    let error = "peeler.speed_error_rms_percent";
+    assert!(
+        told(&*held, error) > 2.0 * told(&*quick, error),
+        "{}{}",
+        held.summary(),
+        quick.summary()
+    );
+}
+
+#[test]
+fn an_axis_that_fails_stops_all_axes_and_the_line_goes_on_when_it_is_well() {
+    for (number, axis) in [(1, 3), (0, 8), (0, 2), (1, 0)] {
+        let mut line = Line::new(&[], &[]);
+        line.until("a core", 150.0, |line| line.plant.cores == 1);
+        line.seconds(4.0);
+        line.plant.sides[number].drives[axis].healthy = false;
+        line.seconds(0.1);
+        let enabled = |line: &Line| line.enabled(number);
+        assert_eq!(enabled(&line), 0, "axis {axis} of side {number}");
+        line.seconds(1.0);
+        line.plant.sides[number].drives[axis].healthy = true;
+        line.seconds(0.5);
+        assert_eq!(
+            enabled(&line),
+            0,
+            "not before it has been well for a second"
+        );
+        line.until("another core", 150.0, |line| line.plant.cores == 3);
+        assert_eq!(counted(&*line.report(number), "peeler.faults"), 1);
+    }
+}
+
+#[test]
+fn a_simulation_that_is_started_again_begins_anew() {
+    let mut line = Line::new(&[], &[]);
+    line.until("a block in the lathe", 60.0, |line| {
+        line.plant.held.is_some()
+    });
+    line.restart();
+    line.until("a core", 150.0, |line| line.plant.cores == 1);
+    assert_eq!(counted(&*line.report(0), "peeler.restarts"), 1);
+    assert_eq!(counted(&*line.report(0), "peeler.faults"), 0);
+}
+
+#[test]
+fn a_link_that_breaks_at_any_moment_loses_no_block() {
+    for moment in (0_u8..40).step_by(3) {
+        let mut line = Line::new(&[], &[]);
+        line.seconds(3.0 + f64::from(moment));
+        for side in [0, 1] {
+            line.alive[side] = (usize::from(moment) / 2 + side) % 2 == 1;
+        }
+        line.seconds(1.0);
+        line.alive = [true; 2];
+        line.until("a core", 150.0, |line| line.plant.cores == 2);
+    }
+}
+
+#[test]
+fn a_line_that_stands_still_waits_and_goes_on() {
+    let mut line = Line::new(&[], &[]);
+    line.until("a block in the lathe", 60.0, |line| {
+        line.plant.held.is_some()
+    });
+    line.frozen = true;
+    line.seconds(100.0);
+    line.frozen = false;
+    line.until("a core", 150.0, |line| line.plant.cores == 1);
+    assert_eq!(
+        counted(&*line.report(0), "peeler.faults"),
+        0,
+        "a pause is no fault"
+    );
+}

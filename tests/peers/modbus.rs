@@ -1,0 +1,201 @@
+//! Modbus buses for tests, and the bytes of telegrams.
+
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use tickbus::time::Manual;
+
+use crate::conformance::rig::{Bus, Liar};
+use crate::peers::{leave, own_address};
+
+/// Modbus TCP at an address of its own.
+pub struct Tcp {
+    pub address: SocketAddr,
+    /// The role of the end that serves.
+    server: &'static str,
+}
+
+impl Tcp {
+    /// A machine that is remote I/O, and a PLC that polls it.
+    pub fn device_serves() -> Self {
+        Self {
+            address: own_address(),
+            server: "device",
+        }
+    }
+
+    /// A PLC that is a server, and a machine that polls it.
+    pub fn controller_serves() -> Self {
+        Self {
+            address: own_address(),
+            server: "controller",
+        }
+    }
+}
+
+impl Bus for Tcp {
+    fn fieldbus(&self, role: &str) -> String {
+        let address = self.address;
+        if role == self.server {
+            return format!("kind = \"modbus-server\"\naddress = \"{address}\"");
+        }
+        // A driver of the suite is called as its role. Its clock does not wait for a server that has not got the
+        // processor, hence the long time-out.
+        format!(
+            "kind = \"modbus-client\"\naddress = \"{address}\"\nwrite_to = \"tickbus {}\"\n\
+             timeout = \"1h\"",
+            self.server
+        )
+    }
+
+    /// Half a telegram from a client, or half an answer from a server, and then no more.
+    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        let over = Arc::new(AtomicBool::new(false));
+        let address = self.address;
+        let listener = (self.server == "controller").then(|| {
+            let listener = TcpListener::bind(address).expect("its own address");
+            listener.set_nonblocking(true).expect("an option");
+            listener
+        });
+        let serves = listener.is_some();
+        let thread = std::thread::spawn({
+            let over = Arc::clone(&over);
+            move || {
+                while !over.load(Ordering::Relaxed) {
+                    let met = match &listener {
+                        Some(listener) => listener.accept().map(|met| met.0),
+                        None => TcpStream::connect(address),
+                    };
+                    match (met, serves) {
+                        (Ok(stream), false) => ask_half(stream),
+                        (Ok(stream), true) => answer_with_too_little(stream),
+                        (Err(_), _) => std::thread::yield_now(),
+                    }
+                }
+            }
+        });
+        let words = if serves {
+            "its answer has 3 bytes behind the function code"
+        } else {
+            "left in the middle of a telegram, after 9 bytes of it"
+        };
+        Liar {
+            _peer: Box::new(Ending {
+                over,
+                thread: Some(thread),
+            }),
+            cause: "protocol",
+            words,
+        }
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            (
+                "kind = \"modbus-server\"\naddress = \"1502\"",
+                "has no port",
+            ),
+            ("kind = \"modbus-server\"\nunit = 256", "\"unit\" is 256"),
+            (
+                "kind = \"modbus-server\"\ninputs = \"coil:1\"",
+                "\"inputs\" of a server is a coil",
+            ),
+            (
+                "kind = \"modbus-server\"\nbaud = 9600",
+                "\"baud\" stands without \"device\"",
+            ),
+            (
+                "kind = \"modbus-server\"\naddress = \"0.0.0.0:0\"\ndevice = \"/dev/ttyS0\"",
+                "\"address\" stands beside \"device\"",
+            ),
+            (
+                "kind = \"modbus-server\"\nclient = 5",
+                "did you mean \"clients\"",
+            ),
+            (
+                "kind = \"modbus-client\"\naddress = \"127.0.0.1:0\"",
+                "port 0 cannot be connected to",
+            ),
+            (
+                "kind = \"modbus-client\"\noutputs = \"holding-register:0\"",
+                "numbers go from 1 to 65536",
+            ),
+            (
+                "kind = \"modbus-client\"\ninputs = \"input-register:1\"",
+                "nobody can write input registers",
+            ),
+            (
+                "kind = \"modbus-client\"\noutput_bytes = 4\noutputs = \"offset:65535\"",
+                "end at offset 65536",
+            ),
+            (
+                "kind = \"modbus-client\"\noutput_bytes = 4\noutputs = [{ at = \"coil:1\", bytes = 1 }]",
+                "1 bytes, but %Q has 4",
+            ),
+            (
+                "kind = \"modbus-client\"\ndevice = \"/dev/ttyS0\"\nunit = 0",
+                "from 1 to 247",
+            ),
+            (
+                "kind = \"modbus-server\"\ndevice = \"/dev/ttyS0\"\nparity = \"mark\"",
+                "none of the parities",
+            ),
+            (
+                "kind = \"modbus-server\"\nevents = \"all\"",
+                "none of the kinds of events",
+            ),
+        ]
+    }
+}
+
+/// Asks for holding registers, but for the last bytes of the request.
+fn ask_half(mut stream: TcpStream) {
+    let whole = request(1, 1, &[3, 0, 0, 0, 1]);
+    let _ = stream.write_all(&whole[..9]);
+    leave(stream);
+}
+
+/// Answers whatever is asked with one register, none asked for so little.
+fn answer_with_too_little(mut stream: TcpStream) {
+    let _ = stream.set_nonblocking(false);
+    let mut request = [0; 260];
+    while let Ok(count @ 8..) = stream.read(&mut request) {
+        let mut answer = request[..8].to_vec();
+        answer[4..6].copy_from_slice(&[0, 6]);
+        answer.extend([2, 0, 0]);
+        answer.truncate(count.max(11));
+        answer[5] = 5;
+        if stream.write_all(&answer).is_err() {
+            break;
+        }
+    }
+}
+
+/// A thread that is told to end, and waited for.
+struct Ending {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("the peer did not panic");
+        }
+    }
+}
+
+/// The bytes of a telegram over TCP.
+pub fn request(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut bytes = transaction.to_be_bytes().to_vec();
+    bytes.extend([0, 0]);
+    let length = u16::try_from(pdu.len() + 1).expect("it is short");
+    bytes.extend(length.to_be_bytes());
+    bytes.push(unit);
+    bytes.extend(pdu);
+    bytes
+}

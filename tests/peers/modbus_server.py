@@ -1,0 +1,39 @@
+"""A Modbus server by pymodbus, with all four tables.
+
+modbus_server.py tcp HOST PORT | modbus_server.py rtu DEVICE
+
+Input register n is 7 n, discrete input n is on where n is a multiple of 3; coils and holding registers are zero.
+"""
+
+import asyncio
+import sys
+
+from pymodbus import FramerType, ModbusDeviceIdentification
+from pymodbus.datastore import ModbusDeviceContext, ModbusSequentialDataBlock, ModbusServerContext
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+
+
+async def main():
+    device = ModbusDeviceContext(
+        di=ModbusSequentialDataBlock(1, [number % 3 == 0 for number in range(4096)]),
+        co=ModbusSequentialDataBlock(1, [False] * 4096),
+        ir=ModbusSequentialDataBlock(1, [7 * number % 65536 for number in range(2048)]),
+        hr=ModbusSequentialDataBlock(1, [0] * 2048),
+    )
+    context = ModbusServerContext(devices=device)
+    identity = ModbusDeviceIdentification(
+        info_name={"VendorName": "ACME", "ProductCode": "PLC 7", "MajorMinorRevision": "1.2"})
+    if sys.argv[1] == "tcp":
+        server = ModbusTcpServer(
+            context, identity=identity, address=(sys.argv[2], int(sys.argv[3])))
+    else:
+        server = ModbusSerialServer(
+            context, identity=identity, framer=FramerType.RTU, port=sys.argv[2], baudrate=115200, parity="N")
+    await server.serve_forever(background=True)
+    print("modbus_server: ready", flush=True)
+    # Until whoever started this one is gone.
+    await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
+    await server.shutdown()
+
+
+asyncio.run(main())

@@ -1,0 +1,313 @@
+//! Ends of the S7 buses: pairs of ours, and a client that speaks by hand.
+#![allow(dead_code, reason = "each test uses a part of it")]
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use tickbus::time::Manual;
+
+use crate::conformance::rig::{Bus, Liar};
+use crate::peers::{leave, own_address};
+
+/// A server and a client of ours, at an address of their own.
+pub struct Pair {
+    pub address: SocketAddr,
+    /// The role of the end that serves.
+    pub serves: &'static str,
+    /// Further lines of the client.
+    pub client: &'static str,
+    pub blocks: bool,
+}
+
+impl Pair {
+    pub fn new(serves: &'static str, client: &'static str) -> Self {
+        Self {
+            address: own_address(),
+            serves,
+            client,
+            blocks: false,
+        }
+    }
+
+    /// The images lie in data blocks, not at their beginnings.
+    pub fn with_blocks(self) -> Self {
+        Self {
+            blocks: true,
+            ..self
+        }
+    }
+}
+
+impl Bus for Pair {
+    fn fieldbus(&self, role: &str) -> String {
+        let Self {
+            address,
+            serves,
+            client,
+            ..
+        } = self;
+        if role == *serves {
+            let blocks = if self.blocks {
+                "db = [{ number = 10, area = \"%I\" }, { number = 65535, area = \"%Q\" }]\n"
+            } else {
+                ""
+            };
+            return format!("kind = \"s7-server\"\naddress = \"{address}\"\n{blocks}");
+        }
+        let places = if self.blocks {
+            "input = \"DB10\"\noutput = \"%DB65535.DBX0.0\"\n"
+        } else {
+            ""
+        };
+        format!(
+            "kind = \"s7-client\"\naddress = \"{address}\"\nwrite_to = \"tickbus {serves}\"\n{places}{client}"
+        )
+    }
+
+    /// A client, or a server, that begins well and then sends what no S7 is.
+    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        let over = Arc::new(AtomicBool::new(false));
+        let address = self.address;
+        let listener = (self.serves != "device").then(|| {
+            let listener = TcpListener::bind(address).expect("its own address");
+            listener.set_nonblocking(true).expect("an option");
+            listener
+        });
+        let dials = listener.is_some();
+        let thread = std::thread::spawn({
+            let over = Arc::clone(&over);
+            move || {
+                while !over.load(Ordering::Relaxed) {
+                    let meet = |listener: &TcpListener| listener.accept().map(|met| met.0);
+                    let met = match &listener {
+                        Some(listener) => meet(listener),
+                        None => TcpStream::connect(address),
+                    };
+                    match met {
+                        Ok(stream) => lie(stream, dials),
+                        Err(_) => std::thread::yield_now(),
+                    }
+                }
+            }
+        });
+        Liar {
+            _peer: Box::new(Ending {
+                over,
+                thread: Some(thread),
+            }),
+            cause: "protocol",
+            words: "a message of it begins with 0x11, where S7 has 0x32",
+        }
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            (
+                "kind = \"s7-server\"\naddress = \"127.0.0.1\"",
+                "has no port",
+            ),
+            (
+                "kind = \"s7-server\"\ndb = [{ number = 0, area = \"%Q\" }]",
+                "from 1 to 65535",
+            ),
+            (
+                "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%M\" }]",
+                "is none of the areas",
+            ),
+            (
+                "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%Q\", offset = 1 }]",
+                "goes up to byte 2 of an area that has 1",
+            ),
+            (
+                "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%I\" }]",
+                "goes up to byte 1 of an area that has 0",
+            ),
+            (
+                "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%Q\" }, { number = 1, area = \"%Q\" }]",
+                "is there twice",
+            ),
+            (
+                "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%Q\", station = \"a\" }]",
+                "there is no station \"a\"",
+            ),
+            ("kind = \"s7-server\"\npdu = 100", "from 240 to 960"),
+            ("kind = \"s7-client\"", "has no \"address\""),
+            (
+                "kind = \"s7-client\"\naddress = \"10.0.0.1:0\"",
+                "port 0 cannot be connected to",
+            ),
+            (
+                "kind = \"s7-client\"\naddress = \"10.0.0.1\"\noutput = \"%QW0\"",
+                "is no place in a CPU",
+            ),
+            (
+                "kind = \"s7-client\"\naddress = \"10.0.0.1\"\nremote_tsap = \"3.1\"",
+                "is no TSAP",
+            ),
+            (
+                "kind = \"s7-client\"\naddress = \"10.0.0.1\"\nremote_tsap = \"03.01\"\nslot = 1",
+                "stands beside",
+            ),
+            (
+                "kind = \"s7-client\"\naddress = \"10.0.0.1\"\nslot = 32",
+                "from 0 to 31",
+            ),
+        ]
+    }
+}
+
+/// Connects, or lets connect, and breaks the rules then.
+fn lie(mut stream: TcpStream, serves: bool) {
+    // If the other end is quicker to go, so be it.
+    let _ = stream.set_nonblocking(false);
+    let _ = stream.set_read_timeout(Some(Duration::from_secs(20)));
+    if serves {
+        let _ = stream.read(&mut [0; 64]);
+        let _ = stream.write_all(&CONFIRM);
+    } else {
+        let _ = stream.write_all(&CONNECT);
+    }
+    // All ones would be a good speed, were they believed.
+    let _ = stream.write_all(&packet(&[0x11; 20]));
+    leave(stream);
+}
+
+/// A thread that is told to end, and waited for.
+struct Ending {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("the peer did not panic");
+        }
+    }
+}
+
+/// Asks for a connection with rack 0, slot 1.
+pub const CONNECT: [u8; 22] = [
+    3, 0, 0, 22, 17, 0xE0, 0, 0, 0, 1, 0, 0xC1, 2, 1, 0, 0xC2, 2, 1, 1, 0xC0, 1, 10,
+];
+
+pub const CONFIRM: [u8; 22] = [
+    3, 0, 0, 22, 17, 0xD0, 0, 1, 0, 1, 0, 0xC0, 1, 10, 0xC1, 2, 1, 0, 0xC2, 2, 1, 1,
+];
+
+/// A packet with a message.
+pub fn packet(message: &[u8]) -> Vec<u8> {
+    let [high, low] = u16::try_from(7 + message.len())
+        .expect("short")
+        .to_be_bytes();
+    [&[3, 0, high, low, 2, 0xF0, 0x80][..], message].concat()
+}
+
+/// A packet with a job of these parameters and data.
+pub fn job(parameters: &[u8], data: &[u8]) -> Vec<u8> {
+    let length = |bytes: &[u8]| u16::try_from(bytes.len()).expect("short").to_be_bytes();
+    let ([p0, p1], [d0, d1]) = (length(parameters), length(data));
+    let header = [0x32, 1, 0, 0, 0, 7, p0, p1, d0, d1];
+    packet(&[&header[..], parameters, data].concat())
+}
+
+/// The address of so many bytes of an area: 0x81 for inputs, 0x82 for outputs, 0x83 for flags, 0x84 for a block.
+pub fn address(area: u8, block: u16, byte: usize, count: usize) -> Vec<u8> {
+    let [b0, b1] = block.to_be_bytes();
+    let [c0, c1] = u16::try_from(count).expect("short").to_be_bytes();
+    let [_, a0, a1, a2] = u32::try_from(byte * 8).expect("short").to_be_bytes();
+    vec![0x12, 10, 0x10, 2, c0, c1, b0, b1, area, a0, a1, a2]
+}
+
+/// A packet that asks to read these bytes.
+pub fn request(area: u8, byte: usize, count: usize) -> Vec<u8> {
+    job(&[&[4, 1][..], &address(area, 0, byte, count)].concat(), &[])
+}
+
+/// A packet that asks to write these bytes.
+pub fn command(area: u8, byte: usize, bytes: &[u8]) -> Vec<u8> {
+    let [high, low] = u16::try_from(bytes.len() * 8).expect("short").to_be_bytes();
+    let data = [&[0, 4, high, low][..], bytes].concat();
+    let address = address(area, 0, byte, bytes.len());
+    job(&[&[5, 1][..], &address].concat(), &data)
+}
+
+/// A client that speaks by hand.
+pub struct Client(pub TcpStream);
+
+impl Client {
+    /// One that has connected and agreed upon units of 480 bytes.
+    pub fn new(address: SocketAddr) -> Self {
+        Self::in_slot(address, 1)
+    }
+
+    /// The same, that means the CPU in this slot.
+    pub fn in_slot(address: SocketAddr, slot: u8) -> Self {
+        let mut client = Self::silent(address);
+        let mut connect = CONNECT;
+        connect[18] = slot;
+        assert_eq!(client.ask(&connect).len(), 22);
+        let agreed = client.ask(&job(&[0xF0, 0, 0, 1, 0, 1, 1, 0xE0], &[]));
+        assert_eq!(agreed[agreed.len() - 2..], [1, 0xE0]);
+        client
+    }
+
+    /// One that has said nothing yet.
+    pub fn silent(address: SocketAddr) -> Self {
+        let stream = TcpStream::connect(address).expect("somebody listens");
+        stream.set_nodelay(true).expect("a TCP option");
+        let limit = Some(Duration::from_secs(20));
+        stream.set_read_timeout(limit).expect("a TCP option");
+        Self(stream)
+    }
+
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.0.write_all(bytes).expect("the server reads");
+    }
+
+    /// The next packet; none when the server closes the connection.
+    pub fn receive(&mut self) -> Option<Vec<u8>> {
+        let mut packet = vec![0; 4];
+        match self.0.read_exact(&mut packet) {
+            Ok(()) => {}
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    ErrorKind::UnexpectedEof | ErrorKind::ConnectionReset
+                ) =>
+            {
+                return None;
+            }
+            Err(error) => panic!("no answer: {error}"),
+        }
+        let length = usize::from(u16::from_be_bytes([packet[2], packet[3]]));
+        packet.resize(length, 0);
+        self.0.read_exact(&mut packet[4..]).expect("a whole packet");
+        Some(packet)
+    }
+
+    /// Sends, and receives one packet.
+    pub fn ask(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.send(bytes);
+        self.receive().expect("an answer")
+    }
+
+    /// Reads bytes.
+    pub fn read(&mut self, area: u8, byte: usize, count: usize) -> Vec<u8> {
+        let answer = self.ask(&request(area, byte, count));
+        // Packet, header, parameters, and the item's code.
+        assert_eq!(answer[7 + 12 + 2], 0xFF, "{answer:02x?}");
+        answer[7 + 12 + 2 + 4..].to_vec()
+    }
+
+    /// Writes bytes.
+    pub fn write(&mut self, area: u8, byte: usize, bytes: &[u8]) {
+        let answer = self.ask(&command(area, byte, bytes));
+        assert_eq!(answer[7 + 12..], [5, 1, 0xFF]);
+    }
+}

@@ -117,7 +117,7 @@ impl Bus for OpcUa {
             ),
             (
                 "kind = \"opcua-client\"\nurl = \"opc.tcp://h\"\nnodes = { \"t\" = \"ns=2;s=x\" }",
-                "no signal is called that",
+                "no signal is called",
             ),
             ("kind = \"opcua-server\"", "anonymous"),
             (

@@ -7,6 +7,7 @@ use opcua::types::{DataValue, DateTime, NodeId, NumericRange, StatusCode, Varian
 
 use crate::fieldbus::opcua::values::{self, Values};
 use crate::fieldbus::{Port, Role};
+use crate::image::Event;
 use crate::signal::{Plan, Scale, Signal, SignalTable, Slot};
 use crate::time::Nanos;
 
@@ -22,6 +23,8 @@ pub(super) struct Image {
     places: Vec<Place>,
     frames: Vec<Box<[u8]>>,
     show: Show,
+    /// Whether a write is an event though it changes nothing.
+    every_write: bool,
 }
 
 /// Where values are shown: the nodes of the crate's server, and who is told of them.
@@ -45,7 +48,13 @@ struct Place {
 
 impl Image {
     /// Nothing shown yet.
-    pub(super) fn new(table: &Arc<SignalTable>, role: Role, port: &Port, show: Show) -> Self {
+    pub(super) fn new(
+        table: &Arc<SignalTable>,
+        role: Role,
+        port: &Port,
+        show: Show,
+        every_write: bool,
+    ) -> Self {
         let (tx, rx) = role.areas();
         let place = |signal: &Signal| Place {
             node: space::node(&signal.name),
@@ -74,6 +83,7 @@ impl Image {
             places: table.signals.iter().map(place).collect(),
             frames,
             show,
+            every_write,
         }
     }
 
@@ -94,6 +104,16 @@ impl Image {
     pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, Slot)]) {
         let mut touched = vec![false; self.frames.len()];
         for &(signal, bits) in list {
+            // A change is reported by the port.
+            if self.every_write && self.receives.bits(signal) == bits {
+                let value = slot(&self.table.signals[signal], bits);
+                let signal = u32::try_from(signal).expect("tables hold fewer than 2^32 signals");
+                port.event(Event {
+                    signal,
+                    value,
+                    time: now,
+                });
+            }
             self.receives.set(signal, bits);
             let place = &mut self.places[signal];
             place.written = true;
@@ -205,6 +225,19 @@ fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
         None if age > port.max_age() => StatusCode::UncertainLastUsableValue,
         _ => StatusCode::Good,
     }
+}
+
+/// The slot of a signal with these bits, in engineering units.
+fn slot(signal: &Signal, bits: Slot) -> Slot {
+    if signal.is_integer_slot() {
+        return bits;
+    }
+    let raw = values::variant(signal.data_type, bits);
+    let raw = match raw {
+        Variant::Boolean(value) => f64::from(u8::from(value)),
+        other => real(&other),
+    };
+    Slot::from_real(signal.scale.map_or(raw, |scale| scale.value(raw)))
 }
 
 /// A raw value as a double.

@@ -13,7 +13,7 @@ use opcua::server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManag
 use opcua::server::node_manager::{
     MonitoredItemRef, ParsedReadValueId, ParsedWriteValue, RequestContext, ServerContext, WriteNode,
 };
-use opcua::server::{CreateMonitoredItem, MonitoredItemHandle};
+use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
 use opcua::types::{
     AttributeId, DataValue, DateTime, NodeId, NumericRange, StatusCode, TimestampsToReturn,
 };
@@ -153,6 +153,7 @@ impl Signals {
 }
 
 #[async_trait]
+#[expect(clippy::mut_mut, reason = "the crate's own signature")]
 impl InMemoryNodeManagerImpl for Signals {
     async fn init(&self, _: &mut AddressSpace, _: ServerContext) {}
 
@@ -294,7 +295,7 @@ fn publishing(context: &RequestContext, item: MonitoredItemHandle) -> Nanos {
         let of_session = of_session.lock();
         let interval = of_session
             .get(item.subscription_id)
-            .map(|one| one.publishing_interval());
+            .map(Subscription::publishing_interval);
         interval.map_or(Nanos::ZERO, |interval| {
             Nanos(i64::try_from(interval.as_nanos()).unwrap_or(i64::MAX))
         })

@@ -160,7 +160,7 @@ impl Free for Server {
                     service
                 }
                 None => service.insert(Service {
-                    image: Image::new(&self.table, self.role, port, show),
+                    image: Image::new(&self.table, self.role, port, show, self.options.every_write),
                     peers: Peers::default(),
                     waiting: waiting.clone(),
                     rejected: self.pki.rejected(),

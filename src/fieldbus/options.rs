@@ -161,6 +161,7 @@ impl Options {
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),
+            Self::OpcuaClient(options) => options.fit(table, collector),
             _ => {}
         }
     }
@@ -186,7 +187,7 @@ impl Options {
             Some("modbus-client") => {
                 modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
             }
-            Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
+            Some("opcua-client") => opcua::ClientOptions::read(moved, table).map(Self::OpcuaClient),
             Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
                 table.finish_open();

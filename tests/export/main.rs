@@ -56,7 +56,7 @@ fn exports_are_their_golden_files() {
         let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
         for target in Target::ALL {
             let golden = right.join(format!("{stem}-{}", target.name()));
-            if !golden.exists() && std::env::var_os("BLESS").is_none() {
+            if !golden.exists() {
                 continue;
             }
             let folder = tempfile::tempdir().expect("a folder");
@@ -75,7 +75,7 @@ fn exports_are_their_golden_files() {
             count += 1;
         }
     }
-    assert!(count >= 2 * Target::ALL.len(), "golden files are there");
+    assert!(count >= 12, "golden files are there");
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! `tickbus export`: golden files, and properties of what it makes for any signal table.
 #![allow(missing_docs, reason = "tests")]
 
+mod machine;
 mod s7;
+mod st;
 mod tables;
 
 use std::fs;

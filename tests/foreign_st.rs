@@ -1,4 +1,4 @@
-//! Exports in Structured Text under the eyes of a parser that somebody else wrote: blark, for TwinCAT.
+//! Exports in Structured Text under the eyes of a parser that somebody else wrote: blark.
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
 mod foreign;
@@ -28,7 +28,10 @@ fn write(file: &str, target: Target, folder: &Path) -> Vec<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let made = export(&config, target).unwrap_or_else(|mistakes| panic!("{mistakes}"));
-    let sources = made.files.iter().filter(|file| file.name.ends_with(".st"));
+    let sources = made
+        .files
+        .iter()
+        .filter(|file| Path::new(&file.name).extension() == Some("st".as_ref()));
     let written = sources.map(|source| {
         let path = folder.join(format!("{}-{}", target.name(), source.name));
         std::fs::write(&path, &source.text).expect("the file is written");

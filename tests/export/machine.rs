@@ -192,11 +192,11 @@ impl Machine {
             let mut arguments = arguments.iter();
             for variable in function.var_blocks.iter().flat_map(|block| &block.vars) {
                 let data_type = format!("{:?}", variable.var_type.kind);
-                let first = match data_type.split('"').nth(1).expect("a type").parse() {
-                    Ok(DataType::Real) => Value::Real(0.0),
-                    Ok(DataType::Bool) => Value::Bool(false),
-                    Ok(other) => Value::Whole(Some(other), 0),
-                    Err(_) => panic!("{data_type}"),
+                let data_type = data_type.split('"').nth(1).expect("a type");
+                let first = match data_type.parse::<DataType>().expect("an elementary type") {
+                    DataType::Real => Value::Real(0.0),
+                    DataType::Bool => Value::Bool(false),
+                    other => Value::Whole(Some(other), 0),
                 };
                 let value = arguments.next().copied().unwrap_or(first);
                 inside.variables.insert(variable.name.clone(), value);

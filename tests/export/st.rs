@@ -198,7 +198,7 @@ proptest! {
     }
 }
 
-/// The functions that the export for OpenPLC brings along.
+/// The functions that the export for `OpenPLC` brings along.
 fn portable_functions() -> String {
     let text = "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"modbus-server\"\n\
                 [[signal]]\nname = \"r\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";

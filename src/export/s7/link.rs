@@ -2,6 +2,7 @@
 
 use super::{Plan, line, modbus, s7comm, socket, source};
 use crate::fieldbus::Options;
+use crate::fieldbus::socket::Message;
 
 /// A body: what it declares and what it does.
 #[derive(Default)]
@@ -18,6 +19,9 @@ pub(super) struct Body {
 /// The second source.
 pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
     let body = match &plan.config.bus {
+        Options::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
+            by_hand("socket with message = \"axis\"", notes)
+        }
         Options::Socket(options) => socket::body(plan, options, notes),
         Options::ModbusServer(options) => modbus::client(plan, options, notes),
         Options::ModbusClient(options) => modbus::server(plan, options, notes),

@@ -78,6 +78,6 @@ record Intervals(long count, double mean, double max, double min, double varianc
     }
 
     private static String text(double value) {
-        return String.format(Locale.ROOT, value < 0.1 ? "%.4f" : "%.2f", value);
+        return String.format(Locale.ROOT, "%.2f", value);
     }
 }

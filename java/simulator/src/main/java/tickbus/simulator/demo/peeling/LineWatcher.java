@@ -21,13 +21,13 @@ final class LineWatcher {
     private final Peeler line;
     private final Timeline timeline;
     private final String[] links;
+    private final boolean[] ran;
     private final List<String> shapes = new ArrayList<>();
     private int centred;
     private int clamped;
     private int held;
     private boolean round;
     private int cores;
-    private int unpeeled;
     private double ribbonBefore;
 
     LineWatcher(Simulator simulator, Peeler line, Timeline timeline) {
@@ -35,6 +35,7 @@ final class LineWatcher {
         this.line = line;
         this.timeline = timeline;
         this.links = new String[simulator.drivers().size()];
+        this.ran = new boolean[links.length];
     }
 
     Simulator simulator() {
@@ -96,10 +97,8 @@ final class LineWatcher {
             timeline.add(now, "lathe", "block " + held + " is peeled: "
                     + text("%.1f m of ribbon", line.wood().ribbon() - ribbonBefore) + ", the core falls");
         }
-        if (line.wood().unpeeledCount() != unpeeled) {
-            unpeeled = line.wood().unpeeledCount();
-            shapes.remove(shapes.size() - 1);
-            timeline.add(now, "lathe", "block " + held + " falls before it is peeled");
+        if (line.wood().unpeeledCount() > 0) {
+            throw new DemoFailure("block " + held + " fell before it was peeled");
         }
     }
 
@@ -117,6 +116,12 @@ final class LineWatcher {
                 links[i] = state;
                 timeline.add(now, "link", driver.name() + ": " + state);
             }
+            boolean runs = "running".equals(statistics.get("state"));
+            if (ran[i] && !runs) {
+                throw new DemoFailure("the link to the PLC of the " + driver.name().toLowerCase(Locale.ROOT)
+                        + " broke: " + state);
+            }
+            ran[i] |= runs;
         }
     }
 }

@@ -64,7 +64,7 @@ final class PeelingReport {
 
               here: by the end that receives, which takes the time when it has read the last byte of a record. The simulator's
               driver does so for records of the PLCs, and each PLC's process for records of the simulator. All of it runs on
-              one machine, over its loopback network.
+              one machine, over its loopback network. A time of 0 is that of two records that were read at once.
               2018: table 4 of S. Nyyssonen's thesis, two S7-1500 and a PC on an Ethernet, seen by Wireshark at the PC. Its
               variances are printed there 1000 times smaller and in ms; they fit the other figures as seconds squared / 1000.
             """);

@@ -6,7 +6,7 @@ use super::tcp::Address;
 use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
-use crate::signal::SignalTable;
+use crate::signal::{Signal, SignalTable, Station};
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -138,10 +138,19 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
             Self::ModbusClient(options) => options.stations.read_station(count, true, table),
-            Self::Socket(options) => options.read_station(count, table),
+            Self::Socket(options) => options.read_station(table),
             Self::S7Server(options) => options.read_station(count, table),
             Self::S7Client(options) => options.read_station(count, table),
             Self::Loopback(_) | Self::Plugin(_) | Self::OpcuaClient(_) | Self::OpcuaServer(_) => {}
+        }
+    }
+
+    /// Where a signal of `station` lies, in the bus's own words; empty where those are its address.
+    pub fn place(&self, signal: &Signal, station: &Station) -> String {
+        match self {
+            Self::ModbusServer(options) => options.place(signal),
+            Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            _ => String::new(),
         }
     }
 
@@ -152,6 +161,7 @@ impl Options {
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),
+            Self::OpcuaClient(options) => options.fit(table, collector),
             _ => {}
         }
     }
@@ -177,7 +187,7 @@ impl Options {
             Some("modbus-client") => {
                 modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
             }
-            Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
+            Some("opcua-client") => opcua::ClientOptions::read(moved, table).map(Self::OpcuaClient),
             Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
                 table.finish_open();

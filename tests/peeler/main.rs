@@ -210,25 +210,27 @@ fn troubles_at_random_moments_lose_no_block() {
     };
     for run in 0..10 {
         let mut line = Line::new(&[], &[]);
-        let mut troubles = String::new();
+        let mut troubles = Vec::new();
         for _ in 0..3 {
             let wait = f64::from(next(4_000)) / 100.0;
             line.seconds(wait);
             let (side, lasts) = (usize::from(next(2) == 1), f64::from(next(400)) / 100.0);
             if next(2) == 0 {
-                troubles += &format!("after {wait} s the link of {side} for {lasts} s\n");
+                troubles.push(format!("after {wait} s the link of {side} for {lasts} s"));
                 line.alive[side] = false;
                 line.seconds(lasts);
                 line.alive[side] = true;
             } else {
                 let axis = next(12) as usize;
-                troubles += &format!("after {wait} s axis {axis} of {side} for {lasts} s\n");
+                troubles.push(format!(
+                    "after {wait} s axis {axis} of {side} for {lasts} s"
+                ));
                 line.plant.sides[side].drives[axis].healthy = false;
                 line.seconds(lasts);
                 line.plant.sides[side].drives[axis].healthy = true;
             }
         }
-        println!("run {run}\n{troubles}");
+        println!("run {run}: {}", troubles.join(", "));
         let cores = line.plant.cores;
         line.until("two more cores", 200.0, |line| {
             line.plant.cores == cores + 2

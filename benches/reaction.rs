@@ -67,6 +67,22 @@ fn main() {
         let simulator = reaction(&device, Some(&controller), Machine::Simulator, edges);
         println!("rust reaction.{kind}.simulator_us {simulator:.1}");
     }
+    #[cfg(feature = "opcua")]
+    opcua(edges.min(500));
+}
+
+/// By Write one way and by a subscription the other; publishing is in whole milliseconds.
+#[cfg(feature = "opcua")]
+fn opcua(edges: usize) {
+    let device = config(
+        "kind = \"opcua-server\"\naddress = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true",
+    );
+    let controller = config(
+        "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1\"\nsecurity = \"None\"\n\
+         write_to = \"urn:tickbus:bench tickbus\"",
+    );
+    let mirror = reaction(&device, Some(&controller), Machine::Mirror, edges);
+    println!("rust reaction.opcua_us {mirror:.1}");
 }
 
 /// The median of a bare exchange, in microseconds.

@@ -161,6 +161,7 @@ impl Options {
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),
+            Self::OpcuaClient(options) => options.fit(table, collector),
             _ => {}
         }
     }
@@ -186,7 +187,7 @@ impl Options {
             Some("modbus-client") => {
                 modbus::ClientOptions::read(role, moved, table).map(Self::ModbusClient)
             }
-            Some("opcua-client") => opcua::ClientOptions::read(table).map(Self::OpcuaClient),
+            Some("opcua-client") => opcua::ClientOptions::read(moved, table).map(Self::OpcuaClient),
             Some("opcua-server") => opcua::ServerOptions::read(table).map(Self::OpcuaServer),
             other => {
                 table.finish_open();
@@ -203,10 +204,13 @@ pub(super) fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
     if value.is_boolean() {
         return value.boolean().map(|events| (events, false));
     }
-    value.text(
-        "write true for every change, \"writes\" for every write, changed or not, or false",
-    )?;
-    value.choice("kinds of events", &[("writes", (true, true))])
+    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
+    let text = value.text(right)?;
+    if text != "writes" {
+        value.wrong(format!("\"{}\" is no kind of events", shown(text)), right);
+        return None;
+    }
+    Some((true, true))
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {

@@ -71,9 +71,10 @@ async def main():
         await server.load_certificate(str(certificate))
         await server.load_private_key(str(key))
     await server.register_namespace("urn:test:signals")
-    nodes, kinds = {}, {}
+    nodes, kinds, values = {}, {}, {}
     for name, (kind, value) in asked["nodes"].items():
         kinds[name] = getattr(ua.VariantType, kind)
+        values[name] = value
         node = await server.nodes.objects.add_variable(
             ua.NodeId(name, 2), name, ua.Variant(value, kinds[name])
         )
@@ -85,10 +86,11 @@ async def main():
             answer = {}
             for name, value in line.get("set", {}).items():
                 await nodes[name].write_value(ua.Variant(value, kinds[name]))
+                values[name] = value
             for name, status in line.get("status", {}).items():
                 value = ua.DataValue(
-                    ua.Variant(await nodes[name].read_value(), kinds[name]),
-                    StatusCode_=ua.StatusCode(getattr(ua.StatusCodes, status)),
+                    ua.Variant(values[name], kinds[name]),
+                    StatusCode=ua.StatusCode(getattr(ua.StatusCodes, status)),
                 )
                 await server.write_attribute_value(nodes[name].nodeid, value)
             if "get" in line:

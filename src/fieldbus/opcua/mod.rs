@@ -26,7 +26,7 @@ pub use client::Client;
 #[cfg(feature = "opcua")]
 pub use line::Line;
 pub use node::{Identifier, Namespace, NodeName, NodeNameError, Pattern};
-pub use options::{ClientOptions, ServerOptions};
+pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};
 #[cfg(feature = "opcua")]
 pub use server::Server;

@@ -1,13 +1,15 @@
 //! What a driver.cfg says to the two OPC UA buses.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
-use crate::config::{Table, Value, shown};
+use crate::config::{Collector, Table, Value, did_you_mean, shown};
+use crate::fieldbus::options::read_events;
 use crate::fieldbus::tcp::{Address, AddressError};
+use crate::signal::{Signal, SignalTable};
 use crate::time::Nanos;
 
 use super::security::{Credentials, Keys, Policy};
-use super::{NodeName, Pattern, Url, UrlError};
+use super::{NodeName, NodeNameError, Pattern, Url, UrlError};
 
 /// The longest `write_to`, in characters.
 const IDENTITY_LIMIT: usize = 1000;
@@ -32,13 +34,24 @@ pub struct ClientOptions {
     /// How often the server looks for changes; `None` leaves it to the publishing interval.
     pub sampling_interval: Option<Nanos>,
     /// The nodes of signals that have one of their own, by the signals' names.
-    pub nodes: BTreeMap<String, NodeName>,
+    pub nodes: BTreeMap<String, Node>,
     /// How the node ids of all other signals are made.
     pub node_pattern: Pattern,
     /// The identity of the one server that is written to.
     pub write_to: Option<String>,
     /// Whether every change that the server reports is an event, beside the image.
     pub events: bool,
+    /// Where the table stands in the text.
+    at: usize,
+}
+
+/// The node of one signal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// Its name.
+    pub name: NodeName,
+    /// Where it stands in the text.
+    at: usize,
 }
 
 /// What a driver.cfg says to a server.
@@ -54,6 +67,8 @@ pub struct ServerOptions {
     pub anonymous: bool,
     /// Whether every change that a client makes is reported as an event, beside the image.
     pub events: bool,
+    /// Whether every write is one, changed or not.
+    pub every_write: bool,
 }
 
 impl ClientOptions {
@@ -77,12 +92,15 @@ impl ClientOptions {
         Ok(())
     }
 
-    /// Reads the keys of a client.
-    pub(in crate::fieldbus) fn read(mut table: Table<'_>) -> Option<Self> {
-        let url = table.require(
-            "url",
-            "write where the server is, such as url = \"opc.tcp://192.168.0.1:4840\"",
-        );
+    /// Reads the keys of a client. `moved` says that [`set_address`](Self::set_address) follows.
+    pub(in crate::fieldbus) fn read(moved: bool, mut table: Table<'_>) -> Option<Self> {
+        let right = "write where the server is, such as url = \"opc.tcp://192.168.0.1:4840\"";
+        let url = if moved {
+            table.take("url")
+        } else {
+            table.require("url", right)
+        };
+        let at = table.at();
         let keys = Keys::take(&mut table);
         let intervals = ["publishing_interval", "sampling_interval"].map(|key| table.take(key));
         let nodes = table.take("nodes");
@@ -91,13 +109,18 @@ impl ClientOptions {
         let events = table.take("events");
         table.finish();
 
-        let url = url.and_then(|value| {
-            let text = value.text("write it in quotes, such as \"opc.tcp://192.168.0.1:4840\"")?;
-            let parsed = text.parse();
-            parsed
-                .map_err(|error: UrlError| value.wrong(error.what, error.right))
-                .ok()
-        });
+        let url = match &url {
+            None => moved.then(|| Url {
+                address: ADDRESS,
+                path: String::new(),
+            }),
+            Some(value) => value.text(right).and_then(|text| {
+                let parsed = text.parse();
+                parsed
+                    .map_err(|error: UrlError| value.wrong(error.what, error.right))
+                    .ok()
+            }),
+        };
         let security = match &keys.security {
             None => Some(Policy::Basic256Sha256),
             Some(value) => value.choice("security policies", &Policy::NAMES),
@@ -129,7 +152,67 @@ impl ClientOptions {
             node_pattern: node_pattern?,
             write_to: write_to?,
             events: events?,
+            at,
         })
+    }
+}
+
+impl ClientOptions {
+    /// The node of a signal of `table`.
+    ///
+    /// # Errors
+    ///
+    /// What is made of its name is no node id.
+    pub(super) fn node(
+        &self,
+        table: &SignalTable,
+        signal: &Signal,
+    ) -> Result<NodeName, NodeNameError> {
+        match self.nodes.get(&signal.name) {
+            Some(node) => Ok(node.name.clone()),
+            None => {
+                let station = &table.stations[signal.station].name;
+                self.node_pattern.node(&signal.name, station)
+            }
+        }
+    }
+
+    /// Reports nodes of signals that are not there, and nodes that several signals have.
+    pub(in crate::fieldbus) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let names: Vec<&str> = table.signals.iter().map(|signal| &*signal.name).collect();
+        for (name, node) in &self.nodes {
+            if !names.contains(&&**name) {
+                collector.report(
+                    node.at,
+                    format!("no signal is called \"{}\"", shown(name)),
+                    did_you_mean(name, "signals", &names),
+                );
+            }
+        }
+        let mut taken: HashMap<NodeName, &str> = HashMap::new();
+        for signal in &table.signals {
+            let at = self.nodes.get(&signal.name).map_or(self.at, |node| node.at);
+            match self.node(table, signal) {
+                Err(error) => {
+                    let what = format!("signal \"{}\": {}", shown(&signal.name), error.what);
+                    collector.report(at, what, error.right);
+                }
+                Ok(node) => {
+                    if let Some(other) = taken.insert(node.clone(), &signal.name) {
+                        collector.report(
+                            at,
+                            format!(
+                                "the signals \"{}\" and \"{}\" are both the node {}",
+                                shown(other),
+                                shown(&signal.name),
+                                shown(&node.to_string())
+                            ),
+                            "give each signal a node of its own, in nodes or by {name} in node_pattern",
+                        );
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -178,13 +261,14 @@ impl ServerOptions {
                 "name a user with password_file or password_env, or write anonymous = true",
             );
         }
-        let events = events.map_or(Some(false), |value| value.boolean());
+        let events = events.as_ref().map_or(Some((false, false)), read_events);
         Some(Self {
             address: read?,
             security: security?,
             credentials: credentials?,
             anonymous: allowed?,
-            events: events?,
+            events: events?.0,
+            every_write: events?.1,
         })
     }
 }
@@ -227,7 +311,7 @@ fn read_policies(value: &Value<'_>) -> Option<Vec<Policy>> {
     Some(read)
 }
 
-fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, NodeName>> {
+fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, Node>> {
     let right = "write them as { \"name of a signal\" = \"ns=3;s=…\" }";
     let table = value.table("nodes", right)?;
     let mut nodes = BTreeMap::new();
@@ -235,13 +319,16 @@ fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, NodeName>> {
     for (name, value) in table.all() {
         let node = value.text("write a node id in quotes, such as \"ns=2;s=Motor.Speed\"");
         let node: Option<NodeName> = node.and_then(|text| {
-            let parsed: Result<NodeName, super::NodeNameError> = text.parse();
+            let parsed: Result<NodeName, NodeNameError> = text.parse();
             parsed
                 .map_err(|error| value.wrong(error.what, error.right))
                 .ok()
         });
         match node {
-            Some(node) => drop(nodes.insert(name.to_owned(), node)),
+            Some(node) => {
+                let at = value.at();
+                nodes.insert(name.to_owned(), Node { name: node, at });
+            }
             None => sound = false,
         }
     }

@@ -74,6 +74,12 @@ impl Reactor {
         }
     }
 
+    /// Calls `make`, which may start tasks of its own.
+    pub(super) fn within<T>(&self, make: impl FnOnce() -> T) -> T {
+        let _context = self.runtime().enter();
+        make()
+    }
+
     /// Lets a task run during waits.
     pub(super) fn spawn(&self, task: impl Future<Output = ()> + Send + 'static) {
         // Nobody waits for its end: it ends with the runtime at the latest.

@@ -125,6 +125,9 @@ pub(super) struct Keys<'a> {
     whole: bool,
 }
 
+/// A mistake was taken down.
+struct Reported;
+
 /// What those keys say.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Credentials {
@@ -173,14 +176,14 @@ impl<'a> Keys<'a> {
         let login = self.login();
         Some(Credentials {
             mode: mode?,
-            login: login?,
+            login: login.ok()?,
             pki: pki?.into(),
             trust: trust?,
         })
     }
 
-    /// The user with the password; `Some(None)` without one.
-    fn login(&self) -> Option<Option<Login>> {
+    /// The user with the password, if there is one; an error has been reported.
+    fn login(&self) -> Result<Option<Login>, Reported> {
         let user = self.user.as_ref().map(|value| {
             let user = value.label(TEXT_LIMIT, "write the name of the user")?;
             Some((value, user.to_owned()))
@@ -192,7 +195,7 @@ impl<'a> Keys<'a> {
                 "the password is named twice",
                 "keep one of password_file, password_env and password_in_clear",
             );
-            return None;
+            return Err(Reported);
         }
         let secret = match &self.passwords {
             [Some(file), ..] => file
@@ -210,12 +213,12 @@ impl<'a> Keys<'a> {
             [None, None, None] => None,
         };
         match (user, first) {
-            (None, None) => Some(None),
+            (None, None) => Ok(None),
             (None, Some(value)) => {
                 if self.whole {
                     value.wrong("there is a password and no user", "add user = \"…\"");
                 }
-                None
+                Err(Reported)
             }
             (Some(user), None) => {
                 if let (true, Some((value, _))) = (self.whole, user) {
@@ -225,11 +228,12 @@ impl<'a> Keys<'a> {
                          password_in_clear = \"…\" writes it here, where everybody can read it",
                     );
                 }
-                None
+                Err(Reported)
             }
             (Some(user), Some(_)) => {
-                let ((_, user), password) = (user?, secret?);
-                Some(Some(Login { user, password }))
+                let both = user.zip(secret).ok_or(Reported)?;
+                let ((_, user), password) = both;
+                Ok(Some(Login { user, password }))
             }
         }
     }

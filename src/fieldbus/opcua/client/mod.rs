@@ -8,17 +8,15 @@ mod session;
 mod talk;
 mod writings;
 
-use std::collections::HashMap;
 use std::net::TcpStream;
 use std::sync::Arc;
 
 use opcua::types::EndpointDescription;
 
-use crate::config::did_you_mean;
 use crate::fieldbus::tcp::{self, no_wait};
 use crate::fieldbus::{BusError, Free, Guard, Port, Role};
 use crate::os::Poller;
-use crate::signal::{Area, DataType, SignalTable};
+use crate::signal::{Area, DataType, Signal, SignalTable};
 use crate::time::{Nanos, Stop};
 
 use super::pki::Pki;
@@ -219,41 +217,15 @@ impl Free for Client {
 /// The node of each signal.
 fn fields(options: &ClientOptions, line: Line<'_>) -> Result<Vec<Field>, String> {
     let read: Area = line.role.areas().1;
-    let signals = &line.table.signals;
-    let names: Vec<&str> = signals.iter().map(|signal| &*signal.name).collect();
-    if let Some(name) = options.nodes.keys().find(|name| !names.contains(&&***name)) {
-        return Err(format!(
-            "\"nodes\" has a node for \"{name}\", and no signal is called that; {}",
-            did_you_mean(name, "signals", &names)
-        ));
-    }
-    let mut taken: HashMap<NodeName, &str> = HashMap::new();
-    let field = |signal: &'_ crate::signal::Signal| {
-        let node = match options.nodes.get(&signal.name) {
-            Some(node) => node.clone(),
-            None => {
-                let station = &line.table.stations[signal.station].name;
-                let made = options.node_pattern.node(&signal.name, station);
-                made.map_err(|error| format!("signal \"{}\": {error}", signal.name))?
-            }
-        };
+    let field = |signal: &Signal| {
+        let node = options.node(line.table, signal);
         Ok(Field {
             name: signal.name.clone(),
             data_type: signal.data_type,
             latched: signal.latch.is_some(),
             is_read: signal.area == read,
-            node,
+            node: node.map_err(|error| format!("signal \"{}\": {error}", signal.name))?,
         })
     };
-    let fields: Vec<Field> = signals.iter().map(field).collect::<Result<_, String>>()?;
-    for (field, name) in fields.iter().zip(&names) {
-        if let Some(other) = taken.insert(field.node.clone(), name) {
-            return Err(format!(
-                "the signals \"{other}\" and \"{name}\" are both the node {}; give each its own in \
-                 \"nodes\"",
-                field.node
-            ));
-        }
-    }
-    Ok(fields)
+    line.table.signals.iter().map(field).collect()
 }

@@ -7,6 +7,7 @@ use opcua::types::{DataValue, DateTime, NodeId, NumericRange, StatusCode, Varian
 
 use crate::fieldbus::opcua::values::{self, Values};
 use crate::fieldbus::{Port, Role};
+use crate::image::Event;
 use crate::signal::{Plan, Scale, Signal, SignalTable, Slot};
 use crate::time::Nanos;
 
@@ -21,9 +22,16 @@ pub(super) struct Image {
     receives: Values,
     places: Vec<Place>,
     frames: Vec<Box<[u8]>>,
-    nodes: Arc<Nodes>,
-    subscriptions: Arc<SubscriptionCache>,
-    watched: Watched,
+    show: Show,
+    /// Whether a write is an event though it changes nothing.
+    every_write: bool,
+}
+
+/// Where values are shown: the nodes of the crate's server, and who is told of them.
+pub(super) struct Show {
+    pub(super) nodes: Arc<Nodes>,
+    pub(super) subscriptions: Arc<SubscriptionCache>,
+    pub(super) watched: Watched,
 }
 
 /// A signal's nodes, and what they show.
@@ -44,9 +52,8 @@ impl Image {
         table: &Arc<SignalTable>,
         role: Role,
         port: &Port,
-        nodes: Arc<Nodes>,
-        subscriptions: Arc<SubscriptionCache>,
-        watched: Watched,
+        show: Show,
+        every_write: bool,
     ) -> Self {
         let (tx, rx) = role.areas();
         let place = |signal: &Signal| Place {
@@ -75,16 +82,38 @@ impl Image {
             receives,
             places: table.signals.iter().map(place).collect(),
             frames,
-            nodes,
-            subscriptions,
-            watched,
+            show,
+            every_write,
         }
+    }
+
+    /// Goes on with another server, which shows nothing yet.
+    pub(super) fn move_to(&mut self, show: Show) {
+        self.show = show;
+        for place in &mut self.places {
+            place.shown = None;
+        }
+    }
+
+    /// How many subscriptions to a node the server remembers, though nobody is there.
+    pub(super) fn left_behind(&self) -> usize {
+        self.show.watched.left_behind()
     }
 
     /// Takes the values of one list into the image, as one commit for each station that it touches.
     pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, Slot)]) {
         let mut touched = vec![false; self.frames.len()];
         for &(signal, bits) in list {
+            // A change is reported by the port.
+            if self.every_write && self.receives.bits(signal) == bits {
+                let value = slot(&self.table.signals[signal], bits);
+                let signal = u32::try_from(signal).expect("tables hold fewer than 2^32 signals");
+                port.event(Event {
+                    signal,
+                    value,
+                    time: now,
+                });
+            }
             self.receives.set(signal, bits);
             let place = &mut self.places[signal];
             place.written = true;
@@ -106,7 +135,7 @@ impl Image {
             for (index, signal) in self.table.signals.iter().enumerate() {
                 let is_sent = signal.area == self.role.areas().0;
                 if is_sent
-                    && let Some(span) = self.watched.span(index)
+                    && let Some(span) = self.show.watched.span(index)
                     && now - self.places[index].since >= span
                 {
                     port.sent_part(signal.station, bytes(signal));
@@ -177,7 +206,7 @@ impl Image {
             (node, None::<&NumericRange>, value(Variant::Double(real)))
         });
         let all = std::iter::once((&place.node, None, value(raw.clone()))).chain(scaled);
-        let put = self.nodes.set_values(&self.subscriptions, all);
+        let put = self.show.nodes.set_values(&self.show.subscriptions, all);
         debug_assert!(put.is_ok(), "every signal has its nodes: {put:?}");
     }
 }
@@ -196,6 +225,19 @@ fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
         None if age > port.max_age() => StatusCode::UncertainLastUsableValue,
         _ => StatusCode::Good,
     }
+}
+
+/// The slot of a signal with these bits, in engineering units.
+fn slot(signal: &Signal, bits: Slot) -> Slot {
+    if signal.is_integer_slot() {
+        return bits;
+    }
+    let raw = values::variant(signal.data_type, bits);
+    let raw = match raw {
+        Variant::Boolean(value) => f64::from(u8::from(value)),
+        other => real(&other),
+    };
+    Slot::from_real(signal.scale.map_or(raw, |scale| scale.value(raw)))
 }
 
 /// A raw value as a double.

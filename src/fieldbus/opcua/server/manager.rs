@@ -13,7 +13,7 @@ use opcua::server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManag
 use opcua::server::node_manager::{
     MonitoredItemRef, ParsedReadValueId, ParsedWriteValue, RequestContext, ServerContext, WriteNode,
 };
-use opcua::server::{CreateMonitoredItem, MonitoredItemHandle};
+use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
 use opcua::types::{
     AttributeId, DataValue, DateTime, NodeId, NumericRange, StatusCode, TimestampsToReturn,
 };
@@ -119,9 +119,17 @@ impl Signals {
     }
 
     /// The signal and its bits that a client wants to write.
-    fn judge(&self, write: &ParsedWriteValue) -> Result<(usize, Slot), StatusCode> {
+    fn judge(
+        &self,
+        space: &AddressSpace,
+        write: &ParsedWriteValue,
+    ) -> Result<(usize, Slot), StatusCode> {
         let Some(&index) = self.by_node.get(&write.node_id) else {
-            return Err(StatusCode::BadNotWritable);
+            return Err(if space.node_exists(&write.node_id) {
+                StatusCode::BadNotWritable
+            } else {
+                StatusCode::BadNodeIdUnknown
+            });
         };
         let signal = &self.table.signals[index];
         let its_own = write.node_id == space::node(&signal.name);
@@ -145,6 +153,7 @@ impl Signals {
 }
 
 #[async_trait]
+#[expect(clippy::mut_mut, reason = "the crate's own signature")]
 impl InMemoryNodeManagerImpl for Signals {
     async fn init(&self, _: &mut AddressSpace, _: ServerContext) {}
 
@@ -232,7 +241,7 @@ impl InMemoryNodeManagerImpl for Signals {
         let mut space = address_space.write();
         let now = DateTime::now();
         for node in nodes_to_write {
-            let (index, bits) = match self.judge(node.value()) {
+            let (index, bits) = match self.judge(&space, node.value()) {
                 Ok(judged) => judged,
                 Err(status) => {
                     node.set_status(status);
@@ -286,7 +295,7 @@ fn publishing(context: &RequestContext, item: MonitoredItemHandle) -> Nanos {
         let of_session = of_session.lock();
         let interval = of_session
             .get(item.subscription_id)
-            .map(|one| one.publishing_interval());
+            .map(Subscription::publishing_interval);
         interval.map_or(Nanos::ZERO, |interval| {
             Nanos(i64::try_from(interval.as_nanos()).unwrap_or(i64::MAX))
         })
@@ -304,32 +313,48 @@ fn millis(millis: f64) -> Nanos {
 
 /// The signals that clients subscribe to, and for how long each has to be shown to be seen by all of them.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Watched(Arc<Mutex<HashMap<usize, HashMap<MonitoredItemHandle, Nanos>>>>);
+pub(super) struct Watched(Arc<Mutex<Items>>);
+
+#[derive(Debug, Default)]
+struct Items {
+    of: HashMap<usize, HashMap<MonitoredItemHandle, Nanos>>,
+    /// How many there ever were.
+    made: usize,
+}
 
 impl Watched {
-    fn lock(&self) -> MutexGuard<'_, HashMap<usize, HashMap<MonitoredItemHandle, Nanos>>> {
+    fn lock(&self) -> MutexGuard<'_, Items> {
         // A table is whole between any two of its changes.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn add(&self, signal: usize, item: MonitoredItemHandle, span: Nanos) {
-        self.lock().entry(signal).or_default().insert(item, span);
+        let mut items = self.lock();
+        items.of.entry(signal).or_default().insert(item, span);
+        items.made += 1;
     }
 
     fn remove(&self, signal: usize, item: MonitoredItemHandle) {
-        let mut all = self.lock();
-        if let Some(items) = all.get_mut(&signal) {
+        let of = &mut self.lock().of;
+        if let Some(items) = of.get_mut(&signal) {
             items.remove(&item);
             if items.is_empty() {
-                all.remove(&signal);
+                of.remove(&signal);
             }
         }
     }
 
     /// How long the signal has to be shown; `None` when nobody subscribes to it.
     pub(super) fn span(&self, signal: usize) -> Option<Nanos> {
-        self.lock()
+        let items = &self.lock().of;
+        items
             .get(&signal)
             .and_then(|items| items.values().max().copied())
+    }
+
+    /// How many items were left behind, if nobody subscribes to anything any more.
+    pub(super) fn left_behind(&self) -> usize {
+        let items = self.lock();
+        if items.of.is_empty() { items.made } else { 0 }
     }
 }

@@ -8,8 +8,10 @@ mod space;
 mod units;
 
 use std::collections::BTreeSet;
+use std::net::TcpListener;
 use std::sync::Arc;
 
+use opcua::server::ServerHandle;
 use socket2::SockRef;
 use tokio::sync::Notify;
 
@@ -20,7 +22,7 @@ use crate::time::{Nanos, Pace, Stop};
 use super::pki::Pki;
 use super::reactor::{Inbox, Reactor};
 use super::{Line, Policy, ServerOptions};
-use image::Image;
+use image::{Image, Show};
 use manager::{News, Visitor, Watched};
 use peers::{Peers, Seen};
 
@@ -29,6 +31,10 @@ const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// How often the folder of rejected certificates is looked at.
 const LOOK: Nanos = Nanos::from_secs(1);
+
+/// The crate's server does not forget subscriptions to nodes when the subscription as a whole is deleted. When so
+/// many are left behind and nobody is there, it is made anew; the listener stays.
+const WORN: usize = 30;
 
 /// The bus of kind `opcua-server`.
 #[derive(Debug)]
@@ -62,19 +68,17 @@ impl Server {
     }
 }
 
-impl Free for Server {
-    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        if self.is_secure() {
-            self.pki.prepare()?;
-        }
-        let login = self.pki.login()?;
-        let Some((listener, bound)) = tcp::listen(&self.options.address, port, stop)? else {
-            return Ok(());
-        };
-        // Every connection inherits it: an answer waits for no other.
-        let at_once = SockRef::from(&listener).set_tcp_nodelay(true);
-        at_once.map_err(|error| tcp::no_wait(&error))?;
-        let reactor = Reactor::new(stop)?;
+impl Server {
+    /// Starts the crate's server on `listener`.
+    fn start(
+        &self,
+        reactor: &Reactor,
+        max_age: Nanos,
+        listener: TcpListener,
+    ) -> Result<Started, BusError> {
+        let bound = listener
+            .local_addr()
+            .map_err(|error| tcp::no_wait(&error))?;
         let inbox: Inbox<News> = reactor.inbox();
         let watched = Watched::default();
         let signals = manager::Signals::new(
@@ -83,9 +87,15 @@ impl Free for Server {
             watched.clone(),
             inbox.clone(),
         );
-        let (server, handle) = setup::build(self, login, bound, signals)?;
+        let login = self.pki.login()?;
+        let (server, handle) =
+            reactor.within(|| setup::build(self, max_age, login, bound, signals))?;
         let nodes = handle.node_managers().get_of_type();
-        let nodes = nodes.expect("it was handed to the server");
+        let show = Show {
+            nodes: nodes.expect("it was handed to the server"),
+            subscriptions: Arc::clone(handle.subscriptions()),
+            watched,
+        };
         let ended = Arc::new(Notify::new());
         reactor.spawn({
             let (inbox, ended) = (inbox.clone(), Arc::clone(&ended));
@@ -98,23 +108,84 @@ impl Free for Server {
                 ended.notify_one();
             }
         });
-        let subscriptions = Arc::clone(handle.subscriptions());
-        let image = Image::new(&self.table, self.role, port, nodes, subscriptions, watched);
-        let service = Service {
-            image,
-            peers: Peers::default(),
-            waiting: format!("listening on {bound}, and nobody has written yet"),
-            rejected: self.pki.rejected(),
-            pki: self.is_secure().then_some(&self.pki),
-            look: port.clock().now() + LOOK,
-            // Where nothing is written, readers are the peers.
-            receives: (0..port.stations()).any(|station| port.sizes(station).1 > 0),
-        };
-        let served = service.serve(&reactor, &inbox, self.cycle, port, stop);
-        handle.cancel();
-        reactor.farewell(FAREWELL, ended.notified());
-        served
+        Ok(Started {
+            inbox,
+            handle,
+            ended,
+            show,
+        })
     }
+}
+
+/// The crate's server, running.
+struct Started {
+    inbox: Inbox<News>,
+    handle: ServerHandle,
+    /// Told when it has ended.
+    ended: Arc<Notify>,
+    show: Show,
+}
+
+impl Free for Server {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        if self.is_secure() {
+            self.pki.prepare()?;
+        }
+        let Some((listener, bound)) = tcp::listen(&self.options.address, port, stop)? else {
+            return Ok(());
+        };
+        // Every connection inherits it: an answer waits for no other.
+        let refused = |error: std::io::Error| tcp::no_wait(&error);
+        SockRef::from(&listener)
+            .set_tcp_nodelay(true)
+            .map_err(refused)?;
+        let waiting = format!("listening on {bound}, and nobody has written yet");
+        port.opening(&waiting);
+        let mut service: Option<Service<'_>> = None;
+        loop {
+            let reactor = Reactor::new(stop)?;
+            let Started {
+                inbox,
+                handle,
+                ended,
+                show,
+            } = self.start(
+                &reactor,
+                port.max_age(),
+                listener.try_clone().map_err(refused)?,
+            )?;
+            let service = match &mut service {
+                Some(service) => {
+                    service.image.move_to(show);
+                    service
+                }
+                None => service.insert(Service {
+                    image: Image::new(&self.table, self.role, port, show, self.options.every_write),
+                    peers: Peers::default(),
+                    waiting: waiting.clone(),
+                    rejected: self.pki.rejected(),
+                    pki: self.is_secure().then_some(&self.pki),
+                    look: port.clock().now() + LOOK,
+                    // Where nothing is written, readers are the peers.
+                    receives: (0..port.stations()).any(|station| port.sizes(station).1 > 0),
+                }),
+            };
+            let served = service.serve(&reactor, &inbox, self.cycle, port, stop);
+            handle.cancel();
+            reactor.farewell(FAREWELL, ended.notified());
+            match served? {
+                Served::Stopped => return Ok(()),
+                Served::Worn => log::debug!("the server begins anew, as nobody is there"),
+            }
+        }
+    }
+}
+
+/// How serving ended.
+enum Served {
+    Stopped,
+    /// The crate's server remembers too much of clients that are gone.
+    Worn,
 }
 
 /// The server while it runs, as its bus sees it.
@@ -133,14 +204,13 @@ struct Service<'a> {
 
 impl Service<'_> {
     fn serve(
-        mut self,
+        &mut self,
         reactor: &Reactor,
         inbox: &Inbox<News>,
         cycle: Nanos,
         port: &mut Port,
         stop: &Stop,
-    ) -> Result<(), BusError> {
-        port.opening(&self.waiting);
+    ) -> Result<Served, BusError> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), cycle);
         let mut news = Vec::new();
@@ -152,12 +222,15 @@ impl Service<'_> {
             }
             if pace.take(now) {
                 self.look(port, now);
+                if self.peers.count() == 0 && self.image.left_behind() >= WORN {
+                    return Ok(Served::Worn);
+                }
                 self.image.show(port, now);
             }
             port.observe(now);
             reactor.wait(&*clock, pace.due().min(port.due()));
         }
-        Ok(())
+        Ok(Served::Stopped)
     }
 
     fn hear(&mut self, port: &mut Port, now: Nanos, news: News) -> Result<(), BusError> {

@@ -31,9 +31,18 @@ fn rhythm(cycle: Nanos) -> u64 {
     u64::try_from(millis.clamp(1, 10)).expect("it is positive")
 }
 
+/// For how many publishing intervals a subscription may have nothing to say: three times within `max_age` for one
+/// that publishes every 100 ms, as most do.
+fn keep_alives(max_age: Nanos) -> u32 {
+    u32::try_from(max_age.0 / Nanos::from_millis(300).0)
+        .unwrap_or(u32::MAX)
+        .max(1)
+}
+
 /// Makes the server of the bus `of`, bound to `bound`, with the nodes of `signals`.
 pub(super) fn build(
     of: &super::Server,
+    max_age: Nanos,
     login: Option<(String, String)>,
     bound: SocketAddr,
     signals: Signals,
@@ -75,6 +84,9 @@ pub(super) fn build(
     #[expect(clippy::cast_precision_loss, reason = "a few milliseconds")]
     let shortest = rhythm as f64;
     limits.min_publishing_interval_ms = shortest;
+    // A client that asks for the next publish shows that it is there: it is answered often enough.
+    limits.max_keep_alive_count = keep_alives(max_age);
+    limits.default_keep_alive_count = limits.max_keep_alive_count;
     // Changes are reported when they happen.
     limits.min_sampling_interval_ms = 0.0;
     limits.max_monitored_items_per_sub = limits

@@ -2,7 +2,7 @@
 //! out.
 
 use crate::fieldbus::identity::Guard;
-use crate::fieldbus::modbus::identification::{self, READ_DEVICE_IDENTIFICATION};
+use crate::fieldbus::modbus::identification::{self, READ_DEVICE_IDENTIFICATION, Taken};
 use crate::fieldbus::modbus::mbap::{self, Telegram};
 use crate::fieldbus::modbus::rtu;
 use crate::fieldbus::modbus::{Exception, Function, Identification};
@@ -481,7 +481,7 @@ impl<'a> Poll<'a> {
     ) -> Result<(), BusError> {
         let said = expect(Function::DeviceIdentification, pdu);
         match said.map(|data| so_far.take(data)) {
-            Ok(Some(Some(next))) if requests + 1 < IDENTIFYING => {
+            Ok(Some(Taken::MoreFrom(next))) if requests + 1 < IDENTIFYING => {
                 self.ask_identity(station, so_far, requests + 1, next, now);
                 return Ok(());
             }

@@ -144,7 +144,7 @@ impl Bus for Tcp {
             ),
             (
                 "kind = \"modbus-server\"\nevents = \"all\"",
-                "none of the kinds of events",
+                "no kind of events",
             ),
         ]
     }

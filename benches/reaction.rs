@@ -56,6 +56,17 @@ fn main() {
     println!("rust reaction.socket_us {mirror:.1}");
     let simulator = reaction(&device, Some(&controller), Machine::Simulator, edges);
     println!("rust reaction.socket.simulator_us {simulator:.1}");
+    for kind in ["modbus", "s7"] {
+        let device = config(&format!(
+            "kind = \"{kind}-server\"\naddress = \"127.0.0.1:0\""
+        ));
+        let client = format!("kind = \"{kind}-client\"\nwrite_to = \"tickbus bench\"");
+        let controller = config(&client);
+        let mirror = reaction(&device, Some(&controller), Machine::Mirror, edges);
+        println!("rust reaction.{kind}_us {mirror:.1}");
+        let simulator = reaction(&device, Some(&controller), Machine::Simulator, edges);
+        println!("rust reaction.{kind}.simulator_us {simulator:.1}");
+    }
 }
 
 /// The median of a bare exchange, in microseconds.
@@ -196,6 +207,6 @@ fn controller_config(device: &str, controller: Option<&str>, machine: &Running) 
             None => std::thread::yield_now(),
         }
     };
-    config.bus.set_address(&address).expect("a socket");
+    config.bus.set_address(&address).expect("an address");
     config
 }

@@ -126,7 +126,7 @@ fn the_rig_is_right() {
 #[test]
 fn a_right_file_prints_as_its_golden_file() {
     let directory = repository().join("tests/right");
-    for name in ["everything", "socket"] {
+    for name in ["everything", "socket", "s7-client", "s7-server"] {
         let printed = check(&directory, format!("{name}.cfg")).stdout;
         let golden = directory.join(format!("{name}.txt"));
         if std::env::var_os("BLESS").is_some() {

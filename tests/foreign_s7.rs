@@ -1,10 +1,19 @@
 //! S7 with the programs of others at the other end: python-snap7, rust7, and tshark looking on.
-#![allow(missing_docs, unreachable_pub, reason = "a test")]
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    clippy::float_cmp,
+    clippy::unnecessary_wraps,
+    reason = "tests of one shape; the values are small whole numbers"
+)]
 
 mod foreign;
+#[path = "peers/pcap.rs"]
+mod pcap;
 
-use std::io::Write as _;
-use std::process::{Command, ExitCode, Stdio};
+use std::io::{BufRead as _, BufReader};
+use std::net::{Ipv4Addr, TcpListener};
+use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -14,10 +23,24 @@ use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
 
 fn main() -> ExitCode {
-    foreign::main(&[(
-        "python_snap7_reads_writes_and_asks_the_server",
-        python_snap7_reads_writes_and_asks_the_server,
-    )])
+    foreign::main(&[
+        (
+            "python_snap7_reads_writes_and_asks_the_server",
+            python_snap7_reads_writes_and_asks_the_server,
+        ),
+        (
+            "our_client_reads_and_writes_a_server_of_python_snap7",
+            our_client_reads_and_writes_a_server_of_python_snap7,
+        ),
+        (
+            "rust7_reads_and_writes_the_server",
+            rust7_reads_and_writes_the_server,
+        ),
+        (
+            "tshark_finds_nothing_malformed",
+            tshark_finds_nothing_malformed,
+        ),
+    ])
 }
 
 const SIGNALS: &str = r#"
@@ -60,8 +83,14 @@ struct End {
 
 impl End {
     fn open(fieldbus: &str) -> Self {
-        let text =
-            format!("[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\n{fieldbus}\n{SIGNALS}");
+        Self::open_with(fieldbus, "")
+    }
+
+    /// With further signals.
+    fn open_with(fieldbus: &str, further: &str) -> Self {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\n{fieldbus}\n{SIGNALS}{further}"
+        );
         let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
         let clock = Monotonic::shared().expect("a thread");
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
@@ -112,6 +141,7 @@ impl End {
         }
     }
 
+    /// The port that it listens on.
     fn port(&mut self) -> u16 {
         let mut port = 0;
         self.until("it listens", |end| {
@@ -143,12 +173,12 @@ fn run(end: &mut End, mut python: Command, script: &str, arguments: &[String]) -
     let output = child.wait_with_output().expect("a child");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, errors) = (text(&output.stdout), text(&output.stderr));
-    let _ = std::io::stdout().flush();
     assert!(output.status.success(), "{script}: {out}\n{errors}");
     out
 }
 
-const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nevents = true\n\
+/// What a client wrote last stays when it is gone.
+const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\n\
     db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\", offset = 2, length = 6 }]";
 
 fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
@@ -165,5 +195,178 @@ fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
         (end.get("run"), end.get("speed"), end.get("setpoint")),
         (1.0, 1234.0, 2.5)
     );
+    Ok(())
+}
+
+/// A server of python-snap7 with data blocks 1 and 2 of 600 bytes.
+struct Cpu {
+    process: Child,
+    port: u16,
+}
+
+impl Cpu {
+    fn start(mut python: Command) -> Self {
+        let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
+        let port = free.local_addr().expect("it is bound").port();
+        drop(free);
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/snap7_server.py");
+        let mut process = python
+            .args([path, &port.to_string()])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("python starts");
+        let mut line = String::new();
+        let out = process.stdout.take().expect("it was piped");
+        BufReader::new(out).read_line(&mut line).expect("text");
+        assert_eq!(line, "ready\n");
+        Self { process, port }
+    }
+}
+
+impl Drop for Cpu {
+    fn drop(&mut self) {
+        // The end of its stdin ends it.
+        drop(self.process.stdin.take());
+        let _ = self.process.wait();
+    }
+}
+
+fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> {
+    let cpu = Cpu::start(foreign::python_with("main", &["snap7"])?);
+    let who = "6ES7 315-2EH14-0AB0 CPU 315-2 PN/DP S C-C2UR28922012";
+    let fieldbus = |further: &str| {
+        format!(
+            "kind = \"s7-client\"\naddress = \"127.0.0.1:{}\"\ncycle = \"2ms\"\nslot = 2\n\
+             input_bytes = 600\noutput_bytes = 600\ninput = \"DB2\"\noutput = \"DB1\"\n{further}",
+            cpu.port
+        )
+    };
+    let last = "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
+                [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n";
+    let mut end = End::open_with(&fieldbus(""), last);
+    end.set("position", 70.0);
+    end.until("it reads", |end| end.get("speed") == 1.0);
+    assert_eq!(end.statistic("identity").as_deref(), Some(who));
+    assert_eq!(end.statistic("writes").as_deref(), Some("blocked"));
+    let cycles = end.statistic("bus_cycles");
+    end.until("more is read", |end| end.statistic("bus_cycles") != cycles);
+    assert_eq!(end.get("speed"), 1.0, "nothing was written");
+    end.driver.close();
+
+    let mut end = End::open_with(&fieldbus(&format!("write_to = \"{who}\"")), last);
+    for value in [70.0, 71.0, 72.0] {
+        end.set("position", value);
+        end.set("last", value + 100.0);
+        end.until("it comes back", |end| {
+            (end.get("speed"), end.get("last back")) == (value + 1.0, value + 101.0)
+        });
+    }
+    assert_eq!(end.statistic("writes").as_deref(), Some("allowed"));
+    end.driver.close();
+
+    let gone = fieldbus("").replace("\"DB1\"", "\"DB7\"");
+    let mut end = End::open_with(&gone, last);
+    end.until("it is told", |end| {
+        let reason = end.driver.link().reason;
+        reason.contains("refuses reading DB7 bytes 0 to")
+            && reason.contains("optimized block access")
+    });
+    assert_eq!(end.driver.link().cause.name(), "refused");
+    Ok(())
+}
+
+fn rust7_reads_and_writes_the_server() -> Result<(), Absent> {
+    let mut end = End::open(SERVER);
+    end.set("position", 258.0);
+    let port = end.port();
+    end.tick();
+    let client = std::thread::spawn(move || {
+        let mut client = rust7::client::S7Client::new();
+        client.set_connection_port(port).expect("not connected yet");
+        client
+            .connect_rack_slot("127.0.0.1", 0, 1)
+            .expect("connects");
+        let mut inputs = [0xFF; 6];
+        client.read_db(2, 0, &mut inputs).expect("DB 2 is there");
+        assert_eq!(inputs, [1, 2, 0, 0, 0, 0]);
+        client.write_db(1, 2, &[0, 7]).expect("DB 1 is there");
+        client
+            .write_bit(0x84, 1, 0, 0, true)
+            .expect("so is its first bit");
+        assert!(client.read_bit(0x82, 0, 0, 0).expect("an output"));
+        client
+            .read_db(3, 0, &mut inputs)
+            .expect_err("there is no DB 3");
+        client
+            .read_db(2, 1, &mut inputs)
+            .expect_err("nor byte 6 of DB 2");
+        client.disconnect();
+    });
+    end.until("the client ends", |_| client.is_finished());
+    client.join().expect("all as it should be");
+    end.tick();
+    assert_eq!((end.get("run"), end.get("speed")), (1.0, 7.0));
+    Ok(())
+}
+
+fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
+    let python = foreign::python_with("main", &["snap7"])?;
+    let tshark = || foreign::command("tshark", "tshark");
+    tshark()?;
+    let mut end = End::open(SERVER);
+    end.set("sensor", 1.0);
+    end.set("position", -2.0);
+    end.set("pressure", 1.5);
+    let port = end.port();
+    let tap = pcap::Tap::before((Ipv4Addr::LOCALHOST, port).into());
+    run(
+        &mut end,
+        python,
+        "snap7_client.py",
+        &[tap.address.port().to_string()],
+    );
+    let us = format!(
+        "kind = \"s7-client\"\naddress = \"{}\"\nrole = \"controller\"\nwrite_to = \"tickbus Test rig\"",
+        tap.address
+    );
+    let mut controller = End::open(&us);
+    controller.until("our client reads", |controller| {
+        end.tick();
+        controller.get("position") == -2.0
+    });
+    controller.driver.close();
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s7.pcap");
+    let conversations = tap.conversations();
+    assert_eq!(conversations.len(), 4, "three of python-snap7, and ours");
+    pcap::write(&file, 1102, &conversations).expect("written");
+    let decode = "tcp.port==1102,tpkt";
+    let said = "tcp.srcport == 1102 && tcp.len > 0";
+    let said = pcap::tshark(tshark()?, &file, decode, said, &["_ws.col.Protocol"]);
+    let count = |name| said.lines().filter(|line| *line == name).count();
+    assert_eq!(count("COTP"), conversations.len(), "each was confirmed");
+    assert_eq!(count("COTP") + count("S7COMM"), said.lines().count());
+    assert!(count("S7COMM") > 50, "{said}");
+    let wrong = "tcp.srcport == 1102 && (_ws.malformed || _ws.expert.severity == error)";
+    let wrong = pcap::tshark(
+        tshark()?,
+        &file,
+        decode,
+        wrong,
+        &["frame.number", "_ws.expert.message"],
+    );
+    assert_eq!(wrong, "");
+    // And of ours, what the client says, too.
+    let ours = "tcp.port == 50003 && (_ws.malformed || _ws.expert.severity == error)";
+    let wrong = pcap::tshark(
+        tshark()?,
+        &file,
+        decode,
+        ours,
+        &["frame.number", "_ws.expert.message"],
+    );
+    assert_eq!(wrong, "");
     Ok(())
 }

@@ -11,20 +11,269 @@ mod conformance;
 mod modbus;
 #[allow(dead_code, reason = "some are for the socket bus")]
 mod peers;
-#[cfg(unix)]
-#[path = "peers/pty.rs"]
-mod pty;
 
-#[cfg(unix)]
-use modbus::Rtu;
-use modbus::Tcp;
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use conformance::rig::{MAX_AGE, await_that, pass};
+use modbus::{Tcp, request};
+use peers::{Alone, client, is_closed, leave};
+use socket2::SockRef;
+use tickbus::fieldbus::LinkState;
 
 conformance!(device_serves, crate::Tcp::device_serves());
 conformance!(controller_serves, crate::Tcp::controller_serves());
-#[cfg(unix)]
-conformance!(device_serves_on_a_serial_line, crate::Rtu::new("device"));
-#[cfg(unix)]
-conformance!(
-    controller_serves_on_a_serial_line,
-    crate::Rtu::new("controller")
-);
+
+/// A Device that listens on a port which the system chooses, with the signals of the suite: `speed` is holding
+/// register 1.
+fn device(further: &str) -> (Alone, TcpStream) {
+    let mut device = Alone::open(&conformance::rig::config(&AnyPort, "device", further));
+    device.end.tick();
+    let stream = client(device.address());
+    (device, stream)
+}
+
+struct AnyPort;
+
+impl conformance::rig::Bus for AnyPort {
+    fn fieldbus(&self, _role: &str) -> String {
+        "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"".to_owned()
+    }
+
+    fn liar(&self, _: &std::sync::Arc<tickbus::time::Manual>) -> conformance::rig::Liar {
+        unreachable!("it is no bus of the suite")
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        Vec::new()
+    }
+}
+
+/// Sends a request and receives the answer's PDU.
+#[track_caller]
+fn ask(stream: &mut TcpStream, transaction: u16, pdu: &[u8]) -> Vec<u8> {
+    stream
+        .write_all(&request(transaction, 1, pdu))
+        .expect("the server reads");
+    answer(stream, transaction)
+}
+
+#[track_caller]
+fn answer(stream: &mut TcpStream, transaction: u16) -> Vec<u8> {
+    let mut header = [0; 7];
+    stream.read_exact(&mut header).expect("a header");
+    let [high, low] = transaction.to_be_bytes();
+    assert_eq!(header[..4], [high, low, 0, 0], "{header:?}");
+    let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
+    let mut pdu = vec![0; length - 1];
+    stream.read_exact(&mut pdu).expect("a PDU");
+    pdu
+}
+
+/// Writes a speed, as an honest client does, and sees it arrive.
+#[track_caller]
+fn is_served(device: &mut Alone, stream: &mut TcpStream, speed: i16) {
+    let [high, low] = speed.to_be_bytes();
+    let write = [6, 0, 1, high, low];
+    assert_eq!(ask(stream, 4711, &write), write);
+    device.until_speed(speed);
+    device.end.set("position", f64::from(speed));
+    device.end.tick();
+    assert_eq!(ask(stream, 4712, &[4, 0, 1, 0, 1]), [4, 2, high, low]);
+}
+
+#[test]
+fn each_write_is_one_commit_and_reading_back_gives_it() {
+    let (mut device, mut stream) = device("events = true");
+    let write = [16, 0, 1, 0, 2, 4, 0, 5, 0, 5];
+    assert_eq!(ask(&mut stream, 1, &write), write[..5]);
+    let both = [23, 0, 1, 0, 2, 0, 1, 0, 2, 4, 0, 6, 0, 6];
+    assert_eq!(ask(&mut stream, 2, &both), [23, 4, 0, 6, 0, 6]);
+    device.until_speed(6);
+    assert_eq!(device.end.statistic("bus_cycles"), "2");
+    assert_eq!(device.end.get("echo"), 6.0);
+    // A read is no cycle, but a sign of life.
+    ask(&mut stream, 3, &[3, 0, 1, 0, 1]);
+    assert_eq!(device.end.statistic("bus_cycles"), "2");
+}
+
+#[test]
+fn changes_are_events_or_every_write_is() {
+    for (events, expected) in [
+        ("true", vec![5.0, 6.0]),
+        ("\"writes\"", vec![5.0, 5.0, 6.0]),
+    ] {
+        let (mut device, mut stream) = device(&format!("events = {events}"));
+        for speed in [5, 5, 6] {
+            ask(&mut stream, 1, &[6, 0, 1, 0, speed]);
+        }
+        // A coil of another signal, and a byte that no signal has.
+        ask(&mut stream, 1, &[5, 0, 9, 0xFF, 0]);
+        device.until_speed(6);
+        let mut events = [tickbus::image::Event::default(); 16];
+        let count = device.end.driver.poll_events(&mut events);
+        let speeds = events[..count].iter().filter(|event| event.signal == 1);
+        let speeds: Vec<f64> = speeds.map(|event| event.value.real()).collect();
+        assert_eq!(speeds, expected, "{events:?}");
+    }
+}
+
+#[test]
+fn what_nobody_has_written_is_fail_safe() {
+    let (mut device, mut stream) = device("");
+    assert_eq!(ask(&mut stream, 1, &[3, 0, 1, 0, 1]), [3, 2, 0xFF, 0xFF]);
+    ask(&mut stream, 2, &[5, 0, 0, 0xFF, 0]);
+    device.until("the coil is on", |end| end.get("run") == 1.0);
+    assert_eq!(device.end.get("speed"), -1.0);
+}
+
+#[test]
+fn a_pulse_is_held_until_a_client_has_read_it() {
+    let (mut device, mut stream) = device("");
+    for level in [1.0, 0.0] {
+        device.end.set("sensor", level);
+        device.end.tick();
+    }
+    // Of another place no pulse is read.
+    for _ in 0..3 {
+        assert_eq!(ask(&mut stream, 1, &[4, 0, 1, 0, 2])[0], 4);
+    }
+    assert_eq!(ask(&mut stream, 2, &[2, 0, 0, 0, 1]), [2, 1, 1]);
+    assert_eq!(ask(&mut stream, 3, &[2, 0, 0, 0, 1]), [2, 1, 0]);
+}
+
+#[test]
+fn telegrams_that_come_together_or_in_pieces_are_answered_one_by_one() {
+    let (mut device, mut stream) = device("");
+    let all: Vec<u8> = (0..300)
+        .flat_map(|number| request(number, 1, &[3, 0, 1, 0, 1]))
+        .collect();
+    stream.write_all(&all).expect("the server reads");
+    for number in 0..300 {
+        assert_eq!(answer(&mut stream, number).len(), 4);
+    }
+    for byte in request(7, 1, &[6, 0, 1, 0, 9]) {
+        stream.write_all(&[byte]).expect("the server reads");
+    }
+    assert_eq!(answer(&mut stream, 7), [6, 0, 1, 0, 9]);
+    device.until_speed(9);
+}
+
+/// Clients that break the rules are dropped, each with its reason; the honest one beside them notices nothing.
+#[test]
+fn a_client_that_breaks_the_rules_is_dropped_alone() {
+    let (mut device, mut honest) = device("");
+    is_served(&mut device, &mut honest, 1);
+    let floods: [(&str, Vec<u8>); 5] = [
+        ("another protocol", b"GET / HTTP/1.1\r\n\r\n".to_vec()),
+        ("no length", vec![0, 1, 0, 0, 0, 0, 1]),
+        ("too long", vec![0, 1, 0, 0, 0xFF, 0xFF, 1, 3]),
+        ("no function", vec![0, 1, 0, 0, 0, 1, 1]),
+        (
+            "noise",
+            (0..100_000_u32).map(|n| (n * 193 >> 3) as u8 | 1).collect(),
+        ),
+    ];
+    for ((what, bytes), speed) in floods.into_iter().zip(2..) {
+        let mut liar = client(device.address());
+        let _ = liar.write_all(&bytes);
+        await_that(what, || is_closed(&liar));
+        is_served(&mut device, &mut honest, speed);
+    }
+    assert_eq!(device.end.statistic("clients.dropped"), "5");
+    assert_eq!(device.end.statistic("link.running"), "1");
+}
+
+#[test]
+fn a_client_that_leaves_half_a_telegram_is_given_up_alone() {
+    let (mut device, mut honest) = device("");
+    let mut slow = client(device.address());
+    slow.write_all(&request(1, 1, &[3, 0, 0, 0, 1])[..9])
+        .expect("the server reads");
+    is_served(&mut device, &mut honest, 1);
+    let mut speed = 1;
+    await_that("it is given up", || {
+        pass(&device.clock, 1);
+        speed = speed % 1000 + 1;
+        is_served(&mut device, &mut honest, speed);
+        is_closed(&slow)
+    });
+    assert!(device.now() >= MAX_AGE);
+    assert_eq!(device.end.statistic("link.running"), "1");
+}
+
+/// Half-open: the client is gone without a word, and another one that never reads is not waited for.
+#[test]
+fn clients_that_do_not_read_or_are_gone_hold_nobody_up() {
+    let (mut device, mut honest) = device("");
+    let mut deaf = client(device.address());
+    deaf.set_write_timeout(Some(Duration::from_millis(50)))
+        .expect("an option");
+    let all = request(1, 1, &[3, 0, 0, 0, 3]).repeat(400);
+    // Until neither system has room any more.
+    while deaf.write_all(&all).is_ok() {}
+    let gone = client(device.address());
+    SockRef::from(&gone)
+        .set_linger(Some(Duration::ZERO))
+        .expect("an option");
+    drop(gone);
+    for speed in 1..100 {
+        is_served(&mut device, &mut honest, speed);
+    }
+    await_that("the deaf one is given up", || {
+        pass(&device.clock, 1);
+        is_served(&mut device, &mut honest, 7);
+        device.end.statistic("clients") == "1"
+    });
+}
+
+#[test]
+fn a_thousand_clients_are_served_side_by_side() {
+    let (mut device, mut honest) = device("");
+    let address = device.address();
+    let mut crowd: Vec<TcpStream> = (0..1000).map(|_| client(address)).collect();
+    for stream in &mut crowd {
+        let bytes = request(9, 1, &[6, 0, 2, 0, 3]);
+        stream.write_all(&bytes).expect("the server reads");
+    }
+    for stream in &mut crowd {
+        assert_eq!(answer(stream, 9), [6, 0, 2, 0, 3]);
+    }
+    is_served(&mut device, &mut honest, 5);
+    assert_eq!(device.end.statistic("clients"), "1001");
+    assert_eq!(device.end.get("echo"), 3.0);
+    drop(crowd);
+    await_that("they are gone", || device.end.statistic("clients") == "1");
+    is_served(&mut device, &mut honest, 6);
+}
+
+#[test]
+fn clients_beyond_the_limit_are_turned_away() {
+    let (mut device, mut honest) = device("clients = 2");
+    is_served(&mut device, &mut honest, 1);
+    let mut second = client(device.address());
+    is_served(&mut device, &mut second, 2);
+    let third = client(device.address());
+    await_that("it is turned away", || is_closed(&third));
+    is_served(&mut device, &mut honest, 3);
+    assert_eq!(device.end.statistic("clients"), "2");
+}
+
+#[test]
+fn the_line_runs_while_a_client_talks_and_is_stale_when_none_does() {
+    let (mut device, mut stream) = device("");
+    // What is refused is no sign of life: nobody knows that it was meant for this one.
+    ask(&mut stream, 1, &[3, 0, 99, 0, 1]);
+    ask(&mut stream, 2, &[3, 0, 0, 0, 1]);
+    device.until("it runs", |end| end.link().state == LinkState::Running);
+    device.until("it is stale", |end| end.link().state == LinkState::Stale);
+    ask(&mut stream, 3, &[43, 14, 1, 0]);
+    device.until("it runs again", |end| {
+        end.link().state == LinkState::Running
+    });
+    leave(stream);
+    device.until("it waits for the next one", |end| {
+        end.link().state == LinkState::Opening
+    });
+}

@@ -7,11 +7,18 @@
 )]
 
 mod conformance;
+#[allow(dead_code, reason = "some are for the socket bus")]
 mod peers;
 #[path = "peers/s7.rs"]
 mod s7_peers;
 
-use s7_peers::Pair;
+use std::net::{Ipv4Addr, SocketAddr};
+
+use conformance::rig::{await_that, config, pass};
+use peers::{Alone, is_closed};
+use s7_peers::{CONFIRM, CONNECT, Client, Pair, address, command, job, packet, request};
+use tickbus::driver::Code;
+use tickbus::image::Event;
 
 conformance!(device_serves, crate::Pair::new("device", ""));
 conformance!(device_dials, crate::Pair::new("controller", ""));
@@ -19,3 +26,400 @@ conformance!(
     by_data_blocks_and_small_units,
     crate::Pair::new("device", "pdu = 240").with_blocks()
 );
+
+const INPUTS: u8 = 0x81;
+const OUTPUTS: u8 = 0x82;
+const FLAGS: u8 = 0x83;
+
+/// A Device that serves the conformance suite's signals at a port which the system chooses.
+fn server(further: &str) -> (Alone, SocketAddr) {
+    let pair = Pair {
+        address: (Ipv4Addr::LOCALHOST, 0).into(),
+        ..Pair::new("device", "")
+    };
+    let alone = Alone::open(&config(&pair, "device", further));
+    let address = alone.address();
+    (alone, address)
+}
+
+#[test]
+fn a_write_is_seen_at_the_next_tick_and_what_was_never_written_is_fail_safe() {
+    let (mut device, address) = server("");
+    let mut client = Client::new(address);
+    assert_eq!(client.read(OUTPUTS, 0, 6), [0, 0, 0xFF, 0xFF, 0, 0]);
+    client.write(OUTPUTS, 4, &[0, 9]);
+    device.end.tick();
+    assert_eq!(
+        (device.end.get("speed"), device.end.get("echo")),
+        (-1.0, 9.0)
+    );
+    assert_eq!(client.read(OUTPUTS, 0, 6), [0, 0, 0xFF, 0xFF, 0, 9]);
+    assert_eq!(
+        device.end.statistic("bus_cycles"),
+        "1",
+        "one write, one commit"
+    );
+}
+
+#[test]
+fn the_items_of_a_job_are_one_commit() {
+    let (mut device, at) = server("");
+    let mut client = Client::new(at);
+    let parameters = [
+        &[5, 2][..],
+        &address(OUTPUTS, 0, 2, 2),
+        &address(OUTPUTS, 0, 4, 2),
+    ];
+    for value in 1..=50 {
+        let data = [0, 4, 0, 16, 0, value, 0, 4, 0, 16, 0, value];
+        client.ask(&job(&parameters.concat(), &data));
+        device.end.tick();
+        let seen = (device.end.get("speed"), device.end.get("echo"));
+        assert_eq!(seen, (f64::from(value), f64::from(value)));
+    }
+    assert_eq!(device.end.statistic("bus_cycles"), "50");
+}
+
+fn events(device: &mut Alone) -> Vec<(u32, f64)> {
+    let mut events = [Event::default(); 16];
+    let count = device.end.driver.poll_events(&mut events);
+    let event = |event: &Event| (event.signal, event.value.real());
+    events[..count].iter().map(event).collect()
+}
+
+#[test]
+fn events_are_changes_or_every_write_as_asked() {
+    for (asked, expected) in [
+        ("events = true", &[(1, 5.0), (0, 1.0)][..]),
+        (
+            "events = \"writes\"",
+            &[(1, 5.0), (1, 5.0), (0, 1.0), (0, 1.0), (2, 0.0)],
+        ),
+    ] {
+        let (mut device, at) = server(asked);
+        let mut client = Client::new(at);
+        for _ in 0..2 {
+            client.write(OUTPUTS, 2, &[0, 5]);
+        }
+        for _ in 0..2 {
+            // Bit 0 of byte 0 alone, whose neighbours are no events.
+            let bit = [&[5, 1, 0x12, 10, 0x10, 1, 0, 1, 0, 0, OUTPUTS, 0, 0, 0][..]].concat();
+            client.ask(&job(&bit, &[0, 3, 0, 1, 1]));
+        }
+        client.write(OUTPUTS, 4, &[0, 0]);
+        assert_eq!(events(&mut device), expected, "{asked}");
+    }
+}
+
+#[test]
+fn what_is_read_is_the_latest_and_a_pulse_elsewhere_is_not_taken_as_seen() {
+    let (mut device, at) = server("");
+    let mut client = Client::new(at);
+    device.end.set("position", 513.0);
+    device.end.set("sensor", 1.0);
+    device.end.tick();
+    device.end.set("sensor", 0.0);
+    device.end.tick();
+    for _ in 0..3 {
+        assert_eq!(client.read(INPUTS, 2, 2), [2, 1]);
+    }
+    assert_eq!(
+        client.read(INPUTS, 0, 1),
+        [1],
+        "the pulse is still to be seen"
+    );
+    await_that("it is over", || client.read(INPUTS, 0, 1) == [0]);
+}
+
+#[test]
+fn pulses_are_seen_by_a_client_that_asks_for_several_pieces_at_once() {
+    let (mut device, at) = server("");
+    let mut client = Client::new(at);
+    for _ in 0..20 {
+        for level in [1.0, 0.0] {
+            device.end.set("sensor", level);
+            device.end.tick();
+        }
+        client.send(&[request(INPUTS, 0, 1), request(INPUTS, 2, 2)].concat());
+        let both = [(); 2].map(|()| client.receive().expect("an answer"));
+        assert_eq!(both[0].last(), Some(&1));
+        await_that("it is over", || client.read(INPUTS, 0, 1) == [0]);
+    }
+}
+
+#[test]
+fn inputs_are_not_written_and_flags_are_scratch() {
+    let (mut device, at) = server("m_bytes = 16");
+    let mut client = Client::new(at);
+    let code = |answer: Vec<u8>| *answer.last().expect("a code");
+    assert_eq!(code(client.ask(&command(INPUTS, 2, &[0, 1]))), 3);
+    assert_eq!(code(client.ask(&command(OUTPUTS, 5, &[0, 1]))), 5);
+    assert_eq!(code(client.ask(&command(FLAGS, 15, &[0, 1]))), 5);
+    client.write(FLAGS, 14, &[3, 4]);
+    assert_eq!(client.read(FLAGS, 13, 3), [0, 3, 4]);
+    device.end.tick();
+    assert_eq!(device.end.get("speed"), -1.0);
+    assert_eq!(
+        device.end.statistic("bus_cycles"),
+        "0",
+        "none of it was a cycle"
+    );
+}
+
+#[test]
+fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
+    let (mut device, at) = server("");
+    let mut panel = Client::new(at);
+    panel.read(INPUTS, 0, 6);
+    assert_eq!(device.end.tick().code, Code::Unchanged, "somebody is there");
+    let mut plc = Client::new(at);
+    plc.write(OUTPUTS, 2, &[0, 7]);
+    device.until_speed(7);
+    drop(plc);
+    device.until("the PLC's values are stale", |end| {
+        panel.read(INPUTS, 0, 6);
+        panel.read(OUTPUTS, 0, 6);
+        end.tick().code == Code::Stale
+    });
+    assert_eq!(device.end.get("speed"), -1.0);
+    // A write of the panel would be one.
+    panel.write(OUTPUTS, 2, &[0, 8]);
+    device.until_speed(8);
+}
+
+#[test]
+fn every_station_has_a_slot_and_blocks_of_its_own() {
+    let text = "[driver]\nid = 1\nname = \"two\"\n[fieldbus]\nkind = \"s7-server\"\n\
+        address = \"127.0.0.1:0\"\ndb = [{ number = 1, area = \"%Q\", station = \"lathe\" }]\n\
+        [[station]]\nname = \"charger\"\nslot = 1\n[[station]]\nname = \"lathe\"\nslot = 2\n\
+        [[station]]\nname = \"none\"\n\
+        [[signal]]\nname = \"a\"\nstation = \"charger\"\naddress = \"%QB0\"\n\
+        [[signal]]\nname = \"b\"\nstation = \"lathe\"\naddress = \"%QB0\"\n\
+        [[signal]]\nname = \"c\"\nstation = \"none\"\naddress = \"%QB0\"\n";
+    let mut device = Alone::open(text);
+    let at = device.address();
+    for (slot, value) in [(1, 11), (2, 12)] {
+        let mut client = Client::in_slot(at, slot);
+        client.write(OUTPUTS, 0, &[value]);
+    }
+    device.end.tick();
+    assert_eq!((device.end.get("a"), device.end.get("b")), (11.0, 12.0));
+    let mut stranger = Client::in_slot(at, 3);
+    assert_eq!(stranger.ask(&command(OUTPUTS, 0, &[1])).last(), Some(&10));
+    let block = [&[5, 1][..], &address(0x84, 1, 0, 1)].concat();
+    assert_eq!(
+        stranger.ask(&job(&block, &[0, 4, 0, 8, 13])).last(),
+        Some(&0xFF)
+    );
+    device.end.tick();
+    assert_eq!((device.end.get("a"), device.end.get("b")), (11.0, 13.0));
+}
+
+/// Whatever a client does that is wrong, another one and the image do not notice.
+#[test]
+fn a_client_that_breaks_the_protocol_is_dropped_and_disturbs_nobody() {
+    let (mut device, at) = server("");
+    let mut good = Client::new(at);
+    good.write(OUTPUTS, 2, &[0, 5]);
+    device.until_speed(5);
+    let connected = |further: &[u8]| [&CONNECT[..], further].concat();
+    for (bytes, words) in [
+        (b"GET / HTTP/1.1\r\n\r\n".to_vec(), "begins with 0x47"),
+        (vec![3, 0, 0xFF, 0xFF, 0], "65535 bytes"),
+        (vec![3, 0, 0, 6, 0, 0], "6 bytes"),
+        (
+            packet(&[0x32]),
+            "before it asked for a transport connection",
+        ),
+        (connected(&CONNECT), "stands already"),
+        (connected(&packet(&[0x72, 1, 0, 0])), "S7CommPlus"),
+        (
+            connected(&packet(&[0x32, 1, 0, 0, 0, 1, 0, 9, 0, 0, 4])),
+            "do not add up",
+        ),
+        (connected(&[3, 0, 0, 7, 2, 0xF0, 0]), "in pieces"),
+        (connected(&[3, 0, 0, 7, 0xFF, 0xF0, 0]), "malformed"),
+        (connected(&[3, 0, 0, 8, 3, 0x10, 0, 0]), "0x10"),
+    ] {
+        let mut bad = Client::silent(at);
+        bad.send(&bytes);
+        await_that("it is dropped", || is_closed(&bad.0));
+        assert_eq!(good.read(OUTPUTS, 2, 2), [0, 5], "{words}");
+        device.end.tick();
+        assert_eq!(device.end.get("speed"), 5.0);
+    }
+    let mut endless = Client::new(at);
+    for _ in 0..10 {
+        // The last of them may find the connection closed.
+        let piece = [&[3, 0, 0, 107, 2, 0xF0, 0][..], &[0x32; 100]].concat();
+        let _ = std::io::Write::write_all(&mut endless.0, &piece);
+    }
+    await_that("it is dropped", || is_closed(&endless.0));
+    assert_eq!(good.read(OUTPUTS, 2, 2), [0, 5]);
+}
+
+#[test]
+fn a_client_alone_that_breaks_the_protocol_is_told_in_words() {
+    let (mut device, at) = server("");
+    let mut bad = Client::silent(at);
+    bad.send(&[&CONNECT[..], &packet(&[0x72, 1, 0, 0])].concat());
+    let cause = device.until_reason("it speaks S7CommPlus");
+    assert_eq!(cause, "protocol");
+    let mut leaves = Client::new(at);
+    leaves.send(&[3, 0, 0, 11, 6, 0x80, 0, 1, 0, 1, 0]);
+    assert_eq!(
+        device.until_reason("it ended the transport connection"),
+        "left"
+    );
+}
+
+#[test]
+fn jobs_that_do_not_add_up_are_refused_and_nothing_of_them_is_done() {
+    let (mut device, at) = server("");
+    let mut client = Client::new(at);
+    let item = address(OUTPUTS, 0, 2, 2);
+    for (parameters, data) in [
+        ([&[5, 255][..], &item].concat(), vec![0, 4, 0, 16, 0, 1]),
+        (
+            [&[5, 2][..], &item, &item].concat(),
+            vec![0, 4, 0, 16, 0, 1],
+        ),
+        ([&[5, 1][..], &item].concat(), vec![0, 4, 255, 255, 0, 1]),
+        ([&[4, 255][..], &item].concat(), Vec::new()),
+        // An answer would be longer than was agreed.
+        (
+            [&[4, 1][..], &address(FLAGS, 0, 0, 60_000)].concat(),
+            Vec::new(),
+        ),
+        (
+            [&[4, 40][..], &item.repeat(40), &[0; 400]].concat(),
+            Vec::new(),
+        ),
+    ] {
+        let answer = client.ask(&job(&parameters, &data));
+        assert_eq!(answer[7..], [0x32, 2, 0, 0, 0, 7, 0, 0, 0, 0, 0x85, 0]);
+    }
+    client.read(INPUTS, 0, 1);
+    device.end.tick();
+    assert_eq!(device.end.get("speed"), -1.0);
+}
+
+#[test]
+fn half_a_telegram_is_waited_for_and_not_for_ever() {
+    let (mut device, at) = server("");
+    let mut good = Client::new(at);
+    let mut slow = Client::new(at);
+    for byte in request(INPUTS, 0, 1) {
+        slow.send(&[byte]);
+    }
+    assert!(slow.receive().is_some(), "byte by byte is one telegram");
+    slow.send(&request(INPUTS, 0, 1)[..9]);
+    await_that("it is given up", || {
+        for _ in 0..100 {
+            pass(&device.clock, 1);
+        }
+        is_closed(&slow.0)
+    });
+    assert_eq!(good.read(INPUTS, 0, 1), [0]);
+    device.end.tick();
+}
+
+#[test]
+fn a_flood_of_one_client_leaves_time_for_another() {
+    let (mut device, at) = server("");
+    let mut good = Client::new(at);
+    let mut flood = Client::new(at);
+    flood.0.set_nonblocking(true).expect("a TCP option");
+    let many = request(INPUTS, 0, 6).repeat(1000);
+    for value in 0..100 {
+        // It never reads, so there comes the moment from which on it is not read any more.
+        let _ = std::io::Write::write(&mut flood.0, &many);
+        good.write(OUTPUTS, 2, &[0, value]);
+        device.end.tick();
+        assert_eq!(device.end.get("speed"), f64::from(value));
+    }
+}
+
+#[test]
+fn two_hundred_clients_are_served_and_one_more_is_turned_away() {
+    let (mut device, at) = server("clients = 200");
+    let mut clients: Vec<Client> = (0..200).map(|_| Client::new(at)).collect();
+    for (value, client) in (0_u8..).zip(&mut clients) {
+        client.write(OUTPUTS, 2, &[0, value]);
+        device.end.tick();
+        assert_eq!(device.end.get("speed"), f64::from(value));
+    }
+    let more = Client::silent(at);
+    await_that("it is turned away", || is_closed(&more.0));
+    assert_eq!(clients[0].read(OUTPUTS, 2, 2), [0, 199]);
+    assert_eq!(device.end.statistic("clients"), "200");
+    assert_eq!(device.end.statistic("clients.turned_away"), "1");
+}
+
+#[test]
+fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
+    let pair = Pair::new("device", "");
+    let mut device = Alone::open(&config(&pair, "device", ""));
+    let text = config(&pair, "controller", "");
+    let mut plc = conformance::rig::End::open(
+        &text.replace("write_to = \"tickbus device\"", "write_to = \"6ES7 315\""),
+        &device.clock,
+    );
+    plc.set("speed", 5.0);
+    device.end.set("position", 3.0);
+    device.until("the client reads", |_| {
+        plc.tick();
+        plc.get("position") == 3.0
+    });
+    for _ in 0..50 {
+        pass(&device.clock, 2);
+        plc.tick();
+        device.end.tick();
+    }
+    assert_eq!(device.end.get("speed"), -1.0);
+    assert_eq!(plc.statistic("writes"), "blocked");
+    assert_eq!(plc.statistic("identity"), "tickbus device");
+    assert!(plc.link().reason.contains("tickbus device"));
+}
+
+/// A CPU by hand that answers a client of ours; one that is asked who it is hangs up.
+#[test]
+fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let pair = Pair {
+        address: listener.local_addr().expect("it is bound"),
+        ..Pair::new("controller", "")
+    };
+    let mut device = Alone::open(&config(&pair, "device", ""));
+    let cpu = std::thread::spawn(move || {
+        let mut connections = 0;
+        loop {
+            connections += 1;
+            let (stream, _) = listener.accept().expect("the client connects");
+            let mut client = Client(stream);
+            assert_eq!(client.receive().expect("it asks")[5], 0xE0);
+            client.send(&CONFIRM);
+            client.receive().expect("it asks for a length");
+            client.send(&packet(&[
+                0x32, 3, 0, 0, 0, 1, 0, 8, 0, 0, 0, 0, 0xF0, 0, 0, 1, 0, 1, 1, 0xE0,
+            ]));
+            let next = client.receive().expect("it asks for something");
+            if next[8] == 7 {
+                continue;
+            }
+            let answer = [
+                &[0x32, 3, 0, 0, next[11], next[12], 0, 2, 0, 10, 0, 0, 4, 1][..],
+                &[0xFF, 4, 0, 48, 0, 0, 0, 7, 0, 7],
+            ];
+            client.send(&packet(&answer.concat()));
+            // Until it has been taken, and the client goes.
+            while client.receive().is_some() {}
+            return connections;
+        }
+    });
+    device.until_speed(7);
+    let who = device.end.statistic("identity");
+    assert!(who.starts_with("S7 CPU at 127.0.0.1:"), "{who}");
+    device.end.driver.close();
+    assert_eq!(cpu.join().expect("no panic"), 3);
+}

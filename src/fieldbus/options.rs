@@ -194,10 +194,13 @@ pub(super) fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
     if value.is_boolean() {
         return value.boolean().map(|events| (events, false));
     }
-    value.text(
-        "write true for every change, \"writes\" for every write, changed or not, or false",
-    )?;
-    value.choice("kinds of events", &[("writes", (true, true))])
+    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
+    let text = value.text(right)?;
+    if text != "writes" {
+        value.wrong(format!("\"{}\" is no kind of events", shown(text)), right);
+        return None;
+    }
+    Some((true, true))
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {

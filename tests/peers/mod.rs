@@ -1,6 +1,7 @@
-//! Foreign ends of a socket bus: TCP by the standard library, records by hand.
+//! What tests with foreign ends share: addresses of their own, and ways to begin and end a connection.
+#![allow(dead_code, reason = "each test uses a part of it")]
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -9,10 +10,7 @@ use std::time::Duration;
 
 use tickbus::time::{Manual, Nanos};
 
-use crate::conformance::rig::{Bus, End, Liar, await_that, config, pass};
-
-/// The size of a record of the conformance suite's signals, either way.
-pub const RECORD: usize = 6;
+use crate::conformance::rig::{End, await_that, pass};
 
 /// An address on this machine that nobody else uses.
 pub fn own_address() -> SocketAddr {
@@ -29,105 +27,6 @@ pub fn own_address() -> SocketAddr {
     listener.local_addr().expect("it is bound")
 }
 
-/// A socket bus at an address of its own.
-pub struct Tcp {
-    pub address: SocketAddr,
-    /// Further lines in the `[fieldbus]` table of either end.
-    pub device: &'static str,
-    pub controller: &'static str,
-}
-
-impl Tcp {
-    pub fn new(device: &'static str, controller: &'static str) -> Self {
-        let address = own_address();
-        Self {
-            address,
-            device,
-            controller,
-        }
-    }
-}
-
-impl Bus for Tcp {
-    fn fieldbus(&self, role: &str) -> String {
-        let further = match role {
-            "device" => self.device,
-            _ => self.controller,
-        };
-        format!(
-            "kind = \"socket\"\naddress = \"{}\"\n{further}",
-            self.address
-        )
-    }
-
-    /// A client, or a server, that sends half a record and leaves.
-    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        let over = Arc::new(AtomicBool::new(false));
-        let address = self.address;
-        let listens = self.device.contains("connect");
-        let listener = listens.then(|| {
-            let listener = TcpListener::bind(address).expect("its own address");
-            listener.set_nonblocking(true).expect("an option");
-            listener
-        });
-        let thread = std::thread::spawn({
-            let over = Arc::clone(&over);
-            move || {
-                while !over.load(Ordering::Relaxed) {
-                    let meet = |listener: &TcpListener| listener.accept().map(|met| met.0);
-                    let met = match &listener {
-                        Some(listener) => meet(listener),
-                        None => TcpStream::connect(address),
-                    };
-                    match met {
-                        Ok(stream) => lie(stream),
-                        Err(_) => std::thread::yield_now(),
-                    }
-                }
-            }
-        });
-        Liar {
-            _peer: Box::new(Ending {
-                over,
-                thread: Some(thread),
-            }),
-            cause: "protocol",
-            words: "left in the middle of a record: 3 of 6 bytes had come",
-        }
-    }
-
-    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
-        vec![
-            ("kind = \"socket\"\naddress = \"127.0.0.1\"", "has no port"),
-            (
-                "kind = \"socket\"\nrole = \"controller\"\naddress = \"127.0.0.1:0\"",
-                "port 0 cannot be connected to",
-            ),
-            (
-                "kind = \"socket\"\nrole_tcp = \"server\"",
-                "TCP roles are listen, connect",
-            ),
-            (
-                "kind = \"socket\"\nsend = \"on_change\"",
-                "did you mean \"on-change\"",
-            ),
-            (
-                "kind = \"socket\"\nmin_interval = \"5ms\"",
-                "without send = \"on-change\"",
-            ),
-            ("kind = \"socket\"\nadress = \"127.0.0.1:1\"", "address"),
-        ]
-    }
-}
-
-/// Sends half a record, and leaves in good order.
-fn lie(mut stream: TcpStream) {
-    // All zeros would be a good speed, were they believed. If the other end is quicker to go, so be it.
-    let _ = stream.set_nonblocking(false);
-    let _ = stream.write_all(&[0; RECORD / 2]);
-    leave(stream);
-}
-
 /// Closes in good order: with nothing left unread, which would make the system reset the connection.
 pub fn leave(mut stream: TcpStream) {
     let _ = stream.shutdown(Shutdown::Write);
@@ -135,9 +34,9 @@ pub fn leave(mut stream: TcpStream) {
 }
 
 /// A thread that is told to end, and waited for.
-struct Ending {
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+pub struct Ending {
+    pub over: Arc<AtomicBool>,
+    pub thread: Option<JoinHandle<()>>,
 }
 
 impl Drop for Ending {
@@ -149,6 +48,31 @@ impl Drop for Ending {
     }
 }
 
+pub fn client(address: SocketAddr) -> TcpStream {
+    let stream = TcpStream::connect(address).expect("the device listens");
+    stream.set_nodelay(true).expect("a TCP option");
+    stream
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .expect("a TCP option");
+    stream
+}
+
+/// Whether the other end has closed; what had come before is thrown away.
+pub fn is_closed(stream: &TcpStream) -> bool {
+    stream.set_nonblocking(true).expect("a TCP option");
+    let mut reader = stream;
+    let closed = loop {
+        match reader.read(&mut [0; 4096]) {
+            Ok(0) => break true,
+            Ok(_) => {}
+            Err(error) if error.kind() == ErrorKind::WouldBlock => break false,
+            Err(_) => break true,
+        }
+    };
+    stream.set_nonblocking(false).expect("a TCP option");
+    closed
+}
+
 /// An end of the bus with foreign peers, and the clock that only it waits on.
 pub struct Alone {
     pub clock: Arc<Manual>,
@@ -156,18 +80,6 @@ pub struct Alone {
 }
 
 impl Alone {
-    /// A Device that listens on a port which the system chooses.
-    pub fn device(further: &str) -> (Self, SocketAddr) {
-        let bus = Tcp {
-            address: (Ipv4Addr::LOCALHOST, 0).into(),
-            device: "",
-            controller: "",
-        };
-        let alone = Self::open(&config(&bus, "device", further));
-        let address = alone.address();
-        (alone, address)
-    }
-
     pub fn open(text: &str) -> Self {
         let clock = Manual::new();
         let end = End::open(text, &clock);
@@ -230,35 +142,4 @@ impl Alone {
         use tickbus::time::Clock as _;
         self.clock.now()
     }
-}
-
-/// What a PLC sends: `run`, `speed`, `echo`.
-pub fn record(speed: i16) -> [u8; RECORD] {
-    let [high, low] = speed.to_be_bytes();
-    [0, 0, high, low, high, low]
-}
-
-pub fn client(address: SocketAddr) -> TcpStream {
-    let stream = TcpStream::connect(address).expect("the device listens");
-    stream.set_nodelay(true).expect("a TCP option");
-    stream
-        .set_read_timeout(Some(Duration::from_secs(20)))
-        .expect("a TCP option");
-    stream
-}
-
-/// Whether the other end has closed; what had come before is thrown away.
-pub fn is_closed(stream: &TcpStream) -> bool {
-    stream.set_nonblocking(true).expect("a TCP option");
-    let mut reader = stream;
-    let closed = loop {
-        match reader.read(&mut [0; 4096]) {
-            Ok(0) => break true,
-            Ok(_) => {}
-            Err(error) if error.kind() == ErrorKind::WouldBlock => break false,
-            Err(_) => break true,
-        }
-    };
-    stream.set_nonblocking(false).expect("a TCP option");
-    closed
 }

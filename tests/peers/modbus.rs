@@ -36,71 +36,17 @@ impl Tcp {
     }
 }
 
-/// Modbus RTU over a line of its own.
-///
-/// The manual clock does not wait for the thread that carries its bytes, hence the long time-out.
-#[cfg(unix)]
-pub struct Rtu {
-    line: crate::pty::Line,
-    server: &'static str,
-}
-
-#[cfg(unix)]
-impl Rtu {
-    pub fn new(server: &'static str) -> Self {
-        let line = crate::pty::Line::new();
-        Self { line, server }
-    }
-}
-
-#[cfg(unix)]
-impl Bus for Rtu {
-    fn fieldbus(&self, role: &str) -> String {
-        let device = |end: usize| self.line.end(end).display().to_string();
-        if role == self.server {
-            let device = device(0);
-            return format!("kind = \"modbus-server\"\ndevice = \"{device}\"\nbaud = 115200");
-        }
-        format!(
-            "kind = \"modbus-client\"\ndevice = \"{}\"\nbaud = 115200\nwrite_to = \"tickbus {}\"\n\
-             timeout = \"20s\"",
-            device(1),
-            self.server
-        )
-    }
-
-    /// On a serial line damage is the rule, and nobody is accused of it.
-    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        Liar {
-            _peer: Box::new(()),
-            cause: "waiting",
-            words: "",
-        }
-    }
-
-    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
-        vec![
-            (
-                "kind = \"modbus-server\"\ndevice = \"/dev/ttyS0\"\nparity = \"mark\"",
-                "none of the parities",
-            ),
-            (
-                "kind = \"modbus-server\"\ndevice = \"/dev/ttyS0\"\nunit = 248",
-                "from 1 to 247",
-            ),
-        ]
-    }
-}
-
 impl Bus for Tcp {
     fn fieldbus(&self, role: &str) -> String {
         let address = self.address;
         if role == self.server {
             return format!("kind = \"modbus-server\"\naddress = \"{address}\"");
         }
-        // A driver of the suite is called as its role.
+        // A driver of the suite is called as its role. Its clock does not wait for a server that has not got the
+        // processor, hence the long time-out.
         format!(
-            "kind = \"modbus-client\"\naddress = \"{address}\"\nwrite_to = \"tickbus {}\"",
+            "kind = \"modbus-client\"\naddress = \"{address}\"\nwrite_to = \"tickbus {}\"\n\
+             timeout = \"1h\"",
             self.server
         )
     }
@@ -192,6 +138,14 @@ impl Bus for Tcp {
             (
                 "kind = \"modbus-client\"\ndevice = \"/dev/ttyS0\"\nunit = 0",
                 "from 1 to 247",
+            ),
+            (
+                "kind = \"modbus-server\"\ndevice = \"/dev/ttyS0\"\nparity = \"mark\"",
+                "none of the parities",
+            ),
+            (
+                "kind = \"modbus-server\"\nevents = \"all\"",
+                "none of the kinds of events",
             ),
         ]
     }

@@ -17,10 +17,10 @@ use crate::peers::{leave, own_address};
 pub struct Pair {
     pub address: SocketAddr,
     /// The role of the end that serves.
-    serves: &'static str,
+    pub serves: &'static str,
     /// Further lines of the client.
-    client: &'static str,
-    blocks: bool,
+    pub client: &'static str,
+    pub blocks: bool,
 }
 
 impl Pair {
@@ -243,8 +243,15 @@ pub struct Client(pub TcpStream);
 impl Client {
     /// One that has connected and agreed upon units of 480 bytes.
     pub fn new(address: SocketAddr) -> Self {
+        Self::in_slot(address, 1)
+    }
+
+    /// The same, that means the CPU in this slot.
+    pub fn in_slot(address: SocketAddr, slot: u8) -> Self {
         let mut client = Self::silent(address);
-        assert_eq!(client.ask(&CONNECT).len(), 22);
+        let mut connect = CONNECT;
+        connect[18] = slot;
+        assert_eq!(client.ask(&connect).len(), 22);
         let agreed = client.ask(&job(&[0xF0, 0, 0, 1, 0, 1, 1, 0xE0], &[]));
         assert_eq!(agreed[agreed.len() - 2..], [1, 0xE0]);
         client

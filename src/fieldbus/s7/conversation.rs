@@ -249,7 +249,7 @@ impl Conversation {
             [] => return Err(error::LENGTHS),
         };
         let items = Addresses::new(count, addresses).ok_or(error::LENGTHS)?;
-        if self.answer_length(items.clone()) > usize::from(self.pdu) {
+        if answer_length(items.clone()) > usize::from(self.pdu) {
             return Err(error::LENGTHS);
         }
         let mut draft = Draft::begin(Kind::AckData, pdu.reference, error::NONE, reply);
@@ -275,16 +275,16 @@ impl Conversation {
         draft.end(reply);
         Ok(())
     }
+}
 
-    /// How long the answer to these items is, if all of them can be read.
-    fn answer_length(&self, items: Addresses<'_>) -> usize {
-        let mut length = super::pdu::ANSWER_HEADER + 2;
-        for item in items {
-            let bytes = item.map_or(0, |item| item.range().len());
-            length = length.next_multiple_of(2) + item::DATA_HEADER + bytes;
-        }
-        length
+/// How long the answer to these items is, if all of them can be read.
+fn answer_length(items: Addresses<'_>) -> usize {
+    let mut length = super::pdu::ANSWER_HEADER + 2;
+    for item in items {
+        let bytes = item.map_or(0, |item| item.range().len());
+        length = length.next_multiple_of(2) + item::DATA_HEADER + bytes;
     }
+    length
 }
 
 fn write(pdu: &Pdu<'_>, memory: &mut impl Memory, reply: &mut Vec<u8>) -> Result<(), u16> {

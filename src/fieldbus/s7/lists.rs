@@ -96,9 +96,7 @@ pub fn write(id: u16, index: u16, facts: &Facts, now: Nanos, out: &mut Vec<u8>) 
     for number in [id, index, short(length), short(records.len())] {
         out.extend_from_slice(&number.to_be_bytes());
     }
-    records
-        .iter()
-        .for_each(|record| out.extend_from_slice(record));
+    out.extend(records.into_iter().flatten());
     Ok(())
 }
 

@@ -167,9 +167,9 @@ fn read_connect(fields: &[u8]) -> Result<Connect<'_>, Fault> {
 pub fn write_request(connect: &Connect<'_>, out: &mut Vec<u8>) {
     let names = [(CALLING, connect.calling), (CALLED, connect.called)];
     write_connect(CONNECT_REQUEST, connect, out, |out| {
-        names
-            .iter()
-            .for_each(|(code, name)| write_name(*code, name, out));
+        for (code, name) in names {
+            write_name(code, name, out);
+        }
         write_size(connect.size, out);
     });
 }
@@ -179,9 +179,9 @@ pub fn write_confirm(connect: &Connect<'_>, out: &mut Vec<u8>) {
     let names = [(CALLING, connect.calling), (CALLED, connect.called)];
     write_connect(CONNECT_CONFIRM, connect, out, |out| {
         write_size(connect.size, out);
-        names
-            .iter()
-            .for_each(|(code, name)| write_name(*code, name, out));
+        for (code, name) in names {
+            write_name(code, name, out);
+        }
     });
 }
 

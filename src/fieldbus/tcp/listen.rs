@@ -29,7 +29,9 @@ pub(crate) fn listen(
                 "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
             }
             ErrorKind::PermissionDenied => {
-                "write a port above 1023, or get the right to use this one"
+                "write a port above 1023, or get the right to use this one: on Linux by sysctl \
+                 net.ipv4.ip_unprivileged_port_start, by setcap cap_net_bind_service=+ep, or with a redirect \
+                 by nft; docs/s7.md has the lines for port 102"
             }
             _ => "end the program that has this port, or write another \"address\"",
         };

@@ -78,7 +78,10 @@ pub(super) struct Poll<'a> {
     timeout: Nanos,
     /// What messages call the server.
     peer: String,
+    cycle: Nanos,
     pace: Pace,
+    /// When it was last looked at what is due.
+    looked: Nanos,
     asking: Option<Asking>,
     request: Vec<u8>,
     written: usize,
@@ -107,7 +110,9 @@ impl<'a> Poll<'a> {
             framing,
             timeout,
             peer,
+            cycle,
             pace: Pace::new(now, cycle),
+            looked: now,
             asking: None,
             request: Vec::new(),
             written: 0,
@@ -121,11 +126,13 @@ impl<'a> Poll<'a> {
         let Some(asking) = &self.asking else {
             return self.pace.due();
         };
-        match &self.framing {
+        // An answer that takes its time is waited for cycle by cycle, so that its age is looked at.
+        let deadline = asking.limit.min(self.looked + self.cycle);
+        match self.framing {
             Framing::Rtu { quiet_until, .. } if self.written < self.request.len() => {
-                asking.limit.min(*quiet_until)
+                deadline.min(quiet_until)
             }
-            _ => asking.limit,
+            _ => deadline,
         }
     }
 
@@ -144,6 +151,7 @@ impl<'a> Poll<'a> {
 
     /// Does what is due at `now`: begins a cycle, gives up what is not answered.
     pub(super) fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        self.looked = now;
         match &self.asking {
             Some(asking) if now >= asking.limit => {
                 let within = self.timeout;

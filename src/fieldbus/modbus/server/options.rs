@@ -5,6 +5,7 @@ use crate::fieldbus::Role;
 use crate::fieldbus::modbus::line::Line;
 use crate::fieldbus::modbus::stations::{Stations, Units};
 use crate::fieldbus::modbus::{CONTROLLER_INPUTS, Map, Place, Side, table};
+use crate::fieldbus::options::read_events;
 use crate::fieldbus::tcp::Address;
 
 use super::super::place::SHAPE;
@@ -77,16 +78,6 @@ impl ServerOptions {
             every_write: events?.1,
         })
     }
-}
-
-/// Whether changes are reported as events, and whether every write is.
-fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
-    if value.is_boolean() {
-        return value.boolean().map(|events| (events, false));
-    }
-    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
-    value.text(right)?;
-    value.choice("kinds of events", &[("writes", (true, true))])
 }
 
 /// The holding register at which `%I` begins once more.

@@ -454,7 +454,9 @@ impl Dialog {
                 Way::Read => function::READ,
             };
             out.extend_from_slice(&[code, count]);
-            pieces.iter().for_each(|piece| piece.item.write(out));
+            for piece in pieces {
+                piece.item.write(out);
+            }
             draft.data(out);
             if *way == Way::Write {
                 write_data(pieces, &images.out, out);

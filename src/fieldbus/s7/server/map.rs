@@ -21,17 +21,30 @@ pub(super) struct Map {
     /// The data blocks in order of their numbers, and their lengths for those who ask.
     blocks: Vec<(u16, Place)>,
     lengths: Vec<(u16, usize)>,
-    /// Sizes of the stations' inputs and outputs, and the slot that each station is in.
-    stations: Vec<([usize; 2], Option<(u8, u8)>)>,
+    stations: Vec<Cpu>,
+}
+
+/// A station as a CPU in a rack.
+#[derive(Debug)]
+struct Cpu {
+    inputs: usize,
+    outputs: usize,
+    /// Rack and slot that it is in.
+    slot: Option<(u8, u8)>,
 }
 
 impl Map {
     /// The map that `options` describe, which [fit](ServerOptions::fit) the table.
     pub(super) fn new(options: &ServerOptions, table: &SignalTable) -> Self {
-        let stations = table.stations.iter().enumerate().map(|(index, station)| {
-            let sizes = [Area::Input, Area::Output].map(|area| station.bytes(area));
-            (sizes, options.slots.get(index).copied().flatten())
-        });
+        let stations = table
+            .stations
+            .iter()
+            .enumerate()
+            .map(|(index, station)| Cpu {
+                inputs: station.input_bytes,
+                outputs: station.output_bytes,
+                slot: options.slots.get(index).copied().flatten(),
+            });
         let blocks = options.blocks.iter().filter_map(|block| {
             let station = block.station_in(table)?;
             let size = table.stations[station].bytes(block.area);
@@ -59,7 +72,9 @@ impl Map {
             return Some(0);
         }
         let slot = called.slot()?;
-        self.stations.iter().position(|(_, own)| *own == Some(slot))
+        self.stations
+            .iter()
+            .position(|station| station.slot == Some(slot))
     }
 
     /// Where an object lies, for a client that means `station`.
@@ -76,7 +91,9 @@ impl Map {
             }
         };
         let station = station.ok_or(Code::MISSING)?;
-        let ([inputs, outputs], _) = self.stations[station];
+        let Cpu {
+            inputs, outputs, ..
+        } = self.stations[station];
         Ok(Place {
             station,
             area,

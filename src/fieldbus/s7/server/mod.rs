@@ -12,7 +12,7 @@ use crate::time::{Nanos, Stop};
 
 use super::item::{Code, Object};
 use super::lists::{Facts, Identity};
-use super::{Conversation, Memory, transport};
+use super::{Conversation, Fault, Memory, transport};
 
 use map::{Map, Place};
 pub use options::{Block, ServerOptions};
@@ -65,14 +65,7 @@ impl S7Server {
 
 impl Free for S7Server {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        tcp::serve(&self.address, &mut self.service, port, stop).map_err(|error| match error {
-            BusError::Link(text) if text.contains("(Permission denied") => BusError::Link(format!(
-                "{text}: for port 102 on Linux, once and as root: setcap cap_net_bind_service=+ep on the \
-                 program that opens the driver, or sysctl net.ipv4.ip_unprivileged_port_start=102, or let nft \
-                 redirect port 102 to 1102; docs/s7.md has the lines"
-            )),
-            other => other,
-        })
+        tcp::serve(&self.address, &mut self.service, port, stop)
     }
 }
 
@@ -169,7 +162,7 @@ impl tcp::Service for Service {
         let taken = client
             .conversation
             .packet(now, bytes, &self.facts, &mut jobs, reply)
-            .map_err(|fault| fault.into_error())?;
+            .map_err(Fault::into_error)?;
         if jobs.lost {
             reply.truncate(begin);
         }
@@ -287,13 +280,13 @@ impl Memory for Jobs<'_> {
             if !station.changed.is_empty() {
                 station.has_writer = true;
                 self.writes[index] = true;
-                if !self.shared.every_write {
-                    self.port.received(index, self.now, &station.written);
-                    station.changed.clear();
-                } else {
-                    let written = station.changed.drain(..);
+                let written = station.changed.drain(..);
+                if self.shared.every_write {
                     self.port
                         .received_parts(index, self.now, &station.written, written);
+                } else {
+                    drop(written);
+                    self.port.received(index, self.now, &station.written);
                 }
             } else if (addressed || alone) && (self.writes[index] || !station.has_writer) {
                 // Whoever only looks does not make the values of another one younger.

@@ -138,7 +138,7 @@ fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
     hears(
         &mut dialog,
         &format!(
-            "03 00 00 3b 02 f0 80 32 07 0000 0002 000c 0022 0001120812840101 07 01 0000 ff 09 001e {order}"
+            "03 00 00 3f 02 f0 80 32 07 0000 0002 000c 0022 0001120812840101 07 01 0000 ff 09 001e {order}"
         ),
     )
     .expect("right");

@@ -1,0 +1,85 @@
+//! Any bytes as what a CPU answers to an S7 client, in pieces of any size.
+//!
+//! The first byte chooses what is asked; then come pieces, each with its length before it. Nothing may panic or go
+//! on without end, and what the client sends is well made.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tickbus::driver::Config;
+use tickbus::fieldbus::s7::{Frames, News, Terms, Tsap, pdu::Pdu, transport};
+use tickbus::fieldbus::{Options, Role};
+use tickbus::time::Nanos;
+
+const CONFIG: &str = "[driver]\nid = 1\nname = \"fuzz\"\n[fieldbus]\nkind = \"s7-client\"\n\
+    address = \"127.0.0.1:1\"\ninput_bytes = 700\noutput_bytes = 500\ninput = \"DB1\"\noutput = \"%DB2.DBB3\"\n\
+    [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n";
+
+thread_local! {
+    static FRAMES: Frames = {
+        let config = Config::parse("fuzz.cfg", CONFIG).expect("a right file");
+        let Options::S7Client(options) = &config.bus else {
+            panic!("its bus is a client");
+        };
+        Frames::new(options, &config.table, Role::Device)
+    };
+}
+
+fuzz_target!(|data: &[u8]| {
+    let Some((choice, mut pieces)) = data.split_first() else {
+        return;
+    };
+    let terms = Terms {
+        calling: Tsap::new(&[1, 0]),
+        called: Tsap::of_slot(0, 1),
+        pdu: 960,
+        patience: Nanos(1000),
+        asks_who: choice & 1 == 0,
+    };
+    let mut dialog = FRAMES.with(|frames| frames.dialog(terms, Nanos::ZERO));
+    let mut now = Nanos::ZERO;
+    while let Some((length, rest)) = pieces.split_first() {
+        let (piece, rest) = rest.split_at(usize::from(*length).min(rest.len()));
+        pieces = rest;
+        now = now + Nanos(1);
+        let mut bytes = piece;
+        loop {
+            match dialog.hear(now, bytes) {
+                Ok(None) => break,
+                Ok(Some(News::Met(..))) => dialog.allow(choice & 2 == 0),
+                Ok(Some(News::Done)) => assert!(dialog.is_idle()),
+                Err(end) => {
+                    assert!(!end.into_error("peer").to_string().is_empty());
+                    return;
+                }
+            }
+            bytes = &[];
+        }
+        if dialog.is_idle() {
+            dialog.begin(now);
+        }
+        check(dialog.to_write());
+        let count = dialog.to_write().len();
+        dialog.wrote(count);
+        assert!(dialog.check(now).is_ok());
+        assert!(dialog.deadline() > now);
+    }
+});
+
+/// What is sent are packets of whole units.
+fn check(mut sent: &[u8]) {
+    let mut message = Vec::new();
+    while !sent.is_empty() {
+        let (length, tpdu) = transport::read(sent).expect("well made").expect("whole");
+        sent = &sent[length..];
+        if let transport::Tpdu::Data { last, bytes } = tpdu {
+            message.extend_from_slice(bytes);
+            if last {
+                assert!(message.len() <= 960);
+                Pdu::read(&message).expect("well made");
+                message.clear();
+            }
+        }
+    }
+    assert!(message.is_empty());
+}

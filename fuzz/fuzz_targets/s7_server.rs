@@ -1,0 +1,102 @@
+//! Any bytes as what a client sends to an S7 server, in pieces of any size.
+//!
+//! Nothing may panic; answers are the same however the bytes are cut, well made, and no longer than was agreed;
+//! nothing is written that was not asked for in bounds.
+
+#![no_main]
+
+use std::ops::Range;
+
+use libfuzzer_sys::fuzz_target;
+use tickbus::fieldbus::s7::item::{Code, Object};
+use tickbus::fieldbus::s7::lists::{Facts, Identity};
+use tickbus::fieldbus::s7::pdu::Pdu;
+use tickbus::fieldbus::s7::transport::{self, Tpdu};
+use tickbus::fieldbus::s7::{Conversation, Fault, Memory};
+use tickbus::time::Nanos;
+
+fuzz_target!(|data: (u8, &[u8])| {
+    let (piece, bytes) = data;
+    let (answers, end) = talk(bytes, bytes.len().max(1));
+    assert_eq!(talk(bytes, usize::from(piece).max(1)), (answers.clone(), end));
+    check(&answers);
+});
+
+/// Outputs and data block 1 over the same bytes, inputs that cannot be written.
+struct Bytes {
+    outputs: [u8; 64],
+    inputs: [u8; 700],
+}
+
+impl Memory for Bytes {
+    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+        let all = match object {
+            Object::Inputs => &self.inputs[..],
+            Object::Outputs | Object::Block(1) => &self.outputs[..],
+            _ => return Err(Code::MISSING),
+        };
+        all.get(range).ok_or(Code::ADDRESS)
+    }
+
+    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], Code> {
+        match object {
+            Object::Outputs | Object::Block(1) => self.outputs.get_mut(range).ok_or(Code::ADDRESS),
+            Object::Inputs => Err(Code::ACCESS),
+            _ => Err(Code::MISSING),
+        }
+    }
+
+    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, Code> {
+        assert!(bit < 8);
+        Ok(&mut self.write(object, byte..byte + 1)?[0])
+    }
+
+    fn done(&mut self) {}
+
+    fn blocks(&self) -> &[(u16, usize)] {
+        &[(1, 64)]
+    }
+}
+
+/// All answers to `bytes`, handed in by pieces of `piece` bytes, and how it ended.
+fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<Fault>) {
+    let mut conversation = Conversation::default();
+    let mut memory = Bytes { outputs: [0; 64], inputs: [7; 700] };
+    let facts = Facts { identity: Identity::of_driver("fuzz"), pdu: 480, clients: 1 };
+    let (mut begun, mut answers) = (Vec::new(), Vec::new());
+    for piece in bytes.chunks(piece) {
+        begun.extend_from_slice(piece);
+        loop {
+            let mut reply = Vec::new();
+            match conversation.packet(Nanos::ZERO, &begun, &facts, &mut memory, &mut reply) {
+                Ok(0) => break,
+                Ok(taken) => drop(begun.drain(..taken)),
+                Err(fault) => return (answers, Some(fault)),
+            }
+            answers.extend_from_slice(&reply);
+        }
+    }
+    (answers, None)
+}
+
+/// Answers are packets of whole units.
+fn check(mut answers: &[u8]) {
+    let mut message = Vec::new();
+    while !answers.is_empty() {
+        let (length, tpdu) = transport::read(answers).expect("well made").expect("whole");
+        answers = &answers[length..];
+        match tpdu {
+            Tpdu::ConnectConfirm(_) => {}
+            Tpdu::Data { last, bytes } => {
+                message.extend_from_slice(bytes);
+                if last {
+                    assert!(message.len() <= 960);
+                    Pdu::read(&message).expect("well made");
+                    message.clear();
+                }
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(message.is_empty());
+}

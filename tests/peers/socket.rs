@@ -1,0 +1,130 @@
+//! Foreign ends of a socket bus: TCP by the standard library, records by hand.
+
+use std::io::Write;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use tickbus::time::Manual;
+
+use crate::conformance::rig::{Bus, Liar, config};
+use crate::peers::{Alone, Ending, leave, own_address};
+
+/// The size of a record of the conformance suite's signals, either way.
+pub const RECORD: usize = 6;
+
+/// A socket bus at an address of its own.
+pub struct Tcp {
+    pub address: SocketAddr,
+    /// Further lines in the `[fieldbus]` table of either end.
+    pub device: &'static str,
+    pub controller: &'static str,
+}
+
+impl Tcp {
+    pub fn new(device: &'static str, controller: &'static str) -> Self {
+        let address = own_address();
+        Self {
+            address,
+            device,
+            controller,
+        }
+    }
+}
+
+impl Bus for Tcp {
+    fn fieldbus(&self, role: &str) -> String {
+        let further = match role {
+            "device" => self.device,
+            _ => self.controller,
+        };
+        format!(
+            "kind = \"socket\"\naddress = \"{}\"\n{further}",
+            self.address
+        )
+    }
+
+    /// A client, or a server, that sends half a record and leaves.
+    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        let over = Arc::new(AtomicBool::new(false));
+        let address = self.address;
+        let listens = self.device.contains("connect");
+        let listener = listens.then(|| {
+            let listener = TcpListener::bind(address).expect("its own address");
+            listener.set_nonblocking(true).expect("an option");
+            listener
+        });
+        let thread = std::thread::spawn({
+            let over = Arc::clone(&over);
+            move || {
+                while !over.load(Ordering::Relaxed) {
+                    let meet = |listener: &TcpListener| listener.accept().map(|met| met.0);
+                    let met = match &listener {
+                        Some(listener) => meet(listener),
+                        None => TcpStream::connect(address),
+                    };
+                    match met {
+                        Ok(stream) => lie(stream),
+                        Err(_) => std::thread::yield_now(),
+                    }
+                }
+            }
+        });
+        Liar {
+            _peer: Box::new(Ending {
+                over,
+                thread: Some(thread),
+            }),
+            cause: "protocol",
+            words: "left in the middle of a record: 3 of 6 bytes had come",
+        }
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            ("kind = \"socket\"\naddress = \"127.0.0.1\"", "has no port"),
+            (
+                "kind = \"socket\"\nrole = \"controller\"\naddress = \"127.0.0.1:0\"",
+                "port 0 cannot be connected to",
+            ),
+            (
+                "kind = \"socket\"\nrole_tcp = \"server\"",
+                "TCP roles are listen, connect",
+            ),
+            (
+                "kind = \"socket\"\nsend = \"on_change\"",
+                "did you mean \"on-change\"",
+            ),
+            (
+                "kind = \"socket\"\nmin_interval = \"5ms\"",
+                "without send = \"on-change\"",
+            ),
+            ("kind = \"socket\"\nadress = \"127.0.0.1:1\"", "address"),
+        ]
+    }
+}
+
+/// Sends half a record, and leaves in good order.
+fn lie(mut stream: TcpStream) {
+    // All zeros would be a good speed, were they believed. If the other end is quicker to go, so be it.
+    let _ = stream.set_nonblocking(false);
+    let _ = stream.write_all(&[0; RECORD / 2]);
+    leave(stream);
+}
+
+/// A Device that listens on a port which the system chooses, without a peer.
+pub fn device(further: &str) -> (Alone, SocketAddr) {
+    let bus = Tcp {
+        address: (Ipv4Addr::LOCALHOST, 0).into(),
+        device: "",
+        controller: "",
+    };
+    let alone = Alone::open(&config(&bus, "device", further));
+    let address = alone.address();
+    (alone, address)
+}
+
+/// What a PLC sends: `run`, `speed`, `echo`.
+pub fn record(speed: i16) -> [u8; RECORD] {
+    let [high, low] = speed.to_be_bytes();
+    [0, 0, high, low, high, low]
+}

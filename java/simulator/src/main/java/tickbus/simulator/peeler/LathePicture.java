@@ -14,10 +14,10 @@ public final class LathePicture {
     private static final int WIDTH = 960;
     private static final int HEIGHT = 620;
     private static final int BAR = 66;
-    private static final double X = 430;
-    private static final double Y = 285;
+    private static final double X = 450;
+    private static final double Y = 275;
     /** Pixels per millimetre. */
-    private static final double SCALE = 1.4;
+    private static final double SCALE = 1.25;
     private static final double ROLL = 60;
     private static final double SECTOR = 2 * Math.PI / Profile.SECTORS;
     private static final String INK = "fill=\"#22313f\"";
@@ -36,7 +36,8 @@ public final class LathePicture {
     public static String draw(Peeler line) {
         Svg svg = new Svg(WIDTH, HEIGHT, "The lathe of the peeling line: " + caption(line));
         svg.rect(0, 0, WIDTH, HEIGHT, 14, "fill=\"#f1f4f7\"");
-        svg.text(28, 42, "font-size=\"21\" font-weight=\"600\" " + INK, "The lathe, from its right end");
+        svg.text(28, 42, "font-size=\"21\" font-weight=\"600\" " + INK, "The lathe");
+        svg.text(28, 66, "font-size=\"14\" " + INK, "seen from its right end");
         block(line, svg);
         roll(svg, line.position(AxisName.TOP_ROLL), 118, "top roll");
         roll(svg, line.position(AxisName.BOTTOM_ROLL_LEFT), 196, "bottom roll left");
@@ -107,17 +108,17 @@ public final class LathePicture {
                 + (line.round() ? "" : " stroke-dasharray=\"34 12 11 15\"");
         svg.path(String.format(Locale.ROOT, "M%.1f %.1fC%.1f %.1f %.1f %.1f %d %.1f", edge + 2, Y - 2, edge + 30,
                 Y + 60, edge + 70, Y + 112, WIDTH, Y + 120), look);
-        svg.text(edge + 110, Y + 90, "font-size=\"14\" font-weight=\"600\" " + INK,
+        svg.text(edge + 110, Y + 74, "font-size=\"14\" font-weight=\"600\" " + INK,
                 line.round() ? "a whole ribbon" : "torn pieces: not round yet");
     }
 
     private static void bar(Peeler line, Svg svg) {
         svg.rect(0, HEIGHT - BAR, WIDTH, BAR, 0, "fill=\"#22313f\"");
-        field(svg, 28, "block", caption(line));
-        field(svg, 440, "knife", text("%.1f mm", line.position(AxisName.KNIFE_CARRIAGE)));
-        field(svg, 560, "thickness", text("%.1f mm", line.torque(AxisName.KNIFE_CARRIAGE)));
-        field(svg, 670, "spindles", text("%.2f rev/s", line.speed(AxisName.SPINDLE_ROTATION)));
-        field(svg, 810, "ribbon so far", text("%.1f m", line.wood().ribbon()));
+        field(svg, 28, "in the spindles", caption(line));
+        field(svg, 480, "knife", text("%.1f mm", line.position(AxisName.KNIFE_CARRIAGE)));
+        field(svg, 590, "thickness", text("%.1f mm", line.torque(AxisName.KNIFE_CARRIAGE)));
+        field(svg, 690, "spindles", text("%.2f rev/s", line.speed(AxisName.SPINDLE_ROTATION)));
+        field(svg, 830, "ribbon so far", text("%.1f m", line.wood().ribbon()));
     }
 
     private static String text(String format, double value) {
@@ -126,6 +127,6 @@ public final class LathePicture {
 
     private static void field(Svg svg, double x, String name, String value) {
         svg.text(x, HEIGHT - BAR + 24, "font-size=\"12\" fill=\"#9fb2c2\"", name);
-        svg.text(x, HEIGHT - BAR + 48, "font-size=\"17\" font-weight=\"600\" fill=\"#ffffff\"", value);
+        svg.text(x, HEIGHT - BAR + 48, "font-size=\"16\" fill=\"#ffffff\"", value);
     }
 }

@@ -182,6 +182,7 @@ public final class PeelingDemo {
                 stalls.silent(plcs.longestSilenceNanos());
                 rate.look(simulator.simulationNanos());
                 watcher.look();
+                lookAtLinks(plcs, guard);
                 if (simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
                     plcs.listen(simulator.simulationNanos(), timeline);
                     check(plcs, guard);
@@ -199,6 +200,19 @@ public final class PeelingDemo {
         if (line.wood().coreCount() < options.logs()) {
             throw new DemoFailure("interrupted");
         }
+    }
+
+    /** A link breaks because its PLC has died, which is told; or because this machine stood still, which does not count. */
+    private void lookAtLinks(Plcs plcs, ShutdownGuard guard) {
+        if (watcher.broken() == null) {
+            return;
+        }
+        if (guard.triggers(INTERRUPTION_MILLIS)) {
+            throw new DemoFailure("interrupted");
+        }
+        plcs.check();
+        stalls.silent(watcher.silentNanos());
+        throw new DemoFailure(watcher.broken());
     }
 
     /** A picture of a block that is being rounded, once. */

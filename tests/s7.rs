@@ -16,7 +16,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 
 use conformance::rig::{await_that, config, pass};
 use peers::{Alone, is_closed};
-use s7_peers::{CONNECT, Client, Pair, address, command, job, packet, request};
+use s7_peers::{CONFIRM, CONNECT, Client, Pair, address, command, job, packet, request};
 use tickbus::driver::Code;
 use tickbus::image::Event;
 
@@ -380,4 +380,46 @@ fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
     assert_eq!(plc.statistic("writes"), "blocked");
     assert_eq!(plc.statistic("identity"), "tickbus device");
     assert!(plc.link().reason.contains("tickbus device"));
+}
+
+/// A CPU by hand that answers a client of ours; one that is asked who it is hangs up.
+#[test]
+fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let pair = Pair {
+        address: listener.local_addr().expect("it is bound"),
+        ..Pair::new("controller", "")
+    };
+    let mut device = Alone::open(&config(&pair, "device", ""));
+    let cpu = std::thread::spawn(move || {
+        let mut connections = 0;
+        loop {
+            connections += 1;
+            let (stream, _) = listener.accept().expect("the client connects");
+            let mut client = Client(stream);
+            assert_eq!(client.receive().expect("it asks")[5], 0xE0);
+            client.send(&CONFIRM);
+            client.receive().expect("it asks for a length");
+            client.send(&packet(&[
+                0x32, 3, 0, 0, 0, 1, 0, 8, 0, 0, 0, 0, 0xF0, 0, 0, 1, 0, 1, 1, 0xE0,
+            ]));
+            let next = client.receive().expect("it asks for something");
+            if next[8] == 7 {
+                continue;
+            }
+            let answer = [
+                &[0x32, 3, 0, 0, next[11], next[12], 0, 2, 0, 10, 0, 0, 4, 1][..],
+                &[0xFF, 4, 0, 48, 0, 0, 0, 7, 0, 7],
+            ];
+            client.send(&packet(&answer.concat()));
+            // Until it has been taken, and the client goes.
+            while client.receive().is_some() {}
+            return connections;
+        }
+    });
+    device.until_speed(7);
+    let who = device.end.statistic("identity");
+    assert!(who.starts_with("S7 CPU at 127.0.0.1:"), "{who}");
+    device.end.driver.close();
+    assert_eq!(cpu.join().expect("no panic"), 3);
 }

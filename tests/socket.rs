@@ -16,8 +16,8 @@ use std::net::TcpListener;
 use std::time::Duration;
 
 use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, pass};
-use peers::{client, is_closed, leave};
-use socket_peers::{Alone, RECORD, Tcp, record};
+use peers::{Alone, client, is_closed, leave};
+use socket_peers::{RECORD, Tcp, device, record};
 use socket2::SockRef;
 use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;
@@ -36,7 +36,7 @@ conformance!(
 
 #[test]
 fn a_record_that_comes_byte_by_byte_is_one_record() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut peer = client(address);
     for byte in record(258) {
         peer.write_all(&[byte]).expect("the device reads");
@@ -47,7 +47,7 @@ fn a_record_that_comes_byte_by_byte_is_one_record() {
 
 #[test]
 fn records_that_come_together_are_handed_in_one_by_one() {
-    let (mut device, address) = Alone::device("events = true");
+    let (mut device, address) = device("events = true");
     let mut peer = client(address);
     let three = [record(1), record(2), record(3)].concat();
     peer.write_all(&three).expect("the device reads");
@@ -87,7 +87,7 @@ fn stations_follow_one_another_in_a_record() {
 
 #[test]
 fn a_peer_that_leaves_within_a_record_is_told_by_its_bytes() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut peer = client(address);
     peer.write_all(&record(7)).expect("the device reads");
     device.until_speed(7);
@@ -104,7 +104,7 @@ fn a_peer_that_leaves_within_a_record_is_told_by_its_bytes() {
 fn every_truncation_of_a_stream_is_told_as_what_it_is() {
     let stream = [record(7), record(8)].concat();
     for cut in 0..=stream.len() {
-        let (mut device, address) = Alone::device("");
+        let (mut device, address) = device("");
         let mut peer = client(address);
         peer.write_all(&stream[..cut]).expect("the device reads");
         leave(peer);
@@ -121,7 +121,7 @@ fn every_truncation_of_a_stream_is_told_as_what_it_is() {
 
 #[test]
 fn a_record_left_incomplete_ends_the_connection_after_max_age() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut peer = client(address);
     peer.write_all(&record(7)[..3]).expect("the device reads");
     let cause = device.until_reason("did not complete it within 300ms: 3 of 6 bytes have come");
@@ -131,7 +131,7 @@ fn a_record_left_incomplete_ends_the_connection_after_max_age() {
 
 #[test]
 fn a_client_that_says_nothing_is_given_up_after_four_max_ages() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let peer = client(address);
     device.until_reason("has connected; waiting for its first record");
     let before = device.now();
@@ -149,7 +149,7 @@ fn a_client_that_says_nothing_is_given_up_after_four_max_ages() {
 
 #[test]
 fn a_client_that_falls_silent_is_stale_first_and_then_given_up() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut peer = client(address);
     peer.write_all(&record(7)).expect("the device reads");
     device.until_speed(7);
@@ -196,7 +196,7 @@ fn a_client_that_never_reads_is_given_up_with_its_byte_count() {
 
 #[test]
 fn a_second_client_is_turned_away_and_the_first_goes_on() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut first = client(address);
     first.write_all(&record(1)).expect("the device reads");
     device.until_speed(1);
@@ -213,7 +213,7 @@ fn a_second_client_is_turned_away_and_the_first_goes_on() {
 
 #[test]
 fn a_second_client_takes_the_place_of_a_silent_one() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut first = client(address);
     first.write_all(&record(1)).expect("the device reads");
     device.until_speed(1);
@@ -228,7 +228,7 @@ fn a_second_client_takes_the_place_of_a_silent_one() {
 
 #[test]
 fn a_client_that_comes_back_at_once_is_not_turned_away() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     for speed in 1..=50 {
         let mut peer = client(address);
         peer.write_all(&record(speed)).expect("the device reads");
@@ -247,7 +247,7 @@ fn a_client_that_comes_back_at_once_is_not_turned_away() {
 
 #[test]
 fn a_reset_connection_is_lost_and_the_next_one_served() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut peer = client(address);
     peer.write_all(&record(1)).expect("the device reads");
     device.until_speed(1);
@@ -263,7 +263,7 @@ fn a_reset_connection_is_lost_and_the_next_one_served() {
 
 #[test]
 fn a_client_that_closes_in_good_order_has_left() {
-    let (mut device, address) = Alone::device("");
+    let (mut device, address) = device("");
     let mut peer = client(address);
     peer.write_all(&record(1)).expect("the device reads");
     device.until_speed(1);
@@ -274,7 +274,7 @@ fn a_client_that_closes_in_good_order_has_left() {
 
 #[test]
 fn a_device_that_replies_says_nothing_by_itself_and_answers_each_record() {
-    let (mut device, address) = Alone::device("send = \"reply\"");
+    let (mut device, address) = device("send = \"reply\"");
     let mut peer = client(address);
     device.end.set("position", 513.0);
     device.end.tick();

@@ -128,6 +128,20 @@ fn a_stepped_bus_with_faults() {
     assert_eq!(allocations(STEPPED, FAULTS), 0);
 }
 
+/// Every reflex of an axis; on a mirror the PLC's bits come back as feedback and the other way round.
+const AXES: &str = "
+[[axis]]\nname = \"A\"\ncommand_offset = 100\nfeedback_offset = 100\nacknowledge = true\ndiagnostics = true\n
+command = [{ number = 1, position = 5.0 }, { number = 2, mode = \"speed\", speed = 1.0 }]\n
+[[axis.switch]]\nname = \"up\"\nabove = 10.0\naddress = \"%IX140.0\"\n
+[[axis.switch]]\nname = \"down\"\nbelow = 1.0\nhysteresis = 0.5\naddress = \"%IX140.1\"\n
+";
+
+#[test]
+fn axes_with_all_their_reflexes() {
+    assert_eq!(allocations(FREE, AXES), 0);
+    assert_eq!(allocations(STEPPED, AXES), 0);
+}
+
 #[test]
 fn a_link_whose_other_end_is_absent() {
     assert_eq!(allocations("kind = \"loopback\"\nlink = \"nobody\"", ""), 0);

@@ -76,12 +76,14 @@ maven() {
 }
 
 # Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
-# command) and simulator/ (the simulator and the rig's control table). Needs what tools/build makes.
+# command) and simulator/ (the simulator, the control tables, and in peeler/ the driver.cfg of the
+# peeling line). Needs what tools/build makes.
 assemble() {
     local folder=$1 release
     release=$(version)
     rm -rf "$folder/DeviceDriver" "$folder/simulator"
-    mkdir -p "$folder/DeviceDriver" "$folder/simulator"
+    mkdir -p "$folder/DeviceDriver" "$folder/simulator/peeler"
+    cp plc/peeler/*.cfg "$folder/simulator/peeler/"
     # The command is there for plug-ins in helper processes.
     cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "target/release/$(tickbus_command)" \
         "$folder/DeviceDriver/"

@@ -39,6 +39,8 @@ struct Numbers {
     pending: Option<u16>,
     /// What the PLC asks for is not in the table.
     unknown: bool,
+    /// The simulation's own error, while that stands in its place.
+    error_of_simulation: Option<Slot>,
 }
 
 #[derive(Debug)]
@@ -102,6 +104,7 @@ impl Reflex {
                 ],
                 pending: None,
                 unknown: false,
+                error_of_simulation: None,
             })
         };
         let switches = axis.switches.iter().map(|switch| Trip {
@@ -163,6 +166,9 @@ impl Reflex {
 impl Numbers {
     /// Puts the command that the PLC names in the place of what it sent.
     fn received(&mut self, slots: &mut [Slot], execute: usize) {
+        if let (Some(error), Some(own)) = (self.error, self.error_of_simulation.take()) {
+            slots[error] = own;
+        }
         self.unknown = false;
         let number = slots[self.number].real();
         if number == 0.0 {
@@ -209,11 +215,12 @@ impl Numbers {
 
     fn sending(&mut self, slots: &mut [Slot]) {
         let there = slots[self.in_position].real() != 0.0;
-        let done = self.pending.filter(|_| there).map_or(0, |number| number);
+        let done = self.pending.filter(|_| there).unwrap_or(0);
         slots[self.done] = Slot::from_real(f64::from(done));
         if let Some(error) = self.error
             && self.unknown
         {
+            self.error_of_simulation = Some(slots[error]);
             slots[error] = Slot::from_real(f64::from(UNKNOWN_COMMAND));
         }
     }

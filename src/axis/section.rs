@@ -153,7 +153,7 @@ pub fn read<'a>(
     let commands = commands.map(|value| read_commands(&value, kind, bounds));
     let numbered = commands.is_some();
     let switches = switches
-        .map(|value| read_switches(&value, addressing, bounds))
+        .map(|value| read_switches(&value, number, addressing, bounds))
         .unwrap_or_default();
 
     let feedback_bytes = if diagnostics == Some(true) || numbered {
@@ -304,6 +304,13 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
 
 fn limits_of(value: &Value<'_>) -> Option<[f64; 2]> {
     let [(low, _), (high, _)] = pair_of(value, "write two numbers, such as [0.0, 650.0]")?;
+    if !(low + high).is_finite() {
+        value.wrong(
+            "the sum of these \"limits\" is beyond every number",
+            "write smaller ones, such as [0.0, 650.0]",
+        );
+        return None;
+    }
     if low >= high {
         value.wrong(
             format!(

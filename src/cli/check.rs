@@ -11,7 +11,7 @@ use super::Outcome;
 use crate::config::{short_number, shown};
 use crate::driver::{Config, Timing};
 use crate::fieldbus::socket::{self, Sending, TcpRole};
-use crate::fieldbus::{Options, loopback, modbus, plugin, s7};
+use crate::fieldbus::{Options, Role, loopback, plugin, s7};
 use crate::record;
 use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
 use crate::time::Nanos;
@@ -53,7 +53,7 @@ fn report(config: &Config) -> String {
     };
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
-    line("bus", &bus(&config.bus));
+    line("bus", &bus(&config.bus, config.role));
     line("timing", &timing(&config.timing));
     if let Some(record) = &config.record {
         line("record", &recording(record));
@@ -102,7 +102,7 @@ fn report(config: &Config) -> String {
             .table
             .signals
             .iter()
-            .map(|signal| row(signal, stations, &taken)),
+            .map(|signal| row(signal, stations, &taken, &config.bus)),
     ));
     let total = |area| {
         stations
@@ -123,19 +123,19 @@ fn report(config: &Config) -> String {
 
 fn role(config: &Config) -> &'static str {
     match config.role {
-        crate::fieldbus::Role::Device => "device: the machine, which writes %I and reads %Q",
-        crate::fieldbus::Role::Controller => "controller: the PLC, which reads %I and writes %Q",
+        Role::Device => "device: the machine, which writes %I and reads %Q",
+        Role::Controller => "controller: the PLC, which reads %I and writes %Q",
     }
 }
 
-fn bus(options: &Options) -> String {
+fn bus(options: &Options, role: Role) -> String {
     let mut parts = vec![options.kind().to_owned()];
     match options {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
-        Options::ModbusServer(options) => parts.extend(modbus_server(options)),
-        Options::ModbusClient(options) => parts.push(format!("TODO {}", options.line)),
+        Options::ModbusServer(options) => parts.extend(options.shown()),
+        Options::ModbusClient(options) => parts.extend(options.shown(role)),
         Options::S7Server(options) => parts.extend(s7_server(options)),
         Options::S7Client(options) => parts.extend(s7_client(options)),
         Options::OpcuaClient(options) => parts.extend(options.summary()),
@@ -173,18 +173,6 @@ fn socket(options: &socket::Options) -> Vec<String> {
     parts
 }
 
-fn modbus_server(options: &modbus::ServerOptions) -> Vec<String> {
-    let mut parts = vec![match &options.line {
-        modbus::Line::Tcp(address) => format!("listens on {address}"),
-        serial @ modbus::Line::Serial(_) => format!("listens on {serial}"),
-    }];
-    if let Some(offset) = options.map.window {
-        let table = modbus::Table::HoldingRegisters;
-        parts.push(format!("%I from {} on", modbus::Place { table, offset }));
-    }
-    parts
-}
-
 fn s7_server(options: &s7::ServerOptions) -> Vec<String> {
     let mut parts = vec![format!("listens on {}", options.address)];
     for block in &options.blocks {
@@ -211,7 +199,8 @@ fn s7_client(options: &s7::ClientOptions) -> Vec<String> {
         }
     }
     parts.push(match &options.write_to {
-        Some(identity) => format!("writes into \"{}\" alone", shown(identity)),
+        // It was read as one line, and matters to its last character.
+        Some(identity) => format!("writes into \"{identity}\" alone"),
         None => "writes nothing".to_owned(),
     });
     parts
@@ -288,10 +277,11 @@ fn size(station: &Station, area: Area) -> String {
     )
 }
 
-const HEADINGS: [&str; 12] = [
+const HEADINGS: [&str; 13] = [
     "station",
     "address",
     "in word",
+    "place",
     "type",
     "order",
     "direction",
@@ -307,6 +297,7 @@ fn row(
     signal: &Signal,
     stations: &[Station],
     taken: &HashSet<WordKey>,
+    bus: &Options,
 ) -> [String; HEADINGS.len()] {
     let station = &stations[signal.station];
     [
@@ -317,6 +308,7 @@ fn row(
         },
         signal.address().to_string(),
         bit_of_word(signal, station, taken),
+        bus.place(signal, station),
         signal.data_type.to_string(),
         if signal.order == ByteOrder::Abcd {
             String::new()

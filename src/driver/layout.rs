@@ -96,8 +96,15 @@ pub(super) fn lay_out<'a>(
     };
     // A signal whose station is not known is left out of the rules about places.
     let mut placed = vec![true; sections.len()];
+    // The station of a table with many signals is looked up, and blamed, once.
+    let mut of_tables = HashMap::new();
     for (section, placed) in sections.iter_mut().zip(&mut placed) {
-        match station_of(section, &stations, certain) {
+        let look_up = || station_of(section, &stations, certain);
+        let found = match section.structure {
+            Some(structure) => *of_tables.entry(structure.table).or_insert_with(look_up),
+            None => look_up(),
+        };
+        match found {
             Some(station) => section.signal.station = station,
             None => *placed = false,
         }
@@ -207,7 +214,7 @@ fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -
             section.address.wrong(
                 format!(
                     "{} names no station, and there are {}",
-                    section.label(),
+                    section.title(),
                     stations.len()
                 ),
                 format!("add station = \"{}\", or another of them", stations[0].name),
@@ -259,24 +266,24 @@ pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
 
 /// No name that an edge count has, or that a signal of an axis has.
 fn check_names(sections: &[Section<'_>]) {
-    let mut of_axes: HashMap<&str, &Section<'_>> = HashMap::new();
-    for section in sections
-        .iter()
-        .filter(|section| section.structure.is_some())
-    {
-        of_axes.insert(&section.signal.name, section);
-    }
-    for section in sections
-        .iter()
-        .filter(|section| section.structure.is_none())
-    {
-        let axis = of_axes.get(section.signal.name.as_str());
-        if let (Some(name), Some(axis)) = (&section.name, axis) {
+    let mut first: HashMap<&str, &Section<'_>> = HashMap::new();
+    for section in sections {
+        let Some(taken) = first.insert(&section.signal.name, section) else {
+            continue;
+        };
+        let twins = section.structure.is_none() && taken.structure.is_none();
+        // Of a name that is made and one that is written, the latter is to be changed.
+        let (wrong, other) = if section.has_own_name() {
+            (section, taken)
+        } else {
+            (taken, section)
+        };
+        if let (Some(name), true, false) = (&wrong.name, wrong.has_own_name(), twins) {
             name.wrong(
                 format!(
-                    "the name \"{}\" is that of a signal of the axis on line {}",
+                    "the name \"{}\" is that of a signal of an axis, on line {}",
                     shown(&section.signal.name),
-                    line_of(axis),
+                    line_of(other),
                 ),
                 "choose another",
             );
@@ -337,7 +344,7 @@ fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usiz
         section.address.wrong(
             format!(
                 "{} ends at byte {}, but {area} has {stated} {} (line {})",
-                section.label(),
+                section.title(),
                 section.end() - 1,
                 if stated == 1 { "byte" } else { "bytes" },
                 value.line(),

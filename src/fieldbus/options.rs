@@ -6,7 +6,7 @@ use super::tcp::Address;
 use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
-use crate::signal::SignalTable;
+use crate::signal::{Signal, SignalTable, Station};
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -145,6 +145,15 @@ impl Options {
         }
     }
 
+    /// Where a signal of `station` lies, in the bus's own words; empty where those are its address.
+    pub fn place(&self, signal: &Signal, station: &Station) -> String {
+        match self {
+            Self::ModbusServer(options) => options.place(signal),
+            Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            _ => String::new(),
+        }
+    }
+
     /// Reports what does not go together with the stations, signals and axes of the driver.
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
@@ -195,10 +204,13 @@ pub(super) fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
     if value.is_boolean() {
         return value.boolean().map(|events| (events, false));
     }
-    value.text(
-        "write true for every change, \"writes\" for every write, changed or not, or false",
-    )?;
-    value.choice("kinds of events", &[("writes", (true, true))])
+    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
+    let text = value.text(right)?;
+    if text != "writes" {
+        value.wrong(format!("\"{}\" is no kind of events", shown(text)), right);
+        return None;
+    }
+    Some((true, true))
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {

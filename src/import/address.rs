@@ -62,7 +62,7 @@ pub(super) fn place(text: &str, addressing: Addressing) -> Place {
         Some('I' | 'Q') => letters.to_owned(),
         _ => return Place::Nothing,
     };
-    if international.len() > 2 {
+    if !["", "X", "B", "W", "D", "L"].contains(&&international[1..]) {
         return Place::Nothing;
     }
     match Address::parse(&format!("%{international}{numbers}"), addressing) {

@@ -46,6 +46,23 @@ impl Section<'_> {
         self.structure.map_or(own, |structure| structure.end)
     }
 
+    /// Whether its name stands in the file, and is not made of that of its table.
+    pub fn has_own_name(&self) -> bool {
+        let name = self.name.as_ref().and_then(Value::as_text);
+        name == Some(&self.signal.name)
+    }
+
+    /// What the whole of its table is called, where a message is about that.
+    pub fn title(&self) -> String {
+        let name = self.name.as_ref().and_then(Value::as_text);
+        match (name, self.structure) {
+            (Some(name), Some(_)) if !self.has_own_name() => {
+                format!("the axis \"{}\"", shown(name))
+            }
+            _ => self.label(),
+        }
+    }
+
     /// The signal as a message names it.
     pub fn label(&self) -> String {
         let Signal { name, .. } = &self.signal;

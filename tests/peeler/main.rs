@@ -51,6 +51,7 @@ fn an_acknowledge_gives_many_commands_a_second_where_holding_gives_two() {
     let mut quick = Line::new(&[], &[]);
     quick.until("a core", 150.0, |line| line.plant.cores == 1);
     let (held, quick) = (held.report(1), quick.report(1));
+    println!("hold:\n{}acknowledge:\n{}", held.summary(), quick.summary());
     assert!(told(&*held, rotation) <= 2.0);
     assert!(told(&*quick, rotation) >= 10.0, "{}", quick.summary());
     // What the rate is good for: the speed of the veneer.
@@ -127,4 +128,72 @@ fn a_line_that_stands_still_waits_and_goes_on() {
         0,
         "a pause is no fault"
     );
+}
+
+/// What a program says to options or a table that it cannot use.
+fn refusal(name: &str, options: &[(&str, &str)]) -> String {
+    let options: Vec<(String, String)> = options
+        .iter()
+        .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+        .collect();
+    let refused = tickbus::plc::program(name, &options).err();
+    refused.expect("refused").to_string()
+}
+
+#[test]
+fn wrong_options_are_told_with_what_would_be_right() {
+    for (name, option, value, part) in [
+        ("charger", "hold", "long", "write a duration, such as 500ms"),
+        ("lathe", "hold", "0s", "write a duration, such as 500ms"),
+        ("charger", "blocks", "0", "after how many blocks"),
+        (
+            "charger",
+            "thickness",
+            "1.5",
+            "it takes \"hold\" and \"blocks\"",
+        ),
+        ("lathe", "thickness", "-1", "in mm, such as 1.5"),
+        ("lathe", "peeling_speed", "fast", "in mm/s, such as 3000"),
+    ] {
+        let told = refusal(name, &[(option, value)]);
+        assert!(told.contains(part), "{told}");
+    }
+}
+
+#[test]
+fn a_table_that_lacks_a_signal_is_told_by_its_name() {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("plc/peeler/charger.cfg");
+    let text = std::fs::read_to_string(file).expect("the file");
+    for (from, to, part) in [
+        (
+            "acknowledge = true\n",
+            "",
+            "give the option hold, such as hold=500ms",
+        ),
+        (
+            "\"transfer arm\"",
+            "\"arm\"",
+            "finds no signal \"transfer arm.",
+        ),
+        (
+            "\"simulation time\"",
+            "\"time\"",
+            "finds no signal \"simulation time\"",
+        ),
+    ] {
+        let text = text.replace(from, to);
+        let config = tickbus::driver::Config::parse("charger.cfg", &text).expect("a good file");
+        let mut program = tickbus::plc::program("charger", &[]).expect("a program");
+        let told = program.fit(&config.table, config.addressing);
+        let told = told.expect_err("a signal is missing").to_string();
+        assert!(told.contains(part), "{told}");
+    }
+}
+
+#[test]
+fn a_program_is_done_after_its_blocks() {
+    let mut line = Line::new(&[], &[("blocks", "1")]);
+    assert!(!line.report(1).is_done());
+    line.until("its end", 150.0, |line| line.report(1).is_done());
+    assert!(!line.report(0).is_done(), "the charger was asked for none");
 }

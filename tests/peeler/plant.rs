@@ -66,6 +66,7 @@ impl Places {
 }
 
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(crate) struct Plant {
     pub(crate) sides: [Side; 2],
     places: Places,
@@ -79,6 +80,8 @@ pub(crate) struct Plant {
     in_clamps: Option<Block>,
     /// Between the spindles of the lathe.
     pub(crate) held: Option<Block>,
+    /// The clamps and the centring spindles hold the same block.
+    grabbed: bool,
     /// The clamps and the lathe hold the same block.
     shared: bool,
     pub(crate) cores: u32,
@@ -123,6 +126,7 @@ impl Plant {
             in_spindles: None,
             in_clamps: None,
             held: None,
+            grabbed: false,
             shared: false,
             cores: 0,
             veneer: 0.0,
@@ -222,11 +226,9 @@ impl Plant {
             self.in_spindles = self.on_feeder.take();
         }
         if self.in_spindles.is_some() && tips.iter().any(|tip| *tip > HALF + 10.0) {
-            assert!(
-                self.in_clamps.is_some(),
-                "the block falls from the spindles"
-            );
+            assert!(self.grabbed, "the block falls from the spindles");
             self.in_spindles = None;
+            self.grabbed = false;
         }
     }
 
@@ -242,7 +244,13 @@ impl Plant {
                 );
             }
             self.in_clamps = self.in_spindles;
+            self.grabbed = true;
         }
+        let brought = self.in_spindles.is_some() && self.at(0, 4) < 100.0;
+        assert!(
+            !brought || self.grabbed || self.in_clamps.is_none(),
+            "one block runs into another: {self:#?}"
+        );
         let spindles = [self.at(1, 0), self.at(1, 1)];
         if let Some(block) = self.in_clamps {
             if self.near(8, 0.0) && spindles.iter().all(|tip| *tip <= HALF) && self.held.is_none() {

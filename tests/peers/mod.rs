@@ -8,6 +8,10 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use tickbus::time::{Manual, Nanos};
+
+use crate::conformance::rig::{End, await_that, pass};
+
 /// An address on this machine that nobody else uses.
 pub fn own_address() -> SocketAddr {
     static NEXT: AtomicU32 = AtomicU32::new(0);
@@ -67,4 +71,75 @@ pub fn is_closed(stream: &TcpStream) -> bool {
     };
     stream.set_nonblocking(false).expect("a TCP option");
     closed
+}
+
+/// An end of the bus with foreign peers, and the clock that only it waits on.
+pub struct Alone {
+    pub clock: Arc<Manual>,
+    pub end: End,
+}
+
+impl Alone {
+    pub fn open(text: &str) -> Self {
+        let clock = Manual::new();
+        let end = End::open(text, &clock);
+        Self { clock, end }
+    }
+
+    /// Where it listens, by its statistics.
+    pub fn address(&self) -> SocketAddr {
+        let mut address = None;
+        await_that("it listens", || {
+            let text = self.end.driver.statistics();
+            let line = text.lines().find_map(|line| line.strip_prefix("address="));
+            address = line.map(|line| line.parse().expect("an address"));
+            address.is_some()
+        });
+        address.expect("it was waited for")
+    }
+
+    /// Lets cycles pass, and ticks, until `done` holds.
+    #[track_caller]
+    pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
+        await_that(what, || {
+            pass(&self.clock, 1);
+            self.end.tick();
+            done(&mut self.end)
+        });
+    }
+
+    /// Until the line's reason has these words; gives the name of its cause.
+    #[track_caller]
+    pub fn until_reason(&mut self, words: &str) -> &'static str {
+        let mut cause = "";
+        let mut last = String::new();
+        let limit = std::time::Instant::now() + Duration::from_secs(20);
+        self.until(&format!("the reason has \"{words}\""), |end| {
+            let link = end.link();
+            cause = link.cause.name();
+            let said = link.reason.contains(words);
+            if last != link.reason {
+                last = link.reason;
+            }
+            assert!(
+                said || std::time::Instant::now() < limit,
+                "no \"{words}\" in {last}"
+            );
+            said
+        });
+        cause
+    }
+
+    #[track_caller]
+    pub fn until_speed(&mut self, speed: i16) {
+        self.until(&format!("the speed is {speed}"), |end| {
+            end.get("speed") == f64::from(speed)
+        });
+    }
+
+    /// How long the clock has run.
+    pub fn now(&self) -> Nanos {
+        use tickbus::time::Clock as _;
+        self.clock.now()
+    }
 }

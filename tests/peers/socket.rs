@@ -4,12 +4,10 @@ use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use tickbus::time::Manual;
 
-use tickbus::time::{Manual, Nanos};
-
-use crate::conformance::rig::{Bus, End, Liar, await_that, config, pass};
-use crate::peers::{Ending, leave, own_address};
+use crate::conformance::rig::{Bus, Liar, config};
+use crate::peers::{Alone, Ending, leave, own_address};
 
 /// The size of a record of the conformance suite's signals, either way.
 pub const RECORD: usize = 6;
@@ -113,87 +111,16 @@ fn lie(mut stream: TcpStream) {
     leave(stream);
 }
 
-/// An end of the bus with foreign peers, and the clock that only it waits on.
-pub struct Alone {
-    pub clock: Arc<Manual>,
-    pub end: End,
-}
-
-impl Alone {
-    /// A Device that listens on a port which the system chooses.
-    pub fn device(further: &str) -> (Self, SocketAddr) {
-        let bus = Tcp {
-            address: (Ipv4Addr::LOCALHOST, 0).into(),
-            device: "",
-            controller: "",
-        };
-        let alone = Self::open(&config(&bus, "device", further));
-        let address = alone.address();
-        (alone, address)
-    }
-
-    pub fn open(text: &str) -> Self {
-        let clock = Manual::new();
-        let end = End::open(text, &clock);
-        Self { clock, end }
-    }
-
-    /// Where it listens, by its statistics.
-    pub fn address(&self) -> SocketAddr {
-        let mut address = None;
-        await_that("it listens", || {
-            let text = self.end.driver.statistics();
-            let line = text.lines().find_map(|line| line.strip_prefix("address="));
-            address = line.map(|line| line.parse().expect("an address"));
-            address.is_some()
-        });
-        address.expect("it was waited for")
-    }
-
-    /// Lets cycles pass, and ticks, until `done` holds.
-    #[track_caller]
-    pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
-        await_that(what, || {
-            pass(&self.clock, 1);
-            self.end.tick();
-            done(&mut self.end)
-        });
-    }
-
-    /// Until the line's reason has these words; gives the name of its cause.
-    #[track_caller]
-    pub fn until_reason(&mut self, words: &str) -> &'static str {
-        let mut cause = "";
-        let mut last = String::new();
-        let limit = std::time::Instant::now() + Duration::from_secs(20);
-        self.until(&format!("the reason has \"{words}\""), |end| {
-            let link = end.link();
-            cause = link.cause.name();
-            let said = link.reason.contains(words);
-            if last != link.reason {
-                last = link.reason;
-            }
-            assert!(
-                said || std::time::Instant::now() < limit,
-                "no \"{words}\" in {last}"
-            );
-            said
-        });
-        cause
-    }
-
-    #[track_caller]
-    pub fn until_speed(&mut self, speed: i16) {
-        self.until(&format!("the speed is {speed}"), |end| {
-            end.get("speed") == f64::from(speed)
-        });
-    }
-
-    /// How long the clock has run.
-    pub fn now(&self) -> Nanos {
-        use tickbus::time::Clock as _;
-        self.clock.now()
-    }
+/// A Device that listens on a port which the system chooses, without a peer.
+pub fn device(further: &str) -> (Alone, SocketAddr) {
+    let bus = Tcp {
+        address: (Ipv4Addr::LOCALHOST, 0).into(),
+        device: "",
+        controller: "",
+    };
+    let alone = Alone::open(&config(&bus, "device", further));
+    let address = alone.address();
+    (alone, address)
 }
 
 /// What a PLC sends: `run`, `speed`, `echo`.

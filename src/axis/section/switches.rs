@@ -3,16 +3,17 @@
 use super::{LIST_LIMIT, check_within};
 use crate::axis::Switch;
 use crate::config::{Table, Value};
-use crate::signal::section::{Section, address_of, name_of};
+use crate::signal::section::{Section, Structure, address_of, name_of};
 use crate::signal::{Addressing, Area, ByteOrder, DataType, Signal, Slot, Width};
 use crate::time::Nanos;
 
 /// What is right where a trip point stands.
 const POSITION: &str = "write a position in the unit of the axis, such as 395.0";
 
-/// Reads the end switches of an axis.
+/// Reads the end switches of the axis with this `number`.
 pub(super) fn read_switches<'a>(
     value: &Value<'a>,
+    number: usize,
     addressing: Addressing,
     limits: Option<[f64; 2]>,
 ) -> Vec<(Switch, Section<'a>)> {
@@ -26,12 +27,13 @@ pub(super) fn read_switches<'a>(
     }
     let read = tables
         .into_iter()
-        .filter_map(|table| read_switch(table, addressing, limits));
+        .filter_map(|table| read_switch(table, number, addressing, limits));
     read.collect()
 }
 
 fn read_switch(
     mut table: Table<'_>,
+    number: usize,
     addressing: Addressing,
     limits: Option<[f64; 2]>,
 ) -> Option<(Switch, Section<'_>)> {
@@ -113,7 +115,10 @@ fn read_switch(
         name: Some(name_value),
         address: address?,
         station: None,
-        structure: None,
+        structure: Some(Structure {
+            table: number,
+            end: place.byte + 1,
+        }),
     };
     Some((switch, section))
 }

@@ -14,6 +14,7 @@ pub mod rtu;
 #[cfg(unix)]
 mod serial;
 mod server;
+mod shown;
 mod stations;
 mod table;
 mod tables;

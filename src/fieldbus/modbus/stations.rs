@@ -104,6 +104,15 @@ impl Stations {
         own.or(self.common.unit)
     }
 
+    /// The units, for people; `default` is that of a station without one. `None` where any is right.
+    pub fn shown(&self, default: Option<u8>) -> Option<String> {
+        let stations = 0..self.own.len().max(1);
+        let units = stations.map(|station| Some(self.unit(station).or(default)?.to_string()));
+        let units: Vec<String> = units.collect::<Option<_>>()?;
+        let word = if units.len() == 1 { "unit" } else { "units" };
+        Some(format!("{word} {}", units.join(" ")))
+    }
+
     /// The identity of the device that a station may write to.
     pub fn write_to(&self, station: usize) -> Option<&str> {
         let own = self.own.get(station);

@@ -2,7 +2,7 @@
 
 use crate::fieldbus::tcp::{self, Address, no_wait};
 use crate::fieldbus::{BusError, Port};
-use crate::os::Poller;
+use crate::os::{Poller, Source};
 use crate::time::Stop;
 
 use super::connection::Connection;
@@ -35,7 +35,7 @@ pub(super) fn connect(
         if let Some(news) = connection.news() {
             port.running(&news);
         }
-        let mut sources = [connection.source()];
+        let mut sources = [Source::new(connection.stream(), connection.interest())];
         poller
             .wait(
                 &**port.clock(),

@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpStream};
 
 use crate::fieldbus::tcp::{bow_out, is_for_later, prepare};
 use crate::fieldbus::{BusError, Port};
-use crate::os::{Interest, Source};
+use crate::os::Interest;
 use crate::time::Nanos;
 
 use super::{Frames, Session, Terms};
@@ -51,14 +51,18 @@ impl Connection {
         self.peer
     }
 
+    /// The socket, to wait for.
+    pub(super) fn stream(&self) -> &TcpStream {
+        &self.stream
+    }
+
     /// What to wait for.
-    pub(super) fn source(&self) -> Source<'_> {
-        let interest = if self.session.to_write().is_empty() {
+    pub(super) fn interest(&self) -> Interest {
+        if self.session.to_write().is_empty() {
             Interest::Read
         } else {
             Interest::ReadWrite
-        };
-        Source::new(&self.stream, interest)
+        }
     }
 
     /// Until when to wait for it.

@@ -1,10 +1,11 @@
 //! The end that waits for connections: one peer at a time for each address that it listens on.
 
+use std::io;
 use std::net::{SocketAddr, TcpListener};
 
 use crate::fieldbus::tcp::{self, Address, bow_out, is_of_the_client, no_wait};
 use crate::fieldbus::{BusError, Port};
-use crate::os::{Interest, Poller, Source};
+use crate::os::{Interest, PollSet};
 use crate::time::{Nanos, Stop};
 
 use super::connection::Connection;
@@ -45,6 +46,8 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
             terms: place.terms,
             frames: place.frames,
             served: None,
+            watched: None,
+            hears: false,
             deaf_until: Nanos(i64::MIN),
             told: false,
         });
@@ -57,9 +60,9 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
     for server in &servers {
         lines.opening(server.line, &server.waiting, port);
     }
-    let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
+    let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
     while !stop.is_stopped() {
-        turn(&mut servers, &mut lines, &mut poller, port)?;
+        turn(&mut servers, &mut lines, &mut set, port)?;
     }
     Ok(())
 }
@@ -68,43 +71,29 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
 fn turn(
     servers: &mut [Server<'_>],
     lines: &mut Lines,
-    poller: &mut Poller,
+    set: &mut PollSet,
     port: &mut Port,
 ) -> Result<(), BusError> {
     let now = port.clock().now();
     let mut deadline = Nanos::MAX;
-    let mut sources = Vec::with_capacity(2 * servers.len());
-    for server in &*servers {
+    for server in &mut *servers {
+        server.watch(now, set).map_err(|error| no_wait(&error))?;
         if let Some(served) = &server.served {
             deadline = deadline.min(served.deadline()).min(port.due());
-            sources.push(served.source());
         }
         if server.is_deaf(now) {
             deadline = deadline.min(server.deaf_until);
-        } else {
-            sources.push(Source::new(&server.listener, Interest::Read));
         }
     }
-    poller
-        .wait(&**port.clock(), deadline, &mut sources)
+    set.wait(&**port.clock(), deadline)
         .map_err(|error| no_wait(&error))?;
-    let mut ready = sources
-        .iter()
-        .map(|source| (source.is_readable(), source.is_writable()));
-    let ready: Vec<(Option<(bool, bool)>, bool)> = servers
-        .iter()
-        .map(|server| {
-            let served = server.served.as_ref().and_then(|_| ready.next());
-            let knocked = !server.is_deaf(now) && ready.next().is_some_and(|ready| ready.0);
-            (served, knocked)
-        })
-        .collect();
-    for (server, (ready, knocked)) in servers.iter_mut().zip(ready) {
-        if let Some(ready) = ready {
-            server.serve(ready, knocked, lines, port);
-        }
+    for server in servers {
+        let ready = |key| set.ready().iter().find(|ready| ready.key == key);
+        let served = ready(server.key()).map(|ready| (ready.is_readable, ready.is_writable));
+        let knocked = ready(server.key() + 1).is_some();
+        server.serve(served.unwrap_or_default(), knocked, lines, set, port);
         if knocked {
-            server.accept(lines, port)?;
+            server.accept(lines, set, port)?;
         }
     }
     Ok(())
@@ -119,6 +108,9 @@ struct Server<'a> {
     terms: Terms,
     frames: &'a mut Frames,
     served: Option<Connection>,
+    /// What the served connection is waited for, once it is; and whether the listener is.
+    watched: Option<Interest>,
+    hears: bool,
     /// Until when nobody is accepted beside the served one, after the system could not.
     deaf_until: Nanos,
     /// Whether the log knows that clients are turned away while this one is served.
@@ -126,12 +118,57 @@ struct Server<'a> {
 }
 
 impl Server<'_> {
+    /// Its connection in the poll set; the next is its listener.
+    fn key(&self) -> usize {
+        2 * self.line
+    }
+
+    /// Lets `set` wait for what there is to wait for.
+    fn watch(&mut self, now: Nanos, set: &mut PollSet) -> io::Result<()> {
+        let key = self.key();
+        if let Some(served) = &self.served {
+            let interest = Some(served.interest());
+            if self.watched.is_none() {
+                set.add(key, served.stream(), served.interest())?;
+            } else if self.watched != interest {
+                set.change(key, served.stream(), served.interest())?;
+            }
+            self.watched = interest;
+        }
+        let hears = !self.is_deaf(now);
+        if hears != self.hears {
+            if hears {
+                set.add(key + 1, &self.listener, Interest::Read)?;
+            } else {
+                set.remove(key + 1, &self.listener);
+            }
+            self.hears = hears;
+        }
+        Ok(())
+    }
+
+    /// Ends the served connection.
+    fn part(&mut self, set: &mut PollSet) {
+        if let Some(served) = self.served.take()
+            && self.watched.take().is_some()
+        {
+            set.remove(self.key(), served.stream());
+        }
+    }
+
     fn is_deaf(&self, now: Nanos) -> bool {
         self.served.is_some() && now < self.deaf_until
     }
 
     /// Lets the connection do what there is to do.
-    fn serve(&mut self, ready: (bool, bool), knocked: bool, lines: &mut Lines, port: &mut Port) {
+    fn serve(
+        &mut self,
+        ready: (bool, bool),
+        knocked: bool,
+        lines: &mut Lines,
+        set: &mut PollSet,
+        port: &mut Port,
+    ) {
         let Some(served) = &mut self.served else {
             return;
         };
@@ -147,13 +184,18 @@ impl Server<'_> {
             turned = served.read_all(port, self.frames);
         }
         if let Err(error) = turned {
-            self.served = None;
+            self.part(set);
             lines.lost(self.line, &error, &self.waiting, port);
         }
     }
 
     /// Takes the next client from the queue: serves it, or turns it away.
-    fn accept(&mut self, lines: &mut Lines, port: &mut Port) -> Result<(), BusError> {
+    fn accept(
+        &mut self,
+        lines: &mut Lines,
+        set: &mut PollSet,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
         let now = port.clock().now();
         let (stream, peer) = match self.listener.accept() {
             Ok(accepted) => accepted,
@@ -184,7 +226,7 @@ impl Server<'_> {
                 served.peer(),
                 silence.rounded()
             ));
-            self.served = None;
+            self.part(set);
             lines.lost(self.line, &error, &format!("{peer} takes its place"), port);
         }
         match Connection::new(stream, peer, self.terms, port) {

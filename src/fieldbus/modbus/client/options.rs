@@ -127,6 +127,11 @@ impl ClientOptions {
         }
     }
 
+    /// Where the parts of an area begin.
+    pub(in crate::fieldbus::modbus) fn places(&self, area: Area) -> impl Iterator<Item = Place> {
+        self.lie(area).parts.iter().map(|part| part.place)
+    }
+
     /// The unit of a station.
     pub fn unit(&self, station: usize) -> u8 {
         self.stations.unit(station).unwrap_or(UNIT)

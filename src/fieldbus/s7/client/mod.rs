@@ -37,9 +37,12 @@ pub struct S7Client {
     cycle: Nanos,
     frames: Frames,
     guard: Guard,
-    /// Whether the CPU is asked who it is: there are some that hang up then.
-    asks_who: bool,
+    /// How many times in a row the CPU hung up when it was asked who it is.
+    hang_ups: u8,
 }
+
+/// After so many of them it is not asked, for one connection.
+const HANG_UPS: u8 = 2;
 
 /// What is written into a CPU and read from it, and where it lies there.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -90,7 +93,7 @@ impl S7Client {
             frames: Frames::new(options, table, role),
             guard: Guard::new(options.write_to.as_deref()),
             cycle: cycle.unwrap_or(CYCLE),
-            asks_who: true,
+            hang_ups: 0,
             options: options.clone(),
         }
     }
@@ -114,8 +117,10 @@ impl Free for S7Client {
             called: self.options.called,
             pdu: self.options.pdu,
             patience,
-            asks_who: self.asks_who,
+            asks_who: self.hang_ups < HANG_UPS,
         };
+        // When that connection is over, it is asked once more.
+        self.hang_ups = self.hang_ups.min(HANG_UPS - 1);
         let now = port.clock().now();
         let mut connection = Connection {
             dialog: self.frames.dialog(terms, now),
@@ -129,10 +134,9 @@ impl Free for S7Client {
         let mut is_ready = (false, false);
         while !stop.is_stopped() {
             if let Err(error) = connection.turn(is_ready, port) {
-                // Whoever hangs up when it is asked who it is, is not asked again.
-                let asked = connection.dialog.asks_who();
-                drop(connection);
-                self.asks_who &= !asked;
+                if connection.dialog.asks_who() {
+                    connection.bus.hang_ups += 1;
+                }
                 return Err(error);
             }
             let mut sources = [connection.source()];
@@ -217,6 +221,9 @@ impl Connection<'_> {
     }
 
     fn meet(&mut self, length: u16, identity: Option<Identity>, port: &mut Port) {
+        if identity.is_some() {
+            self.bus.hang_ups = 0;
+        }
         let line = identity.map(|identity| identity.line()).unwrap_or_default();
         let line = if line.is_empty() {
             let called = self.bus.options.called;

@@ -1,6 +1,7 @@
 package tickbus.simulator;
 
 import java.io.PrintStream;
+import java.nio.file.Path;
 import java.util.List;
 import java.util.Map;
 import java.util.function.Supplier;
@@ -39,6 +40,9 @@ public final class Main {
 
     private static final Map<String, Supplier<Machine>> MACHINES = Map.of("rig", Rig::new, "peeler", Peeler::new,
             "none", NoMachine::new);
+
+    /** A machine may have many variables that a plant does not use. */
+    private static final int MOST_NOTES = 10;
 
     private Main() {
     }
@@ -90,6 +94,14 @@ public final class Main {
         }
     }
 
+    private static void note(List<String> unconnected, Path control, PrintStream out) {
+        unconnected.stream().limit(MOST_NOTES)
+                .forEach(name -> out.println("note: no row of " + control + " writes " + name + "; it stays 0"));
+        if (unconnected.size() > MOST_NOTES) {
+            out.println("note: likewise " + (unconnected.size() - MOST_NOTES) + " more");
+        }
+    }
+
     private static void simulate(Arguments arguments, PrintStream out) {
         Machine machine = arguments.choice("--machine", MACHINES, "rig").get();
         long step = arguments.duration("--step", "2ms");
@@ -101,9 +113,7 @@ public final class Main {
         try (ShutdownGuard guard = new ShutdownGuard();
                 Simulator simulator = new Simulator(DeviceDriverFolder.scan(folder).open(), machine, control, step,
                         TimeSource.system())) {
-            for (String name : simulator.unconnected()) {
-                out.println("note: no row of " + control + " writes " + name + "; it stays 0");
-            }
+            note(simulator.unconnected(), control, out);
             out.println("machine " + machine.name() + ", " + simulator.drivers().size() + " driver(s), step "
                     + Durations.text(step) + "; Ctrl-C ends the run");
             simulator.run(mode, () -> !guard.triggered() && simulator.simulationNanos() < duration);

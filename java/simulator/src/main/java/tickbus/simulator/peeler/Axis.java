@@ -72,10 +72,6 @@ final class Axis {
         this.obstacle = name.low();
     }
 
-    AxisName name() {
-        return name;
-    }
-
     AxisCommand command() {
         return command;
     }

@@ -1,6 +1,5 @@
 package tickbus.simulator.peeler;
 
-import java.util.ArrayList;
 import java.util.List;
 
 /**
@@ -130,21 +129,5 @@ public enum AxisName {
      */
     public boolean ofCharger() {
         return compareTo(SPINDLE_LEFT) < 0;
-    }
-
-    /**
-     * The axes of one of the PLCs.
-     *
-     * @param charger true for the charger's, false for the lathe's
-     * @return in the order of its record
-     */
-    public static List<AxisName> of(boolean charger) {
-        List<AxisName> names = new ArrayList<>();
-        for (AxisName name : values()) {
-            if (name.ofCharger() == charger) {
-                names.add(name);
-            }
-        }
-        return names;
     }
 }

@@ -1,7 +1,5 @@
 package tickbus.simulator.peeler;
 
-import java.util.Arrays;
-
 /**
  * The charger: a step feeder with four steps, a linear feeder with a V, centring spindles that move across and up, and
  * the transfer arm with its clamps.
@@ -87,13 +85,6 @@ final class Charger {
     /** The block on a step, counted from 0, or null. */
     Block onStep(int step) {
         return steps[step];
-    }
-
-    /** Blocks that are somewhere in the charger, with the one before the gate. */
-    int blocks() {
-        long count = Arrays.stream(steps).filter(block -> block != null).count();
-        return (int) count + (waiting == null ? 0 : 1) + (fed == null ? 0 : 1) + (centred == null ? 0 : 1)
-                + (clamped == null || clamped == centred ? 0 : 1);
     }
 
     /** Whether a sensor, counted from 0, sees a block. */

@@ -93,8 +93,8 @@ final class Lathe {
         if (knife.tracks()) {
             knife.trackTo(knife.position() - knife.torque() * Math.max(0, revolutions), nanos);
         }
-        for (AxisName roll : AxisName.ROLLS) {
-            Axis axis = axis(roll);
+        for (int i = 0; i < AxisName.ROLLS.size(); i++) {
+            Axis axis = axis(AxisName.ROLLS.get(i));
             if (axis.tracks()) {
                 axis.trackTo(knife.position() + axis.offset(), nanos);
             }

@@ -31,7 +31,7 @@ record PeelingOptions(Path drivers, Path control, Path report, Path plc, Path re
               --recordings DIR   where the drivers record to, charger.vcd and lathe.vcd ([record] in their .cfg):
                                  an HTML page about each is made beside the report
               --step TIME        simulation step size (default 2ms)
-              --logs N           blocks to peel, every second one not a cylinder (default 2)
+              --logs N           blocks to peel; the first is a cylinder, the second is not (default 2)
               --time-limit TIME  longest simulation time (default 2min)
 
             The last line is "demo-peeler: ok …" with exit code 0, or "demo-peeler: failed reason=…" with exit

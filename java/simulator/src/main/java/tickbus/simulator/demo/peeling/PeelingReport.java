@@ -111,9 +111,9 @@ final class PeelingReport {
 
     private void axes(CommandRate rate) {
         heading("Commands by axis");
-        Columns table = new Columns("axis", ">commands", ">per second", ">most in a second");
+        Columns table = new Columns("PLC", "axis", ">commands", ">per second", ">most in a second");
         for (AxisName axis : AxisName.values()) {
-            table.row(axis.label(), rate.commands(axis), rate(rate.mean(axis)), rate.most(axis));
+            table.row(axis.ofCharger() ? "charger" : "lathe", axis.label(), rate.commands(axis), rate(rate.mean(axis)), rate.most(axis));
         }
         text.append(table.text("  "));
     }

@@ -1,0 +1,131 @@
+//! A Modbus server's half of the codec: any stream of TCP or RTU telegrams against the tables of one unit.
+//!
+//! The first bytes choose role, window and sizes; what follows is the stream.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tickbus::fieldbus::modbus::mbap::Telegram;
+use tickbus::fieldbus::modbus::{
+    Done, Function, Identification, Map, PDU_LIMIT, Side, Tables, answer, rtu,
+};
+use tickbus::time::Nanos;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((header, stream)) = data.split_first_chunk::<4>() else {
+        return;
+    };
+    let [flags, window, sends, holds] = *header;
+    let map = Map {
+        input: if flags & 1 == 0 {
+            Side::Sends
+        } else {
+            Side::Holds
+        },
+        window: (flags & 2 != 0).then_some(usize::from(window) * 128),
+    };
+    let holds_len = usize::from(holds) * if flags & 4 == 0 { 1 } else { 257 };
+    let mut unit = Unit {
+        map,
+        sends: (0..sends).collect(),
+        holds: vec![0; holds_len.next_multiple_of(2)],
+        holds_len,
+    };
+    if flags & 8 == 0 {
+        tcp(&mut unit, stream);
+    } else {
+        serial(&mut unit, stream);
+    }
+});
+
+struct Unit {
+    map: Map,
+    sends: Vec<u8>,
+    holds: Vec<u8>,
+    holds_len: usize,
+}
+
+impl Unit {
+    /// Answers, and checks what the standard says of every answer.
+    fn ask(&mut self, pdu: &[u8]) {
+        let before = self.holds.clone();
+        let mut tables = Tables {
+            map: self.map,
+            sends: &self.sends,
+            holds: &mut self.holds,
+            holds_len: self.holds_len,
+        };
+        let mut reply = Vec::new();
+        let identification = Identification::of_driver("fuzz");
+        let done = answer(pdu, &mut tables, &identification, &mut reply);
+        assert!(reply.len() <= PDU_LIMIT, "an answer longer than a PDU");
+        let Done {
+            wrote,
+            read,
+            refused,
+        } = done;
+        match refused {
+            Some(exception) => {
+                assert_eq!(reply, [pdu[0] | 0x80, exception.0]);
+                assert!((1..=3).contains(&exception.0));
+                assert_eq!((&wrote, &read), (&None, &None));
+                assert_eq!(self.holds, before, "what is refused does nothing");
+            }
+            None => {
+                assert_eq!(reply[0], pdu[0]);
+                let function = Function::of(pdu[0]).expect("others are refused");
+                assert_eq!(function.writes(), wrote.is_some());
+            }
+        }
+        if let Some(bytes) = read {
+            assert!(bytes.end <= self.sends.len());
+        }
+        // Nothing changes but the bits that were written.
+        let wrote = wrote.unwrap_or(0..0);
+        assert!(wrote.end <= self.holds.len() * 8);
+        for (at, (old, new)) in before.iter().zip(&self.holds).enumerate() {
+            let mut mask = 0;
+            for bit in 0..8 {
+                mask |= u8::from(!wrote.contains(&(at * 8 + bit))) << bit;
+            }
+            assert_eq!(old & mask, new & mask, "a bit beside those written");
+        }
+    }
+}
+
+fn tcp(unit: &mut Unit, mut stream: &[u8]) {
+    while let Ok(Some((telegram, length))) = Telegram::parse(stream) {
+        assert!(length <= stream.len() && !telegram.pdu.is_empty());
+        unit.ask(telegram.pdu);
+        stream = &stream[length..];
+    }
+}
+
+/// Pieces of the stream, each behind its length and the pause before it.
+fn serial(unit: &mut Unit, mut stream: &[u8]) {
+    let mut framer = rtu::Framer::new(Nanos(16));
+    let mut now = Nanos::ZERO;
+    while let [pause, length, rest @ ..] = stream {
+        now = now + Nanos(i64::from(*pause % 32));
+        let (piece, after) = rest.split_at(usize::from(*length).min(rest.len()));
+        stream = after;
+        framer.take(now, |telegram| {
+            if let Some((_, pdu)) = telegram.and_then(rtu::parse) {
+                unit.ask(pdu);
+            }
+        });
+        // A fuzzer does not find checksums: the piece is a telegram of its own, too, if it can be one.
+        if (2..=PDU_LIMIT + 1).contains(&piece.len()) && *pause >= 128 {
+            let mut whole = Vec::new();
+            rtu::append(piece[0], &mut whole, |pdu| {
+                pdu.extend_from_slice(&piece[1..])
+            });
+            assert_eq!(rtu::parse(&whole), Some((piece[0], &piece[1..])));
+            unit.ask(&piece[1..]);
+            framer.arrived(now, &whole);
+        } else {
+            framer.arrived(now, piece);
+        }
+        assert!(framer.deadline() > now || piece.is_empty());
+    }
+}

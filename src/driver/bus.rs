@@ -114,7 +114,7 @@ fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
 
 #[cfg(not(feature = "opcua"))]
 fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
-    Err(DriverError::Config(format!(
+    Err(DriverError::Unsupported(format!(
         "{}: bus kind \"{}\" is not in this build of tickbus; use the library of a `make dist`, which has it, \
          or build with `cargo build --release --features opcua`",
         config.path.display(),
@@ -221,4 +221,31 @@ pub(super) fn check_fit(
         }
     }
     Ok(())
+}
+
+#[cfg(all(test, not(feature = "opcua")))]
+mod tests {
+    use super::*;
+    use crate::driver::Driver;
+    use crate::time::Manual;
+
+    #[test]
+    fn a_bus_that_is_not_in_this_build_says_how_to_get_it() {
+        for table in [
+            "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1\"",
+            "kind = \"opcua-server\"\nanonymous = true",
+        ] {
+            let text = format!(
+                "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\n{table}\n\
+                 [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
+            );
+            let config = Config::parse("driver.cfg", &text).expect("a right file");
+            let error = Driver::open(config, Manual::new()).expect_err("it is not there");
+            assert_eq!(error.code(), crate::driver::Code::Unsupported);
+            let told = error.to_string();
+            for part in ["driver.cfg: ", "opcua-", "--features opcua", "make dist"] {
+                assert!(told.contains(part), "\"{part}\" in {told}");
+            }
+        }
+    }
 }

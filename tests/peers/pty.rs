@@ -16,7 +16,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// The line; dropping it ends it.
-pub struct Line {
+pub(crate) struct Line {
     /// The names of its two ends.
     pub ends: [PathBuf; 2],
     over: Arc<AtomicBool>,
@@ -26,7 +26,7 @@ pub struct Line {
 }
 
 impl Line {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let [one, other] = [end(), end()];
         let over = Arc::new(AtomicBool::new(false));
         let thread = std::thread::spawn({
@@ -46,7 +46,7 @@ impl Line {
         }
     }
 
-    pub fn end(&self, index: usize) -> &Path {
+    pub(crate) fn end(&self, index: usize) -> &Path {
         &self.ends[index]
     }
 }

@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::super::identification::Taken;
 use super::super::{Map, Side};
 use super::*;
@@ -238,4 +240,37 @@ fn a_long_name_is_told_in_two_answers() {
     assert_eq!(answers, 3);
     assert_eq!(heard.objects[0], "v".repeat(244));
     assert_eq!(heard.objects[1..], long.objects[1..]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(4096))]
+
+    /// Whatever is asked, the answer is one, and nothing changes but what it says.
+    #[test]
+    fn every_request_is_answered_or_refused_and_nothing_else_happens(
+        function in prop::sample::select(Function::ALL.map(Function::code).to_vec()),
+        data in prop::collection::vec(prop_oneof![Just(0_u8), 0..8_u8, any::<u8>()], 0..252),
+        window in prop::option::of(0..8_usize), serves_inputs: bool,
+    ) {
+        let mut unit = Unit::device();
+        unit.map.window = window;
+        if serves_inputs {
+            unit.map.input = Side::Holds;
+        }
+        let before = unit.holds;
+        let pdu = [&[function][..], &data].concat();
+        let (reply, done) = unit.ask(&pdu);
+        prop_assert!(reply.len() <= 253);
+        let wrote = done.wrote.unwrap_or(0..0);
+        if let Some(exception) = done.refused {
+            prop_assert_eq!(reply, vec![function | 0x80, exception.0]);
+            prop_assert!(wrote.is_empty());
+        } else {
+            prop_assert_eq!(reply[0], function);
+        }
+        for bit in (0..unit.holds.len() * 8).filter(|bit| !wrote.contains(bit)) {
+            let mask = 1 << (bit % 8);
+            prop_assert_eq!(before[bit / 8] & mask, unit.holds[bit / 8] & mask, "bit {}", bit);
+        }
+    }
 }

@@ -7,7 +7,6 @@
 )]
 
 mod conformance;
-#[allow(dead_code, reason = "some are for the socket bus")]
 mod peers;
 #[path = "peers/s7.rs"]
 mod s7_peers;

@@ -21,7 +21,9 @@ pub type Test = fn() -> Result<(), Absent>;
 pub fn main(tests: &[(&str, Test)]) -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.iter().any(|argument| argument == "--list") {
-        tests.iter().for_each(|(name, _)| println!("{name}: test"));
+        for (name, _) in tests {
+            println!("{name}: test");
+        }
         println!("\n{} tests, 0 benchmarks", tests.len());
         return ExitCode::SUCCESS;
     }

@@ -141,6 +141,10 @@ fn a_pulse_is_held_until_a_client_has_read_it() {
     for _ in 0..3 {
         assert_eq!(ask(&mut stream, 1, &[4, 0, 1, 0, 2])[0], 4);
     }
+    // Nor of the other bits of its byte.
+    for _ in 0..3 {
+        assert_eq!(ask(&mut stream, 1, &[2, 0, 1, 0, 7])[0], 2);
+    }
     assert_eq!(ask(&mut stream, 2, &[2, 0, 0, 0, 1]), [2, 1, 1]);
     assert_eq!(ask(&mut stream, 3, &[2, 0, 0, 0, 1]), [2, 1, 0]);
 }

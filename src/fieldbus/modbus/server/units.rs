@@ -37,7 +37,7 @@ struct Unit {
 pub(super) struct Carried {
     station: usize,
     generation: u64,
-    bytes: Range<usize>,
+    bits: Range<usize>,
 }
 
 impl UnitSet {
@@ -129,10 +129,10 @@ impl UnitSet {
             }
             (None, None) => port.touch(station, now),
         }
-        read.map(|bytes| Carried {
+        read.map(|bits| Carried {
             station,
             generation: unit.generation,
-            bytes,
+            bits,
         })
     }
 
@@ -141,11 +141,11 @@ impl UnitSet {
         let Carried {
             station,
             generation,
-            bytes,
+            bits,
         } = carried;
         // After an answer with another frame nobody knows what of this one was news; it is told again.
         if self.units[station].generation == generation {
-            port.sent_part(station, bytes);
+            port.sent_bits(station, bits);
         }
     }
 }

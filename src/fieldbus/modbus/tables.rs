@@ -63,6 +63,10 @@ impl Tables<'_> {
             Side::Sends => Side::Holds,
             Side::Holds => Side::Sends,
         };
+        // No address reaches beyond, however long the frame is.
+        if span.end() > ADDRESSES {
+            return Err(Exception::ILLEGAL_DATA_ADDRESS);
+        }
         // Where there is no window, it begins where no address reaches.
         let window = self.map.window.unwrap_or(ADDRESSES);
         let windows = if table.is_writable() {

@@ -76,6 +76,28 @@ fn discrete_inputs_are_the_bits_of_i() {
 }
 
 #[test]
+fn nothing_lies_behind_the_last_address() {
+    let (sends, mut holds) = ([0xFF; 9000], [0; 9000]);
+    let mut tables = Tables {
+        map: Unit::device().map,
+        sends: &sends,
+        holds: &mut holds,
+        holds_len: 9000,
+    };
+    let identification = Identification::default();
+    for (pdu, expected) in [
+        ([2, 0xFF, 0xFF, 0, 1], &[2, 1, 1][..]),
+        ([2, 0xFF, 0xFF, 0, 2], &[0x82, 2]),
+        ([1, 0xFF, 0xF8, 0, 8], &[1, 1, 0]),
+        ([1, 0xFF, 0xF8, 0, 9], &[0x81, 2]),
+    ] {
+        let mut reply = Vec::new();
+        answer(&pdu, &mut tables, &identification, &mut reply);
+        assert_eq!(reply, expected, "{pdu:02X?}");
+    }
+}
+
+#[test]
 fn holding_registers_and_coils_give_back_what_was_written() {
     let mut unit = Unit::device();
     let echo = [6, 0, 1, 0xAB, 0xCD];

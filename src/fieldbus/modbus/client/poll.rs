@@ -359,6 +359,9 @@ impl<'a> Poll<'a> {
             return Ok(());
         };
         port.count("modbus-client.unanswered");
+        // Whoever answers next may be another device.
+        self.stations[station].identified = false;
+        self.guards[station].part();
         self.clear();
         self.request.clear();
         self.written = 0;
@@ -551,3 +554,6 @@ impl<'a> Poll<'a> {
         });
     }
 }
+
+#[cfg(test)]
+mod tests;

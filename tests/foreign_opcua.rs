@@ -200,7 +200,7 @@ impl Device {
         let clock: Arc<Monotonic> = Monotonic::shared().expect("a thread");
         let pki = folder.path().join("pki");
         let text = format!(
-            "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"500ms\"\n\
+            "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"2s\"\n\
              reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{SIGNALS}",
             pki.display().to_string()
         );

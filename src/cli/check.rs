@@ -138,8 +138,8 @@ fn bus(options: &Options, role: Role) -> String {
         Options::ModbusClient(options) => parts.extend(options.shown(role)),
         Options::S7Server(options) => parts.extend(s7_server(options)),
         Options::S7Client(options) => parts.extend(s7_client(options)),
-        Options::OpcuaClient(options) => parts.push(format!("connects to {}", options.url)),
-        Options::OpcuaServer(options) => parts.push(format!("listens on {}", options.address)),
+        Options::OpcuaClient(options) => parts.extend(options.summary()),
+        Options::OpcuaServer(options) => parts.extend(options.summary()),
     }
     if options.events() {
         parts.push("with events".to_owned());

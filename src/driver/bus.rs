@@ -222,3 +222,29 @@ pub(super) fn check_fit(
     }
     Ok(())
 }
+
+#[cfg(all(test, not(feature = "opcua")))]
+mod tests {
+    use super::*;
+    use crate::driver::Driver;
+    use crate::time::Manual;
+
+    #[test]
+    fn a_bus_that_is_not_in_this_build_says_how_to_get_it() {
+        for table in [
+            "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1\"",
+            "kind = \"opcua-server\"\nanonymous = true",
+        ] {
+            let text = format!(
+                "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\n{table}\n\
+                 [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
+            );
+            let config = Config::parse("driver.cfg", &text).expect("a right file");
+            let told = Driver::open(config, Manual::new()).expect_err("it is not there");
+            let told = told.to_string();
+            for part in ["driver.cfg: ", "opcua-", "--features opcua", "make dist"] {
+                assert!(told.contains(part), "\"{part}\" in {told}");
+            }
+        }
+    }
+}

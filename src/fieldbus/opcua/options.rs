@@ -8,7 +8,7 @@ use crate::fieldbus::tcp::{Address, AddressError};
 use crate::signal::{Signal, SignalTable};
 use crate::time::Nanos;
 
-use super::security::{Credentials, Keys, Policy};
+use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, NodeNameError, Pattern, Url, UrlError};
 
 /// The longest `write_to`, in characters.
@@ -158,6 +158,26 @@ impl ClientOptions {
 }
 
 impl ClientOptions {
+    /// What it says, in words for people.
+    pub fn summary(&self) -> Vec<String> {
+        let mut parts = vec![format!("connects to {}", self.url)];
+        parts.push(protection(&[self.security], self.credentials.mode));
+        parts.push(match &self.credentials.login {
+            Some(login) => format!("as user \"{}\"", shown(&login.user)),
+            None => "as nobody".to_owned(),
+        });
+        let pattern = shown(&self.node_pattern.0);
+        parts.push(match self.nodes.len() {
+            0 => format!("nodes {pattern}"),
+            others => format!("nodes {pattern} but for {others}"),
+        });
+        parts.push(match &self.write_to {
+            Some(identity) => format!("writes into \"{}\" alone", shown(identity)),
+            None => "writes nothing".to_owned(),
+        });
+        parts
+    }
+
     /// The node of a signal of `table`.
     ///
     /// # Errors
@@ -229,6 +249,19 @@ impl ServerOptions {
         Ok(())
     }
 
+    /// What it says, in words for people.
+    pub fn summary(&self) -> Vec<String> {
+        let mut parts = vec![format!("listens on {}", self.address)];
+        parts.push(protection(&self.security, self.credentials.mode));
+        let user = self.credentials.login.as_ref();
+        parts.push(match (user, self.anonymous) {
+            (_, true) => "for everybody".to_owned(),
+            (Some(login), false) => format!("for user \"{}\"", shown(&login.user)),
+            (None, false) => "for nobody".to_owned(),
+        });
+        parts
+    }
+
     /// Reads the keys of a server.
     pub(in crate::fieldbus) fn read(mut table: Table<'_>) -> Option<Self> {
         let address = table.take("address");
@@ -271,6 +304,17 @@ impl ServerOptions {
             every_write: events?.1,
         })
     }
+}
+
+/// How messages are, or may be, protected.
+fn protection(policies: &[Policy], mode: Mode) -> String {
+    let names: Vec<String> = (policies.iter())
+        .map(|policy| match policy {
+            Policy::None => "unprotected".to_owned(),
+            policy => format!("{} {}", policy.name(), mode.name()),
+        })
+        .collect();
+    names.join(" or ")
 }
 
 fn interval(value: &Value<'_>) -> Option<Nanos> {

@@ -44,8 +44,8 @@ impl Talk<'_> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), self.cycle);
         let mut news = Vec::new();
-        // What was said of the values last.
-        let mut said = Some(None);
+        // What was said of the values last; `None` for nothing.
+        let mut said = None;
         while !stop.is_stopped() {
             let now = clock.now();
             self.inbox.take(&mut news);
@@ -53,15 +53,14 @@ impl Talk<'_> {
                 self.hear(port, now, news)?;
             }
             let trouble = self.readings.trouble(self.fields);
-            if trouble.is_some() || self.readings.is_complete() {
-                if said.as_ref() != Some(&trouble) || said == Some(None) {
-                    match &trouble {
-                        Some(trouble) => {
-                            let error = BusError::Link(trouble.clone());
-                            port.lost(&error, "it goes on when there is one");
-                        }
-                        None => port.running(&self.running),
+            let can_tell = trouble.is_some() || self.readings.is_complete();
+            if can_tell && said.as_ref() != Some(&trouble) {
+                match &trouble {
+                    Some(trouble) => {
+                        let error = BusError::Link(trouble.clone());
+                        port.lost(&error, "it goes on when there is one");
                     }
+                    None => port.running(&self.running),
                 }
                 said = Some(trouble);
             }

@@ -316,11 +316,11 @@ mod tests {
                     [[signal]]\nname = \"OUT_0\"\naddress = \"%QW0\"\n";
         let config = Config::parse("driver.cfg", text).expect("it is right");
         let text = export(&config).files.remove(0).text.to_lowercase();
-        for declared in ["in_0 at", "in_1 at", "in_1_2 :", "out_0 at", "out_0_2 :"] {
+        for declared in ["in_0 at", "in_1 at", "in_1_2 : ", "out_0 at", "out_0_2 : "] {
             let count = text.matches(&format!("\n    {declared}")).count();
             assert_eq!(count, 1, "{declared}\n{text}");
         }
-        for twice in ["in_1 :", "out_0 :"] {
+        for twice in ["in_1 : ", "out_0 : "] {
             assert!(!text.contains(&format!("\n    {twice}")), "{twice}\n{text}");
         }
     }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::fieldbus::modbus::identification::READ_DEVICE_IDENTIFICATION;
 use crate::fieldbus::modbus::table::Table;
 use crate::fieldbus::{LinkStatus, Role};
 use crate::image::{Directions, image};

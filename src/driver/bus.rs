@@ -114,7 +114,7 @@ fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
 
 #[cfg(not(feature = "opcua"))]
 fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
-    Err(DriverError::Config(format!(
+    Err(DriverError::Unsupported(format!(
         "{}: bus kind \"{}\" is not in this build of tickbus; use the library of a `make dist`, which has it, \
          or build with `cargo build --release --features opcua`",
         config.path.display(),
@@ -240,8 +240,9 @@ mod tests {
                  [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
             );
             let config = Config::parse("driver.cfg", &text).expect("a right file");
-            let told = Driver::open(config, Manual::new()).expect_err("it is not there");
-            let told = told.to_string();
+            let error = Driver::open(config, Manual::new()).expect_err("it is not there");
+            assert_eq!(error.code(), crate::driver::Code::Unsupported);
+            let told = error.to_string();
             for part in ["driver.cfg: ", "opcua-", "--features opcua", "make dist"] {
                 assert!(told.contains(part), "\"{part}\" in {told}");
             }

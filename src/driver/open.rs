@@ -84,12 +84,15 @@ pub enum DriverError {
     /// What the program needs and what the signal table has do not fit.
     #[error("{0}")]
     Config(String),
+    /// The driver.cfg is right, and asks for what this build or platform does not have.
+    #[error("{0}")]
+    Unsupported(String),
 }
 
 impl DriverError {
-    /// Whether the driver.cfg is to blame, and not the system.
+    /// Whether another driver.cfg would help, and the system is not to blame.
     pub fn is_wrong_input(&self) -> bool {
-        self.code() == Code::BadConfig
+        matches!(self.code(), Code::BadConfig | Code::Unsupported)
     }
 
     /// The status code for it.
@@ -97,6 +100,7 @@ impl DriverError {
         match self {
             Self::Thread(_) => Code::BusFailed,
             Self::Program { .. } | Self::Config(_) => Code::BadConfig,
+            Self::Unsupported(_) => Code::Unsupported,
         }
     }
 }

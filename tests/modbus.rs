@@ -21,6 +21,7 @@ use conformance::rig::{MAX_AGE, await_that, pass};
 use modbus::{Tcp, request};
 use peers::{Alone, client, is_closed, leave};
 use socket2::SockRef;
+use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;
 
 conformance!(device_serves, crate::Tcp::device_serves());
@@ -139,6 +140,10 @@ fn a_pulse_is_held_until_a_client_has_read_it() {
     // Of another place no pulse is read.
     for _ in 0..3 {
         assert_eq!(ask(&mut stream, 1, &[4, 0, 1, 0, 2])[0], 4);
+    }
+    // Nor of the other bits of its byte.
+    for _ in 0..3 {
+        assert_eq!(ask(&mut stream, 1, &[2, 0, 1, 0, 7])[0], 2);
     }
     assert_eq!(ask(&mut stream, 2, &[2, 0, 0, 0, 1]), [2, 1, 1]);
     assert_eq!(ask(&mut stream, 3, &[2, 0, 0, 0, 1]), [2, 1, 0]);
@@ -266,6 +271,26 @@ fn clients_beyond_the_limit_are_turned_away() {
     await_that("it is turned away", || is_closed(&third));
     is_served(&mut device, &mut honest, 3);
     assert_eq!(device.end.statistic("clients"), "2");
+}
+
+#[test]
+fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
+    let (mut device, mut panel) = device("");
+    ask(&mut panel, 1, &[3, 0, 1, 0, 1]);
+    assert_eq!(device.end.tick().code, Code::Unchanged, "somebody is there");
+    let mut plc = client(device.address());
+    assert_eq!(ask(&mut plc, 1, &[6, 0, 1, 0, 7])[0], 6);
+    device.until_speed(7);
+    leave(plc);
+    device.until("the PLC's values are stale", |end| {
+        ask(&mut panel, 2, &[3, 0, 1, 0, 1]);
+        ask(&mut panel, 3, &[4, 0, 1, 0, 1]);
+        end.tick().code == Code::Stale
+    });
+    assert_eq!(device.end.get("speed"), -1.0);
+    // A write of the panel would be one.
+    ask(&mut panel, 4, &[6, 0, 1, 0, 8]);
+    device.until_speed(8);
 }
 
 #[test]

@@ -122,6 +122,12 @@ fn what_is_read_is_the_latest_and_a_pulse_elsewhere_is_not_taken_as_seen() {
     for _ in 0..3 {
         assert_eq!(client.read(INPUTS, 2, 2), [2, 1]);
     }
+    // Another bit of its byte.
+    let beside = [4, 1, 0x12, 0x0A, 0x10, 1, 0, 1, 0, 0, INPUTS, 0, 0, 1];
+    let beside = job(&beside, &[]);
+    for _ in 0..3 {
+        assert_eq!(client.ask(&beside).last(), Some(&0));
+    }
     assert_eq!(
         client.read(INPUTS, 0, 1),
         [1],

@@ -77,8 +77,8 @@ impl Unit {
                 assert_eq!(function.writes(), wrote.is_some());
             }
         }
-        if let Some(bytes) = read {
-            assert!(bytes.end <= self.sends.len());
+        if let Some(bits) = read {
+            assert!(bits.end <= self.sends.len() * 8);
         }
         // Nothing changes but the bits that were written.
         let wrote = wrote.unwrap_or(0..0);

@@ -58,6 +58,20 @@ pub struct Motion<T> {
     pub torque: T,
 }
 
+impl Motion<f64> {
+    /// Whether all of them are numbers, and none is infinite.
+    pub fn is_finite(&self) -> bool {
+        let all = [
+            self.position,
+            self.speed,
+            self.acceleration,
+            self.deceleration,
+            self.torque,
+        ];
+        all.into_iter().all(f64::is_finite)
+    }
+}
+
 /// One command of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {

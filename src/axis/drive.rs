@@ -157,7 +157,6 @@ impl Drive {
     fn begin(&mut self, demand: &Demand) {
         self.in_position = false;
         self.error = 0;
-        self.motion = demand.motion;
         let motion = &demand.motion;
         let [low, high] = self.limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let limits = Limits {
@@ -167,11 +166,15 @@ impl Drive {
             jerk: (demand.jerk > 0.0).then_some(demand.jerk),
         };
         let squeeze = demand.torque_control || (demand.tracking && motion.speed <= 0.0);
-        if !squeeze && !demand.tracking && !limits.make_sense() {
+        let moves = !squeeze && !demand.tracking;
+        // A REAL from the wire may be no number, or infinite: the axis would never be anywhere again.
+        if !motion.is_finite() || (moves && !limits.make_sense()) {
             self.error = Feedback::NONSENSE;
+            // It brakes as the command before said.
             self.doing = Doing::Run { speed: 0.0 };
             return;
         }
+        self.motion = demand.motion;
         let way = motion.position - self.position;
         if demand.torque_control {
             self.doing = Doing::Squeeze { speed: SQUEEZE };
@@ -278,7 +281,12 @@ impl Drive {
         } else {
             self.motion.deceleration
         };
-        let most = rate.abs() * seconds;
+        // Where a command has no rate, as one that tracks need not, it is at once.
+        let most = if rate.abs() > 0.0 {
+            rate.abs() * seconds
+        } else {
+            f64::INFINITY
+        };
         self.speed += (wanted - self.speed).clamp(-most, most);
     }
 
@@ -448,6 +456,73 @@ mod tests {
             told = drive.step(SCAN, &open, 0.0, 0.0);
         }
         assert_eq!((told.position, told.speed), (800.0, 0.0));
+    }
+
+    #[test]
+    fn what_is_no_number_stops_an_axis_and_does_not_break_it() {
+        let modes = [
+            (false, false, false),
+            (true, false, false),
+            (false, true, false),
+            (false, false, true),
+        ];
+        for (tracking, torque_control, speed_control) in modes {
+            for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                for field in 0..5 {
+                    let mut drive = Drive::new(20.0, Some([0.0, 100.0]));
+                    let mut numbers = [50.0, 10.0, 10.0, 10.0, 1.0];
+                    numbers[field] = wrong;
+                    let [position, speed, acceleration, deceleration, torque] = numbers;
+                    let command = Demand {
+                        tracking,
+                        torque_control,
+                        speed_control,
+                        motion: Motion {
+                            position,
+                            speed,
+                            acceleration,
+                            deceleration,
+                            torque,
+                        },
+                        ..demand(0.0)
+                    };
+                    for _ in 0..3 {
+                        let told = drive.step(SCAN, &command, 30.0, 0.0);
+                        assert_eq!((told.position, told.error), (20.0, Feedback::NONSENSE));
+                    }
+                    drive.step(
+                        SCAN,
+                        &Demand {
+                            enable: true,
+                            ..Demand::default()
+                        },
+                        0.0,
+                        0.0,
+                    );
+                    arrives(&mut drive, &demand(40.0));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_axis_that_tracked_without_a_deceleration_stops_when_it_tracks_no_more() {
+        let mut drive = Drive::new(0.0, None);
+        let track = Demand {
+            tracking: true,
+            motion: Motion {
+                speed: 100.0,
+                ..Motion::default()
+            },
+            ..demand(0.0)
+        };
+        assert!(drive.step(SCAN, &track, 50.0, 0.0).speed > 0.0);
+        let over = Demand {
+            tracking: false,
+            ..track
+        };
+        let told = drive.step(SCAN, &over, 50.0, 0.0);
+        assert!(told.speed.abs() <= 0.0 && told.in_position, "{told:?}");
     }
 
     #[test]

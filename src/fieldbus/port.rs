@@ -144,12 +144,18 @@ impl Port {
     /// As [`sent`](Self::sent), for a peer that has only these bytes of the frame: no pulse elsewhere counts as
     /// seen by it.
     pub fn sent_part(&mut self, station: usize, bytes: Range<usize>) {
+        self.sent_bits(station, bytes.start * 8..bytes.end * 8);
+    }
+
+    /// As [`sent_part`](Self::sent_part), for a peer that has only these bits (bit n of byte k is 8k + n): the other
+    /// bits of their bytes are news to it.
+    pub fn sent_bits(&mut self, station: usize, bits: Range<usize>) {
         if self
             .troubles
             .wires()
             .is_none_or(|wires| wires.sent(station))
         {
-            self.image.stations[station].sent_part(bytes);
+            self.image.stations[station].sent_bits(&bits);
         }
     }
 

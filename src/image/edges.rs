@@ -245,21 +245,28 @@ impl PulseShaper {
         }
     }
 
-    /// As [`confirm`](Self::confirm), for a receiver that has seen these bytes of the frame alone.
-    pub fn confirm_part(&mut self, bytes: Range<usize>) {
-        for (group, (byte, _)) in self.masks.iter().enumerate() {
-            if bytes.contains(byte) {
-                self.levels[group] = self.next_levels[group];
-            }
+    /// As [`confirm`](Self::confirm), for a receiver that has seen these bits of the frame alone (bit n of byte k is
+    /// 8k + n).
+    pub fn confirm_bits(&mut self, bits: &Range<usize>) {
+        for (group, &(byte, _)) in self.masks.iter().enumerate() {
+            let seen = mask_of(bits, byte);
+            let level = &mut self.levels[group];
+            *level = *level & !seen | self.next_levels[group] & seen;
         }
         if self.busy {
             for (index, bit) in self.bits.iter().enumerate() {
-                if bytes.contains(&bit.byte) {
+                if mask_of(bits, bit.byte) & bit.mask != 0 {
                     self.shown[index] = self.next_shown[index];
                 }
             }
         }
     }
+}
+
+/// Those bits of a byte that are among `bits`.
+fn mask_of(bits: &Range<usize>, byte: usize) -> u8 {
+    let among = (0..8).filter(|bit| bits.contains(&(byte * 8 + bit)));
+    among.fold(0, |mask, bit| mask | 1 << bit)
 }
 
 /// The level to show of one bit, and what will have been shown then.

@@ -262,9 +262,9 @@ impl BusStation {
         self.tx_shaper.confirm();
     }
 
-    /// The exchange carried these bytes of [`outgoing`](Self::outgoing) and was completed.
-    pub fn sent_part(&mut self, bytes: Range<usize>) {
-        self.tx_shaper.confirm_part(bytes);
+    /// The exchange carried these bits of [`outgoing`](Self::outgoing) and was completed; bit n of byte k is 8k + n.
+    pub fn sent_bits(&mut self, bits: &Range<usize>) {
+        self.tx_shaper.confirm_bits(bits);
     }
 
     /// Time since the simulation ticked last; [`Nanos::MAX`] before the first tick.
@@ -444,6 +444,21 @@ mod tests {
         assert_eq!(bus.outgoing(Nanos(22), watchdog), [1]);
         bus.sent();
         assert_eq!(bus.outgoing(Nanos(23), watchdog), [0]);
+    }
+
+    #[test]
+    fn a_pulse_is_sent_by_its_own_bit_and_not_by_another_one_of_its_byte() {
+        let (mut tick, mut bus) = one_latched_byte();
+        for level in [0, 1, 0] {
+            tick.write(Nanos(0), |bytes| bytes[0] = level);
+        }
+        for bits in [1..8, 8..16, 0..0] {
+            assert_eq!(bus.outgoing(Nanos(1), None), [1]);
+            bus.sent_bits(&bits);
+        }
+        assert_eq!(bus.outgoing(Nanos(2), None), [1]);
+        bus.sent_bits(&(0..1));
+        assert_eq!(bus.outgoing(Nanos(3), None), [0]);
     }
 
     #[test]

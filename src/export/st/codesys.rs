@@ -48,7 +48,7 @@ END_FUNCTION
 /// The texts for `config`.
 pub(in crate::export) fn export(config: &Config) -> Export {
     let prefix = block_prefix(&config.name);
-    let records = records(config);
+    let records = records(config, []);
     let list = format!("{prefix}_io");
     let file = |name: String, text: String| File {
         name: format!("{name}.st"),

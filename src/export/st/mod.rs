@@ -18,11 +18,14 @@ use crate::signal::{Area, DataType, Width};
 /// Names that the sources use for themselves.
 const TAKEN: [&str; 6] = ["Simulated", "In", "Out", "bits_32", "bits_64", "Hardware"];
 
-/// Both records; no two signals have one name, whatever their direction.
-fn records(config: &Config) -> [Record<'_>; 2] {
+/// Both records; no two signals have one name, whatever their direction, and none has one of `taken`.
+fn records(config: &Config, taken: impl IntoIterator<Item = String>) -> [Record<'_>; 2] {
     let mut names = Names::default();
     for name in TAKEN {
         names.give(name);
+    }
+    for name in taken {
+        names.give(&name);
     }
     [Area::Input, Area::Output].map(|area| Record::of(&config.table, area, &mut names))
 }

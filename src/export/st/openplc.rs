@@ -5,7 +5,7 @@ use super::{add, comment, copies, records, remark, source, temporaries};
 use crate::driver::Config;
 use crate::export::record::{Record, block_prefix};
 use crate::export::{Export, File};
-use crate::signal::DataType;
+use crate::signal::{Area, DataType};
 
 /// Where `OpenPLC` puts the first register of its first slave device.
 const SLAVE: usize = 100;
@@ -104,9 +104,19 @@ const COMPILED: &str =
 
 /// `OpenPLC` as a Modbus client of the simulation: registers of a slave device.
 fn polled(config: &Config) -> String {
-    let records = records(config);
+    let registers = |area| {
+        let sizes = config
+            .table
+            .stations
+            .iter()
+            .map(|station| station.bytes(area));
+        sizes.sum::<usize>().div_ceil(2)
+    };
+    let (incoming, outgoing) = (registers(Area::Input), registers(Area::Output));
+    let own = (0..incoming).map(|register| format!("in_{register}"));
+    let own = own.chain((0..outgoing).map(|register| format!("out_{register}")));
+    let records = records(config, own);
     let [inputs, outputs] = &records;
-    let (incoming, outgoing) = (inputs.bytes.div_ceil(2), outputs.bytes.div_ceil(2));
     let mut text = source(
         config,
         "The PLC's half over Modbus TCP: OpenPLC polls the simulation.",
@@ -208,7 +218,7 @@ fn guarded(text: &mut String, lines: &[String]) {
 
 /// A program that tickbus itself hosts: located variables are the image.
 fn hosted(config: &Config, notes: &mut Vec<String>) -> String {
-    let records = records(config);
+    let records = records(config, []);
     let mut text = source(
         config,
         "The PLC's half for a program that tickbus hosts: docs/own-plc-program.md tells how.",
@@ -291,5 +301,27 @@ fn configuration(text: &mut String, prefix: &str) {
         "END_CONFIGURATION",
     ] {
         add(text, line);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_that_is_called_as_a_register_gets_another_name() {
+        let text = "[driver]\nname = \"rig\"\nid = 1\n[fieldbus]\nkind = \"modbus-server\"\n\
+                    [[signal]]\nname = \"in 1\"\naddress = \"%IX0.0\"\n\
+                    [[signal]]\nname = \"motor\"\naddress = \"%IW2\"\n\
+                    [[signal]]\nname = \"OUT_0\"\naddress = \"%QW0\"\n";
+        let config = Config::parse("driver.cfg", text).expect("it is right");
+        let text = export(&config).files.remove(0).text.to_lowercase();
+        for declared in ["in_0 at", "in_1 at", "in_1_2 : ", "out_0 at", "out_0_2 : "] {
+            let count = text.matches(&format!("\n    {declared}")).count();
+            assert_eq!(count, 1, "{declared}\n{text}");
+        }
+        for twice in ["in_1 : ", "out_0 : "] {
+            assert!(!text.contains(&format!("\n    {twice}")), "{twice}\n{text}");
+        }
     }
 }

@@ -15,7 +15,7 @@ use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
 pub struct Done {
     /// The bits of the frame that clients write which it wrote.
     pub wrote: Option<Range<usize>>,
-    /// The bytes of the frame that this end writes which the answer carries.
+    /// The bits of the frame that this end writes which the answer carries.
     pub read: Option<Range<usize>>,
     /// Why it was refused, if it was; then it did nothing.
     pub refused: Option<Exception>,

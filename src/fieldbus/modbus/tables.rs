@@ -63,6 +63,10 @@ impl Tables<'_> {
             Side::Sends => Side::Holds,
             Side::Holds => Side::Sends,
         };
+        // No address reaches beyond, however long the frame is.
+        if span.end() > ADDRESSES {
+            return Err(Exception::ILLEGAL_DATA_ADDRESS);
+        }
         // Where there is no window, it begins where no address reaches.
         let window = self.map.window.unwrap_or(ADDRESSES);
         let windows = if table.is_writable() {
@@ -103,7 +107,7 @@ impl Tables<'_> {
     }
 
     /// Appends elements in a row to `reply`: bits from the lowest on, registers with the high byte first. Gives
-    /// the bytes of the frame that this end writes, if it was that.
+    /// their bits of the frame that this end writes, if it was that.
     ///
     /// # Errors
     ///
@@ -131,8 +135,8 @@ impl Tables<'_> {
                 reply.push(0);
             }
         }
-        let bytes = bit / 8..(bit + bits).div_ceil(8).min(frame.len());
-        Ok((side == Side::Sends).then_some(bytes))
+        let read = bit..(bit + bits).min(frame.len() * 8);
+        Ok((side == Side::Sends).then_some(read))
     }
 
     /// Lets `write` change the frame, given the bit at which elements in a row begin; gives all their bits.

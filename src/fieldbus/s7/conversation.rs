@@ -31,6 +31,16 @@ pub trait Memory {
     /// The code of the item.
     fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code>;
 
+    /// A byte of an object of which a job reads one bit. That alone goes out in its answer.
+    ///
+    /// # Errors
+    ///
+    /// The code of the item.
+    fn read_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<u8, Code> {
+        let _ = bit;
+        Ok(self.read(object, byte..byte + 1)?[0])
+    }
+
     /// Bytes of an object that a job writes.
     ///
     /// # Errors
@@ -260,21 +270,29 @@ impl Conversation {
             if (reply.len() - data) % 2 == 1 {
                 reply.push(0);
             }
-            let read = item.and_then(|item| Ok((item, memory.read(item.object, item.range())?)));
-            match read {
-                Ok((item, bytes)) => {
-                    item::write_header(Code::OK, item.element, bytes.len(), reply);
-                    match item.element {
-                        Element::Bit => reply.push(bytes[0] >> item.bit & 1),
-                        _ => reply.extend_from_slice(bytes),
-                    }
-                }
-                Err(code) => item::write_refusal(code, reply),
+            let read = item.and_then(|item| read_item(&item, memory, reply));
+            if let Err(code) = read {
+                item::write_refusal(code, reply);
             }
         }
         draft.end(reply);
         Ok(())
     }
+}
+
+fn read_item(item: &Item, memory: &mut impl Memory, reply: &mut Vec<u8>) -> Result<(), Code> {
+    let bit;
+    let bytes = match item.element {
+        Element::Bit => {
+            let byte = memory.read_bit(item.object, item.byte, item.bit)?;
+            bit = [byte >> item.bit & 1];
+            &bit[..]
+        }
+        _ => memory.read(item.object, item.range())?,
+    };
+    item::write_header(Code::OK, item.element, bytes.len(), reply);
+    reply.extend_from_slice(bytes);
+    Ok(())
 }
 
 /// How long the answer to these items is, if all of them can be read.

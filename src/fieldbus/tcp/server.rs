@@ -91,6 +91,7 @@ pub(crate) fn serve<S: Service>(
         reply: Vec::with_capacity(BUFFER),
         ready: Vec::new(),
         deaf_until: None,
+        told: false,
     };
     let limit = server.limits.telegram;
     assert!(limit <= BUFFER, "a telegram fits into one read");
@@ -119,6 +120,8 @@ struct Server<'a, S: Service> {
     ready: Vec<Ready>,
     /// Until when nobody is accepted, after the system could not.
     deaf_until: Option<Nanos>,
+    /// Whether the log knows that clients are turned away.
+    told: bool,
 }
 
 /// The clients, each at a place of its own; places are used again.
@@ -259,7 +262,9 @@ impl<S: Service> Server<'_, S> {
         };
         if !client.unsent.is_empty() {
             if is_writable && client.write_on()? {
-                self.clients.awaited -= usize::from(client.waits_since.take().is_some());
+                // What it has begun has its time from now on, since nobody read the rest of it.
+                client.waits_since = (!client.begun.is_empty()).then_some(now);
+                self.clients.awaited -= usize::from(client.waits_since.is_none());
                 let client = &*client;
                 let heard = self.set.change(place, &client.stream, Interest::Read);
                 heard.map_err(|error| no_wait(&error))?;
@@ -294,6 +299,8 @@ impl<S: Service> Server<'_, S> {
         };
         if telegrams > 0 {
             client.heard = now;
+            // What is begun now is another telegram, with a time of its own.
+            client.waits_since = client.waits_since.map(|_| now);
             if !client.speaks {
                 client.speaks = true;
                 self.clients.speakers += 1;
@@ -378,7 +385,16 @@ impl<S: Service> Server<'_, S> {
             if self.clients.count >= self.limits.clients && !self.make_room(now, port) {
                 port.count("clients.turned_away");
                 let most = self.limits.clients;
-                log::warn!("{peer} was turned away: {most} clients are served, and no more");
+                // A client that comes again and again shall not fill the log.
+                let level = if std::mem::replace(&mut self.told, true) {
+                    log::Level::Debug
+                } else {
+                    log::Level::Warn
+                };
+                log::log!(
+                    level,
+                    "{peer} was turned away: {most} clients are served, and no more"
+                );
                 continue;
             }
             self.welcome(stream, peer, now, port);
@@ -409,6 +425,7 @@ impl<S: Service> Server<'_, S> {
             self.clients.remove(place);
             return;
         }
+        self.told = false;
         port.count("clients.accepted");
         self.tell(port);
         if self.clients.speakers == 0 {

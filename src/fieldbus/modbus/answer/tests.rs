@@ -60,10 +60,10 @@ impl Unit {
 fn input_registers_are_the_bytes_of_i() {
     let mut unit = Unit::device();
     let done = unit.answers(&[4, 0, 0, 0, 1], &[4, 2, 0x12, 0x34]);
-    assert_eq!(done.read, Some(0..2));
+    assert_eq!(done.read, Some(0..16));
     // The last byte alone is half a register.
     let done = unit.answers(&[4, 0, 0, 0, 2], &[4, 4, 0x12, 0x34, 0x81, 0]);
-    assert_eq!(done.read, Some(0..3));
+    assert_eq!(done.read, Some(0..24));
     unit.refuses(&[4, 0, 0, 0, 3], 2);
     unit.refuses(&[4, 0, 2, 0, 1], 2);
 }
@@ -72,10 +72,32 @@ fn input_registers_are_the_bytes_of_i() {
 fn discrete_inputs_are_the_bits_of_i() {
     let mut unit = Unit::device();
     let done = unit.answers(&[2, 0, 1, 0, 10], &[2, 2, 0b0000_1001, 0b10]);
-    assert_eq!(done.read, Some(0..2));
+    assert_eq!(done.read, Some(1..11));
     unit.answers(&[2, 0, 23, 0, 1], &[2, 1, 1]);
     unit.answers(&[2, 0, 0, 0, 24], &[2, 3, 0x12, 0x34, 0x81]);
     unit.refuses(&[2, 0, 24, 0, 1], 2);
+}
+
+#[test]
+fn nothing_lies_behind_the_last_address() {
+    let (sends, mut holds) = ([0xFF; 9000], [0; 9000]);
+    let mut tables = Tables {
+        map: Unit::device().map,
+        sends: &sends,
+        holds: &mut holds,
+        holds_len: 9000,
+    };
+    let identification = Identification::default();
+    for (pdu, expected) in [
+        ([2, 0xFF, 0xFF, 0, 1], &[2, 1, 1][..]),
+        ([2, 0xFF, 0xFF, 0, 2], &[0x82, 2]),
+        ([1, 0xFF, 0xF8, 0, 8], &[1, 1, 0]),
+        ([1, 0xFF, 0xF8, 0, 9], &[0x81, 2]),
+    ] {
+        let mut reply = Vec::new();
+        answer(&pdu, &mut tables, &identification, &mut reply);
+        assert_eq!(reply, expected, "{pdu:02X?}");
+    }
 }
 
 #[test]
@@ -132,13 +154,13 @@ fn a_window_shows_the_inputs_among_the_holding_registers() {
     let mut unit = Unit::device();
     unit.map.window = Some(4);
     let done = unit.answers(&[3, 0, 4, 0, 2], &[3, 4, 0x12, 0x34, 0x81, 0]);
-    assert_eq!(done.read, Some(0..3));
-    assert_eq!(unit.answers(&[1, 0, 65, 0, 1], &[1, 1, 1]).read, Some(0..1));
+    assert_eq!(done.read, Some(0..24));
+    assert_eq!(unit.answers(&[1, 0, 65, 0, 1], &[1, 1, 1]).read, Some(1..2));
     unit.refuses(&[3, 0, 3, 0, 2], 2);
     unit.refuses(&[6, 0, 4, 0, 1], 2);
     let both = [23, 0, 4, 0, 1, 0, 0, 0, 1, 2, 7, 8];
     let done = unit.answers(&both, &[23, 2, 0x12, 0x34]);
-    assert_eq!((done.wrote, done.read), (Some(0..16), Some(0..2)));
+    assert_eq!((done.wrote, done.read), (Some(0..16), Some(0..16)));
 }
 
 /// A PLC that is a server: its outputs are read, its inputs written.

@@ -358,6 +358,9 @@ impl<'a> Poll<'a> {
             return Ok(());
         };
         port.count("modbus-client.unanswered");
+        // Whoever answers next may be another device.
+        self.stations[station].identified = false;
+        self.guards[station].part();
         self.clear();
         self.request.clear();
         self.written = 0;
@@ -491,3 +494,6 @@ impl<'a> Poll<'a> {
         });
     }
 }
+
+#[cfg(test)]
+mod tests;

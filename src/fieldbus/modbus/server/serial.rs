@@ -34,6 +34,8 @@ pub(super) fn serve(
     let mut server = Server {
         line,
         serial,
+        // A line has one client.
+        writes: vec![true; units.len()].into(),
         units,
         framer: Framer::new(line.silence),
         reply: Vec::new(),
@@ -50,6 +52,8 @@ struct Server<'a> {
     line: &'a Serial,
     serial: SerialPort,
     units: &'a mut UnitSet,
+    /// The stations that the client has written to.
+    writes: Box<[bool]>,
     framer: Framer,
     /// The answer that is under way, and how much of it the system has taken.
     reply: Vec<u8>,
@@ -109,6 +113,7 @@ impl Server<'_> {
     fn attend(&mut self, now: Nanos, port: &mut Port) {
         let Self {
             units,
+            writes,
             framer,
             reply,
             written,
@@ -131,7 +136,7 @@ impl Server<'_> {
                 if Function::of(pdu[0]).is_some_and(Function::writes) {
                     let mut nobody_hears = Vec::new();
                     for station in 0..units.len() {
-                        units.answer(station, now, pdu, &mut nobody_hears, port);
+                        units.answer(station, now, pdu, writes, &mut nobody_hears, port);
                     }
                     port.running("a client is talking");
                 }
@@ -143,7 +148,7 @@ impl Server<'_> {
                 return;
             };
             *carried = rtu::append(number, reply, |reply| {
-                units.answer(station, now, pdu, reply, port)
+                units.answer(station, now, pdu, writes, reply, port)
             });
             port.running("a client is talking");
         });

@@ -19,9 +19,17 @@ pub(super) struct TcpService<'a> {
     pub(super) patience: Nanos,
 }
 
-impl Service for TcpService<'_> {
+/// One client.
+#[derive(Debug)]
+pub(super) struct Client {
     /// What is under way to it.
-    type Client = Vec<Carried>;
+    carried: Vec<Carried>,
+    /// The stations that it has written to.
+    writes: Box<[bool]>,
+}
+
+impl Service for TcpService<'_> {
+    type Client = Client;
 
     fn limits(&self) -> Limits {
         Limits {
@@ -31,13 +39,16 @@ impl Service for TcpService<'_> {
         }
     }
 
-    fn welcome(&mut self, _now: Nanos) -> Vec<Carried> {
-        Vec::new()
+    fn welcome(&mut self, _now: Nanos) -> Client {
+        Client {
+            carried: Vec::new(),
+            writes: vec![false; self.units.len()].into(),
+        }
     }
 
     fn telegram(
         &mut self,
-        client: &mut Vec<Carried>,
+        client: &mut Client,
         now: Nanos,
         bytes: &[u8],
         reply: &mut Vec<u8>,
@@ -55,22 +66,23 @@ impl Service for TcpService<'_> {
         } = telegram;
         let carried = mbap::append(transaction, unit, reply, |reply| {
             if let Some(station) = self.units.station(unit) {
-                return self.units.answer(station, now, pdu, reply, port);
+                let writes = &mut client.writes;
+                return self.units.answer(station, now, pdu, writes, reply, port);
             }
             port.count("modbus-server.unknown_unit");
             refuse(pdu[0], Exception::GATEWAY_TARGET_FAILED, reply);
             None
         });
         if let Some(carried) = carried
-            && client.len() < REMEMBERED
+            && client.carried.len() < REMEMBERED
         {
-            client.push(carried);
+            client.carried.push(carried);
         }
         Ok(length)
     }
 
-    fn replied(&mut self, client: &mut Vec<Carried>, port: &mut Port) {
-        for carried in client.drain(..) {
+    fn replied(&mut self, client: &mut Client, port: &mut Port) {
+        for carried in client.carried.drain(..) {
             self.units.carried(carried, port);
         }
     }

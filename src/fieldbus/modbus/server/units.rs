@@ -30,6 +30,8 @@ struct Unit {
     /// The frame that an answer was made of last, and how many different ones there were before it.
     shown: Vec<u8>,
     generation: u64,
+    /// Whether anybody has ever written.
+    has_writer: bool,
 }
 
 /// What an answer carries of the frame of a station; it counts once the client has it.
@@ -37,7 +39,7 @@ struct Unit {
 pub(super) struct Carried {
     station: usize,
     generation: u64,
-    bytes: Range<usize>,
+    bits: Range<usize>,
 }
 
 impl UnitSet {
@@ -58,6 +60,7 @@ impl UnitSet {
                 holds_len,
                 shown: Vec::new(),
                 generation: 0,
+                has_writer: false,
             }
         };
         Self {
@@ -80,12 +83,14 @@ impl UnitSet {
             .position(|unit| unit.number.is_none_or(|own| own == number))
     }
 
-    /// Answers a request to a station that came at `now`, and appends the answer's PDU to `reply`.
+    /// Answers a request to a station that came at `now`, and appends the answer's PDU to `reply`. `writes` says of
+    /// each station whether this client has written to it.
     pub(super) fn answer(
         &mut self,
         station: usize,
         now: Nanos,
         pdu: &[u8],
+        writes: &mut [bool],
         reply: &mut Vec<u8>,
         port: &mut Port,
     ) -> Option<Carried> {
@@ -120,6 +125,8 @@ impl UnitSet {
                 return None;
             }
             (None, Some(bits)) => {
+                unit.has_writer = true;
+                writes[station] = true;
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
                     port.received_part(station, now, frame, bits);
@@ -127,12 +134,14 @@ impl UnitSet {
                     port.received(station, now, frame);
                 }
             }
-            (None, None) => port.touch(station, now),
+            // Whoever only looks does not make the values of another one younger.
+            (None, None) if writes[station] || !unit.has_writer => port.touch(station, now),
+            (None, None) => {}
         }
-        read.map(|bytes| Carried {
+        read.map(|bits| Carried {
             station,
             generation: unit.generation,
-            bytes,
+            bits,
         })
     }
 
@@ -141,11 +150,11 @@ impl UnitSet {
         let Carried {
             station,
             generation,
-            bytes,
+            bits,
         } = carried;
         // After an answer with another frame nobody knows what of this one was news; it is told again.
         if self.units[station].generation == generation {
-            port.sent_part(station, bytes);
+            port.sent_bits(station, bits);
         }
     }
 }

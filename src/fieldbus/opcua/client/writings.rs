@@ -115,10 +115,7 @@ impl Writings {
             for &signal in self.values.signals(station) {
                 if self.known[signal].is_some() {
                     let signal = &table.signals[signal];
-                    port.sent_part(
-                        station,
-                        signal.byte..signal.byte + signal.data_type.size_bytes(),
-                    );
+                    port.sent_bits(station, signal.address().bits());
                 }
             }
         }

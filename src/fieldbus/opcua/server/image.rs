@@ -138,7 +138,7 @@ impl Image {
                     && let Some(span) = self.show.watched.span(index)
                     && now - self.places[index].since >= span
                 {
-                    port.sent_part(signal.station, bytes(signal));
+                    port.sent_bits(signal.station, signal.address().bits());
                 }
             }
         }
@@ -164,7 +164,7 @@ impl Image {
         for &index in signals {
             let signal = &self.table.signals[index];
             if signal.area == self.role.areas().0 {
-                port.sent_part(signal.station, bytes(signal));
+                port.sent_bits(signal.station, signal.address().bits());
             }
         }
     }
@@ -209,11 +209,6 @@ impl Image {
         let put = self.show.nodes.set_values(&self.show.subscriptions, all);
         debug_assert!(put.is_ok(), "every signal has its nodes: {put:?}");
     }
-}
-
-/// The bytes of a signal in its frame.
-fn bytes(signal: &Signal) -> std::ops::Range<usize> {
-    signal.byte..signal.byte + signal.data_type.size_bytes()
 }
 
 /// How far the values of the simulation can be relied on.

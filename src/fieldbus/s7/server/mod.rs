@@ -115,7 +115,7 @@ struct Client {
     number: u64,
     /// The stations that it has written to.
     writes: Box<[bool]>,
-    /// What goes out to it in answers: station and bytes.
+    /// What goes out to it in answers: station and bits.
     carried: Vec<(usize, Range<usize>)>,
 }
 
@@ -170,8 +170,8 @@ impl tcp::Service for Service {
     }
 
     fn replied(&mut self, client: &mut Client, port: &mut Port) {
-        for (station, bytes) in client.carried.drain(..) {
-            port.sent_part(station, bytes);
+        for (station, bits) in client.carried.drain(..) {
+            port.sent_bits(station, bits);
         }
         self.memory.batch = None;
     }
@@ -239,10 +239,14 @@ impl Jobs<'_> {
         station.changed.push(first + bits.start..first + bits.end);
         Ok(&mut station.written[range])
     }
-}
 
-impl Memory for Jobs<'_> {
-    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+    /// The bytes that a job reads; of them, these bits go out.
+    fn look(
+        &mut self,
+        object: Object,
+        range: Range<usize>,
+        bits: Range<usize>,
+    ) -> Result<&[u8], Code> {
         if object == Object::Flags {
             return self.shared.flags.get(range).ok_or(Code::ADDRESS);
         }
@@ -258,8 +262,23 @@ impl Memory for Jobs<'_> {
             let frame = self.port.outgoing(place.station, self.now);
             station.outgoing.copy_from_slice(frame);
         }
-        self.carried.push((place.station, range.clone()));
+        let first = range.start * 8;
+        let carried = first + bits.start..first + bits.end;
+        self.carried.push((place.station, carried));
         Ok(&station.outgoing[range])
+    }
+}
+
+impl Memory for Jobs<'_> {
+    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+        let bits = 0..range.len() * 8;
+        self.look(object, range, bits)
+    }
+
+    fn read_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<u8, Code> {
+        let bit = usize::from(bit);
+        let bytes = self.look(object, byte..byte + 1, bit..bit + 1)?;
+        Ok(bytes[0])
     }
 
     fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], Code> {

@@ -239,6 +239,21 @@ fn half_a_telegram_has_its_time() {
 }
 
 #[test]
+fn who_completes_each_telegram_in_time_is_served_though_another_one_is_always_begun() {
+    let server = Running::new();
+    let mut client = server.client();
+    client.write_all(&[2]).expect("the server reads");
+    for _ in 0..30 {
+        client.write_all(&[8, 9, 2]).expect("the server reads");
+        let mut reply = [0; 3];
+        client.read_exact(&mut reply).expect("an answer");
+        assert_eq!(reply, [2, 8, 9]);
+        server.pass(Nanos::from_millis(10));
+    }
+    assert_eq!(server.fact("clients.dropped"), None);
+}
+
+#[test]
 fn who_does_not_read_is_not_read_and_dropped_in_the_end() {
     let server = Running::new();
     let (mut good, slow) = (server.client(), server.client());

@@ -195,7 +195,9 @@ impl Image {
         let raw = values::variant(data_type, bits);
         let time = DateTime::now();
         let value = |value: Variant| DataValue {
-            value: Some(value),
+            // Without a value, so that the first good one is a change also for subscribers that are not told of
+            // a status alone.
+            value: (!status.is_bad()).then_some(value),
             status: Some(status),
             source_timestamp: Some(time),
             server_timestamp: Some(time),

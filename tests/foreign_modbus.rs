@@ -3,6 +3,8 @@
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 mod foreign;
+#[path = "peers/pcap.rs"]
+mod pcap;
 #[cfg(unix)]
 #[path = "peers/pty.rs"]
 mod pty;
@@ -15,6 +17,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use foreign::Absent;
+use pcap::Tap;
 use tickbus::driver::{Config, Driver};
 use tickbus::fieldbus::LinkState;
 use tickbus::signal::Slot;
@@ -210,7 +213,7 @@ fn pymodbus(script: &str) -> Result<Command, Absent> {
 
 fn pymodbus_drives_our_server() -> Result<(), Absent> {
     let mut client = pymodbus("modbus_client.py")?;
-    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
     let mut machine = Machine::open(server, &signals());
     let address = machine.address();
     client.args([
@@ -245,7 +248,7 @@ fn pymodbus_meets_units() -> Result<(), Absent> {
             "[[signal]]\nname = \"{name} out\"\nstation = \"{name}\"\naddress = \"%QW0\"\n"
         );
     }
-    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
     let mut machine = Machine::open(server, &text);
     let address = machine.address();
     python.args([
@@ -432,7 +435,7 @@ fn mbpoll(machine: &mut Machine, arguments: &[&str]) -> Result<String, Absent> {
 }
 
 fn mbpoll_over_tcp() -> Result<(), Absent> {
-    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
     let mut machine = Machine::open(server, &signals());
     let port = machine.address().port().to_string();
     let tcp = ["-m", "tcp", "-p", port.as_str()];
@@ -489,8 +492,9 @@ fn pymodbus_drives_our_server_on_a_line() -> Result<(), Absent> {
 #[cfg(unix)]
 fn serial(end: &str, device: &std::path::Path) -> String {
     let device = device.display();
+    // However slow the other end is, what it wrote stays.
     format!(
-        "kind = \"modbus-{end}\"\ndevice = \"{device}\"\nbaud = 115200\nparity = \"none\"\nstop_bits = 1\n"
+        "kind = \"modbus-{end}\"\nmax_age = \"1h\"\ndevice = \"{device}\"\nbaud = 115200\nparity = \"none\"\nstop_bits = 1\n"
     )
 }
 
@@ -523,129 +527,72 @@ fn mbpoll_on_a_line() -> Result<(), Absent> {
     mbpoll_everything(&mut machine, &rtu, &device)
 }
 
-/// One PDU to the server, and its answer, both with their headers.
-fn ask(stream: &mut TcpStream, transaction: u16, pdu: &[u8]) -> (Vec<u8>, Vec<u8>) {
-    let mut request = transaction.to_be_bytes().to_vec();
-    let length = u16::try_from(pdu.len() + 1).expect("it is short");
-    request.extend([0, 0]);
-    request.extend(length.to_be_bytes());
-    request.push(1);
-    request.extend(pdu);
-    stream.write_all(&request).expect("the server reads");
-    let mut answer = vec![0; 6];
-    stream.read_exact(&mut answer).expect("a header");
-    let length = usize::from(u16::from_be_bytes([answer[4], answer[5]]));
-    answer.resize(6 + length, 0);
-    stream.read_exact(&mut answer[6..]).expect("an answer");
-    (request, answer)
-}
+/// Every function, answered and refused.
+const REQUESTS: [&[u8]; 19] = [
+    &[1, 0, 3, 0, 19],
+    &[2, 0, 0, 0, 100],
+    &[3, 0, 0, 0, 32],
+    &[4, 0, 0, 0, 32],
+    &[5, 0, 9, 0xFF, 0],
+    &[6, 0, 1, 0xAB, 0xCD],
+    &[15, 0, 3, 0, 10, 2, 0xFF, 3],
+    &[16, 0, 0, 0, 2, 4, 1, 2, 3, 4],
+    &[22, 0, 1, 0, 0xF2, 0, 0x25],
+    &[23, 0, 0, 0, 4, 0, 0, 0, 1, 2, 7, 8],
+    &[43, 14, 1, 0],
+    &[43, 14, 4, 1],
+    &[1, 2, 0, 0, 1],
+    &[3, 0, 0, 0, 0],
+    &[4, 0, 0, 1, 0],
+    &[16, 0, 31, 0, 2, 4, 1, 2, 3, 4],
+    &[23, 0, 99, 0, 4, 0, 0, 0, 1, 2, 7, 8],
+    &[7],
+    &[43, 14, 4, 9],
+];
 
-/// Every function, answered and refused, as a capture that tshark reads.
 fn tshark_finds_nothing() -> Result<(), Absent> {
-    let mut tshark = foreign::command("tshark", "tshark")?;
-    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"";
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
     let mut machine = Machine::open(server, &signals());
-    let mut stream = TcpStream::connect(machine.address()).expect("it listens");
-    let requests: [&[u8]; 19] = [
-        &[1, 0, 3, 0, 19],
-        &[2, 0, 0, 0, 100],
-        &[3, 0, 0, 0, 32],
-        &[4, 0, 0, 0, 32],
-        &[5, 0, 9, 0xFF, 0],
-        &[6, 0, 1, 0xAB, 0xCD],
-        &[15, 0, 3, 0, 10, 2, 0xFF, 3],
-        &[16, 0, 0, 0, 2, 4, 1, 2, 3, 4],
-        &[22, 0, 1, 0, 0xF2, 0, 0x25],
-        &[23, 0, 0, 0, 4, 0, 0, 0, 1, 2, 7, 8],
-        &[43, 14, 1, 0],
-        &[43, 14, 4, 1],
-        &[1, 2, 0, 0, 1],
-        &[3, 0, 0, 0, 0],
-        &[4, 0, 0, 1, 0],
-        &[16, 0, 31, 0, 2, 4, 1, 2, 3, 4],
-        &[23, 0, 99, 0, 4, 0, 0, 0, 1, 2, 7, 8],
-        &[7],
-        &[43, 14, 4, 9],
-    ];
-    let mut capture = Capture::default();
-    for (transaction, pdu) in (1..).zip(requests) {
-        let (request, answer) = ask(&mut stream, transaction, pdu);
-        capture.sent(true, &request);
-        capture.sent(false, &answer);
+    let tap = Tap::before(machine.address());
+    let mut stream = TcpStream::connect(tap.address).expect("it listens");
+    for (transaction, pdu) in (1_u16..).zip(REQUESTS) {
+        let mut telegram = transaction.to_be_bytes().to_vec();
+        let length = u8::try_from(pdu.len() + 1).expect("it is short");
+        telegram.extend([0, 0, 0, length, 1]);
+        telegram.extend(pdu);
+        stream.write_all(&telegram).expect("the server reads");
+        let mut answer = [0; 260];
+        let count = stream.read(&mut answer).expect("an answer");
+        assert!(count > 8 && answer[7] & 0x7F == pdu[0], "{answer:?}");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("modbus.pcap");
-    std::fs::write(&file, capture.file()).expect("it is written");
-    let output = tshark
-        .arg("-r")
-        .arg(&file)
-        .args(["-d", "tcp.port==502,mbtcp", "-V"])
-        .output()
-        .expect("it runs");
-    let told = String::from_utf8_lossy(&output.stdout);
+    pcap::write(&file, 502, &tap.conversations()).expect("it is written");
+    let ask = |filter: &str, field: &str| {
+        let tshark = foreign::command("tshark", "tshark")?;
+        Ok(pcap::tshark(
+            tshark,
+            &file,
+            "tcp.port==502,mbtcp",
+            filter,
+            &[field],
+        ))
+    };
+    let telegrams = ask("mbtcp", "modbus.func_code")?;
+    assert_eq!(telegrams.lines().count(), 2 * REQUESTS.len(), "{telegrams}");
+    // Of the requests some are wrong on purpose.
+    let bad = "tcp.srcport == 502 && (_ws.malformed || _ws.expert.severity >= 0x600000)";
+    let complaints = ask(bad, "_ws.expert.message")?;
+    assert_eq!(complaints, "");
+    let names = ask("modbus.object_str_value", "modbus.object_str_value")?;
     assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
+        names.contains("tickbus") && names.contains("Cell 4"),
+        "{names}"
     );
-    let frames = told.matches("Modbus/TCP").count();
-    assert_eq!(frames, 2 * requests.len(), "{told}");
-    for bad in ["Malformed", "Expert Info (Error", "Expert Info (Warning"] {
-        let lines: Vec<&str> = told.lines().filter(|line| line.contains(bad)).collect();
-        assert!(lines.is_empty(), "{lines:#?}");
-    }
-    assert!(told.contains("Object String Value: Cell 4"), "{told}");
+    let refused = ask("modbus.exception_code", "modbus.exception_code")?;
+    assert_eq!(
+        refused.split_whitespace().collect::<Vec<_>>(),
+        ["2", "3", "3", "2", "2", "1", "2"]
+    );
     Ok(())
-}
-
-/// One TCP connection as a file of packets: Ethernet frames with IPv4 and TCP headers around what was sent.
-#[derive(Default)]
-struct Capture {
-    packets: Vec<u8>,
-    count: u32,
-    /// Bytes sent so far by the client and by the server.
-    sent: [u32; 2],
-}
-
-impl Capture {
-    fn sent(&mut self, by_client: bool, bytes: &[u8]) {
-        let (own, other) = if by_client { (0, 1) } else { (1, 0) };
-        let ports = [40_000_u16, 502];
-        let length = u16::try_from(40 + bytes.len()).expect("it is short");
-        let mut packet = vec![2, 0, 0, 0, 0, 2, 2, 0, 0, 0, 0, 1, 8, 0];
-        let mut ip = vec![0x45, 0];
-        ip.extend(length.to_be_bytes());
-        ip.extend([0, 0, 0x40, 0, 64, 6, 0, 0]);
-        let hosts = [[10, 0, 0, 1], [10, 0, 0, 2]];
-        ip.extend([hosts[own], hosts[other]].concat());
-        let words = ip
-            .chunks(2)
-            .map(|pair| u32::from(pair[0]) << 8 | u32::from(pair[1]));
-        let sum = words.sum::<u32>();
-        let sum = !u16::try_from((sum & 0xFFFF) + (sum >> 16)).expect("it fits");
-        ip[10..12].copy_from_slice(&sum.to_be_bytes());
-        packet.extend(ip);
-        packet.extend(ports[own].to_be_bytes());
-        packet.extend(ports[other].to_be_bytes());
-        packet.extend((1 + self.sent[own]).to_be_bytes());
-        packet.extend((1 + self.sent[other]).to_be_bytes());
-        packet.extend([0x50, 0x18, 0x20, 0, 0, 0, 0, 0]);
-        packet.extend(bytes);
-        self.sent[own] += u32::try_from(bytes.len()).expect("it is short");
-        let size = u32::try_from(packet.len()).expect("it is short");
-        for word in [1, self.count, size, size] {
-            self.packets.extend(word.to_le_bytes());
-        }
-        self.count += 1;
-        self.packets.extend(packet);
-    }
-
-    fn file(&self) -> Vec<u8> {
-        let mut file = Vec::new();
-        for word in [0xA1B2_C3D4_u32, 0x0004_0002, 0, 0, 0xFFFF, 1] {
-            file.extend(word.to_le_bytes());
-        }
-        file.extend(&self.packets);
-        file
-    }
 }

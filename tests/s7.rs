@@ -423,3 +423,43 @@ fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
     device.end.driver.close();
     assert_eq!(cpu.join().expect("no panic"), 3);
 }
+
+/// Two stations in one job each way, and one that has inputs alone.
+#[test]
+fn the_stations_of_a_client_lie_where_their_tables_say() {
+    let signals = "[[signal]]\nname = \"a\"\nstation = \"one\"\naddress = \"%QW0\"\n\
+        [[signal]]\nname = \"b\"\nstation = \"two\"\naddress = \"%QB2\"\n\
+        [[signal]]\nname = \"c\"\nstation = \"one\"\naddress = \"%IB0\"\n\
+        [[signal]]\nname = \"d\"\nstation = \"three\"\naddress = \"%ID4\"\n";
+    let head =
+        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\ncycle = \"1ms\"\nmax_age = \"300ms\"\n";
+    let blocks = "db = [{ number = 1, area = \"%Q\", station = \"one\" }, { number = 2, area = \"%Q\", \
+        station = \"two\" }, { number = 3, area = \"%I\", station = \"one\" }, { number = 4, area = \"%I\", \
+        station = \"three\", offset = 2 }]";
+    let mut device = Alone::open(&format!(
+        "{head}kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n{blocks}\n\
+         [[station]]\nname = \"one\"\n[[station]]\nname = \"two\"\n[[station]]\nname = \"three\"\n{signals}"
+    ));
+    let at = device.address();
+    let mut plc = conformance::rig::End::open(
+        &format!(
+            "{head}kind = \"s7-client\"\naddress = \"{at}\"\nrole = \"controller\"\n\
+             write_to = \"tickbus machine\"\n\
+             [[station]]\nname = \"one\"\noutput = \"DB1\"\ninput = \"DB3\"\n\
+             [[station]]\nname = \"two\"\noutput = \"DB2\"\n\
+             [[station]]\nname = \"three\"\ninput = \"DB4\"\ninput_bytes = 6\n{}",
+            signals.replace("%ID4", "%ID2")
+        ),
+        &device.clock,
+    );
+    plc.set("a", 0x0102.into());
+    plc.set("b", 3.0);
+    device.end.set("c", 4.0);
+    device.end.set("d", 5.0);
+    let values = |end: &conformance::rig::End, names: [&str; 2]| names.map(|name| end.get(name));
+    device.until("the values arrive", |end| {
+        plc.tick();
+        values(end, ["a", "b"]) == [258.0, 3.0] && values(&plc, ["c", "d"]) == [4.0, 5.0]
+    });
+    assert_eq!(plc.statistic("pdu"), "960");
+}

@@ -2,7 +2,6 @@
 
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::net::SocketAddr;
-use std::ptr;
 
 use libloading::{Library, Symbol};
 
@@ -39,7 +38,7 @@ pub(crate) fn serve(address: SocketAddr) -> Option<SocketAddr> {
             let reply: Reply = std::mem::transmute(*symbol(b"modbus_reply"));
             let context = new(host.as_ptr(), port);
             let tables = mapping(0, 0, 2048, 2048);
-            assert!(context != ptr::null_mut() && tables != ptr::null_mut());
+            assert!(!context.is_null() && !tables.is_null());
             let mut socket = listen(context, 1);
             let _ = ready.send(socket >= 0);
             accept(context, &raw mut socket);

@@ -12,7 +12,7 @@ mod symbols;
 
 use crate::config::Mistakes;
 use crate::driver::Config;
-use crate::fieldbus::Role;
+use crate::fieldbus::{Options, Role};
 
 /// The editors that sources are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -69,6 +69,15 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
             &file,
             "role = \"controller\": this file is the PLC's end itself",
             "export the machine's driver.cfg, or remove \"role\"",
+        ));
+    }
+    if let Options::Socket(options) = &config.bus
+        && !options.stations.is_empty()
+    {
+        return Err(Mistakes::of_file(
+            &file,
+            "each station of this file has an address, and so a PLC, of its own",
+            "export from a driver.cfg for each PLC, with the signals of its station",
         ));
     }
     let mut export = match target {

@@ -138,7 +138,7 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
             Self::ModbusClient(options) => options.stations.read_station(count, true, table),
-            Self::Socket(options) => options.read_station(count, table),
+            Self::Socket(options) => options.read_station(table),
             Self::S7Server(options) => options.read_station(count, table),
             Self::S7Client(options) => options.read_station(count, table),
             Self::Loopback(_) | Self::Plugin(_) | Self::OpcuaClient(_) | Self::OpcuaServer(_) => {}

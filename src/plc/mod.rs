@@ -14,10 +14,10 @@ mod axes;
 mod drum;
 mod hosted;
 mod mirror;
-mod peeler;
 mod reaction;
 
 pub mod blocks;
+pub mod peeler;
 pub mod rig;
 
 pub use axes::Axes;

@@ -111,27 +111,20 @@ fn assert_laid(config: &Config) {
     let structures = structures(&data);
     let copy = source(config, "copy");
     let (begin, end) = copy.split_once("END_FUNCTION").expect("two functions");
+    let prefix = config.name.replace(' ', "_");
     for (area, name, block, body) in [
-        (
-            Area::Input,
-            "\"Cell_1_inputs\"",
-            "\"Cell_1_in\".Image.",
-            begin,
-        ),
-        (
-            Area::Output,
-            "\"Cell_1_outputs\"",
-            "\"Cell_1_out\".Image.",
-            end,
-        ),
+        (Area::Input, "inputs", "in", begin),
+        (Area::Output, "outputs", "out", end),
     ] {
+        let name = format!("\"{prefix}_{name}\"");
+        let block = format!("\"{prefix}_{block}\".Image.");
         let total: usize = config
             .table
             .stations
             .iter()
             .map(|station| station.bytes(area))
             .sum();
-        let Some(structure) = structures.get(name) else {
+        let Some(structure) = structures.get(&name) else {
             assert_eq!(total, 0);
             continue;
         };
@@ -183,7 +176,7 @@ fn assert_laid(config: &Config) {
             "nothing else is there\n{data}"
         );
         assert_eq!(
-            body.matches(block).count(),
+            body.matches(&block).count(),
             covered,
             "each is copied once\n{body}"
         );
@@ -214,6 +207,33 @@ fn axes_become_structures_of_one_type() {
         data.contains("\"axis_3\" : \"Cell_1_command_axis_3\""),
         "{data}"
     );
+}
+
+#[test]
+fn the_peeling_line_has_its_axes_as_structures() {
+    for (file, axes) in [("charger", 12), ("lathe", 13)] {
+        let path = format!("{}/plc/peeler/{file}.cfg", env!("CARGO_MANIFEST_DIR"));
+        let config = Config::load(path.as_ref()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        assert_laid(&config);
+        let structures = structures(&source(&config, "data"));
+        let of_size = |bytes: usize, kind: &str| {
+            let types = structures
+                .iter()
+                .filter(|(name, s)| name.contains(kind) && s.bytes == bytes);
+            types.count()
+        };
+        assert!(
+            of_size(30, "_command_") > 0 && of_size(10, "_feedback_") > 0,
+            "{structures:?}"
+        );
+        let data = source(&config, "data");
+        // The first axis of either lends bits of its reserve to signals between the two PLCs, and is no structure.
+        let members = data.matches("\" : \"").count();
+        assert!(
+            members >= 2 * (axes - 1),
+            "{members} structures for {axes} axes\n{data}"
+        );
+    }
 }
 
 #[test]

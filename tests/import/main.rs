@@ -1,6 +1,7 @@
 //! `tickbus import`: tables that editors write, what is told of wrong ones, and the way back from an export.
 #![allow(missing_docs, reason = "tests")]
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -252,7 +253,7 @@ proptest! {
             let name: String = name.split_whitespace().collect::<Vec<_>>().join(" ");
             let name = name.replace('\\', "\\\\").replace('"', "\\\"");
             let kind = ["REAL", "DINT", "DWORD"][number % 3];
-            sections += &format!("[[signal]]\nname = \"{name}|{number}\"\naddress = \"%QD{}\"\ntype = \"{kind}\"\n", 4 * number);
+            write!(sections, "[[signal]]\nname = \"{name}|{number}\"\naddress = \"%QD{}\"\ntype = \"{kind}\"\n", 4 * number).expect("a String takes all");
         }
         let text = format!("[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\n{sections}");
         if let Ok(config) = Config::parse("driver.cfg", &text) {

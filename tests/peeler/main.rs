@@ -197,3 +197,61 @@ fn a_program_is_done_after_its_blocks() {
     line.until("its end", 150.0, |line| line.report(1).is_done());
     assert!(!line.report(0).is_done(), "the charger was asked for none");
 }
+
+/// Three troubles one after the other, at random moments; what is held by two must not be let go by both.
+#[test]
+fn troubles_at_random_moments_lose_no_block() {
+    let mut random = 0x2545_F491_u32;
+    let mut next = |below: u32| {
+        random ^= random << 13;
+        random ^= random >> 17;
+        random ^= random << 5;
+        random % below
+    };
+    for run in 0..10 {
+        let mut line = Line::new(&[], &[]);
+        let mut troubles = Vec::new();
+        for _ in 0..3 {
+            let wait = f64::from(next(4_000)) / 100.0;
+            line.seconds(wait);
+            let (side, lasts) = (usize::from(next(2) == 1), f64::from(next(400)) / 100.0);
+            if next(2) == 0 {
+                troubles.push(format!("after {wait} s the link of {side} for {lasts} s"));
+                line.alive[side] = false;
+                line.seconds(lasts);
+                line.alive[side] = true;
+            } else {
+                let axis = next(12) as usize;
+                troubles.push(format!(
+                    "after {wait} s axis {axis} of {side} for {lasts} s"
+                ));
+                line.plant.sides[side].drives[axis].healthy = false;
+                line.seconds(lasts);
+                line.plant.sides[side].drives[axis].healthy = true;
+            }
+        }
+        println!("run {run}: {}", troubles.join(", "));
+        let cores = line.plant.cores;
+        line.until("two more cores", 200.0, |line| {
+            line.plant.cores == cores + 2
+        });
+    }
+}
+
+/// Both PLCs are gone while either holds the block: whoever comes back first must not rely on the other.
+#[test]
+fn a_block_in_two_hands_is_dropped_by_neither_when_both_plcs_come_back() {
+    for away in [[1.0_f64, 1.0], [1.0, 3.0], [3.0, 1.0]] {
+        let mut line = Line::new(&[], &[]);
+        line.until("a block in two hands", 60.0, |line| line.plant.is_shared());
+        line.alive = [false; 2];
+        let [first, second] = away;
+        let (sooner, later) = if first < second { (0, 1) } else { (1, 0) };
+        line.seconds(first.min(second));
+        line.alive[sooner] = true;
+        line.seconds((first - second).abs());
+        line.alive[later] = true;
+        line.until("a core", 150.0, |line| line.plant.cores == 1);
+        assert!(line.plant.veneer > 20_000.0, "it was peeled, not dropped");
+    }
+}

@@ -133,6 +133,11 @@ impl Plant {
         }
     }
 
+    /// Whether charger and lathe hold the same block.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.shared
+    }
+
     fn at(&self, side: usize, axis: usize) -> f64 {
         self.sides[side].told[axis].position
     }
@@ -295,6 +300,10 @@ impl Plant {
         let spindles = [self.at(1, 0), self.at(1, 1)];
         if spindles.iter().any(|tip| *tip > HALF + 10.0) {
             let block = self.held.take().expect("it is there");
+            if std::mem::take(&mut self.shared) {
+                // The clamps have it still.
+                return;
+            }
             assert!(
                 self.at(1, 12) > 90.0,
                 "the core falls onto a closed core drop"

@@ -1,4 +1,5 @@
 //! How many sockets this process may have.
+#![allow(unreachable_pub, reason = "a benchmark uses it, too")]
 
 /// Raises the limit of open files as far as it goes; gives how many there may be.
 #[cfg(unix)]

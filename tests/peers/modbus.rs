@@ -4,12 +4,11 @@ use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 
 use tickbus::time::Manual;
 
 use crate::conformance::rig::{Bus, Liar};
-use crate::peers::{leave, own_address};
+use crate::peers::{Ending, leave, own_address};
 
 /// Modbus TCP at an address of its own.
 pub struct Tcp {
@@ -145,7 +144,7 @@ impl Bus for Tcp {
             ),
             (
                 "kind = \"modbus-server\"\nevents = \"all\"",
-                "none of the kinds of events",
+                "no kind of events",
             ),
         ]
     }
@@ -170,21 +169,6 @@ fn answer_with_too_little(mut stream: TcpStream) {
         answer[5] = 5;
         if stream.write_all(&answer).is_err() {
             break;
-        }
-    }
-}
-
-/// A thread that is told to end, and waited for.
-struct Ending {
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Drop for Ending {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.join().expect("the peer did not panic");
         }
     }
 }

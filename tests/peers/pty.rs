@@ -1,6 +1,6 @@
 //! A serial line without hardware: two pseudo-terminals, and a thread that carries what is written into one of
 //! them to the other.
-#![allow(dead_code, reason = "each test uses a part of it")]
+#![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};

@@ -1,7 +1,8 @@
 //! The block that talks to the simulation: one body for each bus.
 
-use super::{Plan, line, socket, source};
+use super::{Plan, line, modbus, s7comm, socket, source};
 use crate::fieldbus::Options;
+use crate::fieldbus::socket::Message;
 
 /// A body: what it declares and what it does.
 #[derive(Default)]
@@ -18,8 +19,16 @@ pub(super) struct Body {
 /// The second source.
 pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
     let body = match &plan.config.bus {
+        Options::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
+            by_hand("socket with message = \"axis\"", notes)
+        }
         Options::Socket(options) => socket::body(plan, options, notes),
-        bus => by_hand(bus.kind(), notes),
+        Options::ModbusServer(options) => modbus::client(plan, options, notes),
+        Options::ModbusClient(options) => modbus::server(plan, options, notes),
+        Options::S7Server(options) => s7comm::puts_and_gets(plan, options, notes),
+        Options::S7Client(options) => s7comm::nothing(plan, options),
+        Options::OpcuaClient(_) | Options::OpcuaServer(_) => opcua(plan),
+        bus @ (Options::Loopback(_) | Options::Plugin(_)) => by_hand(bus.kind(), notes),
     };
     let mut text = source(plan, &body.what);
     let name = format!("{}_link", plan.prefix);
@@ -38,7 +47,16 @@ pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
     }
     line(&mut text, "");
     line(&mut text, "BEGIN");
-    for content in &body.code {
+    let prefix = &plan.prefix;
+    for content in [
+        format!("IF NOT \"{prefix}\".Simulated THEN"),
+        format!("   \"{prefix}\".Received := 0;"),
+        format!("   \"{prefix}\".Sent := 0;"),
+        "END_IF;".to_owned(),
+    ]
+    .iter()
+    .chain(&body.code)
+    {
         line(&mut text, format!("   {content}").trim_end());
     }
     line(&mut text, "END_FUNCTION_BLOCK");
@@ -57,12 +75,14 @@ pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
 pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
     match &plan.config.bus {
         Options::Socket(options) => socket::steps(options),
+        Options::S7Server(_) => s7comm::steps_for_puts_and_gets(),
+        Options::S7Client(_) => s7comm::steps_for_nothing(plan),
         _ => Vec::new(),
     }
 }
 
 /// A bus for which there is no block: the user's own goes here.
-fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
+pub(super) fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
     notes.push(format!(
         "the bus \"{kind}\" has no block of its own for S7: what brings the images is to be written by hand"
     ));
@@ -70,6 +90,23 @@ fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
         what: format!("The bus \"{kind}\" needs no call here, or one that only you can write."),
         code: vec![
             ";   // Put here what receives \"…_in\".Image and sends \"…_out\".Image.".to_owned(),
+        ],
+        ..Body::default()
+    }
+}
+
+/// OPC UA carries single variables, by name: those of both images.
+fn opcua(plan: &Plan<'_>) -> Body {
+    Body {
+        what: "OPC UA carries the members of both images by themselves; no call is needed here."
+            .to_owned(),
+        code: vec![
+            format!(
+                ";   // In the CPU's properties activate the OPC UA server and its licence; \"{}\" and \"{}\" are then",
+                plan.outputs.block, plan.inputs.block
+            ),
+            "    // accessible (and, the inputs, writable) from OPC UA, member by member."
+                .to_owned(),
         ],
         ..Body::default()
     }

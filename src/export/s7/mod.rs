@@ -3,10 +3,13 @@
 //! Three sources, in the order in which TIA Portal is to read them: the types and data blocks of both images, the
 //! block that talks to the simulation, and the two that go at the beginning and the end of OB1.
 
+mod connection;
 mod copy;
 mod data;
 mod link;
 mod members;
+mod modbus;
+mod s7comm;
 mod socket;
 
 use std::collections::HashMap;

@@ -1,18 +1,13 @@
 //! Records over TCP: `TSEND_C` and `TRCV_C` on one connection.
 
-use std::net::IpAddr;
-
 use super::Plan;
+use super::connection;
 use super::link::{Body, time};
 use crate::fieldbus::socket::{Options, TcpRole};
-use crate::fieldbus::tcp::Host;
 use crate::time::Nanos;
 
 /// The cycle of the socket bus, where a driver.cfg states none.
 const CYCLE: Nanos = Nanos::from_millis(10);
-
-/// What stands for the address of the simulator's computer while nobody has put in the right one.
-const SOMEBODY: [u8; 4] = [192, 168, 0, 20];
 
 /// The longest record that every CPU takes.
 const LONGEST: usize = 8192;
@@ -29,14 +24,8 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         "Connection : TCON_IP_v4;".to_owned(),
         "Is_prepared : Bool;".to_owned(),
     ];
-    let mut code = connection(options, notes);
+    let mut code = connection::lines(&options.address, options.tcp == TcpRole::Listen, notes);
     let prefix = &plan.prefix;
-    code.extend([
-        format!("IF NOT \"{prefix}\".Simulated THEN"),
-        format!("   \"{prefix}\".Received := 0;"),
-        format!("   \"{prefix}\".Sent := 0;"),
-        "END_IF;".to_owned(),
-    ]);
     let cycle = plan.config.timing.cycle.unwrap_or(CYCLE);
     let mut add = |lines: &[&str]| code.extend(lines.iter().map(|line| (*line).to_owned()));
     if received > 0 {
@@ -47,6 +36,7 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         ]);
         add(&[
             "",
+            "// TRCV_C and TSEND_C share the connection: they name the same description.",
             &format!("// A record is complete with {received} bytes, however TCP cuts the stream."),
             "#Receive(EN_R := TRUE,",
             &format!("         CONT := \"{prefix}\".Simulated,"),
@@ -114,62 +104,6 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         temporary: Vec::new(),
         code,
     }
-}
-
-fn connection(options: &Options, notes: &mut Vec<String>) -> Vec<String> {
-    let port = options.address.port;
-    let plc_dials = options.tcp == TcpRole::Listen;
-    let (address, remark) = match (&options.address.host, plc_dials) {
-        (_, false) => ([0; 4], "the simulation's driver connects: any address"),
-        (Host::Ip(IpAddr::V4(ip)), true) if !ip.is_unspecified() && !ip.is_loopback() => {
-            (ip.octets(), "the simulator's computer, as in driver.cfg")
-        }
-        _ => {
-            notes.push(format!(
-                "driver.cfg listens on {}, which is no address that a PLC can dial: the source has {} in its place; put in \
-                 that of the simulator's computer, and let the driver listen on \"0.0.0.0:{port}\"",
-                options.address,
-                SOMEBODY.map(|byte| byte.to_string()).join(".")
-            ));
-            (SOMEBODY, "put the address of the simulator's computer here")
-        }
-    };
-    let mut code = vec![
-        "// Both blocks share the connection: they name the same description, with the same ID."
-            .to_owned(),
-        "IF NOT #Is_prepared THEN".to_owned(),
-        "   #Connection.InterfaceId := 64;   // the first PROFINET interface of the CPU".to_owned(),
-        "   #Connection.ID := 1;   // not used by another connection of this CPU".to_owned(),
-        "   #Connection.ConnectionType := 16#0B;   // TCP".to_owned(),
-        format!(
-            "   #Connection.ActiveEstablished := {};   // {}",
-            if plc_dials { "TRUE" } else { "FALSE" },
-            if plc_dials {
-                "the PLC dials"
-            } else {
-                "the PLC waits"
-            }
-        ),
-    ];
-    for (number, byte) in address.iter().enumerate() {
-        let remark = if number == 0 {
-            format!("   // {remark}")
-        } else {
-            String::new()
-        };
-        code.push(format!(
-            "   #Connection.RemoteAddress.ADDR[{}] := {byte};{remark}",
-            number + 1
-        ));
-    }
-    let (remote, local) = if plc_dials { (port, 0) } else { (0, port) };
-    code.extend([
-        format!("   #Connection.RemotePort := {remote};"),
-        format!("   #Connection.LocalPort := {local};"),
-        "   #Is_prepared := TRUE;".to_owned(),
-        "END_IF;".to_owned(),
-    ]);
-    code
 }
 
 pub(super) fn steps(options: &Options) -> Vec<String> {

@@ -14,6 +14,15 @@ const HEADER: usize = 7;
 /// The longest text of an object, such that it fits into an answer.
 const TEXT_LIMIT: usize = PDU_LIMIT - HEADER - 2;
 
+/// What came of what a device says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Taken {
+    /// All of it.
+    Whole,
+    /// All up to this object.
+    MoreFrom(u8),
+}
+
 /// What a device says of itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identification {
@@ -98,9 +107,9 @@ impl Identification {
         Ok(())
     }
 
-    /// Takes over the objects of an answer, of which `data` is what follows the function code; gives the object
-    /// to ask for next, if more follow. `None` when the answer is malformed.
-    pub(super) fn take(&mut self, data: &[u8]) -> Option<Option<u8>> {
+    /// Takes over the objects of an answer, of which `data` is what follows the function code. `None` when the
+    /// answer is malformed.
+    pub(super) fn take(&mut self, data: &[u8]) -> Option<Taken> {
         let &[
             READ_DEVICE_IDENTIFICATION,
             _,
@@ -130,7 +139,11 @@ impl Identification {
                 *object = text.iter().map(printable).collect();
             }
         }
-        rest.is_empty().then_some((more == 0xFF).then_some(next))
+        rest.is_empty().then_some(if more == 0xFF {
+            Taken::MoreFrom(next)
+        } else {
+            Taken::Whole
+        })
     }
 }
 

@@ -1,7 +1,8 @@
 //! S7 communication over ISO on TCP, as CPUs of the S7 family speak it with PUT and GET, panels and libraries.
 //!
 //! The core has no I/O: [`transport`] are the packets, [`pdu`] the units within them, [`item`] the variables,
-//! [`lists`] the system status lists. [`Conversation`] is a server's side of one connection.
+//! [`lists`] the system status lists. [`Conversation`] is a server's side of one connection, [`Dialog`] a client's. The
+//! buses [`S7Server`] and [`S7Client`] stand around them.
 
 mod client;
 mod conversation;

@@ -34,9 +34,6 @@ pub enum Message {
     },
 }
 
-/// The most stations that have an address each: as many sockets as a bus waits for.
-const STATIONS: usize = 3;
-
 /// What a driver.cfg says to the socket bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
@@ -142,8 +139,8 @@ impl Options {
 }
 
 impl Options {
-    /// Reads `address` in the next of `count` `[[station]]` tables.
-    pub(in crate::fieldbus) fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+    /// Reads `address` in the next `[[station]]` table.
+    pub(in crate::fieldbus) fn read_station(&mut self, table: &mut Table<'_>) {
         const ALL: &str = "give each station an address, or none of them";
         self.tables += 1;
         let Some(value) = table.take("address") else {
@@ -158,11 +155,6 @@ impl Options {
             value.wrong(
                 "a station has an \"address\", but this end connects",
                 "only an end that listens serves several peers; write a driver.cfg for each PLC",
-            );
-        } else if count > STATIONS {
-            value.wrong(
-                format!("there are {count} stations"),
-                format!("at most {STATIONS} have an address each; write several driver.cfg"),
             );
         }
         self.stations.extend(Address::read(&value));

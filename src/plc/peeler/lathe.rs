@@ -227,17 +227,20 @@ impl Lathe {
         self.since = None;
     }
 
-    /// Begins anew: what is between the spindles counts as a core.
+    /// Begins anew. What is between the spindles is clamped on if the charger presents it, and else counts as a
+    /// core; then nobody is told that it is held, so that a charger that has it, too, keeps it.
     fn restart(&mut self, io: &mut Io) {
         io.forget();
         self.turns = 0.0;
-        self.holds = SPINDLES
+        self.holds = false;
+        let on_block = SPINDLES
             .into_iter()
             .all(|axis| ON_BLOCK.contains(&io.axes[axis].inputs.position));
-        self.go(if self.holds {
-            Step::Retract
-        } else {
-            Step::Home
+        let presented = io.is_on(self.places.presented);
+        self.go(match (on_block, presented) {
+            (true, true) => Step::Clamp,
+            (true, false) => Step::Retract,
+            (false, _) => Step::Home,
         });
     }
 
@@ -334,13 +337,15 @@ impl Lathe {
                 if !presented {
                     return (Nanos::ZERO, LIMIT);
                 }
-                spindles(axes, Mode::Close, CLAMP_TORQUE);
                 Some(Step::Clamp)
             }
-            Step::Clamp => clamped.then(|| {
-                self.holds = true;
-                Step::Clear
-            }),
+            Step::Clamp => {
+                spindles(axes, Mode::Close, CLAMP_TORQUE);
+                clamped.then(|| {
+                    self.holds = true;
+                    Step::Clear
+                })
+            }
             Step::Clear => {
                 if presented || !clear {
                     return (Nanos::ZERO, LIMIT);

@@ -6,11 +6,12 @@
 //! Both begin anew, from what the sensors show, whenever the link comes back, an axis has failed and is well again, a
 //! step has taken too long, or the simulation was started again.
 
-mod charger;
 mod io;
-mod lathe;
 mod options;
 mod report;
+
+pub mod charger;
+pub mod lathe;
 
 pub use charger::Charger;
 pub use lathe::Lathe;

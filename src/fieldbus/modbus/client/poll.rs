@@ -1,18 +1,17 @@
 //! The polling of a server's units, without I/O: time and bytes are handed in, bytes and the next deadline come
 //! out.
 
+mod identify;
+
 use crate::fieldbus::identity::Guard;
-use crate::fieldbus::modbus::identification::{self, READ_DEVICE_IDENTIFICATION};
+use crate::fieldbus::modbus::identification;
 use crate::fieldbus::modbus::mbap::{self, Telegram};
 use crate::fieldbus::modbus::rtu;
-use crate::fieldbus::modbus::{Exception, Function, Identification};
+use crate::fieldbus::modbus::{Exception, Identification};
 use crate::fieldbus::{BusError, Port};
 use crate::time::{Nanos, Pace};
 
-use super::query::{Block, Fault, Query, expect, length, queries};
-
-/// So many requests are made at most to learn who a device is.
-const IDENTIFYING: usize = 8;
+use super::query::{Block, Fault, Query, length, queries};
 
 /// A station, as it is polled.
 #[derive(Debug)]
@@ -451,65 +450,6 @@ impl<'a> Poll<'a> {
         self.lost = false;
         port.running(&format!("polling {}", self.peer));
         self.begin(station + 1, now, port)
-    }
-
-    fn ask_identity(
-        &mut self,
-        station: usize,
-        so_far: Identification,
-        requests: usize,
-        object: u8,
-        now: Nanos,
-    ) {
-        const BASIC: u8 = 1;
-        let what = Asked::Identity { so_far, requests };
-        self.ask(station, what, rtu::ADU_LIMIT, now, |_, pdu| {
-            let code = Function::DeviceIdentification.code();
-            pdu.extend_from_slice(&[code, READ_DEVICE_IDENTIFICATION, BASIC, object]);
-        });
-    }
-
-    /// Who the device is came, or that it does not say.
-    fn identified(
-        &mut self,
-        station: usize,
-        mut so_far: Identification,
-        requests: usize,
-        pdu: &[u8],
-        now: Nanos,
-        port: &mut Port,
-    ) -> Result<(), BusError> {
-        let said = expect(Function::DeviceIdentification, pdu);
-        match said.map(|data| so_far.take(data)) {
-            Ok(Some(Some(next))) if requests + 1 < IDENTIFYING => {
-                self.ask_identity(station, so_far, requests + 1, next, now);
-                return Ok(());
-            }
-            Ok(Some(_)) => {}
-            // A device that is busy or away says who it is another time.
-            Err(Fault::Refused(
-                exception @ (Exception::SERVER_DEVICE_BUSY
-                | Exception::GATEWAY_PATH_UNAVAILABLE
-                | Exception::GATEWAY_TARGET_FAILED),
-            )) => {
-                self.asking = Some(Asking {
-                    station,
-                    what: Asked::Identity { so_far, requests },
-                    limit: now,
-                });
-                return self.give_up(&format!("gave {exception}"), now, port);
-            }
-            Ok(None) | Err(_) => so_far = Identification::default(),
-        }
-        let mut identity = so_far.line();
-        if identity.is_empty() {
-            let unit = self.stations[station].unit;
-            identity = format!("modbus device at {}, unit {unit}", self.peer);
-        }
-        self.guards[station].meet(port, &identity);
-        self.stations[station].identified = true;
-        self.prepare(station);
-        self.begin(station, now, port)
     }
 
     /// Makes a request, whose PDU `write` appends, and to which an answer of so many bytes is expected.

@@ -1,16 +1,13 @@
 //! A client's side of one connection, without I/O: time and bytes are handed in, bytes and the next deadline come
 //! out.
 
-use std::fmt;
-
-use super::Refusal;
 use super::plan::{self, Image, Job, Piece, Way};
-use crate::fieldbus::BusError;
+use super::{End, News, Refusal, Terms};
+use crate::fieldbus::s7::Fault;
 use crate::fieldbus::s7::item::{self, Code, Data};
 use crate::fieldbus::s7::lists::{self, Identity};
 use crate::fieldbus::s7::pdu::{Draft, Kind, LONGEST, Pdu, SHORTEST, error, function};
 use crate::fieldbus::s7::transport::{self, Connect, Tpdu};
-use crate::fieldbus::s7::{Fault, Tsap};
 use crate::time::Nanos;
 
 /// This client's reference of every connection: there is one connection per socket.
@@ -24,63 +21,6 @@ const LIST_LIMIT: usize = 16_384;
 
 /// The lists that tell who a CPU is.
 const LISTS: [u16; 2] = [0x0011, 0x001C];
-
-/// What both ends of a connection, or this one, have agreed upon.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Terms {
-    /// This end.
-    pub calling: Tsap,
-    /// The CPU.
-    pub called: Tsap,
-    /// The longest unit that is asked for.
-    pub pdu: u16,
-    /// How long an answer may take.
-    pub patience: Nanos,
-    /// Whether the CPU is asked who it is.
-    pub asks_who: bool,
-}
-
-/// Why a connection ends.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum End {
-    /// The peer does not keep to the protocol.
-    Broken(Fault),
-    /// It does, and declined.
-    Refused(Refusal),
-    /// It does not answer.
-    Silent(Nanos),
-}
-
-impl End {
-    /// The error that ends the connection with `peer`.
-    pub fn into_error(self, peer: impl fmt::Display) -> BusError {
-        match self {
-            Self::Broken(fault @ Fault::Disconnected(_)) => {
-                BusError::Left(format!("{peer}: {fault}"))
-            }
-            Self::Broken(fault) => BusError::Protocol(format!("{peer}: {fault}")),
-            Self::Refused(refusal) => refusal.into_error(peer),
-            Self::Silent(patience) => BusError::Link(format!(
-                "{peer} has not answered for {patience}; see whether it still runs"
-            )),
-        }
-    }
-}
-
-impl From<Fault> for End {
-    fn from(fault: Fault) -> Self {
-        Self::Broken(fault)
-    }
-}
-
-/// What the owner of a dialog has to look at.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum News {
-    /// The connection stands, with units of this length at most; the CPU says who it is, or nothing.
-    Met(u16, Option<Identity>),
-    /// The images have been written, and read.
-    Done,
-}
 
 /// One connection with a CPU.
 ///

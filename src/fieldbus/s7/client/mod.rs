@@ -4,6 +4,7 @@ mod dialog;
 mod options;
 mod plan;
 mod refusal;
+mod terms;
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -16,10 +17,11 @@ use crate::time::{Nanos, Pace, Stop};
 
 use super::lists::Identity;
 
-pub use dialog::{Dialog, End, News, Terms};
+pub use dialog::Dialog;
 pub use options::ClientOptions;
 use plan::Image;
 pub use refusal::Refusal;
+pub use terms::{End, News, Terms};
 
 /// The bus cycle where a driver.cfg names none.
 const CYCLE: Nanos = Nanos::from_millis(10);

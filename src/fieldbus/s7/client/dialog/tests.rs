@@ -1,6 +1,6 @@
 use super::*;
-use crate::fieldbus::s7::hex;
 use crate::fieldbus::s7::item::Object;
+use crate::fieldbus::s7::{Tsap, hex};
 
 const PATIENCE: Nanos = Nanos::from_millis(100);
 

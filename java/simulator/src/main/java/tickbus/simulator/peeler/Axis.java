@@ -20,18 +20,6 @@ import tickbus.simulator.motion.Drive;
  * </ul>
  */
 final class Axis {
-    /** Why a command was not carried out, or not as it was meant. */
-    enum Refusal {
-        /** It was carried out. */
-        NONE,
-        /** The target lies beyond an end position: the axis stopped there. */
-        BEYOND_END,
-        /** Speed, acceleration or deceleration is not above 0. */
-        NO_SPEED,
-        /** This kind of axis has no such command. */
-        NO_SUCH_COMMAND
-    }
-
     private enum Mode { IDLE, POSITION, SPEED, STOPPING, TORQUE, TRACKING }
 
     /** Of what opens and closes, in millimetres per second. */
@@ -52,7 +40,7 @@ final class Axis {
     private boolean executed;
     private boolean inPosition;
     private boolean healthy = true;
-    private Refusal refusal = Refusal.NONE;
+    private AxisError error = AxisError.NONE;
     private int commands;
     /** Values of the command that is carried out, where they are needed later. */
     private double offset;
@@ -93,10 +81,6 @@ final class Axis {
         return healthy;
     }
 
-    Refusal refusal() {
-        return refusal;
-    }
-
     /** What it does, as a word: see {@link AxisStatus}. */
     int status() {
         return AxisStatus.READY.when(command.enable() && healthy) | AxisStatus.MOVING.when(velocity() != 0)
@@ -104,16 +88,21 @@ final class Axis {
                 | AxisStatus.HIGH_END.when(position() >= name.high())
                 | AxisStatus.JOGGING.when(mode == Mode.SPEED || mode == Mode.STOPPING)
                 | AxisStatus.TRACKING.when(mode == Mode.TRACKING) | AxisStatus.PRESSURE.when(pressed())
-                | AxisStatus.MET.when(met) | AxisStatus.REFUSED.when(refusal != Refusal.NONE);
+                | AxisStatus.MET.when(met) | AxisStatus.REFUSED.when(error != AxisError.NONE);
     }
 
     private boolean pressed() {
         return mode == Mode.TORQUE && direction != 0 && torque > 0;
     }
 
-    /** What is wrong, as a number: that of the refusal, or 4 while the axis has failed. */
+    /** What is wrong with it or with its last command, as a number. */
     int error() {
-        return healthy ? refusal.ordinal() : Refusal.values().length;
+        return (healthy ? error : AxisError.FAILED).ordinal();
+    }
+
+    /** Something went wrong with what it does; known until its next command. */
+    void blame(AxisError what) {
+        error = what;
     }
 
     /** Commands begun so far. */
@@ -166,6 +155,7 @@ final class Axis {
         boolean edge = command.execute() && !executed;
         executed = command.execute();
         if (!command.enable() || !healthy) {
+            error = edge ? AxisError.NOT_ENABLED : error;
             stop();
             return;
         }
@@ -194,7 +184,7 @@ final class Axis {
         commands++;
         inPosition = false;
         drive.jerk(command.jerk());
-        refusal = Refusal.NONE;
+        error = AxisError.NONE;
         if (name.kind() == AxisKind.TORQUE) {
             torque = command.torque();
             direction = command.tracking() == command.torqueControl() ? 0 : command.tracking() ? -1 : 1;
@@ -204,10 +194,10 @@ final class Axis {
         } else if (command.tracking() || command.torqueControl()) {
             track();
         } else if (!command.movable()) {
-            refuse(Refusal.NO_SPEED);
+            refuse(AxisError.NO_SPEED);
         } else {
             double target = Math.max(name.low(), Math.min(name.high(), command.target()));
-            refusal = target == command.target() ? Refusal.NONE : Refusal.BEYOND_END;
+            error = target == command.target() ? AxisError.NONE : AxisError.BEYOND_END;
             drive.moveTo(target, command.speed(), command.acceleration(), command.deceleration());
             mode = Mode.POSITION;
         }
@@ -215,7 +205,7 @@ final class Axis {
 
     private void turn() {
         if (!command.movable()) {
-            refuse(Refusal.NO_SPEED);
+            refuse(AxisError.NO_SPEED);
             return;
         }
         deceleration = command.deceleration();
@@ -231,7 +221,7 @@ final class Axis {
 
     private void track() {
         if (name.kind() != AxisKind.TRACKING || command.torqueControl()) {
-            refuse(Refusal.NO_SUCH_COMMAND);
+            refuse(AxisError.NO_SUCH_COMMAND);
             return;
         }
         drive.halt();
@@ -241,8 +231,8 @@ final class Axis {
         mode = Mode.TRACKING;
     }
 
-    private void refuse(Refusal why) {
-        refusal = why;
+    private void refuse(AxisError why) {
+        error = why;
         stop();
     }
 

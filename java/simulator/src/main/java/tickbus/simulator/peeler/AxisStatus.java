@@ -20,7 +20,7 @@ enum AxisStatus {
     PRESSURE,
     /** Something is in its way. */
     MET,
-    /** The last command was not carried out, or not to its end. */
+    /** The last command was not carried out, or not to its end: the error word says why. */
     REFUSED;
 
     int when(boolean so) {

@@ -155,6 +155,7 @@ final class Lathe {
         }
         if (revolutions == 0) {
             if (knife.position() < knifeBefore && knife.position() < held.front() - 1) {
+                knife.blame(AxisError.KNIFE_HIT);
                 scold("the knife ran into block " + block.number() + ", which stood still");
             }
             return;
@@ -170,6 +171,7 @@ final class Lathe {
         }
         double grip = GRIP * Math.min(axis(AxisName.SPINDLE_LEFT).pressure(), axis(AxisName.SPINDLE_RIGHT).pressure());
         if (held.load() * CUTTING_FORCE * knife.position() / MM_PER_M > grip) {
+            axis(AxisName.SPINDLE_ROTATION).blame(AxisError.SPIN_OUT);
             scold("spin-out: the spindles slipped in block " + block.number() + ", which they held too loosely");
         }
     }

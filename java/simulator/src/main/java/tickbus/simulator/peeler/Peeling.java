@@ -70,6 +70,11 @@ final class Peeling {
         return radius[SLICES / 2][sector((long) turned)];
     }
 
+    /** The surface in the middle of the block, so many sectors behind the one in front of the knife. */
+    double radius(int sectors) {
+        return radius[SLICES / 2][sector((long) turned + sectors)];
+    }
+
     /** The farthest point in front of the knife, over the length of the block. */
     double front() {
         double most = 0;

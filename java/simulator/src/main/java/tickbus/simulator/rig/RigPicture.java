@@ -4,6 +4,7 @@ import java.io.IOException;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.Locale;
+import tickbus.simulator.text.Svg;
 
 /**
  * Draws a rig as it stands as a self-contained SVG: both wheels seen from a little above, both lifts with their cups,

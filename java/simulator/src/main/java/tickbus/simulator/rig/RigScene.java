@@ -4,6 +4,7 @@ import java.util.ArrayList;
 import java.util.Comparator;
 import java.util.List;
 import java.util.Locale;
+import tickbus.simulator.text.Svg;
 
 /**
  * The machine itself in a picture.

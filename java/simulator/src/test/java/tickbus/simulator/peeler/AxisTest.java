@@ -68,7 +68,9 @@ class AxisTest {
         feeder.set("Enable", 1);
         feeder.ticks(100);
         assertEquals(650, feeder.axis().position());
+        assertEquals(AxisError.NOT_ENABLED.ordinal(), feeder.axis().error());
         feeder.position(100, 400, 1500);
+        assertEquals(0, feeder.axis().error());
         feeder.ticks(200);
         feeder.set("Enable", 0);
         feeder.tick();

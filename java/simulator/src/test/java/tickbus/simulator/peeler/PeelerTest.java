@@ -129,6 +129,7 @@ class PeelerTest {
         player.take();
         player.move(120, AxisName.KNIFE_CARRIAGE);
         assertEquals("the knife ran into block 2, which stood still", line.mishaps().get(1));
+        assertEquals(AxisError.KNIFE_HIT.ordinal(), player.get("knife carriage.Error"));
         player.press(false, 60, AxisName.SPINDLE_LEFT);
         assertEquals(1, line.lathe().wood().unpeeledCount());
     }
@@ -144,6 +145,7 @@ class PeelerTest {
         player.track(AxisName.KNIFE_CARRIAGE, 0, 3);
         player.until("a mishap", () -> !line.mishaps().isEmpty());
         assertTrue(line.mishaps().get(0).startsWith("spin-out: "), line.mishaps().toString());
+        assertEquals(AxisError.SPIN_OUT.ordinal(), player.get("spindle rotation.Error"));
     }
 
     @Test

@@ -22,6 +22,8 @@ final class LineWatcher {
     private final Timeline timeline;
     private final String[] links;
     private final boolean[] ran;
+    private String broken;
+    private long silentNanos;
     private final List<String> shapes = new ArrayList<>();
     private int centred;
     private int clamped;
@@ -54,6 +56,16 @@ final class LineWatcher {
     /** What a driver's line does, as it told last. */
     String link(int driver) {
         return links[driver] == null ? "not known yet" : links[driver];
+    }
+
+    /** How a link broke that had been running; null as long as none has. */
+    String broken() {
+        return broken;
+    }
+
+    /** For how long nothing had come over the link that broke. */
+    long silentNanos() {
+        return silentNanos;
     }
 
     /** Looks at everything once, after a tick. Fails if something happened on the line that must not. */
@@ -117,9 +129,9 @@ final class LineWatcher {
                 timeline.add(now, "link", driver.name() + ": " + state);
             }
             boolean runs = "running".equals(statistics.get("state"));
-            if (ran[i] && !runs) {
-                throw new DemoFailure("the link to the PLC of the " + driver.name().toLowerCase(Locale.ROOT)
-                        + " broke: " + state);
+            if (ran[i] && !runs && broken == null) {
+                broken = "the link to the PLC of the " + driver.name().toLowerCase(Locale.ROOT) + " broke: " + state;
+                silentNanos = (long) (simulator.probe(driver.id() + ":bus.age").getAsDouble() * 1e9);
             }
             ran[i] |= runs;
         }

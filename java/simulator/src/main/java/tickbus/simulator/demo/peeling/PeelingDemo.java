@@ -21,7 +21,10 @@ import tickbus.simulator.demo.HtmlPage;
 import tickbus.simulator.demo.Screen;
 import tickbus.simulator.demo.Stalls;
 import tickbus.simulator.demo.Timeline;
+import tickbus.simulator.peeler.AxisName;
+import tickbus.simulator.peeler.LathePicture;
 import tickbus.simulator.peeler.Peeler;
+import tickbus.simulator.peeler.Place;
 import tickbus.simulator.text.Durations;
 
 /**
@@ -42,6 +45,9 @@ public final class PeelingDemo {
     /** A demo that failed on a machine that stood still meanwhile says nothing, and is begun anew. */
     private static final int ATTEMPTS = 3;
 
+    /** Where the knife is when the picture of a block that is not round tells most. */
+    private static final double PICTURE_MM = 138;
+
     /** How long the news of a Ctrl-C may take to this process. */
     private static final long INTERRUPTION_MILLIS = 500;
 
@@ -60,6 +66,7 @@ public final class PeelingDemo {
     private final Stalls stalls;
     private LineWatcher watcher;
     private String tables = "";
+    private boolean pictured;
 
     private PeelingDemo(PeelingOptions options, PrintStream out, List<String> notes) {
         this.options = options;
@@ -175,11 +182,13 @@ public final class PeelingDemo {
                 stalls.silent(plcs.longestSilenceNanos());
                 rate.look(simulator.simulationNanos());
                 watcher.look();
+                lookAtLinks(plcs, guard);
                 if (simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
                     plcs.listen(simulator.simulationNanos(), timeline);
                     check(plcs, guard);
                 }
                 display.tick(watcher, rate);
+                picture();
             }
             if (line.wood().coreCount() < options.logs() && simulator.simulationNanos() >= options.timeLimitNanos()) {
                 throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
@@ -190,6 +199,35 @@ public final class PeelingDemo {
         });
         if (line.wood().coreCount() < options.logs()) {
             throw new DemoFailure("interrupted");
+        }
+    }
+
+    /** A link breaks because its PLC has died, which is told; or because this machine stood still, which does not count. */
+    private void lookAtLinks(Plcs plcs, ShutdownGuard guard) {
+        if (watcher.broken() == null) {
+            return;
+        }
+        if (guard.triggers(INTERRUPTION_MILLIS)) {
+            throw new DemoFailure("interrupted");
+        }
+        plcs.check();
+        stalls.silent(watcher.silentNanos());
+        throw new DemoFailure(watcher.broken());
+    }
+
+    /** A picture of a block that is being rounded, once. */
+    private void picture() {
+        boolean tells = line.blockAt(Place.LATHE) > 1 && !line.round()
+                && line.position(AxisName.KNIFE_CARRIAGE) < PICTURE_MM;
+        if (pictured || !tells) {
+            return;
+        }
+        pictured = true;
+        try {
+            Files.createDirectories(options.report().toAbsolutePath().getParent());
+            LathePicture.write(line, beside("lathe.svg"));
+        } catch (IOException e) {
+            throw new DemoFailure("the lathe's picture cannot be written: " + e);
         }
     }
 

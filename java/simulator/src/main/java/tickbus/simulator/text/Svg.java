@@ -1,0 +1,133 @@
+package tickbus.simulator.text;
+
+import java.util.Locale;
+
+/** Writes SVG elements, with numbers short enough to read and the same on every locale. */
+public final class Svg {
+    private final StringBuilder text = new StringBuilder(16_384);
+
+    /**
+     * Begins a document.
+     *
+     * @param width in pixels
+     * @param height in pixels
+     * @param title what it shows
+     */
+    public Svg(int width, int height, String title) {
+        line("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\""
+                        + " font-family=\"'Segoe UI', 'DejaVu Sans', Helvetica, Arial, sans-serif\" role=\"img\">",
+                width, height, width, height);
+        line("<title>%s</title>", escape(title));
+    }
+
+    /**
+     * Adds one element or any other line of markup, formatted.
+     *
+     * @param markup a format
+     * @param values its values
+     * @return this
+     */
+    public Svg line(String markup, Object... values) {
+        text.append(String.format(Locale.ROOT, markup, values)).append('\n');
+        return this;
+    }
+
+    /**
+     * Adds a rectangle.
+     *
+     * @param x left
+     * @param y top
+     * @param width of it
+     * @param height of it
+     * @param round radius of its corners
+     * @param look attributes
+     * @return this
+     */
+    public Svg rect(double x, double y, double width, double height, double round, String look) {
+        return line("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" rx=\"%.1f\" %s/>",
+                x, y, width, height, round, look);
+    }
+
+    /**
+     * Adds an ellipse.
+     *
+     * @param x its middle
+     * @param y its middle
+     * @param rx half width
+     * @param ry half height
+     * @param look attributes
+     * @return this
+     */
+    public Svg ellipse(double x, double y, double rx, double ry, String look) {
+        return line("<ellipse cx=\"%.1f\" cy=\"%.1f\" rx=\"%.1f\" ry=\"%.1f\" %s/>", x, y, rx, ry, look);
+    }
+
+    /**
+     * Adds a line.
+     *
+     * @param x1 from
+     * @param y1 from
+     * @param x2 to
+     * @param y2 to
+     * @param look attributes
+     * @return this
+     */
+    public Svg stroke(double x1, double y1, double x2, double y2, String look) {
+        return line("<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\" %s/>", x1, y1, x2, y2, look);
+    }
+
+    /**
+     * Adds a path.
+     *
+     * @param data as SVG writes it
+     * @param look attributes
+     * @return this
+     */
+    public Svg path(String data, String look) {
+        return line("<path d=\"%s\" %s/>", data, look);
+    }
+
+    /**
+     * Adds words.
+     *
+     * @param x left
+     * @param y base line
+     * @param look attributes
+     * @param words what they are
+     * @return this
+     */
+    public Svg text(double x, double y, String look, String words) {
+        return line("<text x=\"%.1f\" y=\"%.1f\" %s>%s</text>", x, y, look, escape(words));
+    }
+
+    /**
+     * Adds an upright cylinder: its round top and its side.
+     *
+     * @param x its middle
+     * @param top of its side
+     * @param bottom of its side
+     * @param rx half width
+     * @param ry half height of its top
+     * @param side attributes
+     * @param lid attributes of its top
+     * @return this
+     */
+    public Svg cylinder(double x, double top, double bottom, double rx, double ry, String side, String lid) {
+        path(String.format(Locale.ROOT, "M%.1f %.1fV%.1fA%.1f %.1f 0 0 0 %.1f %.1fV%.1fZ",
+                x - rx, top, bottom, rx, ry, x + rx, bottom, top), side);
+        return ellipse(x, top, rx, ry, lid);
+    }
+
+    /**
+     * The whole document.
+     *
+     * @return markup
+     */
+    public String document() {
+        return text + "</svg>\n";
+    }
+
+    private static String escape(String words) {
+        return words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;");
+    }
+}

@@ -188,13 +188,11 @@ impl ClientOptions {
         table: &SignalTable,
         signal: &Signal,
     ) -> Result<NodeName, NodeNameError> {
-        match self.nodes.get(&signal.name) {
-            Some(node) => Ok(node.name.clone()),
-            None => {
-                let station = &table.stations[signal.station].name;
-                self.node_pattern.node(&signal.name, station)
-            }
+        if let Some(node) = self.nodes.get(&signal.name) {
+            return Ok(node.name.clone());
         }
+        let station = &table.stations[signal.station].name;
+        self.node_pattern.node(&signal.name, station)
     }
 
     /// Reports nodes of signals that are not there, and nodes that several signals have.

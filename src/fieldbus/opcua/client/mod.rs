@@ -29,8 +29,9 @@ use session::Login;
 use talk::Talk;
 use writings::Writings;
 
-/// How long a server may take to name its endpoints, and again to open a session and have it looked at.
-const PATIENCE: Nanos = Nanos::from_secs(10);
+/// How long a server may take to name its endpoints, and again to open a session and have it looked at. Within
+/// that the crate gives up single requests after some seconds of real time.
+const PATIENCE: Nanos = Nanos::from_secs(60);
 
 /// A server that takes no bytes for so many times `max_age` is given up.
 const SILENCE: i64 = 4;

@@ -27,7 +27,7 @@ pub(super) type Login = Option<(String, String)>;
 pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Client {
     let patience = max_age
         .times(2)
-        .clamp(Nanos::from_secs(1), Nanos::from_secs(10));
+        .clamp(Nanos::from_secs(5), Nanos::from_secs(10));
     let heartbeat = Nanos(max_age.0 / 3).clamp(Nanos::from_millis(100), Nanos::from_secs(10));
     let secure = options.security != Policy::None;
     let folder = if secure {

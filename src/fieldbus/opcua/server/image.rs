@@ -195,7 +195,13 @@ impl Image {
         let raw = values::variant(data_type, bits);
         let time = DateTime::now();
         let value = |value: Variant| DataValue {
-            value: Some(value),
+            // None but the empty one where it is bad, so that the first good one is a change also for
+            // subscribers that are not told of a status alone.
+            value: Some(if status.is_bad() {
+                Variant::Empty
+            } else {
+                value
+            }),
             status: Some(status),
             source_timestamp: Some(time),
             server_timestamp: Some(time),

@@ -92,6 +92,7 @@ pub(crate) fn serve<S: Service>(
         ready: Vec::new(),
         deaf_until: None,
         told: false,
+        gone: None,
     };
     let limit = server.limits.telegram;
     assert!(limit <= BUFFER, "a telegram fits into one read");
@@ -122,6 +123,9 @@ struct Server<'a, S: Service> {
     deaf_until: Option<Nanos>,
     /// Whether the log knows that clients are turned away.
     told: bool,
+    /// When and why the last one that spoke took leave, while it may yet come back: many a client connects anew
+    /// for each request, and its line is no broken one.
+    gone: Option<(Nanos, BusError)>,
 }
 
 /// The clients, each at a place of its own; places are used again.
@@ -226,6 +230,10 @@ impl<S: Service> Server<'_, S> {
         if self.deaf_until.is_some_and(|until| now >= until) {
             self.listen(true).map_err(|error| no_wait(&error))?;
         }
+        let max_age = port.max_age();
+        if let Some((_, error)) = self.gone.take_if(|(since, _)| now - *since >= max_age) {
+            port.lost(&error, &self.waiting);
+        }
         port.observe(now);
         Ok(())
     }
@@ -240,6 +248,9 @@ impl<S: Service> Server<'_, S> {
                 // One more than the limit is stale.
                 deadline = deadline.min(now + (port.max_age() - silence) + Nanos(1));
             }
+        }
+        if let Some((since, _)) = self.gone {
+            deadline = deadline.min(since + port.max_age());
         }
         if self.clients.awaited > 0 {
             let waits = self.clients.iter();
@@ -303,6 +314,7 @@ impl<S: Service> Server<'_, S> {
             client.waits_since = client.waits_since.map(|_| now);
             if !client.speaks {
                 client.speaks = true;
+                self.gone = None;
                 self.clients.speakers += 1;
                 let peer = client.peer;
                 port.running(&match self.clients.speakers {
@@ -428,7 +440,7 @@ impl<S: Service> Server<'_, S> {
         self.told = false;
         port.count("clients.accepted");
         self.tell(port);
-        if self.clients.speakers == 0 {
+        if self.clients.speakers == 0 && self.gone.is_none() {
             port.opening(&format!(
                 "{peer} has connected; waiting for its first telegram"
             ));
@@ -464,7 +476,15 @@ impl<S: Service> Server<'_, S> {
             port.count("clients.dropped");
         }
         self.tell(port);
-        if self.clients.speakers == 0 && (speakers > 0 || self.clients.count == 0) {
+        let is_left = matches!(error, BusError::Left(_));
+        let nobody = self.clients.speakers == 0;
+        if nobody && speakers > 0 && is_left {
+            self.gone = Some((port.clock().now(), error.clone()));
+        } else if nobody
+            && (speakers > 0 || self.clients.count == 0)
+            && !(is_left && self.gone.is_some())
+        {
+            self.gone = None;
             port.lost(error, &self.waiting);
         } else {
             log::info!("{error}; {} clients are served on", self.clients.count);

@@ -58,6 +58,8 @@ impl Service for Echo {
     }
 }
 
+const MAX_AGE: Nanos = Nanos::from_secs(3600);
+
 /// A server on a thread, on a clock that stands still.
 struct Running {
     clock: Arc<Manual>,
@@ -90,7 +92,7 @@ impl Running {
     fn new() -> Self {
         let clock = Manual::new();
         let stop = Stop::new();
-        let status = LinkStatus::new("test", Nanos::from_secs(3600));
+        let status = LinkStatus::new("test", MAX_AGE);
         let (_, end) = image(Vec::new());
         let mut port = Port::new(
             end,
@@ -201,12 +203,30 @@ fn the_line_is_running_until_the_last_one_that_spoke_leaves() {
     server.until(|server| server.fact("clients").as_deref() == Some("1"));
     assert_eq!(server.status.state(), LinkState::Running);
     drop(two);
+    server.until(|server| server.fact("clients").as_deref() == Some("0"));
+    assert_eq!(
+        server.status.state(),
+        LinkState::Running,
+        "it may come back"
+    );
+    server.pass(MAX_AGE);
     server.until(|server| server.status.state() == LinkState::Opening);
     let reason = server.status.link().reason;
     assert!(
         reason.contains("closed the connection; listening on"),
         "{reason}"
     );
+}
+
+#[test]
+fn a_client_that_connects_for_each_telegram_keeps_the_line_running() {
+    let server = Running::new();
+    for count in 1..=50 {
+        ask(&mut server.client(), &[1, count]);
+        server.until(|server| server.fact("clients").as_deref() == Some("0"));
+    }
+    assert_eq!(server.fact("link.running").as_deref(), Some("1"));
+    assert_eq!(server.fact("cause.left"), None);
 }
 
 #[test]

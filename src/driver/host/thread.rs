@@ -112,9 +112,8 @@ impl HostThread {
             let scanning = Arc::clone(&scanning);
             move || {
                 let _end: Sender<()> = end;
-                let scans = || {
-                    scan_until_stopped(&mut cpu, (interval, watchdog), &*clock, &stop, &scanning)
-                };
+                let times = (interval, watchdog);
+                let scans = || scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
                 let result = catch_unwind(AssertUnwindSafe(scans));
                 scanning.set(None);
                 if let Err(panic) = result {

@@ -27,7 +27,7 @@ impl Line<'_> {
                 self.poll.wrote(telegram.len());
                 return rtu::parse(&telegram).expect("a telegram").1.to_vec();
             }
-            self.now = self.now + Nanos::from_millis(1);
+            self.now += Nanos::from_millis(1);
         }
         panic!("nothing is asked");
     }

@@ -67,7 +67,7 @@ impl<'a> Telegram<'a> {
     }
 }
 
-/// Appends a telegram, whose PDU `write` appends.
+/// Appends a telegram, whose PDU `write` appends; nothing if it appends nothing.
 pub fn append<R>(
     transaction: u16,
     unit: u8,
@@ -78,6 +78,10 @@ pub fn append<R>(
     let [high, low] = transaction.to_be_bytes();
     bytes.extend_from_slice(&[high, low, 0, 0, 0, 0, unit]);
     let result = write(bytes);
+    if bytes.len() == begin + HEADER {
+        bytes.truncate(begin);
+        return result;
+    }
     let length = u16::try_from(bytes.len() - begin - 6).expect("a PDU is short");
     bytes[begin + 4..begin + 6].copy_from_slice(&length.to_be_bytes());
     result
@@ -90,6 +94,7 @@ mod tests {
     #[test]
     fn a_telegram_is_read_as_it_is_written_and_every_truncation_waits() {
         let mut bytes = Vec::new();
+        append(0x1233, 7, &mut bytes, |_| ());
         append(0x1234, 7, &mut bytes, |pdu| pdu.extend([3, 0, 0, 0, 1]));
         assert_eq!(
             bytes,

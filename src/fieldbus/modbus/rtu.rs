@@ -48,11 +48,15 @@ pub fn checksum(bytes: &[u8]) -> [u8; 2] {
     crc.to_le_bytes()
 }
 
-/// Appends a telegram, whose PDU `write` appends.
+/// Appends a telegram, whose PDU `write` appends; nothing if it appends nothing.
 pub fn append<R>(unit: u8, bytes: &mut Vec<u8>, write: impl FnOnce(&mut Vec<u8>) -> R) -> R {
     let begin = bytes.len();
     bytes.push(unit);
     let result = write(bytes);
+    if bytes.len() == begin + 1 {
+        bytes.truncate(begin);
+        return result;
+    }
     let checksum = checksum(&bytes[begin..]);
     bytes.extend_from_slice(&checksum);
     result

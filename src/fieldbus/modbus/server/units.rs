@@ -97,6 +97,9 @@ impl UnitSet {
         let unit = &mut self.units[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
+        // An injected fault may swallow what goes out: then the answer is lost on its way.
+        let is_lost = !writes_only && !port.sends_of(station..station + 1, now);
+        let before = reply.len();
         let sends = if writes_only {
             &unit.shown
         } else {
@@ -119,6 +122,9 @@ impl UnitSet {
             read,
             refused,
         } = answer(pdu, &mut tables, &self.identification, reply);
+        if is_lost {
+            reply.truncate(before);
+        }
         match (refused, wrote) {
             (Some(exception), _) => {
                 port.count(counted(exception));
@@ -138,7 +144,7 @@ impl UnitSet {
             (None, None) if writes[station] || !unit.has_writer => port.touch(station, now),
             (None, None) => {}
         }
-        read.map(|bits| Carried {
+        read.filter(|_| !is_lost).map(|bits| Carried {
             station,
             generation: unit.generation,
             bits,

@@ -264,9 +264,12 @@ impl Connection<'_> {
 
     /// A cycle is complete.
     fn done(&mut self, now: Nanos, port: &mut Port) {
+        let asked = self.bus.guard.may_write() || !self.bus.frames.read.is_empty();
         for station in 0..port.stations() {
             let frame = self.dialog.frame_read(station);
-            if frame.is_empty() {
+            if !asked {
+                // Nothing was read, and nothing may be written: the CPU has not been heard of.
+            } else if frame.is_empty() {
                 port.touch(station, now);
             } else {
                 port.received(station, now, frame);

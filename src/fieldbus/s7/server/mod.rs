@@ -258,7 +258,8 @@ impl Jobs<'_> {
         }
         if !station.taken {
             station.taken = true;
-            self.lost |= !self.port.sends(self.now);
+            let only = place.station..place.station + 1;
+            self.lost |= !self.port.sends_of(only, self.now);
             let frame = self.port.outgoing(place.station, self.now);
             station.outgoing.copy_from_slice(frame);
         }

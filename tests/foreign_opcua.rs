@@ -10,21 +10,18 @@
 
 mod conformance;
 mod foreign;
+#[path = "peers/opcua.rs"]
+mod opcua;
 #[path = "peers/pcap.rs"]
 mod pcap;
 
-use std::io::{BufRead, BufReader, Write};
-use std::net::{SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Stdio};
-use std::sync::Arc;
 
-use conformance::rig::{End, await_that};
 use foreign::Absent;
+use opcua::{Device, IDENTITY, Peer, free_address, nodes, plc};
 use serde_json::{Value, json};
 use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;
-use tickbus::time::Monotonic;
 
 fn main() -> std::process::ExitCode {
     foreign::main(&[
@@ -64,213 +61,6 @@ fn main() -> std::process::ExitCode {
             no_anonymous,
         ),
     ])
-}
-
-const SIGNALS: &str = r#"
-[[signal]]
-name    = "run"
-address = "%QX0.0"
-latch   = "rising"
-
-[[signal]]
-name      = "speed"
-address   = "%QW2"
-type      = "INT"
-fail_safe = -1
-
-[[signal]]
-name    = "torque"
-address = "%QD4"
-type    = "REAL"
-
-[[signal]]
-name    = "sensor"
-address = "%IX0.0"
-latch   = "rising"
-
-[[signal]]
-name    = "position"
-address = "%IW2"
-type    = "INT"
-unit    = "mm"
-scale   = { raw = [0, 27648], value = [0.0, 276.48] }
-
-[[signal]]
-name    = "temperature"
-address = "%ID4"
-type    = "REAL"
-unit    = "°C"
-
-[[signal]]
-name    = "count"
-address = "%IL8"
-type    = "ULINT"
-"#;
-
-/// A program of Python, spoken to by lines.
-struct Peer {
-    child: Child,
-    stdin: Option<ChildStdin>,
-    stdout: BufReader<ChildStdout>,
-}
-
-impl Peer {
-    /// Starts it; gives the first line that it says, too.
-    fn start(script: &str, asked: &Value) -> Result<(Self, String), Absent> {
-        let script = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("tests/peers")
-            .join(script);
-        let mut child = foreign::python_with("main", &["asyncua"])?
-            .arg(script)
-            .arg(asked.to_string())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("it starts");
-        let stdin = child.stdin.take();
-        let mut stdout = BufReader::new(child.stdout.take().expect("a pipe"));
-        let mut line = String::new();
-        stdout.read_line(&mut line).expect("it speaks");
-        let peer = Self {
-            child,
-            stdin,
-            stdout,
-        };
-        Ok((peer, line.trim().to_owned()))
-    }
-
-    fn ready(script: &str, asked: &Value) -> Result<Self, Absent> {
-        let (peer, line) = Self::start(script, asked)?;
-        assert_eq!(line, "ready", "{script} {asked}");
-        Ok(peer)
-    }
-
-    #[track_caller]
-    fn ask(&mut self, line: &Value) -> Value {
-        let stdin = self.stdin.as_mut().expect("it lives");
-        writeln!(stdin, "{line}").expect("it listens");
-        let mut answer = String::new();
-        self.stdout.read_line(&mut answer).expect("it speaks");
-        serde_json::from_str(&answer).unwrap_or_else(|why| panic!("{line}: {answer}: {why}"))
-    }
-}
-
-impl Drop for Peer {
-    fn drop(&mut self) {
-        // The end of its stdin is the end of it.
-        drop(self.stdin.take());
-        let _ = self.child.wait();
-    }
-}
-
-/// A free port of this machine.
-fn free_address() -> SocketAddr {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-    listener.local_addr().expect("it is bound")
-}
-
-/// The nodes of a PLC for `SIGNALS`.
-fn nodes() -> Value {
-    json!({
-        "run": ["Boolean", false], "speed": ["Int16", 7], "torque": ["Float", 1.5],
-        "sensor": ["Boolean", false], "position": ["Int16", 0], "temperature": ["Float", 0.0],
-        "count": ["UInt64", 0],
-    })
-}
-
-/// An asyncua server with those nodes.
-fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
-    let mut asked = json!({
-        "url": format!("opc.tcp://{address}"), "security": ["None"], "nodes": nodes(),
-    });
-    for (key, value) in more.as_object().into_iter().flatten() {
-        asked[key] = value.clone();
-    }
-    Peer::ready("opcua_server.py", &asked)
-}
-
-/// The identity of that server.
-const IDENTITY: &str = "urn:test:plc ACME PLC";
-
-struct Device {
-    end: End,
-    folder: tempfile::TempDir,
-}
-
-impl Device {
-    fn open(kind: &str, keys: &str) -> Self {
-        Self::open_in(tempfile::tempdir().expect("a folder"), kind, keys)
-    }
-
-    fn open_in(folder: tempfile::TempDir, kind: &str, keys: &str) -> Self {
-        let clock: Arc<Monotonic> = Monotonic::shared().expect("a thread");
-        let pki = folder.path().join("pki");
-        let text = format!(
-            "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"2s\"\n\
-             reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{SIGNALS}",
-            pki.display().to_string()
-        );
-        let end = End::open(&text, &clock);
-        Self { end, folder }
-    }
-
-    fn client(address: SocketAddr, keys: &str) -> Self {
-        Self::open(
-            "opcua-client",
-            &format!("url = \"opc.tcp://{address}\"\n{keys}"),
-        )
-    }
-
-    /// A client without protection that may write.
-    fn plain(address: SocketAddr) -> Self {
-        Self::client(
-            address,
-            &format!("security = \"None\"\nwrite_to = \"{IDENTITY}\""),
-        )
-    }
-
-    fn pki(&self) -> PathBuf {
-        self.folder.path().join("pki")
-    }
-
-    #[track_caller]
-    fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
-        let mut reason = String::new();
-        let waited = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            await_that(what, || {
-                self.end.tick();
-                reason = self.end.link().reason;
-                std::thread::sleep(std::time::Duration::from_millis(1));
-                done(&mut self.end)
-            });
-        }));
-        assert!(waited.is_ok(), "in vain until {what}: {reason}");
-    }
-
-    #[track_caller]
-    fn until_reason(&mut self, words: &str) -> String {
-        let mut all = String::new();
-        self.until(words, |end| {
-            let reason = end.link().reason;
-            let said = reason.contains(words);
-            if said {
-                all = reason;
-            }
-            said
-        });
-        all
-    }
-
-    fn address(&self) -> SocketAddr {
-        let mut address = None;
-        await_that("it listens", || {
-            let text = self.end.driver.statistics();
-            let line = text.lines().find_map(|line| line.strip_prefix("address="));
-            address = line.map(|line| line.parse().expect("an address"));
-            address.is_some()
-        });
-        address.expect("it was waited for")
-    }
 }
 
 fn reads_and_writes() -> Result<(), Absent> {

@@ -9,7 +9,7 @@ use crate::fieldbus::Role;
 use crate::plc::Axes;
 use crate::time::Nanos;
 
-/// Stand in for the machine: every [[axis]] of FILE is an ideal drive that follows its commands.
+/// Stand in for the machine: every axis that FILE describes is an ideal drive that follows its commands.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The driver.cfg of the device.

@@ -1,6 +1,6 @@
 //! Modbus: over TCP and, as RTU, over a serial line; as server and as client.
 //!
-//! The codec knows no port and no image: [`answer`] is a server's half, a request in and an answer out against
+//! The codec knows no port and no image: [`answer()`] is a server's half, a request in and an answer out against
 //! [`Tables`]; [`Query`] is a client's half. [`mbap`] and [`rtu`] put telegrams around it.
 
 mod answer;

@@ -137,11 +137,15 @@ mod watch {
     use rustix::fd::OwnedFd;
     use rustix::io::Errno;
 
+    use rustix::event::{PollFd, PollFlags};
+
     use super::{AsFd, Duration, Interest, Ready, io};
-    use crate::os::poll::timespec;
+    use crate::os::poll::{poll_once, timespec};
 
     /// So many sockets are told at most by one wait; the others by the next.
     const MOST: usize = 256;
+
+    const MILLISECOND: Duration = Duration::from_millis(1);
 
     pub(super) struct Watch {
         epoll: OwnedFd,
@@ -201,6 +205,20 @@ mod watch {
             patience: Option<Duration>,
             ready: &mut Vec<Ready>,
         ) -> io::Result<()> {
+            let patience = match patience {
+                // The system counts whole milliseconds here. So a wait ends early rather than late, and what is
+                // left of it is waited for by the call that counts finer.
+                Some(span) if span < MILLISECOND && !span.is_zero() => {
+                    let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
+                    poll_once(&mut epoll, Some(span))?;
+                    Some(Duration::ZERO)
+                }
+                Some(span) => {
+                    let rest = Duration::from_nanos(u64::from(span.subsec_nanos() % 1_000_000));
+                    Some(span - rest)
+                }
+                None => None,
+            };
             let patience = patience.map(timespec);
             self.events.clear();
             match epoll::wait(

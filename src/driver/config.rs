@@ -6,7 +6,7 @@ use super::layout;
 use crate::axis::{self, Axis};
 use crate::config::{Collector, Mistakes, Table, Value, load_text, read_text};
 use crate::faults::{self, Fault};
-use crate::fieldbus::{Options, Role};
+use crate::fieldbus::{At, Options, Role};
 use crate::record;
 use crate::signal::{Addressing, SignalTable, Station};
 use crate::time::Nanos;
@@ -212,6 +212,11 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
         .unwrap_or_default();
     let bus = fieldbus.as_mut().and_then(|fieldbus| fieldbus.bus.as_mut());
     let table = layout::lay_out(sections, declared, sizes, bus);
+    if let Some(fieldbus) = &mut fieldbus
+        && let (Some(at), Some(bus), Some(table)) = (&fieldbus.at, &mut fieldbus.bus, &table)
+    {
+        bus.place_signals(&At::read(at, table), table);
+    }
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
         bus.fit(table, &axes, root.collector());
@@ -304,6 +309,8 @@ struct FieldbusTable<'a> {
     is_for_both: bool,
     timing: Option<Timing>,
     sizes: layout::Sizes<'a>,
+    /// `[fieldbus.at]`, to be read when the signals are.
+    at: Option<Value<'a>>,
     bus: Option<Options>,
 }
 
@@ -312,6 +319,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_
     let role = table.take("role");
     let timing = read_timing(&mut table);
     let sizes = layout::Sizes::take(&mut table);
+    let at = table.take("at");
     let roles = Role::ALL.map(|role| (role.name(), role));
     let stated = role
         .as_ref()
@@ -350,6 +358,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_
         is_for_both: stated.is_none(),
         timing,
         sizes,
+        at,
         bus,
     }
 }

@@ -1,5 +1,6 @@
 //! The bus traits, and one room per bus.
 
+mod at;
 mod bus;
 mod changes;
 mod dead_band;
@@ -18,6 +19,7 @@ pub mod s7;
 pub mod socket;
 pub mod tcp;
 
+pub use at::At;
 pub use bus::{Bus, BusError, Free, Stepped};
 pub use changes::ChangeEvents;
 pub use dead_band::DeadBands;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::tcp::Address;
-use super::{Role, loopback, modbus, opcua, plugin, s7, socket};
+use super::{At, Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::{Signal, SignalTable, Station};
@@ -151,6 +151,18 @@ impl Options {
             Self::ModbusServer(options) => options.place(signal),
             Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
             _ => String::new(),
+        }
+    }
+
+    /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
+    /// are none, and that the bus has no addresses of its own.
+    pub fn place_signals(&mut self, lines: &[At<'_>], _table: &SignalTable) {
+        let kind = self.kind();
+        if let Some(first) = lines.first() {
+            first.wrong(
+                format!("the bus \"{kind}\" has no addresses of its own"),
+                "remove [fieldbus.at]; each signal lies where its \"address\" says",
+            );
         }
     }
 

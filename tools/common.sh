@@ -70,6 +70,26 @@ tickbus_command() {
     esac
 }
 
+# Where tools/build puts the tickbus command without its debug tables, and the tables.
+STRIPPED=target/stripped
+DEBUG_TABLES=target/debug-tables
+
+# without_debug_tables FILE COPY: a copy without debug tables, which are half of it and more; where the system has the
+# tools, the tables go to a file of their own, under the copy's name with .debug, and debuggers find them by that.
+without_debug_tables() {
+    mkdir -p "$(dirname "$2")" "$DEBUG_TABLES"
+    local tables
+    tables=$DEBUG_TABLES/$(basename "$2").debug
+    if have objcopy; then
+        objcopy --only-keep-debug "$1" "$tables"
+        objcopy --strip-debug --add-gnu-debuglink="$tables" "$1" "$2"
+    elif have strip; then
+        strip -S -o "$2" "$1"
+    else
+        cp "$1" "$2"
+    fi
+}
+
 # Maven, without its chatter and its colours, on the Java reactor.
 maven() {
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
@@ -85,7 +105,7 @@ assemble() {
     mkdir -p "$folder/DeviceDriver" "$folder/simulator/peeler"
     cp plc/peeler/*.cfg "$folder/simulator/peeler/"
     # The command is there for plug-ins in helper processes.
-    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "target/release/$(tickbus_command)" \
+    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$STRIPPED/$(tickbus_command)" \
         "$folder/DeviceDriver/"
     cp java/simulator/rig.table java/simulator/peeler.table "java/simulator/target/simulator-$release.jar" \
         "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"

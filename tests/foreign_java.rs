@@ -1,0 +1,386 @@
+//! The servers with clients of Apache PLC4X and Eclipse Milo, and `opcua-client` with a server of Milo: programs that
+//! others wrote, in Java.
+#![allow(
+    missing_docs,
+    clippy::float_cmp,
+    reason = "tests; the values are small whole numbers"
+)]
+
+mod foreign;
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::{SocketAddr, TcpListener};
+use std::path::Path;
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use foreign::Absent;
+use tickbus::driver::{Config, Driver};
+use tickbus::signal::Slot;
+use tickbus::time::{Monotonic, Nanos};
+
+fn main() -> ExitCode {
+    foreign::main(&[
+        ("plc4x_drives_the_modbus_server", plc4x_over_modbus),
+        (
+            "plc4x_with_its_defaults_drives_the_s7_server",
+            plc4x_over_s7,
+        ),
+        ("plc4x_drives_the_opcua_server", plc4x_over_opcua),
+        ("milo_drives_the_opcua_server", milo_as_client),
+        ("opcua_client_drives_a_server_of_milo", milo_as_server),
+    ])
+}
+
+/// A JVM that has just started pauses longer than the 250 ms after which data are stale.
+const SIGNALS: &str = r#"
+[[signal]]
+name    = "run"
+address = "%QX0.0"
+
+[[signal]]
+name      = "speed"
+address   = "%QW2"
+type      = "INT"
+fail_safe = -1
+
+[[signal]]
+name    = "torque"
+address = "%QD4"
+type    = "REAL"
+
+[[signal]]
+name    = "sensor"
+address = "%IX0.0"
+
+[[signal]]
+name    = "position"
+address = "%IW2"
+type    = "INT"
+
+[[signal]]
+name    = "pressure"
+address = "%ID4"
+type    = "REAL"
+"#;
+
+/// The machine: a driver on the system's clock.
+struct Machine {
+    driver: Driver,
+    slots: Vec<Slot>,
+}
+
+impl Machine {
+    fn open(fieldbus: &str) -> Self {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\n{fieldbus}\nmax_age = \"3s\"\nreconnect = [\"50ms\"]\n{SIGNALS}"
+        );
+        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let clock = Monotonic::shared().expect("a thread");
+        let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+        let slots = driver.initial_slots();
+        Self { driver, slots }
+    }
+
+    fn index(&self, name: &str) -> usize {
+        let found = self.driver.config().table.position(name);
+        found.unwrap_or_else(|| panic!("no signal {name}"))
+    }
+
+    fn get(&self, name: &str) -> f64 {
+        self.slots[self.index(name)].real()
+    }
+
+    fn set(&mut self, name: &str, value: f64) {
+        let index = self.index(name);
+        self.slots[index] = Slot::from_real(value);
+    }
+
+    fn tick(&mut self) {
+        self.driver.exchange(Nanos::ZERO, &mut self.slots);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+
+    /// Ticks until `done` gives something.
+    #[track_caller]
+    fn until<T>(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> Option<T>) -> T {
+        let limit = Instant::now() + Duration::from_secs(60);
+        loop {
+            if let Some(found) = done(self) {
+                return found;
+            }
+            let reason = self.driver.link().reason;
+            assert!(
+                Instant::now() < limit,
+                "waited in vain until {what}: {reason}"
+            );
+            self.tick();
+        }
+    }
+
+    #[track_caller]
+    fn until_value(&mut self, name: &str, value: f64) {
+        self.until(&format!("{name} is {value}"), |machine| {
+            (machine.get(name) == value).then_some(())
+        });
+    }
+
+    /// Where it listens.
+    fn address(&mut self) -> SocketAddr {
+        self.until("it listens", |machine| {
+            let text = machine.driver.statistics();
+            let line = text.lines().find_map(|line| line.strip_prefix("address="));
+            line.map(|line| line.parse().expect("an address"))
+        })
+    }
+}
+
+/// A program of tests/peers/java, spoken to by lines.
+struct Peer {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    lines: Receiver<String>,
+}
+
+impl Peer {
+    /// Starts it; the machine ticks until it is ready.
+    #[track_caller]
+    fn start(machine: &mut Machine, class: &str, arguments: &[&str]) -> Result<Self, Absent> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/peers/java");
+        if !folder.join("java-peers-0.jar").exists() {
+            return Err(Absent(
+                "PLC4X and Milo are not there; run tools/peers".to_owned(),
+            ));
+        }
+        let separator = if cfg!(windows) { ";" } else { ":" };
+        let jars = format!("java-peers-0.jar{separator}lib/*");
+        let mut child = Command::new("java")
+            .args(["-cp", &jars, &format!("peers.{class}")])
+            .args(arguments)
+            .current_dir(&folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(|why| Absent(format!("there is no java: {why}")))?;
+        let stdin = child.stdin.take();
+        let stdout: ChildStdout = child.stdout.take().expect("a pipe");
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(stdout).lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        let peer = Self {
+            child,
+            stdin,
+            lines,
+        };
+        let said = machine.until("the peer is ready", |_| peer.lines.try_recv().ok());
+        assert_eq!(said, "ready", "{class} {arguments:?}");
+        Ok(peer)
+    }
+
+    /// Asks, and lets the machine tick until the answer is there.
+    #[track_caller]
+    fn ask(&mut self, machine: &mut Machine, words: &[&str]) -> String {
+        let stdin = self.stdin.as_mut().expect("it lives");
+        writeln!(stdin, "{}", words.join("\t")).expect("it listens");
+        machine.until(&format!("{words:?} is answered"), |_| {
+            self.lines.try_recv().ok()
+        })
+    }
+
+    /// Asks until the answer is `right`.
+    #[track_caller]
+    fn ask_until(&mut self, machine: &mut Machine, words: &[&str], right: &str) {
+        let mut last = String::new();
+        let limit = Instant::now() + Duration::from_secs(20);
+        while last != right {
+            assert!(Instant::now() < limit, "{words:?}: {last}, not {right}");
+            last = self.ask(machine, words);
+        }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        // The end of its stdin is the end of it; one that hangs must not hang the test.
+        drop(self.stdin.take());
+        let limit = Instant::now() + Duration::from_secs(10);
+        while Instant::now() < limit {
+            if matches!(self.child.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Where a client of PLC4X finds the signals, and what it calls a truth.
+struct Tags<'a> {
+    run: &'a str,
+    speed: &'a str,
+    torque: &'a str,
+    sensor: &'a str,
+    position: &'a str,
+    pressure: &'a str,
+}
+
+/// Values in both directions, by a client of PLC4X.
+fn plc4x(machine: &mut Machine, url: &str, tags: &Tags<'_>) -> Result<(), Absent> {
+    let mut plc = Peer::start(machine, "Plc4xClient", &[url])?;
+    for (tag, name, text, value) in [
+        (tags.run, "run", "true", 1.0),
+        (tags.speed, "speed", "-1234", -1234.0),
+        (tags.torque, "torque", "0.25", 0.25),
+    ] {
+        assert_eq!(plc.ask(machine, &["write", tag, text]), "OK", "{tag}");
+        machine.until_value(name, value);
+    }
+    machine.set("sensor", 1.0);
+    machine.set("position", -7.0);
+    machine.set("pressure", 1.5);
+    let asked = ["read", tags.sensor, tags.position, tags.pressure];
+    plc.ask_until(machine, &asked, "true\t-7\t1.5");
+    Ok(())
+}
+
+fn plc4x_over_modbus() -> Result<(), Absent> {
+    let mut machine = Machine::open("kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"");
+    let address = machine.address();
+    // PLC4X counts from 1: register 2 is bytes 2 and 3.
+    let tags = Tags {
+        run: "coil:1",
+        speed: "holding-register:2:INT",
+        torque: "holding-register:3:REAL",
+        sensor: "discrete-input:1",
+        position: "input-register:2:INT",
+        pressure: "input-register:3:REAL",
+    };
+    plc4x(&mut machine, &format!("modbus-tcp:tcp://{address}"), &tags)
+}
+
+fn plc4x_over_s7() -> Result<(), Absent> {
+    let mut machine = Machine::open("kind = \"s7-server\"\naddress = \"127.0.0.1:0\"");
+    let address = machine.address();
+    let tags = Tags {
+        run: "%Q0.0:BOOL",
+        speed: "%QW2:INT",
+        torque: "%QD4:REAL",
+        sensor: "%I0.0:BOOL",
+        position: "%IW2:INT",
+        pressure: "%ID4:REAL",
+    };
+    let url = format!("s7://{}:{}", address.ip(), address.port());
+    plc4x(&mut machine, &url, &tags)
+}
+
+const OPCUA_SERVER: &str = "kind = \"opcua-server\"\naddress = \"127.0.0.1:0\"\nsecurity = \"None\"\n\
+                            anonymous = true\ncycle = \"5ms\"";
+
+fn plc4x_over_opcua() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut machine = Machine::open(&format!(
+        "{OPCUA_SERVER}\npki = {:?}",
+        folder.path().display().to_string()
+    ));
+    let address = machine.address();
+    let tags = Tags {
+        run: "ns=2;s=run;BOOL",
+        speed: "ns=2;s=speed;INT",
+        torque: "ns=2;s=torque;REAL",
+        sensor: "ns=2;s=sensor;BOOL",
+        position: "ns=2;s=position;INT",
+        pressure: "ns=2;s=pressure;REAL",
+    };
+    let url = format!("opcua:tcp://{address}?discovery=true");
+    plc4x(&mut machine, &url, &tags)
+}
+
+fn milo_as_client() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut machine = Machine::open(&format!(
+        "{OPCUA_SERVER}\npki = {:?}",
+        folder.path().display().to_string()
+    ));
+    let url = format!("opc.tcp://{}", machine.address());
+    let mut milo = Peer::start(&mut machine, "MiloClient", &[&url])?;
+    let speed = "ns=2;s=speed";
+    for (value, text) in [(-1234.0, "-1234"), (77.0, "77")] {
+        let written = milo.ask(&mut machine, &["write", speed, "Int16", text]);
+        assert_eq!(written, "good");
+        machine.until_value("speed", value);
+        // Write and verify: a value that was just accepted is good at once.
+        assert_eq!(milo.ask(&mut machine, &["read", speed]), text);
+    }
+    let subscribed = milo.ask(&mut machine, &["subscribe", "ns=2;s=position"]);
+    assert_eq!(subscribed, "subscribed");
+    for position in 1..=5 {
+        machine.set("position", f64::from(position));
+        let mut seen = String::new();
+        machine.until("the subscriber hears", |machine| {
+            seen = milo.ask(machine, &["changes"]);
+            seen.split('\t')
+                .any(|one| one == position.to_string())
+                .then_some(())
+        });
+    }
+    // The whole structure ServerStatus is read, and its clock goes.
+    let lag: i64 = milo.ask(&mut machine, &["status"]).parse().expect("a lag");
+    assert!(lag.abs() < 5_000, "its clock is {lag} ms behind");
+    Ok(())
+}
+
+fn milo_as_server() -> Result<(), Absent> {
+    let port = {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        listener.local_addr().expect("it is bound").port()
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut machine = Machine::open(&format!(
+        "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1:{port}\"\nsecurity = \"None\"\npki = {:?}\n\
+         write_to = \"urn:test:milo\"",
+        folder.path().display().to_string()
+    ));
+    let nodes = [
+        "run:Boolean:false",
+        "speed:Int16:7",
+        "torque:Float:1.5",
+        "sensor:Boolean:false",
+        "position:Int16:0",
+        "pressure:Float:0",
+        "nobody:Int16:5",
+    ];
+    let port = port.to_string();
+    let mut arguments = vec![port.as_str()];
+    arguments.extend(nodes);
+    let mut plc = Peer::start(&mut machine, "MiloServer", &arguments)?;
+    machine.until_value("speed", 7.0);
+    assert_eq!(machine.get("torque"), 1.5);
+    plc.ask(&mut machine, &["set", "speed", "-8"]);
+    plc.ask(&mut machine, &["set", "run", "true"]);
+    machine.until_value("speed", -8.0);
+    machine.until_value("run", 1.0);
+    machine.set("position", 42.0);
+    machine.set("pressure", 0.75);
+    plc.ask_until(&mut machine, &["get", "position"], "42");
+    plc.ask_until(&mut machine, &["get", "pressure"], "0.75");
+    // It was killed and comes back.
+    drop(plc);
+    machine.until_value("speed", -1.0);
+    let mut plc = Peer::start(&mut machine, "MiloServer", &arguments)?;
+    machine.until_value("speed", 7.0);
+    plc.ask_until(&mut machine, &["get", "position"], "42");
+    let written = plc.ask(&mut machine, &["written"]);
+    for node in ["speed", "run", "torque", "nobody"] {
+        assert!(!written.contains(node), "{written}");
+    }
+    Ok(())
+}

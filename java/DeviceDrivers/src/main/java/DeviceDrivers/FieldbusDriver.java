@@ -29,6 +29,8 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     private final double[] inputs;
     private boolean timed;
     private long simulationNanos;
+    /** Whether this tick's inputs were delivered before the simulation's step. */
+    private boolean received;
 
     /**
      * Opens the driver that a file describes.
@@ -74,7 +76,27 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     @Override
     public void updateComponentValues(double[] value) {
         bus.setAll(value);
-        int status = timed ? bus.exchange(simulationNanos) : bus.exchange();
+        if (received) {
+            received = false;
+            bus.send();
+        } else {
+            deliver(timed ? bus.exchange(simulationNanos) : bus.exchange());
+        }
+    }
+
+    /**
+     * Takes what has come from the fieldbus; {@link #updateComponentValues} then only sends.
+     *
+     * @throws FieldbusException if the fieldbus failed for good, or the driver was left by {@link #exit}
+     */
+    @Override
+    public void updateHardwareInputs() {
+        int status = timed ? bus.receive(simulationNanos) : bus.receive();
+        received = true;
+        deliver(status);
+    }
+
+    private void deliver(int status) {
         int at = bus.getAll(inputs);
         for (Signal signal : latched) {
             inputs[at++] = signal.edges();

@@ -98,6 +98,26 @@ class FieldbusDriverTest {
     }
 
     @Test
+    void aSimulatorThatAsksFirstHasTheInputsBeforeItsStep() throws IOException {
+        FieldbusDriver driver = open();
+        List<double[]> delivered = new ArrayList<>();
+        driver.connect(inputs -> delivered.add(inputs.clone()));
+        for (int i = 0; i < 5; i++) {
+            driver.simulationTime(i * TICK);
+            driver.updateHardwareInputs();
+            assertEquals(i + 1, delivered.size(), "delivered before the step");
+            driver.updateComponentValues(new double[] {1, -250});
+            assertEquals(i + 1, delivered.size(), "and not again after it");
+        }
+        double[] last = delivered.get(4);
+        assertArrayEquals(new double[] {1, -250}, new double[] {last[0], last[1]});
+        assertEquals("5", driver.statistics().get("ticks"));
+        driver.updateComponentValues(new double[2]);
+        assertEquals(6, delivered.size(), "who does not ask is answered as before");
+        driver.exit();
+    }
+
+    @Test
     void ticksWithoutSimulationTimeAreServed() throws IOException {
         FieldbusDriver driver = open();
         driver.updateComponentValues(new double[2]);

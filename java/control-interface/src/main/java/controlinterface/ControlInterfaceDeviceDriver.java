@@ -9,7 +9,8 @@ import java.util.Objects;
  *
  * <p>The simulator creates one instance for each {@code .cfg} file in the folder by the public constructor
  * that takes the file's {@link java.nio.file.Path}, registers itself with {@link #connect}, and then calls
- * {@link #simulationTime} and {@link #updateComponentValues} once per tick. All calls come from one thread.
+ * {@link #simulationTime}, {@link #updateHardwareInputs} and {@link #updateComponentValues} once per tick. All calls come
+ * from one thread.
  *
  * <p>Our reading of the interface that the 2003 thesis describes; the original class is not public.
  */
@@ -21,8 +22,20 @@ public abstract class ControlInterfaceDeviceDriver {
     }
 
     /**
+     * Asks, before the machine's step, for what the hardware says now. A driver that can tell it answers with
+     * {@link #deliverHardwareInputs} before it returns, and then only sends in the {@link #updateComponentValues} of
+     * this tick: so the machine answers the hardware within one tick. A driver that leaves this as it is delivers in
+     * {@code updateComponentValues}, as in 2003; a simulator need not call it.
+     *
+     * @throws RuntimeException if the hardware failed for good; the simulator then ends the run
+     */
+    public void updateHardwareInputs() {
+    }
+
+    /**
      * One tick: takes the simulation's values, exchanges them with the hardware, and answers with
-     * {@link #deliverHardwareInputs} before it returns.
+     * {@link #deliverHardwareInputs} before it returns, unless it did so in the {@link #updateHardwareInputs} of this
+     * tick.
      *
      * @param value one value per component that the simulation writes, in component order; 0 and 1 for
      *     Booleans. The array belongs to the simulator and is used again at the next tick.
@@ -50,7 +63,8 @@ public abstract class ControlInterfaceDeviceDriver {
 
     /**
      * Tells the driver what time it is in the simulation; called before each
-     * {@link #updateComponentValues}. Drivers that keep no simulation time leave it as it is.
+     * {@link #updateHardwareInputs} with the time at the beginning of the tick, and before each
+     * {@link #updateComponentValues} with that at its end. Drivers that keep no simulation time leave it as it is.
      *
      * @param nanos nanoseconds since the simulation began, never falling
      */

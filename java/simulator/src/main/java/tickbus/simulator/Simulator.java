@@ -14,9 +14,10 @@ import tickbus.simulator.text.Durations;
 /**
  * Ticks a machine and its drivers.
  *
- * <p>One tick: what the drivers delivered last goes through the control table to the machine, the machine
- * takes one step, what it shows goes through the control table to the drivers, and each driver exchanges
- * with its hardware and delivers anew. A tick allocates nothing.
+ * <p>One tick: each driver delivers what its hardware says, that goes through the control table to the machine, the
+ * machine takes one step, what it shows goes through the control table to the drivers, and these send it. So the machine
+ * answers the hardware within the tick. A driver that delivers only after it has sent, as those of 2003, is seen by the
+ * machine one tick later. A tick allocates nothing.
  *
  * <p>One thread ticks and closes; {@link #stop} may be called from any.
  */
@@ -112,6 +113,14 @@ public final class Simulator implements AutoCloseable {
      * @throws DriverFailure if a driver failed; the simulation cannot go on
      */
     public void tick() {
+        for (Seat seat : seats) {
+            try {
+                seat.driver.simulationTime(ticks * stepNanos);
+                seat.driver.updateHardwareInputs();
+            } catch (RuntimeException | LinkageError e) {
+                throw failure(seat, e);
+            }
+        }
         table.computeBeforeStep();
         for (int i = 0; i < machineInputs; i++) {
             machine.input(i, table.destination(firstMachineInput + i));
@@ -128,9 +137,13 @@ public final class Simulator implements AutoCloseable {
                 seat.driver.simulationTime(ticks * stepNanos);
                 seat.driver.updateComponentValues(seat.written);
             } catch (RuntimeException | LinkageError e) {
-                throw new DriverFailure("driver " + seat.driver.id() + " failed in tick " + ticks, e);
+                throw failure(seat, e);
             }
         }
+    }
+
+    private DriverFailure failure(Seat seat, Throwable cause) {
+        return new DriverFailure("driver " + seat.driver.id() + " failed in tick " + ticks, cause);
     }
 
     /**

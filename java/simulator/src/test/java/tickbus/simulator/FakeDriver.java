@@ -18,6 +18,8 @@ public final class FakeDriver extends ControlInterfaceDeviceDriver {
     public long time = -1;
     /** Calls of {@link #exit}. */
     public int exits;
+    /** Whether it delivers before the machine's step, rather than when it has sent. */
+    public boolean deliversFirst;
     /** Thrown by the next tick, if any. */
     public RuntimeException failTick;
     /** Thrown by {@link #exit}, if any. */
@@ -39,12 +41,21 @@ public final class FakeDriver extends ControlInterfaceDeviceDriver {
     }
 
     @Override
+    public void updateHardwareInputs() {
+        if (deliversFirst) {
+            deliverHardwareInputs(answer);
+        }
+    }
+
+    @Override
     public void updateComponentValues(double[] value) {
         if (failTick != null) {
             throw failTick;
         }
         System.arraycopy(value, 0, got, 0, value.length);
-        deliverHardwareInputs(answer);
+        if (!deliversFirst) {
+            deliverHardwareInputs(answer);
+        }
     }
 
     @Override

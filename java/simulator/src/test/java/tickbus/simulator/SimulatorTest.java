@@ -97,6 +97,17 @@ class SimulatorTest {
     }
 
     @Test
+    void theMachineAnswersADriverThatDeliversFirstWithinTheTick() throws IOException {
+        try (Simulator simulator = simulator(TABLE, STEP, TimeSource.system())) {
+            first.deliversFirst = true;
+            first.answer[0] = 10;
+            simulator.tick();
+            assertArrayEquals(new double[] {20, 0}, first.got, "delivered, applied, stepped and collected");
+            assertEquals(STEP, first.time, "the time at the end of the tick");
+        }
+    }
+
+    @Test
     void aTickAllocatesNothing() throws IOException {
         ThreadMXBean bean = (ThreadMXBean) ManagementFactory.getThreadMXBean();
         try (Simulator simulator = simulator(TABLE + "1:speed | d | delay(1s) |\nd | r | rising |\n", STEP,

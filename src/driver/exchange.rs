@@ -98,7 +98,7 @@ impl Driver {
     }
 
     /// Ends the tick that [`receive`](Self::receive) began: takes the values that this end writes from `slots`.
-    /// Gives what `receive` found, or an error.
+    /// Gives what `receive` found, or an error. Where `receive` failed, nothing is sent.
     ///
     /// To send again in the same tick hands the newer values over. That is no tick of its own: it is not counted,
     /// and a recording has what was sent first.
@@ -108,6 +108,10 @@ impl Driver {
     /// As [`exchange`](Self::exchange).
     pub fn send(&mut self, slots: &mut [Slot]) -> Exchange {
         self.check(slots);
+        if self.tick.is_some() && self.last.code == Code::BusFailed {
+            self.end(self.last.code, slots);
+            return self.last;
+        }
         let now = self.now();
         if let Some(reflexes) = &mut self.reflexes {
             reflexes.sending(slots);

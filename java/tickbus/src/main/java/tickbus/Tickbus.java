@@ -216,7 +216,8 @@ public final class Tickbus implements AutoCloseable {
      *
      * <p>To send again in the same tick hands over the newer values; that is no tick of its own.
      *
-     * @throws FieldbusException as {@link #exchange()}; also if the {@code receive()} of this tick failed
+     * @throws FieldbusException as {@link #exchange()}; also if the {@code receive()} of this tick failed, and
+     *     nothing is sent then
      */
     public void send() {
         mustBeTicker();

@@ -43,10 +43,14 @@ impl Guard {
                 None => "no \"write_to\" names it".to_owned(),
                 Some(other) => format!("\"write_to\" names \"{other}\""),
             };
-            log::warn!(
-                "nothing is written into the PLC \"{identity}\", because {why}; if its outputs may be moved \
-                 from here, write into [fieldbus]: write_to = {}",
-                quoted(identity)
+            port.log(
+                log::Level::Warn,
+                "write_to",
+                format_args!(
+                    "nothing is written into the PLC \"{identity}\", because {why}; if its outputs may be moved \
+                     from here, write into [fieldbus]: write_to = {}",
+                    quoted(identity)
+                ),
             );
         }
         self.may_write

@@ -1,14 +1,15 @@
 //! How a line is doing: its state, the cause of that, and the reason in words.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::fmt::{Arguments, Write as _};
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::os::one_line;
 use crate::time::{Nanos, Spans};
 
 use super::BusError;
+use super::rarely::Rarely;
 
 /// How a line is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -144,8 +145,12 @@ pub struct LinkStatus(Arc<Shared>);
 struct Shared {
     driver: String,
     max_age: Nanos,
+    /// The names of the stations where there are several.
+    stations: Vec<String>,
     /// The record's state once more, to be read without its lock.
     state: AtomicU8,
+    /// How many stations were stale when the reason was made.
+    stale: AtomicUsize,
     record: Mutex<Record>,
 }
 
@@ -164,6 +169,8 @@ struct Record {
     caused: [u64; Cause::ALL.len()],
     facts: BTreeMap<&'static str, String>,
     counts: BTreeMap<&'static str, u64>,
+    /// What the log was told.
+    log: Rarely,
     cycle: Spans,
 }
 
@@ -188,6 +195,12 @@ impl LinkStatus {
     /// The state of the line of the driver called `driver`, which is closed so far. Data older than
     /// `max_age` make it stale.
     pub fn new(driver: &str, max_age: Nanos) -> Self {
+        Self::of_stations(driver, max_age, Vec::new())
+    }
+
+    /// The same for a driver with `stations` of these names: the one that is silent is told by its name, if there
+    /// are several.
+    pub fn of_stations(driver: &str, max_age: Nanos, stations: Vec<String>) -> Self {
         let link = Link {
             state: LinkState::Closed,
             cause: Cause::NotOpened,
@@ -197,7 +210,9 @@ impl LinkStatus {
         Self(Arc::new(Shared {
             driver: driver.to_owned(),
             max_age,
+            stations,
             state: AtomicU8::new(0),
+            stale: AtomicUsize::new(0),
             record: Mutex::new(Record {
                 link,
                 running: String::new(),
@@ -208,6 +223,7 @@ impl LinkStatus {
                 caused: [0; Cause::ALL.len()],
                 facts: BTreeMap::new(),
                 counts: BTreeMap::new(),
+                log: Rarely::default(),
                 cycle: Spans::new(),
             }),
         }))
@@ -248,7 +264,7 @@ impl LinkStatus {
 
     /// Enters a state at `now`; entering the present one with the same reason does nothing.
     pub fn enter(&self, now: Nanos, state: LinkState, cause: Cause, reason: &str) {
-        self.0.enter(&mut self.lock(), now, state, cause, reason);
+        self.0.enter(self.lock(), now, state, cause, reason);
     }
 
     /// The peer is there. A line that is running or stale stays so.
@@ -259,37 +275,39 @@ impl LinkStatus {
         let mut record = self.lock();
         reason.clone_into(&mut record.running);
         let (state, cause) = (LinkState::Running, Cause::Running);
-        self.0.enter(&mut record, now, state, cause, reason);
+        self.0.enter(record, now, state, cause, reason);
     }
 
-    /// Looks at the clock: a running line whose newest data are `age` old becomes stale or, when the data
-    /// are young again, running. Lock-free unless something changes.
-    pub fn observe(&self, now: Nanos, age: Nanos) {
+    /// Looks at the clock: a running line becomes stale when the newest data of a station, whose `ages` these are,
+    /// are too old, and running again when all are young. Lock-free unless something changes.
+    pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
+        let limit = self.0.max_age;
+        let stale = ages.clone().filter(|age| *age > limit).count();
         match self.state() {
-            LinkState::Running if age > self.0.max_age => {}
-            LinkState::Stale if age <= self.0.max_age => {}
+            LinkState::Running if stale > 0 => {}
+            LinkState::Stale if stale == 0 || stale != self.0.stale.load(Ordering::Relaxed) => {}
             _ => return,
         }
         let mut record = self.lock();
-        let silence = age.min(now - record.link.since);
+        let shown = now - record.link.since;
         match record.link.state {
             // A line that has only just come up may still have the old data.
-            LinkState::Running if silence > self.0.max_age => {
-                let mut reason = format!(
-                    "nothing has come from the peer for {}; the limit is max_age = {}",
-                    silence.rounded(),
-                    self.0.max_age
-                );
-                if !record.injected.is_empty() {
-                    let _ = write!(reason, "; injected fault: {}", record.injected);
-                }
+            LinkState::Running if shown > limit && stale > 0 => {
+                let reason = self.0.silence(&record, shown, ages);
+                self.0.stale.store(stale, Ordering::Relaxed);
                 let (state, cause) = (LinkState::Stale, Cause::Silent);
-                self.0.enter(&mut record, now, state, cause, &reason);
+                self.0.enter(record, now, state, cause, &reason);
             }
-            LinkState::Stale if age <= self.0.max_age && !record.is_hung(now) => {
+            LinkState::Stale if stale > 0 => {
+                self.0.stale.store(stale, Ordering::Relaxed);
+                if record.link.cause == Cause::Silent {
+                    record.link.reason = self.0.silence(&record, Nanos::MAX, ages);
+                }
+            }
+            LinkState::Stale if !record.is_hung(now) => {
                 let reason = record.running.clone();
                 let (state, cause) = (LinkState::Running, Cause::Running);
-                self.0.enter(&mut record, now, state, cause, &reason);
+                self.0.enter(record, now, state, cause, &reason);
             }
             _ => {}
         }
@@ -312,7 +330,7 @@ impl LinkStatus {
                 record.before_hang = Some(record.link.clone());
             }
             let (state, cause) = (LinkState::Stale, Cause::Hung);
-            self.0.enter(&mut record, now, state, cause, &reason);
+            self.0.enter(record, now, state, cause, &reason);
         }
     }
 
@@ -336,7 +354,7 @@ impl LinkStatus {
         let before = record.before_hang.take();
         if let Some(link) = before.filter(|link| link.state == LinkState::Opening) {
             self.0
-                .enter(&mut record, now, link.state, link.cause, &link.reason);
+                .enter(record, now, link.state, link.cause, &link.reason);
         } else if let Some(call) = call {
             let reason = format!(
                 "{} returned after {}, and nothing has come from the peer since",
@@ -344,7 +362,7 @@ impl LinkStatus {
                 (now - call.since).rounded()
             );
             let (state, cause) = (LinkState::Stale, Cause::Silent);
-            self.0.enter(&mut record, now, state, cause, &reason);
+            self.0.enter(record, now, state, cause, &reason);
         }
     }
 
@@ -356,6 +374,15 @@ impl LinkStatus {
     /// Counts something for the statistics.
     pub fn count(&self, key: &'static str) {
         *self.lock().counts.entry(key).or_default() += 1;
+    }
+
+    /// Writes a message of which a peer can cause as many as it likes, with the name of the driver. `kind` names what it
+    /// is about: the log has the first 20 of a kind, and then those whose number is a power of two.
+    pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
+        let told = self.lock().log.count(("", kind));
+        if let Some(times) = told {
+            log::log!(level, "driver \"{}\": {message}{times}", self.driver());
+        }
     }
 
     /// A bus cycle was `span` long.
@@ -393,6 +420,7 @@ impl LinkStatus {
         for (key, count) in &record.counts {
             let _ = writeln!(text, "{key}={count}");
         }
+        let _ = writeln!(text, "log.untold={}", record.log.untold());
         record.cycle.write("bus_cycle", text);
     }
 
@@ -402,15 +430,51 @@ impl LinkStatus {
     }
 }
 
+/// A message for the log, made while the record was locked and written when it no longer is.
+#[must_use]
+struct Message(log::Level, String);
+
+impl Message {
+    fn write(self) {
+        log::log!(self.0, "{}", self.1);
+    }
+}
+
 impl Shared {
-    fn enter(&self, record: &mut Record, now: Nanos, state: LinkState, cause: Cause, reason: &str) {
-        let link = &mut record.link;
-        let reason = one_line(reason);
-        if (link.state, link.cause) == (state, cause) {
-            // A state that only tells it in other words, such as how long it has lasted, goes on.
-            link.reason = reason;
-            return;
+    /// Enters a state. The log is told when others have the record again: nobody waits for whoever reads the log.
+    fn enter(
+        &self,
+        mut record: MutexGuard<'_, Record>,
+        now: Nanos,
+        state: LinkState,
+        cause: Cause,
+        reason: &str,
+    ) {
+        let message = self.change(&mut record, now, state, cause, reason);
+        drop(record);
+        if let Some(message) = message {
+            message.write();
         }
+    }
+
+    /// Changes the state, and gives what the log is to know of that.
+    fn change(
+        &self,
+        record: &mut Record,
+        now: Nanos,
+        state: LinkState,
+        cause: Cause,
+        reason: &str,
+    ) -> Option<Message> {
+        let reason = one_line(reason);
+        if (record.link.state, record.link.cause) == (state, cause) {
+            // A state that only tells it in other words, such as how long it has lasted, goes on.
+            record.link.reason = reason;
+            return None;
+        }
+        record.entered[state as usize] += 1;
+        record.caused[cause as usize] += 1;
+        self.state.store(state as u8, Ordering::Relaxed);
         let trouble = matches!(state, LinkState::Stale | LinkState::Failed)
             || (state == LinkState::Opening && cause != Cause::Waiting);
         let level = if trouble {
@@ -418,21 +482,52 @@ impl Shared {
         } else {
             log::Level::Info
         };
-        log::log!(
-            level,
-            "driver \"{}\" is {}: {reason}",
-            self.driver,
-            state.name()
-        );
-        *link = Link {
+        let told = record.log.count((state.name(), cause.name()));
+        let message = told.filter(|_| log::log_enabled!(level)).map(|times| {
+            let (driver, state) = (&self.driver, state.name());
+            Message(
+                level,
+                format!("driver \"{driver}\" is {state}: {reason}{times}"),
+            )
+        });
+        record.link = Link {
             state,
             cause,
             reason,
             since: now,
         };
-        record.entered[state as usize] += 1;
-        record.caused[cause as usize] += 1;
-        self.state.store(state as u8, Ordering::Relaxed);
+        message
+    }
+
+    /// The reason of a silence: whose data are too old, though the line has been up for `shown`.
+    fn silence(
+        &self,
+        record: &Record,
+        shown: Nanos,
+        ages: impl Iterator<Item = Nanos> + Clone,
+    ) -> String {
+        let mut reason = "nothing has come from ".to_owned();
+        // Writing to a string cannot fail.
+        if self.stations.len() < 2 {
+            let age = ages.max().unwrap_or_default().min(shown);
+            let _ = write!(reason, "the peer for {}", age.rounded());
+        } else {
+            let silent = ages.zip(&self.stations);
+            let silent = silent.filter(|(age, _)| *age > self.max_age);
+            for (index, (age, name)) in silent.enumerate() {
+                let comma = if index > 0 { ", " } else { "" };
+                let _ = write!(reason, "{comma}station \"{name}\" ");
+                let _ = match age {
+                    Nanos::MAX => write!(reason, "at all"),
+                    age => write!(reason, "for {}", age.rounded()),
+                };
+            }
+        }
+        let _ = write!(reason, "; the limit is max_age = {}", self.max_age);
+        if !record.injected.is_empty() {
+            let _ = write!(reason, "; injected fault: {}", record.injected);
+        }
+        reason
     }
 }
 
@@ -461,9 +556,9 @@ mod tests {
         let status = LinkStatus::new("test", MAX_AGE);
         status.running(at(1000), "the peer is there");
         // Data of an earlier peer, or none at all: it has the time to send its first.
-        status.observe(at(1100), Nanos::MAX);
+        status.observe(at(1100), std::iter::once(Nanos::MAX));
         assert_eq!(status.state(), LinkState::Running);
-        status.observe(at(1101), Nanos::MAX);
+        status.observe(at(1101), std::iter::once(Nanos::MAX));
         let link = status.link();
         assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Silent));
         assert_eq!(
@@ -476,10 +571,35 @@ mod tests {
             LinkState::Stale,
             "being there is not enough"
         );
-        status.observe(at(1103), at(3));
+        status.observe(at(1103), std::iter::once(at(3)));
         let link = status.link();
         assert_eq!(link.state, LinkState::Running);
         assert_eq!(link.reason, "the peer is there");
+    }
+
+    #[test]
+    fn a_silent_station_among_several_is_told_by_its_name() {
+        let names = ["lift", "press", "saw"].map(str::to_owned);
+        let status = LinkStatus::of_stations("test", MAX_AGE, names.into());
+        status.running(at(0), "all are there");
+        let observe = |now, ages: [Nanos; 3]| {
+            status.observe(at(now), ages.into_iter());
+            let link = status.link();
+            (link.state, link.reason)
+        };
+        let (state, reason) = observe(1000, [at(5), at(101), at(100)]);
+        assert_eq!(state, LinkState::Stale);
+        let limit = "the limit is max_age = 100ms";
+        let said = format!("nothing has come from station \"press\" for 101ms; {limit}");
+        assert_eq!(reason, said);
+        let (_, reason) = observe(1100, [at(5), at(201), Nanos::MAX]);
+        let said = format!(
+            "nothing has come from station \"press\" for 201ms, station \"saw\" at all; {limit}"
+        );
+        assert_eq!(reason, said);
+        let (_, reason) = observe(1200, [at(5), at(3), Nanos::MAX]);
+        assert!(reason.contains("from station \"saw\" at all; "), "{reason}");
+        assert_eq!(observe(1300, [at(5), at(3), at(1)]).0, LinkState::Running);
     }
 
     #[test]
@@ -499,7 +619,7 @@ mod tests {
         status.call_ends(at(3211));
         let link = status.link();
         assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Silent));
-        status.observe(at(3211), at(1));
+        status.observe(at(3211), std::iter::once(at(1)));
         assert_eq!(status.state(), LinkState::Running);
         assert_eq!(status.link().reason, "the peer is there");
     }

@@ -1,5 +1,6 @@
 //! How a line is doing: its state, the cause of that, and the reason in words.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::{Arguments, Write as _};
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
@@ -20,7 +21,7 @@ pub enum LinkState {
     Opening,
     /// The peer is there.
     Running,
-    /// The peer was there, and nothing has come from it for longer than `max_age`.
+    /// The peer was there, and nothing that counts has come from it for longer than `max_age`.
     Stale,
     /// The line broke; it is tried again after a pause.
     Failed,
@@ -75,11 +76,13 @@ pub enum Cause {
     Closed,
     /// A fault was injected, and holds the line down.
     Injected,
+    /// The PLC does not run its program.
+    Stopped,
 }
 
 impl Cause {
     /// All of them; each one's code is its place here.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::NotOpened,
         Self::Waiting,
         Self::Running,
@@ -92,6 +95,7 @@ impl Cause {
         Self::Hung,
         Self::Closed,
         Self::Injected,
+        Self::Stopped,
     ];
 
     /// The cause's name, in lower case.
@@ -109,6 +113,7 @@ impl Cause {
             Self::Hung => "hung",
             Self::Closed => "closed",
             Self::Injected => "injected",
+            Self::Stopped => "stopped",
         }
     }
 }
@@ -162,12 +167,14 @@ struct Record {
     call: Option<Call>,
     /// The injected faults of the line that are active, in words.
     injected: String,
+    /// Why data that arrive do not count; `None` while they do.
+    doubt: Option<(Cause, String)>,
     /// What a call that hangs interrupted.
     before_hang: Option<Link>,
     /// How often each state was entered, and each cause given.
     entered: [u64; LinkState::ALL.len()],
     caused: [u64; Cause::ALL.len()],
-    facts: BTreeMap<&'static str, String>,
+    facts: BTreeMap<Cow<'static, str>, String>,
     counts: BTreeMap<&'static str, u64>,
     /// What the log was told.
     log: Rarely,
@@ -218,6 +225,7 @@ impl LinkStatus {
                 running: String::new(),
                 call: None,
                 injected: String::new(),
+                doubt: None,
                 before_hang: None,
                 entered: [0; LinkState::ALL.len()],
                 caused: [0; Cause::ALL.len()],
@@ -275,7 +283,32 @@ impl LinkStatus {
         let mut record = self.lock();
         reason.clone_into(&mut record.running);
         let (state, cause) = (LinkState::Running, Cause::Running);
-        self.0.enter(record, now, state, cause, reason);
+        let up = self.0.change(&mut record, now, state, cause, reason);
+        let doubt = record.doubt.clone();
+        let doubt = doubt.and_then(|(cause, reason)| {
+            let state = LinkState::Stale;
+            self.0.change(&mut record, now, state, cause, &reason)
+        });
+        drop(record);
+        up.into_iter().chain(doubt).for_each(Message::write);
+    }
+
+    /// Data that arrive do not count, for a cause and a reason in words, or they do again (`None`). A line that is
+    /// running is stale meanwhile; one that is not will be when it comes up.
+    pub fn doubt(&self, now: Nanos, doubt: Option<(Cause, String)>) {
+        let mut record = self.lock();
+        let before = std::mem::replace(&mut record.doubt, doubt);
+        if !matches!(record.link.state, LinkState::Running | LinkState::Stale) {
+            return;
+        }
+        let (state, cause, reason) = match (record.doubt.clone(), before) {
+            (Some((cause, reason)), _) => (LinkState::Stale, cause, reason),
+            (None, Some((cause, _))) if record.link.cause == cause => {
+                (LinkState::Running, Cause::Running, record.running.clone())
+            }
+            (None, _) => return,
+        };
+        self.0.enter(record, now, state, cause, &reason);
     }
 
     /// Looks at the clock: a running line becomes stale when the newest data of a station, whose `ages` these are,
@@ -304,7 +337,7 @@ impl LinkStatus {
                     record.link.reason = self.0.silence(&record, Nanos::MAX, ages);
                 }
             }
-            LinkState::Stale if !record.is_hung(now) => {
+            LinkState::Stale if record.doubt.is_none() && !record.is_hung(now) => {
                 let reason = record.running.clone();
                 let (state, cause) = (LinkState::Running, Cause::Running);
                 self.0.enter(record, now, state, cause, &reason);
@@ -367,8 +400,8 @@ impl LinkStatus {
     }
 
     /// Notes a fact for the statistics, such as the address that was bound.
-    pub fn tell(&self, key: &'static str, fact: &str) {
-        self.lock().facts.insert(key, one_line(fact));
+    pub fn tell(&self, key: impl Into<Cow<'static, str>>, fact: &str) {
+        self.lock().facts.insert(key.into(), one_line(fact));
     }
 
     /// Counts something for the statistics.

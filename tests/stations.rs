@@ -17,7 +17,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::os::fd::AsRawFd as _;
 
 use conformance::resources;
-use conformance::rig::await_that;
+use conformance::rig::{await_that, logged};
 use peers::{Alone, client, is_closed, leave};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tickbus::fieldbus::{Cause, LinkState};
@@ -133,6 +133,7 @@ fn a_system_without_descriptors_costs_the_served_peer_nothing() {
     let (mut device, [a, b]) = device();
     let mut a = client(a);
     until_heard(&mut device, &mut [("a", &mut a)], 1);
+    logged::expect("a client could not be accepted");
     // Room for one more, which the client of b takes.
     let next = File::open("/dev/null").expect("it is there").as_raw_fd();
     let usual = getrlimit(Resource::Nofile);

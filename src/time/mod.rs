@@ -9,11 +9,9 @@ mod nanos;
 mod pace;
 mod spans;
 mod stop;
-mod wall;
 
 pub use clock::{Clock, CoarseTime, Manual, Monotonic};
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
 pub use spans::Spans;
 pub use stop::{Stop, Waker};
-pub use wall::unix_time;

@@ -1,5 +1,9 @@
 //! Messages of the log on stderr.
 
+/// What tests expect of the log; integration tests have the same.
+#[cfg(test)]
+#[path = "../../tests/conformance/logged.rs"]
+pub(crate) mod logged;
 mod queue;
 
 use std::io::{self, Write};

@@ -11,6 +11,8 @@ mod serial;
 mod shared_memory;
 
 pub use library::{Library, one_line};
+#[cfg(test)]
+pub(crate) use log::logged;
 pub use log::{dropped_log_lines, flush_log, is_told, is_told_rarely, log_to_stderr};
 #[cfg(unix)]
 pub use own_file::own_file;

@@ -167,6 +167,7 @@ fn is_loaded(library: &Path) -> bool {
 
 #[test]
 fn a_plain_call_that_never_returns_is_told_and_closing_leaves_it_behind_with_its_library() {
+    logged::expect("and its thread is left behind");
     for function in ["open", "exchange", "close"] {
         let mut plugin = Misbehaving::new(false, "").with_own_library();
         let release = plugin.file("release");

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use libfuzzer_sys::fuzz_target;
 use tickbus::fieldbus::s7::item::{Code, Object};
-use tickbus::fieldbus::s7::lists::{Facts, Identity};
+use tickbus::fieldbus::s7::szl::{Facts, Identity};
 use tickbus::fieldbus::s7::pdu::Pdu;
 use tickbus::fieldbus::s7::transport::{self, Tpdu};
 use tickbus::fieldbus::s7::{Conversation, Fault, Memory};

@@ -1,8 +1,8 @@
 //! Questions about the system: status lists, the clock, which blocks there are.
 
 use super::item::{self, Code};
-use super::lists::{self, Facts};
 use super::pdu::{Draft, JOB_HEADER, Kind, Pdu, error};
+use super::szl::{self, Facts};
 use crate::time::Nanos;
 
 /// Bytes of the parameters of an answer.
@@ -178,10 +178,10 @@ fn say(question: &Question<'_>, ask: &Ask<'_>) -> Result<Vec<u8>, u16> {
     match (question.group, question.function, question.data) {
         (group::LISTS, 1, &[i0, i1, n0, n1]) => {
             let (id, index) = (u16::from_be_bytes([i0, i1]), u16::from_be_bytes([n0, n1]));
-            lists::write(id, index, ask.facts, ask.now, &mut out)?;
+            szl::write(id, index, ask.facts, ask.now, &mut out)?;
         }
         (group::CLOCK, 1 | 3, _) => {
-            let clock = lists::clock(ask.now);
+            let clock = szl::clock(ask.now);
             out.extend_from_slice(&[0, 0x19]);
             out.extend_from_slice(&clock);
         }

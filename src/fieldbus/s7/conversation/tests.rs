@@ -1,6 +1,6 @@
 use super::*;
 use crate::fieldbus::s7::hex;
-use crate::fieldbus::s7::lists::{self, Identity};
+use crate::fieldbus::s7::szl::{self, Identity};
 
 /// Inputs that count up, outputs and DB 1 over the same bytes, four flags; one job after the other.
 #[derive(Default)]
@@ -390,7 +390,7 @@ fn question(line: &mut Line, parameters: &str, data: &str) -> (Vec<u8>, Vec<u8>)
 fn a_list_that_is_too_long_is_fetched_piece_by_piece() {
     let mut whole = Vec::new();
     let mut line = Line::agreed(64);
-    lists::write(0x001C, 0, &line.facts, Nanos::ZERO, &mut whole).expect("it is there");
+    szl::write(0x001C, 0, &line.facts, Nanos::ZERO, &mut whole).expect("it is there");
     let (mut more, data) = question(&mut line, "000112041144 0100", "ff 09 0004 001c 0000");
     let mut fetched = data[4..].to_vec();
     let mut units = 1;

@@ -11,7 +11,7 @@ use crate::signal::{SignalTable, fail_safe_frame};
 use crate::time::{Nanos, Stop};
 
 use super::item::{Code, Object};
-use super::lists::{Facts, Identity};
+use super::szl::{Facts, Identity};
 use super::{Conversation, Fault, Memory, transport};
 
 use map::{Map, Place};

@@ -1,6 +1,7 @@
 //! System status lists (SZL): what a client asks a CPU for before anything else, and who that CPU is.
 
 use super::pdu::error;
+use crate::fieldbus::PlcState;
 use crate::time::Nanos;
 
 /// Who a CPU is, as its system status lists tell it.
@@ -67,9 +68,12 @@ const MODULE: usize = 2 + ORDER + 6;
 /// Bytes before the records of a list: its id, its index, length of a record, number of records.
 const HEADER: usize = 8;
 
+/// The list that tells whether a CPU runs.
+pub const STATE: u16 = 0x0424;
+
 /// Lists that a server of ours has.
 const LISTS: [u16; 9] = [
-    0x0000, 0x0011, 0x0111, 0x001C, 0x011C, 0x0131, 0x0132, 0x0232, 0x0424,
+    0x0000, 0x0011, 0x0111, 0x001C, 0x011C, 0x0131, 0x0132, 0x0232, STATE,
 ];
 
 /// Appends the list `id`, or its part `index`, as a CPU gives it at `now`.
@@ -88,7 +92,7 @@ pub fn write(id: u16, index: u16, facts: &Facts, now: Nanos, out: &mut Vec<u8>) 
         0x0131 if index <= 1 => vec![communication(facts)],
         0x0132 if index == 4 => vec![protection()],
         0x0232 if index == 4 || index == 0 => vec![protection()],
-        0x0424 => vec![running(now)],
+        STATE => vec![running(now)],
         0x0131 | 0x0132 | 0x0232 => return Err(error::NO_INDEX),
         _ => return Err(error::NO_LIST),
     };
@@ -211,6 +215,27 @@ pub fn clock(now: Nanos) -> [u8; 8] {
         bcd(millis / 10),
         ones * 16 + weekday,
     ]
+}
+
+/// Whether a CPU runs, as its list 0x0424 says; `None` when it does not say.
+///
+/// The fourth byte of the record has the state that was entered in its lower half, and the one before in the upper.
+pub fn state(list: &[u8]) -> Option<PlcState> {
+    let (header, record) = list.split_first_chunk::<HEADER>()?;
+    let [_, _, _, entered, ..] = *record else {
+        return None;
+    };
+    if header[..2] != STATE.to_be_bytes() {
+        return None;
+    }
+    Some(match entered & 0x0F {
+        // It does not know.
+        0 => return None,
+        // RUN; of a redundant pair also RUN-R, LINK-UP and UPDATE, in which the program goes on.
+        0x8 | 0x9 | 0xB | 0xC => PlcState::Run,
+        // STOP in its kinds, STARTUP, HOLD, DEFECTIVE.
+        _ => PlcState::Stop,
+    })
 }
 
 /// Takes what lists 0x0011 and 0x001C say into an identity. `list` begins with its id.

@@ -62,7 +62,7 @@ impl Memory for Bytes {
 fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<Fault>) {
     let mut conversation = Conversation::default();
     let mut memory = Bytes { outputs: [0; 64], inputs: [7; 700] };
-    let facts = Facts { identity: Identity::of_driver("fuzz"), pdu: 480, clients: 1 };
+    let facts = Facts { identity: Identity::of_driver("fuzz"), pdu: 480, clients: 1, epoch: Facts::NEVER_SET };
     let (mut begun, mut answers) = (Vec::new(), Vec::new());
     for piece in bytes.chunks(piece) {
         begun.extend_from_slice(piece);

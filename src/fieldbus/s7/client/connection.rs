@@ -64,8 +64,7 @@ impl<'a> Connection<'a> {
             dialog: bus.frames.dialog(terms, now),
             pace: Pace::new(now, bus.cycle),
             has_identity: false,
-            // It is the first question: what a CPU in STOP has in its memory is not to be taken for its outputs.
-            state: bus.state.is_asked().then_some(now),
+            state: None,
             is_due: false,
             stations: (0..port.stations()).map(station).collect(),
             buffer: [0; BUFFER],
@@ -151,8 +150,13 @@ impl<'a> Connection<'a> {
     }
 
     fn meet(&mut self, now: Nanos, length: u16, identity: Option<Identity>, port: &mut Port) {
+        // A CPU that hangs up when it is asked who it is would do so at the next question of that kind.
         if identity.is_some() {
             self.bus.identity.unanswered = 0;
+            self.state = self.bus.state.is_asked().then_some(now);
+        }
+        if self.state.is_none() {
+            port.tell("cpu", "unknown");
         }
         let line = identity.map(|identity| identity.line()).unwrap_or_default();
         let line = if line.is_empty() {
@@ -166,6 +170,7 @@ impl<'a> Connection<'a> {
         self.has_identity = true;
         port.tell("pdu", &length.to_string());
         port.running(&format!("connected with {}, {line}", self.peer));
+        // Before the first cycle: what lies in the memory of a CPU in STOP is not to be taken for its outputs.
         self.ask_state(now);
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::Frames;
 use crate::config::{Collector, Table, Value};
 use crate::fieldbus::s7::item::Object;
 use crate::fieldbus::s7::transport::PORT;
@@ -75,6 +76,19 @@ impl ClientOptions {
             width: signal.data_type.width(),
             data_type: Some(signal.data_type),
         })
+    }
+
+    /// What is written and what is read in one cycle, for people.
+    pub(in crate::fieldbus) fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
+        let frames = Frames::new(self, table, self.role);
+        let writes = match self.write_to {
+            Some(_) => "writes",
+            None => "would write",
+        };
+        let ways = [writes, "reads"].into_iter();
+        ways.zip(frames.summary(self.pdu))
+            .map(|(way, what)| format!("{way} {what}"))
+            .collect()
     }
 
     /// Takes the lines of `[fieldbus.at]`.

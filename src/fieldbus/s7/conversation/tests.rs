@@ -57,6 +57,7 @@ impl Line {
                 identity: Identity::of_driver("Test rig"),
                 pdu: 480,
                 clients: 32,
+                epoch: Facts::NEVER_SET,
             },
         }
     }
@@ -433,6 +434,16 @@ fn the_clock_and_the_blocks_are_told() {
     assert_eq!(data.len(), 4 + 78);
     assert_eq!(data[4 + 12..4 + 14], [1, 0x2C], "its number");
     assert_eq!(data[4 + 40..4 + 42], [0, 10], "its length");
+}
+
+#[test]
+fn the_first_question_of_plc4x_is_answered_though_it_states_more_bytes_than_it_has() {
+    let mut line = Line::agreed(480);
+    let right = question(&mut line, "000112041144 0100", "ff 09 0004 0011 0000");
+    let of_plc4x = question(&mut line, "000112041144 0100", "ff 09 000c 0011 0000");
+    assert_eq!(right, of_plc4x);
+    assert_eq!(right.0[3..], [0, 0], "no error");
+    assert_eq!(right.1[4..8], [0, 0x11, 0, 0]);
 }
 
 #[test]

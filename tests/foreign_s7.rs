@@ -269,8 +269,18 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             cpu.port
         )
     };
-    let last = "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
-                [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n";
+    // That server does the first item of a job that writes, and no other: so what is written lies without gaps.
+    let mut further = String::from(
+        "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n",
+    );
+    let bits = (1..8).map(|bit| format!("%IX0.{bit}"));
+    let longs = (8..592).step_by(8).map(|byte| format!("%IL{byte}"));
+    let words = (592..598).step_by(2).map(|byte| format!("%IW{byte}"));
+    for address in bits.chain(["%IB1".to_owned()]).chain(longs).chain(words) {
+        further += &format!("[[signal]]\nname = \"{address}\"\naddress = \"{address}\"\n");
+    }
+    let last = &*further;
     let mut end = End::open_with(&fieldbus(""), last);
     end.set("position", 70.0);
     end.until("it reads", |end| end.get("speed") == 1.0);

@@ -392,6 +392,7 @@ fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
 /// A CPU by hand that answers a client of ours; one that is asked who it is hangs up.
 #[test]
 fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
+    logged::expect("nothing is written into the PLC");
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let pair = Pair {
         address: listener.local_addr().expect("it is bound"),
@@ -516,6 +517,7 @@ fn nothing_is_written_but_the_bits_that_signals_cover() {
 
 #[test]
 fn a_signal_is_read_where_its_line_says_and_else_in_its_area() {
+    logged::expect("nothing is written into the PLC");
     let (mut device, at) = server("");
     let text = format!(
         "[driver]\nid = 1\nname = \"plc\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\nrole = \"controller\"\n\
@@ -613,6 +615,7 @@ impl Cpu {
 
 /// A machine with two stations in data blocks 5 and 7 of `cpu`.
 fn machine_of_two(cpu: Cpu) -> (Alone, std::sync::Arc<std::sync::Mutex<Cpu>>) {
+    logged::expect("nothing is written into the PLC");
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let at = listener.local_addr().expect("it is bound");
     let cpu = std::sync::Arc::new(std::sync::Mutex::new(cpu));
@@ -660,6 +663,7 @@ fn a_cpu_in_stop_is_stale_with_that_cause_until_it_runs() {
 
 #[test]
 fn a_cpu_that_does_not_tell_its_state_is_asked_once_a_connection() {
+    logged::expect("does not say whether it is in RUN");
     let (mut machine, cpu) = machine_of_two(Cpu {
         blocks: vec![5, 7],
         state: None,
@@ -677,6 +681,7 @@ fn a_cpu_that_does_not_tell_its_state_is_asked_once_a_connection() {
 
 #[test]
 fn a_station_of_which_something_is_refused_is_stale_alone_and_tried_again() {
+    logged::expect("it is stale, and is tried again");
     let (mut machine, cpu) = machine_of_two(Cpu {
         blocks: vec![5],
         state: Some(8),

@@ -43,8 +43,6 @@ struct Station {
     /// The CPU refused something of it, which is tried again at this time.
     resume: Option<Nanos>,
     refusal: Option<Refusal>,
-    /// What the log knows of that.
-    told: String,
 }
 
 impl<'a> Connection<'a> {
@@ -192,6 +190,8 @@ impl<'a> Connection<'a> {
         self.bus.state.unanswered = 0;
         if state.is_none() {
             self.state = None;
+        }
+        if state.is_none() && !std::mem::replace(&mut self.bus.told_unknown, true) {
             log::warn!(
                 "the CPU at {} does not say whether it is in RUN (system status list 0x0424), so its values count as \
                  fresh in STOP, too; name a signal that has to change: alive = {{ signal = \"...\", within = \
@@ -270,12 +270,8 @@ impl<'a> Connection<'a> {
                 port.sent(index);
             }
             if station.refusal.take().is_some() {
-                let name = &self.bus.names[index];
-                log::info!(
-                    "the CPU at {} serves the station \"{name}\" again",
-                    self.peer
-                );
-                port.tell("refused", "nothing");
+                self.bus.told_refusals[index].clear();
+                port.tell("refused", &refusals(&self.bus.told_refusals));
             }
         }
         self.put_off(port)
@@ -300,10 +296,13 @@ impl<'a> Connection<'a> {
             self.dialog.suspend(index, true);
             let name = &self.bus.names[index];
             let text = format!("station \"{name}\": {} {refusal}", self.peer);
-            if station.told != text {
-                log::warn!("{text}; it is stale, and is tried again every {RETRY}");
-                port.tell("refused", &text);
-                station.told = text;
+            let told = &mut self.bus.told_refusals[index];
+            if *told != text {
+                if let Some(times) = self.bus.rarely.count(("s7", "refused")) {
+                    log::warn!("{text}; it is stale, and is tried again every {RETRY}{times}");
+                }
+                *told = text;
+                port.tell("refused", &refusals(&self.bus.told_refusals));
             }
         }
         Ok(())
@@ -336,6 +335,17 @@ impl<'a> Connection<'a> {
         BusError::Link(format!(
             "the connection with {peer} broke ({error}); see whether the CPU still runs"
         ))
+    }
+}
+
+/// What the statistics say of what the CPU refuses.
+fn refusals(told: &[String]) -> String {
+    let told = told.iter().map(String::as_str);
+    let told: Vec<&str> = told.filter(|text| !text.is_empty()).collect();
+    if told.is_empty() {
+        "nothing".to_owned()
+    } else {
+        told.join("; ")
     }
 }
 

@@ -8,6 +8,7 @@ mod plan;
 mod refusal;
 mod terms;
 
+use crate::fieldbus::rarely::Rarely;
 use crate::fieldbus::tcp::{self, no_wait};
 use crate::fieldbus::{BusError, Free, Guard, Port, Role};
 use crate::os::Poller;
@@ -41,6 +42,11 @@ pub struct S7Client {
     state: Question,
     /// Whether the CPU said last that it is in STOP.
     said_stop: bool,
+    /// Whether the log knows that it does not say.
+    told_unknown: bool,
+    /// What the log knows of that the CPU refuses, by station.
+    told_refusals: Vec<String>,
+    rarely: Rarely,
 }
 
 /// A question about the system that some CPUs answer by hanging up, or not at all.
@@ -79,6 +85,9 @@ impl S7Client {
             identity: Question::default(),
             state: Question::default(),
             said_stop: false,
+            told_unknown: false,
+            told_refusals: vec![String::new(); table.stations.len()],
+            rarely: Rarely::default(),
             options: options.clone(),
         }
     }

@@ -150,13 +150,18 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.place(signal),
             Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            Self::OpcuaClient(options) => options.place(signal, station),
             _ => String::new(),
         }
     }
 
     /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
     /// are none, and that the bus has no addresses of its own.
-    pub fn place_signals(&mut self, lines: &[At<'_>], _table: &SignalTable) {
+    pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        if let Self::OpcuaClient(options) = self {
+            options.place_signals(lines, table);
+            return;
+        }
         let kind = self.kind();
         if let Some(first) = lines.first() {
             first.wrong(

@@ -288,6 +288,11 @@ impl Port {
             .unwrap_or_default()
     }
 
+    /// How long ago the peer of a station was heard of; [`Nanos::MAX`] for never.
+    pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
+        self.image.stations[station].peer_age(now)
+    }
+
     /// How long ago the simulation ticked last; [`Nanos::MAX`] for never.
     pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
         self.image.stations[station].tick_age(now)

@@ -136,6 +136,7 @@ impl Driver {
         );
         let board = Arc::<Board>::default();
         port.suffer_from(Arc::clone(&board));
+        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
         if config.bus.events() {
             let stations = 0..config.table.stations.len();
             port.watch_changes(

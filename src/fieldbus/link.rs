@@ -1,5 +1,6 @@
 //! How a line is doing: its state, the cause of that, and the reason in words.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -19,7 +20,7 @@ pub enum LinkState {
     Opening,
     /// The peer is there.
     Running,
-    /// The peer was there, and nothing has come from it for longer than `max_age`.
+    /// The peer was there, and nothing that counts has come from it for longer than `max_age`.
     Stale,
     /// The line broke; it is tried again after a pause.
     Failed,
@@ -74,11 +75,13 @@ pub enum Cause {
     Closed,
     /// A fault was injected, and holds the line down.
     Injected,
+    /// The PLC does not run its program.
+    Stopped,
 }
 
 impl Cause {
     /// All of them; each one's code is its place here.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::NotOpened,
         Self::Waiting,
         Self::Running,
@@ -91,6 +94,7 @@ impl Cause {
         Self::Hung,
         Self::Closed,
         Self::Injected,
+        Self::Stopped,
     ];
 
     /// The cause's name, in lower case.
@@ -108,6 +112,7 @@ impl Cause {
             Self::Hung => "hung",
             Self::Closed => "closed",
             Self::Injected => "injected",
+            Self::Stopped => "stopped",
         }
     }
 }
@@ -157,12 +162,14 @@ struct Record {
     call: Option<Call>,
     /// The injected faults of the line that are active, in words.
     injected: String,
+    /// Why data that arrive do not count; `None` while they do.
+    doubt: Option<(Cause, String)>,
     /// What a call that hangs interrupted.
     before_hang: Option<Link>,
     /// How often each state was entered, and each cause given.
     entered: [u64; LinkState::ALL.len()],
     caused: [u64; Cause::ALL.len()],
-    facts: BTreeMap<&'static str, String>,
+    facts: BTreeMap<Cow<'static, str>, String>,
     counts: BTreeMap<&'static str, u64>,
     cycle: Spans,
 }
@@ -203,6 +210,7 @@ impl LinkStatus {
                 running: String::new(),
                 call: None,
                 injected: String::new(),
+                doubt: None,
                 before_hang: None,
                 entered: [0; LinkState::ALL.len()],
                 caused: [0; Cause::ALL.len()],
@@ -260,6 +268,28 @@ impl LinkStatus {
         reason.clone_into(&mut record.running);
         let (state, cause) = (LinkState::Running, Cause::Running);
         self.0.enter(&mut record, now, state, cause, reason);
+        if let Some((cause, reason)) = record.doubt.clone() {
+            self.0
+                .enter(&mut record, now, LinkState::Stale, cause, &reason);
+        }
+    }
+
+    /// Data that arrive do not count, for a cause and a reason in words, or they do again (`None`). A line that is
+    /// running is stale meanwhile; one that is not will be when it comes up.
+    pub fn doubt(&self, now: Nanos, doubt: Option<(Cause, String)>) {
+        let mut record = self.lock();
+        let before = std::mem::replace(&mut record.doubt, doubt);
+        if !matches!(record.link.state, LinkState::Running | LinkState::Stale) {
+            return;
+        }
+        let (state, cause, reason) = match (record.doubt.clone(), before) {
+            (Some((cause, reason)), _) => (LinkState::Stale, cause, reason),
+            (None, Some((cause, _))) if record.link.cause == cause => {
+                (LinkState::Running, Cause::Running, record.running.clone())
+            }
+            (None, _) => return,
+        };
+        self.0.enter(&mut record, now, state, cause, &reason);
     }
 
     /// Looks at the clock: a running line whose newest data are `age` old becomes stale or, when the data
@@ -286,7 +316,9 @@ impl LinkStatus {
                 let (state, cause) = (LinkState::Stale, Cause::Silent);
                 self.0.enter(&mut record, now, state, cause, &reason);
             }
-            LinkState::Stale if age <= self.0.max_age && !record.is_hung(now) => {
+            LinkState::Stale
+                if age <= self.0.max_age && record.doubt.is_none() && !record.is_hung(now) =>
+            {
                 let reason = record.running.clone();
                 let (state, cause) = (LinkState::Running, Cause::Running);
                 self.0.enter(&mut record, now, state, cause, &reason);
@@ -349,8 +381,8 @@ impl LinkStatus {
     }
 
     /// Notes a fact for the statistics, such as the address that was bound.
-    pub fn tell(&self, key: &'static str, fact: &str) {
-        self.lock().facts.insert(key, one_line(fact));
+    pub fn tell(&self, key: impl Into<Cow<'static, str>>, fact: &str) {
+        self.lock().facts.insert(key.into(), one_line(fact));
     }
 
     /// Counts something for the statistics.

@@ -10,6 +10,7 @@ mod options;
 mod port;
 mod role;
 mod troubles;
+mod vitals;
 
 pub mod loopback;
 pub mod modbus;
@@ -28,3 +29,4 @@ pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use options::{KINDS, Options};
 pub use port::{CallWatch, Port};
 pub use role::Role;
+pub use vitals::PlcState;

@@ -149,11 +149,15 @@ impl Device {
     }
 
     pub fn open_in(folder: tempfile::TempDir, kind: &str, keys: &str) -> Self {
+        Self::open_with(folder, kind, keys, SIGNALS)
+    }
+
+    pub fn open_with(folder: tempfile::TempDir, kind: &str, keys: &str, signals: &str) -> Self {
         let clock: Arc<Monotonic> = Monotonic::shared().expect("a thread");
         let pki = folder.path().join("pki");
         let text = format!(
             "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"2s\"\n\
-             reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{SIGNALS}",
+             reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{signals}",
             pki.display().to_string()
         );
         let end = End::open(&text, &clock);

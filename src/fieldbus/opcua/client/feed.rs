@@ -9,9 +9,9 @@ use opcua::types::{
     StatusCode, TimestampsToReturn, VariableId, Variant,
 };
 
-use crate::fieldbus::{BusError, PlcState};
 use crate::fieldbus::opcua::pki::meaning;
 use crate::fieldbus::opcua::reactor::Inbox;
+use crate::fieldbus::{BusError, PlcState};
 use crate::time::Nanos;
 
 use super::Field;
@@ -133,6 +133,8 @@ pub(super) async fn subscribe(
             rhythm.max_age
         );
     }
+    // Before the values, which count for nothing while it is not running.
+    watch_state(session, id, interval).await?;
     let read: Vec<usize> = (0..fields.len())
         .filter(|index| fields[*index].is_read)
         .collect();
@@ -171,7 +173,6 @@ pub(super) async fn subscribe(
             }
         }
     }
-    watch_state(session, id, interval).await?;
     Ok(revised)
 }
 

@@ -65,7 +65,8 @@ impl Show {
         } else {
             debug_assert!(false, "every signal has its nodes: {node}");
         }
-        self.watched.tell(&self.subscriptions, node, variable, &value);
+        self.watched
+            .tell(&self.subscriptions, node, variable, &value);
     }
 }
 
@@ -249,7 +250,8 @@ impl Image {
             signal: index,
             is_scaled: true,
         };
-        self.show.put(node, variable, self.show.value(status, scaled));
+        self.show
+            .put(node, variable, self.show.value(status, scaled));
     }
 }
 

@@ -15,9 +15,7 @@ use opcua::server::node_manager::{
     MonitoredItemRef, ParsedReadValueId, ParsedWriteValue, RequestContext, ServerContext, WriteNode,
 };
 use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
-use opcua::types::{
-    AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn,
-};
+use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
 use tokio::sync::oneshot;
 
 use crate::fieldbus::opcua::pki::date;

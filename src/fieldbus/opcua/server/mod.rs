@@ -40,9 +40,9 @@ const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
 /// The most sessions at once.
 const SESSIONS: usize = 100;
 
-/// async-opcua 0.19 does not forget the monitored items of a subscription that ends as a whole, some 200 bytes each.
+/// async-opcua 0.19 does not forget the monitored items of a subscription that ends as a whole, up to 200 bytes each.
 /// When at least this many have ended and nobody at all is connected, its server is made anew; the listener stays.
-const WORN: usize = 1000;
+const WORN: usize = 500;
 
 /// The bus of kind `opcua-server`.
 #[derive(Debug)]

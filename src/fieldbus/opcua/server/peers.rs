@@ -38,10 +38,7 @@ impl Peers {
         visitor: Visitor,
         stations: impl IntoIterator<Item = usize>,
     ) -> Option<&str> {
-        let known = self
-            .0
-            .iter()
-            .position(|peer| peer.visitor.id == visitor.id);
+        let known = self.0.iter().position(|peer| peer.visitor.id == visitor.id);
         let at = known.unwrap_or_else(|| {
             let deadline = (visitor.deadline)();
             self.0.push(Peer {

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use opcua::nodes::DefaultTypeTree;
+use opcua::server::CreateMonitoredItem;
 use opcua::server::diagnostics::NamespaceMetadata;
 use opcua::server::node_manager::memory::CoreNodeManager;
 use opcua::server::node_manager::{
     BrowseNode, BrowsePathItem, MonitoredItemRef, MonitoredItemUpdateRef, NodeManager, ReadNode,
     RequestContext, ServerContext, WriteNode,
 };
-use opcua::server::CreateMonitoredItem;
 use opcua::types::{
     AttributeId, DataValue, ExtensionObject, MonitoringMode, NodeId, ServerStatusDataType,
     StatusCode, TimestampsToReturn, VariableId,

@@ -112,9 +112,15 @@ mod tests {
         assert_eq!(watched.span(7), None);
         watched.add(raw, item(1), Nanos(10));
         watched.add(scaled, item(2), Nanos(30));
-        assert_eq!((watched.span(7), watched.left_behind()), (Some(Nanos(30)), 0));
+        assert_eq!(
+            (watched.span(7), watched.left_behind()),
+            (Some(Nanos(30)), 0)
+        );
         watched.remove(scaled, item(2));
-        assert_eq!((watched.span(7), watched.left_behind()), (Some(Nanos(10)), 0));
+        assert_eq!(
+            (watched.span(7), watched.left_behind()),
+            (Some(Nanos(10)), 0)
+        );
         watched.remove(raw, item(1));
         // An item that was never made does not count as one that ended.
         watched.remove(raw, item(3));

@@ -8,6 +8,7 @@ mod identity;
 mod link;
 mod options;
 mod port;
+mod rarely;
 mod role;
 mod troubles;
 mod vitals;

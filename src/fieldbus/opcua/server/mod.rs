@@ -18,6 +18,7 @@ use opcua::types::{VariableId, Variant};
 use socket2::SockRef;
 use tokio::sync::Notify;
 
+use crate::fieldbus::rarely::Rarely;
 use crate::fieldbus::{BusError, Free, Port, Role, tcp};
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Pace, Stop};
@@ -216,7 +217,7 @@ impl Free for Server {
                     table: &self.table,
                     waiting: waiting.clone(),
                     pki: &self.pki,
-                    turned_away: 0,
+                    turned_away: Rarely::default(),
                 }),
             };
             match service.serve(&reactor, &mut started, self.cycle, port, stop) {
@@ -246,8 +247,8 @@ struct Service<'a> {
     table: &'a SignalTable,
     waiting: String,
     pki: &'a Pki,
-    /// How many clients were turned away, for certificates that are unknown or not their own.
-    turned_away: u64,
+    /// Clients that were turned away, for certificates that are unknown or not their own.
+    turned_away: Rarely,
 }
 
 impl Service<'_> {
@@ -307,22 +308,20 @@ impl Service<'_> {
             }
             News::Impostor(why) => {
                 port.count("opcua.refused_applications");
-                self.turned_away += 1;
-                if is_told(self.turned_away) {
+                if let Some(times) = self.turned_away.count(("opcua", "application")) {
                     log::warn!(
                         "a client gets no values, as its certificate is not its own ({why}); give it a \
-                         certificate for its ApplicationUri, or write trust = \"any\""
+                         certificate for its ApplicationUri, or write trust = \"any\"{times}"
                     );
                 }
             }
             News::Rejected(files, count) => {
                 let folder = self.pki.folder.display();
                 for file in files {
-                    self.turned_away += 1;
-                    if is_told(self.turned_away) {
+                    if let Some(times) = self.turned_away.count(("opcua", "certificate")) {
                         log::warn!(
                             "a client with an unknown certificate was turned away; to trust it, move \
-                             \"{folder}/rejected/{file}\" to \"{folder}/trusted\""
+                             \"{folder}/rejected/{file}\" to \"{folder}/trusted\"{times}"
                         );
                     }
                 }
@@ -362,9 +361,4 @@ impl Service<'_> {
             port.lost(&error, &self.waiting);
         }
     }
-}
-
-/// Whether the log tells of the `count`th of its kind: peers cause them, so the first twenty, then ever fewer.
-fn is_told(count: u64) -> bool {
-    count <= 20 || count.is_power_of_two()
 }

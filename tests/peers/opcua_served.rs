@@ -93,7 +93,7 @@ pub fn undisturbed() -> Result<(), Absent> {
     read(&mut reader);
     for _ in 0..3 {
         let mut visitor = client(&device)?;
-        let nodes = ["sensor", "position", "temperature", "count"].repeat(125);
+        let nodes = ["sensor", "position", "temperature", "count"].repeat(15);
         visitor.ask(&json!({"subscribe": [nodes, 10, 1]}));
         read(&mut reader);
         drop(visitor);
@@ -101,7 +101,7 @@ pub fn undisturbed() -> Result<(), Absent> {
     }
     let begun = |device: &Device| {
         let statistics = device.end.driver.statistics();
-        statistics.contains("opcua.begun_anew=1\n")
+        statistics.contains("opcua.begun_anew=")
     };
     assert!(!begun(&device), "while somebody is there");
     drop(reader);

@@ -57,6 +57,9 @@ impl Driver {
         if let Some(reflexes) = &mut self.reflexes {
             reflexes.sending(slots);
         }
+        for beat in &mut self.beats {
+            beat.beat(now, slots);
+        }
         if let Some(faults) = &mut self.faults {
             let tick = self.counters.ticks;
             faults.begin_tick(moment(self.first, simulation_time, now, tick), slots);

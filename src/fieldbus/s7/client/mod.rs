@@ -10,7 +10,7 @@ use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 
 use crate::fieldbus::tcp::{self, bow_out, is_for_later, no_wait};
-use crate::fieldbus::{BusError, Free, Guard, Port, Role};
+use crate::fieldbus::{BusError, CYCLE, Free, Guard, Port, Role};
 use crate::os::{Interest, Poller, Source};
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Pace, Stop};
@@ -22,9 +22,6 @@ pub use options::ClientOptions;
 use plan::Image;
 pub use refusal::Refusal;
 pub use terms::{End, News, Terms};
-
-/// The bus cycle where a driver.cfg names none.
-const CYCLE: Nanos = Nanos::from_millis(10);
 
 /// How long an answer may take at least; in other cases four times `max_age`.
 const PATIENCE: Nanos = Nanos::from_secs(2);

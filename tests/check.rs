@@ -206,7 +206,8 @@ fn files_beside_a_driver_cfg_are_found_in_a_folder_whose_name_is_no_utf_8() {
     let text = "[driver]\nid = 1\nname = \"x\"\nfaults = \"f.toml\"\n[fieldbus]\nkind = \"socket\"\n\
                 [[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\n";
     fs::write(folder.join("driver.cfg"), text).expect("written");
-    fs::write(folder.join("f.toml"), "").expect("written");
+    let fault = "[[fault]]\nkind = \"stuck\"\nsignal = \"a\"\nvalue = true\nat = \"1s\"\n";
+    fs::write(folder.join("f.toml"), fault).expect("written");
     let output = check(temporary.path(), folder.join("driver.cfg"));
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");

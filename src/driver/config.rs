@@ -470,10 +470,7 @@ fn read_reconnect(value: &Value<'_>) -> Option<Vec<Nanos>> {
         return None;
     }
     let pause = |value: &Value<'_>| {
-        value.duration_from(
-            LEAST_PAUSE,
-            "attempts that often only burden both ends",
-        )
+        value.duration_from(LEAST_PAUSE, "attempts that often only burden both ends")
     };
     let spans: Vec<Option<Nanos>> = list.iter().map(pause).collect();
     spans.into_iter().collect()

@@ -9,6 +9,7 @@ mod identity;
 mod link;
 mod options;
 mod port;
+mod rarely;
 mod role;
 mod troubles;
 mod vitals;

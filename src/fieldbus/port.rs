@@ -1,5 +1,6 @@
 //! What a bus sees of its driver.
 
+use std::fmt::Arguments;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -326,6 +327,16 @@ impl Port {
             .unwrap_or_default()
     }
 
+    /// When the next station becomes stale if nothing comes from it; [`Nanos::MAX`] if all are.
+    pub fn stale_at(&self, now: Nanos) -> Nanos {
+        let limit = self.max_age();
+        let ages = self.image.stations.iter();
+        let ages = ages.map(|station| station.peer_age(now));
+        let oldest = ages.filter(|age| *age <= limit).max();
+        // One more than the limit is stale.
+        oldest.map_or(Nanos::MAX, |age| now + (limit - age) + Nanos(1))
+    }
+
     /// How long ago the simulation ticked last; [`Nanos::MAX`] for never.
     pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
         self.image.stations[station].tick_age(now)
@@ -343,7 +354,9 @@ impl Port {
         while let Some(station) = self.vitals.look(now) {
             self.doubt(station, now);
         }
-        self.status.observe(now, self.silence(now));
+        let stations = self.image.stations.iter();
+        let ages = stations.map(|station| station.peer_age(now));
+        self.status.observe(now, ages);
     }
 
     /// The line is on its way, or waits for its peer.
@@ -386,6 +399,11 @@ impl Port {
     /// Counts something for the statistics; keys are `<kind of bus>.<what>`.
     pub fn count(&self, key: &'static str) {
         self.status.count(key);
+    }
+
+    /// Writes a message of which a peer can cause as many as it likes; see [`LinkStatus::log`].
+    pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
+        self.status.log(level, kind, message);
     }
 
     /// What another thread needs to look after the [calls](Self::calling) of this one.

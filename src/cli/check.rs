@@ -54,6 +54,9 @@ fn report(config: &Config) -> String {
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
     line("bus", &bus(&config.bus, config.role));
+    for request in config.bus.requests(&config.table) {
+        line("request", &request);
+    }
     line("timing", &timing(&config.timing));
     life_signs(config, &mut line);
     if let Some(record) = &config.record {

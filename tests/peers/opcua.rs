@@ -9,6 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tickbus::time::Monotonic;
 
+use crate::conformance::logged;
 use crate::conformance::rig::{End, await_that};
 use crate::foreign::{self, Absent};
 
@@ -154,6 +155,8 @@ impl Device {
 
     pub fn open_with(folder: tempfile::TempDir, kind: &str, keys: &str, signals: &str) -> Self {
         let clock: Arc<Monotonic> = Monotonic::shared().expect("a thread");
+        // A new folder has no certificate yet.
+        logged::expect("made a certificate for \"tickbus Test rig\"");
         let pki = folder.path().join("pki");
         let text = format!(
             "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"2s\"\n\

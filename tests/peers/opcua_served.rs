@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 use tickbus::fieldbus::LinkState;
 
+use crate::conformance::logged;
 use crate::foreign::Absent;
 use crate::opcua::{Device, Peer};
 
@@ -148,6 +149,8 @@ pub fn tells_of_itself() -> Result<(), Absent> {
 
 /// A client with a trusted certificate that says it is another application than the certificate's.
 pub fn impostor() -> Result<(), Absent> {
+    logged::expect("a client with an unknown certificate was turned away");
+    logged::expect("a client gets no values, as its certificate is not its own");
     let folder = tempfile::tempdir().expect("a folder");
     let made = json!({"certificate": folder.path(), "uri": "urn:test:client"});
     drop(Peer::ready("opcua_client.py", &made)?);

@@ -236,7 +236,7 @@ fn wrong_types() -> Result<(), Absent> {
 }
 
 fn guarded() -> Result<(), Absent> {
-    conformance::logged::expect("nothing is written into the PLC \"urn:test:plc ACME PLC\"");
+    conformance::rig::logged::expect("nothing is written into the PLC \"urn:test:plc ACME PLC\"");
     let address = free_address();
     let mut plc = plc(address, &json!({}))?;
     let mut device = Device::client(address, "security = \"None\"");
@@ -533,7 +533,7 @@ fn nothing_malformed() -> Result<(), Absent> {
 }
 
 fn secured() -> Result<(), Absent> {
-    conformance::logged::expect("a client with an unknown certificate was turned away");
+    conformance::rig::logged::expect("a client with an unknown certificate was turned away");
     let folder = tempfile::tempdir().expect("a folder");
     let uri = "urn:test:client";
     let made = json!({"certificate": folder.path(), "uri": uri});

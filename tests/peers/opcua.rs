@@ -9,8 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tickbus::time::Monotonic;
 
-use crate::conformance::logged;
-use crate::conformance::rig::{End, await_that};
+use crate::conformance::rig::{End, await_that, logged};
 use crate::foreign::{self, Absent};
 
 pub const SIGNALS: &str = r#"

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use tickbus::fieldbus::LinkState;
 
-use crate::conformance::logged;
+use crate::conformance::rig::logged;
 use crate::foreign::Absent;
 use crate::opcua::{Device, Peer};
 

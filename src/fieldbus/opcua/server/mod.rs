@@ -43,7 +43,7 @@ const SESSIONS: usize = 100;
 
 /// async-opcua 0.19 does not forget the monitored items of a subscription that ends as a whole, up to 200 bytes each.
 /// When at least this many have ended and nobody at all is connected, its server is made anew; the listener stays.
-const WORN: usize = 30;
+const WORN: usize = 10;
 
 /// The bus of kind `opcua-server`.
 #[derive(Debug)]

@@ -15,17 +15,21 @@ pub mod rtu;
 mod serial;
 mod server;
 mod shown;
+mod spot;
 mod stations;
 mod table;
 mod tables;
 
 pub use answer::{Done, answer, refuse};
-pub use client::{Block, ClientOptions, Fault, ModbusClient, Query, queries};
+pub use client::{
+    Abilities, Block, ClientOptions, Fault, ModbusClient, Piece, Query, Region, queries,
+};
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;
 pub use line::{Line, Serial};
 pub use place::{Place, PlaceError};
 pub use server::{ModbusServer, ServerOptions};
+pub use spot::Spot;
 pub use stations::Stations;
 pub use table::{Span, Table, put_bits, take_bits};
 pub use tables::{Map, Side, Tables};

@@ -26,6 +26,7 @@ use jni::{Env, EnvUnowned};
 
 use crate::driver::Code;
 use crate::report::page_beside;
+use crate::time::Nanos;
 
 use device::{Device, EVENT_WORDS, EVENTS};
 use failure::{Failure, ThrowFieldbusException};
@@ -33,6 +34,9 @@ use handles::Handles;
 
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
+
+/// How long closing waits for whoever reads the log.
+const LAST_WORDS: Nanos = Nanos::from_millis(100);
 
 /// Called by the JVM when it loads the library.
 ///
@@ -86,8 +90,13 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
     _class: JClass<'local>,
     handle: jlong,
 ) {
-    env.with_env(|_| DRIVERS.close(handle, Device::close).map_err(Failure::plain))
-        .resolve::<ThrowFieldbusException>();
+    env.with_env(|_| {
+        let closed = DRIVERS.close(handle, Device::close);
+        // The process may end right after this, and nobody has the driver any more.
+        crate::os::flush_log(LAST_WORDS);
+        closed.map_err(Failure::plain)
+    })
+    .resolve::<ThrowFieldbusException>();
 }
 
 /// `static native String statisticsNative(long handle)`

@@ -137,7 +137,7 @@ fn bus(options: &Options, role: Role, table: &SignalTable) -> String {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
-        Options::ModbusServer(options) => parts.extend(options.shown()),
+        Options::ModbusServer(options) => parts.extend(options.shown(table)),
         Options::ModbusClient(options) => parts.extend(options.shown(role, table)),
         Options::S7Server(options) => parts.extend(s7_server(options)),
         Options::S7Client(options) => parts.extend(s7_client(options)),

@@ -6,6 +6,7 @@ use crate::axis::Reflexes;
 use crate::faults::{Board, Faults};
 use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
+use crate::os::dropped_log_lines;
 use crate::plc;
 use crate::record::{Columns, Recorder, When};
 use crate::signal::Slot;
@@ -116,7 +117,9 @@ impl Driver {
         let (tx, rx) = config.role.areas();
         let directions = directions(&config.table, config.role);
         let (tick, bus_end) = image(directions);
-        let status = LinkStatus::new(&config.name, config.timing.max_age);
+        let names = config.table.stations.iter();
+        let names = names.map(|station| station.name.clone()).collect();
+        let status = LinkStatus::of_stations(&config.name, config.timing.max_age, names);
         let (bus, program) = bus::open(&config, &clock)?;
         let slots = SlotMap::new(&config.table, config.role);
         // On a stepped bus the tick may wait, so that no tick of it is dropped.
@@ -136,6 +139,7 @@ impl Driver {
         );
         let board = Arc::<Board>::default();
         port.suffer_from(Arc::clone(&board));
+        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
         if config.bus.events() {
             let stations = 0..config.table.stations.len();
             port.watch_changes(
@@ -229,7 +233,13 @@ impl Driver {
         // Writing to a string cannot fail.
         let _ = write!(text, "bus_cycles={cycles}\nevents_lost={lost}\n");
         self.observe();
-        self.status.write(self.clock.now(), &mut text);
+        let now = self.clock.now();
+        self.status.write(now, &mut text);
+        if self.stations.len() > 1 {
+            for (station, section) in self.stations.iter().zip(&self.config.table.stations) {
+                station.write(&section.name, now, self.max_age, &mut text);
+            }
+        }
         self.samples.write(&mut text);
         self.board.tell(self.status.driver());
         self.board.write(&mut text);
@@ -239,6 +249,7 @@ impl Driver {
         if let Some(recorder) = &self.recorder {
             recorder.tally().write(&mut text);
         }
+        let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
         text
     }
 
@@ -246,7 +257,7 @@ impl Driver {
     fn observe(&self) {
         let now = self.clock.now();
         let ages = self.stations.iter().map(|station| station.peer_age(now));
-        self.status.observe(now, ages.max().unwrap_or_default());
+        self.status.observe(now, ages);
         self.status.observe_call(now);
     }
 

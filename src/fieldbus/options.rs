@@ -182,6 +182,7 @@ impl Options {
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
             Self::Socket(options) => options.fit(table, axes, collector),
+            Self::ModbusServer(options) => options.fit(table, collector),
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),

@@ -34,9 +34,9 @@ pub use stations::Stations;
 pub use table::{Span, Table, put_bits, take_bits};
 pub use tables::{Map, Side, Tables};
 
-/// The holding register at which the inputs of a PLC begin that is itself a server, unless a driver.cfg says
-/// otherwise: behind all its outputs, and where `OpenPLC` has its memory words.
-const CONTROLLER_INPUTS: usize = 1024;
+/// The holding register at which `%I` begins among those of a PLC or of a machine that is a server, unless a driver.cfg
+/// says otherwise: behind the outputs of all but the largest, and where `OpenPLC` has its memory words.
+const INPUTS: usize = 1024;
 
 /// This system's serial ports are not used yet.
 #[cfg(not(unix))]

@@ -3,16 +3,28 @@
 use crate::fieldbus::Role;
 use crate::signal::{Area, DataType, Signal, SignalTable};
 
-use super::{Block, ClientOptions, Place, Query, ServerOptions, Table};
+use super::{Block, ClientOptions, Place, Query, ServerOptions, Side, Table};
 
 impl ServerOptions {
-    /// What the line is and does.
-    pub fn shown(&self) -> Vec<String> {
+    /// What the line is and does, with the signals of `signals`.
+    pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
         parts.extend(self.stations.shown(None));
-        if let Some(offset) = self.map.window {
-            let table = Table::HoldingRegisters;
+        let bytes = |area| signals.stations.iter().map(move |station| station.bytes(area)).max();
+        let outputs = bytes(Area::Output).unwrap_or_default();
+        let table = Table::HoldingRegisters;
+        if bytes(Area::Input) > Some(0)
+            && let Some(offset) = self.map(outputs).window
+        {
             parts.push(format!("%I also from {} on", Place { table, offset }));
+        }
+        if outputs > 0 && self.input == Side::Sends {
+            // Whoever expects %I there sees plausible numbers: what he wrote himself.
+            parts.push(format!(
+                "{} and the {} behind it are %Q: read, they give back what was written last",
+                Place { table, offset: 0 },
+                table.elements(outputs) - 1
+            ));
         }
         if self.every_write {
             parts.push("every write".to_owned());

@@ -7,7 +7,7 @@ use crate::fieldbus::Role;
 use crate::fieldbus::modbus::line::Line;
 use crate::fieldbus::modbus::stations::{Stations, Units, read_write_to};
 use crate::fieldbus::modbus::table::Table as OfTable;
-use crate::fieldbus::modbus::{CONTROLLER_INPUTS, Place, Spot};
+use crate::fieldbus::modbus::{INPUTS, Place, Spot};
 use crate::fieldbus::tcp::Address;
 use crate::signal::{Area, SignalTable};
 use crate::time::Nanos;
@@ -207,7 +207,7 @@ fn default(role: Role, area: Area) -> Place {
     let (table, offset) = match (role, area) {
         (_, Area::Output) => (OfTable::HoldingRegisters, 0),
         (Role::Controller, Area::Input) => (OfTable::InputRegisters, 0),
-        (Role::Device, Area::Input) => (OfTable::HoldingRegisters, CONTROLLER_INPUTS),
+        (Role::Device, Area::Input) => (OfTable::HoldingRegisters, INPUTS),
     };
     Place { table, offset }
 }

@@ -97,7 +97,7 @@ impl Poll<'_> {
         now: Nanos,
         port: &mut Port,
     ) -> Result<(), BusError> {
-        if self.adapts(station, index, exception) {
+        if self.adapts(station, index, exception, port) {
             self.stations[station].forget_queries();
             return self.begin(station, now, port);
         }
@@ -146,7 +146,13 @@ impl Poll<'_> {
     }
 
     /// Whether the device can be asked in another way, which is taken from now on.
-    fn adapts(&mut self, station: usize, index: usize, exception: Exception) -> bool {
+    fn adapts(
+        &mut self,
+        station: usize,
+        index: usize,
+        exception: Exception,
+        port: &Port,
+    ) -> bool {
         let unit = self.named(station);
         let polled = &mut self.stations[station];
         let (query, able) = (&polled.queries[index], &mut polled.able);
@@ -171,7 +177,11 @@ impl Poll<'_> {
             }
             _ => return false,
         };
-        log::info!("{unit} refused to {query}: {exception}; {instead}");
+        port.log(
+            log::Level::Info,
+            "adapted",
+            format_args!("{unit} refused to {query}: {exception}; {instead}"),
+        );
         true
     }
 
@@ -214,6 +224,10 @@ impl Poll<'_> {
 }
 
 /// The log hears of a station that is in trouble beside others that are not.
-fn tell(error: &BusError, rest: Nanos, _port: &Port) {
-    log::warn!("{error}; it is asked again in {rest}, and the other stations go on");
+fn tell(error: &BusError, rest: Nanos, port: &Port) {
+    port.log(
+        log::Level::Warn,
+        "station",
+        format_args!("{error}; it is asked again in {rest}, and the other stations go on"),
+    );
 }

@@ -10,7 +10,13 @@ impl ServerOptions {
     pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
         parts.extend(self.stations.shown(None));
-        let bytes = |area| signals.stations.iter().map(move |station| station.bytes(area)).max();
+        let bytes = |area| {
+            signals
+                .stations
+                .iter()
+                .map(move |station| station.bytes(area))
+                .max()
+        };
         let outputs = bytes(Area::Output).unwrap_or_default();
         let table = Table::HoldingRegisters;
         if bytes(Area::Input) > Some(0)
@@ -63,9 +69,8 @@ impl ClientOptions {
             }
             let places: Vec<String> = self.places(area).map(|place| place.to_string()).collect();
             let places = places.join(" and from ");
-            let elsewhere = |signal: &Signal| {
-                signal.area == area && self.at.contains_key(&signal.name)
-            };
+            let elsewhere =
+                |signal: &Signal| signal.area == area && self.at.contains_key(&signal.name);
             if table.signals.iter().any(elsewhere) {
                 format!("{does} {area} where [fieldbus.at] says, the rest from {places} on")
             } else {
@@ -99,7 +104,7 @@ impl ClientOptions {
             };
             let blocked = match self.stations.write_to(station) {
                 Some(_) => "",
-                None => ", once \"write_to\" names the device",
+                None => "; written once \"write_to\" names the device",
             };
             for query in self.requests(table, station) {
                 let Some(write) = query.write() else {
@@ -112,8 +117,8 @@ impl ClientOptions {
                 };
                 let rest = match zeros {
                     0 => String::new(),
-                    1 => ", of which 1 bit has no signal and becomes 0".to_owned(),
-                    bits => format!(", of which {bits} bits have no signal and become 0"),
+                    1 => "; 1 of the bits written has no signal and becomes 0".to_owned(),
+                    bits => format!("; {bits} of the bits written have no signal and become 0"),
                 };
                 lines.push(format!("{unit}{query}{rest}{blocked}"));
             }

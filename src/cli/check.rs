@@ -53,11 +53,7 @@ fn report(config: &Config) -> String {
     };
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
-<<<<<<< HEAD
     line("bus", &bus(&config.bus, config.role, &config.table));
-=======
-    line("bus", &bus(&config.bus, config.role));
->>>>>>> main
     for request in config.bus.requests(&config.table) {
         line("request", &request);
     }

@@ -176,11 +176,8 @@ impl Options {
     /// What a bus that polls asks for in each cycle, a line for each request; empty for others.
     pub fn requests(&self, table: &SignalTable) -> Vec<String> {
         match self {
-<<<<<<< HEAD
             Self::ModbusClient(options) => options.shown_requests(table),
-=======
             Self::S7Client(options) => options.shown_requests(table),
->>>>>>> main
             _ => Vec::new(),
         }
     }
@@ -188,15 +185,10 @@ impl Options {
     /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
     /// are none, and that the bus has no addresses of its own.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
-<<<<<<< HEAD
-        if let Self::ModbusClient(options) = self {
-            options.place_signals(lines, table);
-            return;
-        }
-=======
->>>>>>> main
         let kind = self.kind();
         if let Self::S7Client(options) = self {
+            options.place_signals(lines, table);
+        } else if let Self::ModbusClient(options) = self {
             options.place_signals(lines, table);
         } else if let Some(first) = lines.first() {
             first.wrong(

@@ -561,6 +561,37 @@ fn a_loop_that_never_ends_is_a_fault_of_the_program() {
 
 #[test]
 #[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
+fn a_loop_that_never_ends_is_a_fault_when_the_duration_ends_first() {
+    let folder = folder();
+    by_hand(folder.path(), &["-DLOOP"]);
+    driver_cfg(
+        folder.path(),
+        "addressing = \"iec\"",
+        "kind = \"socket\"\naddress = \"127.0.0.1:1\"\ninput_bytes = 10",
+    );
+    let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .current_dir(folder.path())
+        .args([
+            "plc",
+            "./program.so",
+            "--config",
+            "driver.cfg",
+            "--duration",
+            "200ms",
+        ])
+        .output()
+        .expect("tickbus runs");
+    let out = String::from_utf8_lossy(&output.stdout).into_owned();
+    let last = out.lines().last().expect("a line");
+    assert_eq!(
+        last,
+        "plc: failed reason=a PLC program's scan did not end within 3s, and its thread is left behind"
+    );
+    assert_eq!(output.status.code(), Some(3));
+}
+
+#[test]
+#[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
 fn no_copy_is_left_behind() {
     // A folder for temporary files of its own needs a process of its own.
     let folder = folder();

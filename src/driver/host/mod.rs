@@ -93,7 +93,11 @@ impl Host {
     }
 
     /// Stops scanning and closes the bus.
-    pub fn close(self) {
-        drop(self);
+    ///
+    /// # Errors
+    ///
+    /// The scan under way does not end; its thread is left behind.
+    pub fn close(mut self) -> Result<(), String> {
+        self.0.end()
     }
 }

@@ -166,18 +166,32 @@ impl HostThread {
     }
 }
 
+impl HostThread {
+    /// Stops scanning, and waits for the thread to end.
+    ///
+    /// # Errors
+    ///
+    /// It does not, and is left behind.
+    pub(super) fn end(&mut self) -> Result<(), String> {
+        self.stop.stop();
+        let Some(thread) = self.thread.take() else {
+            return Ok(());
+        };
+        if self.ended.recv_timeout(LONGEST_SCAN.to_duration()) == Err(Timeout) {
+            return Err(format!(
+                "a PLC program's scan did not end within {LONGEST_SCAN}, and its thread is left behind"
+            ));
+        }
+        // Its panics are caught and recorded on the thread itself.
+        let _ = thread.join();
+        Ok(())
+    }
+}
+
 impl Drop for HostThread {
     fn drop(&mut self) {
-        self.stop.stop();
-        if self.ended.recv_timeout(LONGEST_SCAN.to_duration()) == Err(Timeout) {
-            log::error!(
-                "a PLC program's scan did not end within {LONGEST_SCAN}, and its thread is left behind"
-            );
-            return;
-        }
-        if let Some(thread) = self.thread.take() {
-            // Its panics are caught and recorded on the thread itself.
-            let _ = thread.join();
+        if let Err(error) = self.end() {
+            log::error!("{error}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The native methods of the Java class `tickbus.Tickbus`.
 //!
-//! Each is one line into the rooms above. `xChangeData` is the tick: a raw function that takes no
-//! lock, makes no system call, allocates nothing and never throws. All the others go through the jni
-//! crate, and throw `tickbus.FieldbusException`.
+//! Each is one line into the rooms above. `xChangeData` is the tick, `receiveNative` and `sendNative` are its
+//! halves: raw functions that take no lock, make no system call, allocate nothing and never throw. All the others go
+//! through the jni crate, and throw `tickbus.FieldbusException`.
 
 #![allow(
     unsafe_code,
@@ -26,6 +26,7 @@ use jni::{Env, EnvUnowned};
 
 use crate::driver::Code;
 use crate::report::page_beside;
+use crate::time::Nanos;
 
 use device::{Device, EVENT_WORDS, EVENTS};
 use failure::{Failure, ThrowFieldbusException};
@@ -33,6 +34,9 @@ use handles::Handles;
 
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
+
+/// How long closing waits for whoever reads the log.
+const LAST_WORDS: Nanos = Nanos::from_millis(100);
 
 /// Called by the JVM when it loads the library.
 ///
@@ -79,6 +83,30 @@ extern "system" fn Java_tickbus_Tickbus_xChangeData(
         .unwrap_or_else(Code::code)
 }
 
+/// `static native int receiveNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_receiveNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jint {
+    DRIVERS
+        .with(handle, Device::receive)
+        .unwrap_or_else(Code::code)
+}
+
+/// `static native int sendNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_sendNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jint {
+    DRIVERS
+        .with(handle, Device::send)
+        .unwrap_or_else(Code::code)
+}
+
 /// `static native void finalizeNative(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
@@ -86,8 +114,13 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
     _class: JClass<'local>,
     handle: jlong,
 ) {
-    env.with_env(|_| DRIVERS.close(handle, Device::close).map_err(Failure::plain))
-        .resolve::<ThrowFieldbusException>();
+    env.with_env(|_| {
+        let closed = DRIVERS.close(handle, Device::close);
+        // The process may end right after this, and nobody has the driver any more.
+        crate::os::flush_log(LAST_WORDS);
+        closed.map_err(Failure::plain)
+    })
+    .resolve::<ThrowFieldbusException>();
 }
 
 /// `static native String statisticsNative(long handle)`

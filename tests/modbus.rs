@@ -17,7 +17,7 @@ use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Duration;
 
-use conformance::rig::{MAX_AGE, await_that, pass};
+use conformance::rig::{MAX_AGE, await_that, logged, pass};
 use modbus::{Tcp, request};
 use peers::{Alone, client, is_closed, leave};
 use socket2::SockRef;
@@ -263,6 +263,7 @@ fn a_thousand_clients_are_served_side_by_side() {
 
 #[test]
 fn clients_beyond_the_limit_are_turned_away() {
+    logged::expect("was turned away");
     let (mut device, mut honest) = device("clients = 2");
     is_served(&mut device, &mut honest, 1);
     let mut second = client(device.address());

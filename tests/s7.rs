@@ -13,7 +13,7 @@ mod s7_peers;
 
 use std::net::{Ipv4Addr, SocketAddr};
 
-use conformance::rig::{await_that, config, pass};
+use conformance::rig::{await_that, config, logged, pass};
 use peers::{Alone, is_closed};
 use s7_peers::{CONFIRM, CONNECT, Client, Pair, address, command, job, packet, request};
 use tickbus::driver::Code;
@@ -347,6 +347,7 @@ fn a_flood_of_one_client_leaves_time_for_another() {
 
 #[test]
 fn two_hundred_clients_are_served_and_one_more_is_turned_away() {
+    logged::expect("was turned away");
     let (mut device, at) = server("clients = 200");
     let mut clients: Vec<Client> = (0..200).map(|_| Client::new(at)).collect();
     for (value, client) in (0_u8..).zip(&mut clients) {
@@ -363,6 +364,7 @@ fn two_hundred_clients_are_served_and_one_more_is_turned_away() {
 
 #[test]
 fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
+    logged::expect("nothing is written into the PLC");
     let pair = Pair::new("device", "");
     let mut device = Alone::open(&config(&pair, "device", ""));
     let text = config(&pair, "controller", "");

@@ -15,7 +15,7 @@ use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::time::Duration;
 
-use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, pass};
+use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, logged, pass};
 use peers::{Alone, client, is_closed, leave};
 use socket_peers::{RECORD, Tcp, device, record};
 use socket2::SockRef;
@@ -196,6 +196,7 @@ fn a_client_that_never_reads_is_given_up_with_its_byte_count() {
 
 #[test]
 fn a_second_client_is_turned_away_and_the_first_goes_on() {
+    logged::expect("was turned away");
     let (mut device, address) = device("");
     let mut first = client(address);
     first.write_all(&record(1)).expect("the device reads");

@@ -18,6 +18,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::time::Nanos;
+
 /// Puts a simulated machine on a real PLC's fieldbus.
 #[derive(Debug, Parser)]
 #[command(name = "tickbus", version, about)]
@@ -66,12 +68,15 @@ impl From<Outcome> for ExitCode {
     }
 }
 
+/// How long the end of the process waits for whoever reads its log.
+const LAST_WORDS: Nanos = Nanos::from_secs(1);
+
 /// Runs the command with the arguments of the process.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // What happens to the line is told on stdout.
     crate::os::log_to_stderr(log::LevelFilter::Error);
-    match arguments.command {
+    let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
@@ -82,6 +87,7 @@ pub fn main() -> ExitCode {
         Command::Test(arguments) => test::run(&arguments),
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),
-    }
-    .into()
+    };
+    crate::os::flush_log(LAST_WORDS);
+    outcome.into()
 }

@@ -85,8 +85,13 @@ fn open_plugin(config: &Config, options: &plugin::Options) -> Result<Box<dyn Fre
         cycle: config.timing.cycle,
         max_age: config.timing.max_age,
     };
-    let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
-    plugin::open(options, line).map_err(refused)
+    plugin::open(options, line).map_err(|refusal| {
+        let named = |what| format!("{}: {what}", config.path.display());
+        match refusal {
+            plugin::Refusal::Config(what) => DriverError::Config(named(what)),
+            plugin::Refusal::Unsupported(what) => DriverError::Unsupported(named(what)),
+        }
+    })
 }
 
 #[cfg(feature = "opcua")]

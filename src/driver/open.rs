@@ -6,12 +6,14 @@ use crate::axis::Reflexes;
 use crate::faults::{Board, Faults};
 use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
+use crate::os::dropped_log_lines;
 use crate::plc;
 use crate::record::{Columns, Recorder, When};
 use crate::signal::Slot;
-use crate::time::{Clock, CoarseTime, Manual, Nanos};
+use crate::time::{Clock, Manual, Nanos};
 
 use super::bus::{self, Program};
+use super::exchange::{Exchange, Tick};
 use super::frames::directions;
 use super::station::Station;
 use super::statistics::Samples;
@@ -25,14 +27,20 @@ pub struct Driver {
     pub(super) slots: SlotMap,
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
-    pub(super) time: CoarseTime,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
     pub(super) samples: Samples,
-    /// Simulation time and the clock's at the first exchange.
-    pub(super) first: (Nanos, Nanos),
+    /// The clock's time, and the tick's, at the first tick.
+    pub(super) first_now: Nanos,
+    pub(super) first_time: Nanos,
+    /// Simulation time as it was given last.
+    pub(super) given: Option<Nanos>,
+    /// The tick that is under way.
+    pub(super) tick: Option<Tick>,
+    /// What the last tick found.
+    pub(super) last: Exchange,
     /// Faults to inject; none for most drivers.
     pub(super) faults: Option<Box<Faults>>,
     pub(super) board: Arc<Board>,
@@ -116,7 +124,9 @@ impl Driver {
         let (tx, rx) = config.role.areas();
         let directions = directions(&config.table, config.role);
         let (tick, bus_end) = image(directions);
-        let status = LinkStatus::new(&config.name, config.timing.max_age);
+        let names = config.table.stations.iter();
+        let names = names.map(|station| station.name.clone()).collect();
+        let status = LinkStatus::of_stations(&config.name, config.timing.max_age, names);
         let (bus, program) = bus::open(&config, &clock)?;
         let slots = SlotMap::new(&config.table, config.role);
         // On a stepped bus the tick may wait, so that no tick of it is dropped.
@@ -136,6 +146,7 @@ impl Driver {
         );
         let board = Arc::<Board>::default();
         port.suffer_from(Arc::clone(&board));
+        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
         if config.bus.events() {
             let stations = 0..config.table.stations.len();
             port.watch_changes(
@@ -171,13 +182,16 @@ impl Driver {
             recorder,
             stations,
             line,
-            time: clock.coarse(),
             clock,
             max_age: config.timing.max_age,
             status,
             counters: Counters::default(),
             samples: Samples::default(),
-            first: (Nanos::ZERO, Nanos::ZERO),
+            first_now: Nanos::ZERO,
+            first_time: Nanos::ZERO,
+            given: None,
+            tick: None,
+            last: Exchange::NONE,
             faults: None,
             board,
             // They are the machine's: a PLC has its own.
@@ -229,7 +243,13 @@ impl Driver {
         // Writing to a string cannot fail.
         let _ = write!(text, "bus_cycles={cycles}\nevents_lost={lost}\n");
         self.observe();
-        self.status.write(self.clock.now(), &mut text);
+        let now = self.clock.now();
+        self.status.write(now, &mut text);
+        if self.stations.len() > 1 {
+            for (station, section) in self.stations.iter().zip(&self.config.table.stations) {
+                station.write(&section.name, now, self.max_age, &mut text);
+            }
+        }
         self.samples.write(&mut text);
         self.board.tell(self.status.driver());
         self.board.write(&mut text);
@@ -239,6 +259,7 @@ impl Driver {
         if let Some(recorder) = &self.recorder {
             recorder.tally().write(&mut text);
         }
+        let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
         text
     }
 
@@ -246,7 +267,7 @@ impl Driver {
     fn observe(&self) {
         let now = self.clock.now();
         let ages = self.stations.iter().map(|station| station.peer_age(now));
-        self.status.observe(now, ages.max().unwrap_or_default());
+        self.status.observe(now, ages);
         self.status.observe_call(now);
     }
 

@@ -1,5 +1,7 @@
 //! One station of an open driver, as the tick sees it.
 
+use std::fmt::Write as _;
+
 use super::{Code, Counters, SlotMap};
 use crate::image::{Arrival, TickStation};
 use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
@@ -42,6 +44,17 @@ impl Station {
         self.tick.peer_age(now)
     }
 
+    /// Appends how old its data are and how many bus cycles it has sent, one `key=value` a line.
+    pub(super) fn write(&self, name: &str, now: Nanos, max_age: Nanos, text: &mut String) {
+        let age = self.peer_age(now);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "station.{name}.stale={}", age > max_age);
+        if age != Nanos::MAX {
+            let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
+        }
+        let _ = writeln!(text, "station.{name}.bus_cycles={}", self.cycles());
+    }
+
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
         let encode = &self.encode;
         let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
@@ -59,8 +72,15 @@ impl Station {
         map: &SlotMap,
     ) -> Arrival {
         let decode = &self.decode;
-        let arrival = self.tick.read(now, &mut Receiver { decode, slots, map });
-        let stale = arrival.age > max_age;
+        let valid = self.tick.is_valid();
+        let mut receiver = Receiver {
+            decode,
+            slots,
+            map,
+            valid,
+        };
+        let arrival = self.tick.read(now, &mut receiver);
+        let stale = !valid || arrival.age > max_age;
         if stale && (arrival.changed || !self.stale) {
             self.decode.fail_safe(slots);
             self.tick.shown_instead();
@@ -75,6 +95,8 @@ struct Receiver<'a> {
     decode: &'a Plan,
     slots: &'a mut [Slot],
     map: &'a SlotMap,
+    /// Edges of data that do not count are not counted.
+    valid: bool,
 }
 
 impl crate::image::Receiver for Receiver<'_> {
@@ -86,7 +108,44 @@ impl crate::image::Receiver for Receiver<'_> {
     #[inline]
     fn edges(&mut self, signal: usize, count: u32) {
         if let Some(slot) = self.map.edges[signal] {
+            let count = if self.valid { count } else { 0 };
             self.slots[slot] = Slot::from_real(f64::from(count));
         }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::driver::frames::directions;
+    use crate::driver::{Config, SlotMap};
+    use crate::fieldbus::Role;
+    use crate::image::image;
+
+    #[test]
+    fn data_that_do_not_count_are_delivered_as_fail_safe_values_without_edges() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                    [[signal]]\nname = \"go\"\naddress = \"%QX0.0\"\nlatch = \"both\"\n\
+                    [[signal]]\nname = \"speed\"\naddress = \"%QB1\"\nfail_safe = 7\n";
+        let config = Config::parse("driver.cfg", text).expect("right");
+        let (table, role) = (&config.table, Role::Device);
+        let (tick, mut bus) = image(directions(table, role));
+        let ends = tick.stations.into_iter().next().expect("one");
+        let mut station = Station::new(ends, table, 0, role.areas());
+        let map = SlotMap::new(table, role);
+        let mut slots = vec![Slot::default(); map.count];
+        let edges = map.edges[0].expect("it is latched");
+        let mut shown = |bus: &mut crate::image::BusStation, valid, bytes: &[u8]| {
+            bus.received(Nanos(1), bytes);
+            bus.set_valid(valid);
+            station.receive(Nanos(2), Nanos(10), &mut slots, &map);
+            let real = |slot: usize| slots[slot].real();
+            (station.stale, real(0), real(1), real(edges))
+        };
+        let bus = &mut bus.stations[0];
+        assert_eq!(shown(bus, true, &[1, 9]), (false, 1.0, 9.0, 1.0));
+        assert_eq!(shown(bus, false, &[0, 8]), (true, 0.0, 7.0, 0.0));
+        assert_eq!(shown(bus, false, &[1, 8]), (true, 0.0, 7.0, 0.0));
+        assert_eq!(shown(bus, true, &[1, 9]), (false, 1.0, 9.0, 0.0));
     }
 }

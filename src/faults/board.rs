@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::LineFault;
 use super::list::Moment;
+use crate::os::{is_told, is_told_rarely};
 use crate::time::Nanos;
 
 /// Where a fault stands in its life.
@@ -126,20 +127,20 @@ impl Cell {
         }
     }
 
-    /// Writes its beginnings and ends to the log, each once.
-    fn tell(&self, driver: &str) {
+    /// What the log is to know of its beginnings and ends since the last time.
+    fn news(&self, driver: &str) -> Option<String> {
         let changes = self.changes.load(Ordering::Acquire);
         let told = self.told.swap(changes, Ordering::Relaxed);
-        if told >= changes || !is_told(changes) {
-            return;
+        // Nothing is made for a log that nobody keeps: on a stepped bus this is the tick.
+        if told >= changes || !is_told(changes) || !log::log_enabled!(log::Level::Warn) {
+            return None;
         }
         let happens = match (self.phase(), changes - told) {
             (Phase::Active, _) => "begins",
             (_, 1) => "ends",
             _ => "has begun and ended",
         };
-        // Nothing is made for a log that nobody keeps: on a stepped bus this is the tick.
-        log::warn!(
+        Some(format!(
             "driver \"{driver}\": injected fault \"{}\" ({}) {happens} at {}, tick {}{}: {}",
             self.name,
             self.kind,
@@ -147,16 +148,8 @@ impl Cell {
             self.tick.load(Ordering::Relaxed),
             Often(changes),
             self.what
-        );
+        ))
     }
-}
-
-/// Changes of one fault that the log gets in any case.
-const TOLD: u64 = 20;
-
-/// Whether the log is to know of this change: a fault that comes and goes at every tick must not fill it.
-const fn is_told(changes: u64) -> bool {
-    changes <= TOLD || changes.is_power_of_two()
 }
 
 /// Says that not every change is told any more.
@@ -164,7 +157,7 @@ struct Often(u64);
 
 impl fmt::Display for Often {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0 < TOLD {
+        if !is_told_rarely(self.0) {
             return Ok(());
         }
         write!(
@@ -225,7 +218,15 @@ impl Board {
 
     /// Writes to the log what has begun and ended since the last time.
     pub fn tell(&self, driver: &str) {
-        self.cells().iter().for_each(|cell| cell.tell(driver));
+        // Written when others have the list again: nobody waits for whoever reads the log.
+        let news: Vec<String> = self
+            .cells()
+            .iter()
+            .filter_map(|cell| cell.news(driver))
+            .collect();
+        for line in news {
+            log::warn!("{line}");
+        }
     }
 
     /// All faults, in the order of injection; those that are long over may be missing.

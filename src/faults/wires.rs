@@ -56,9 +56,9 @@ pub struct Wires {
     faults: Vec<LineFault>,
     stations: Vec<Wire>,
     sum: Sum,
-    /// What chance has decided for the cycle of received frames that is under way.
-    cycle: Fate,
-    /// What chance has decided for the frames that go out.
+    /// What chance has decided for the frames of the cycle that comes in.
+    fate: Fate,
+    /// Whether it has decided that the frames of the cycle that goes out repeat those of the last one.
     repeats: bool,
     /// The active troubles, in words.
     active: String,
@@ -68,6 +68,10 @@ pub struct Wires {
 #[derive(Debug)]
 struct Wire {
     dead: bool,
+    /// Whether its part of the cycle that comes in, and of the one that goes out, is over: when it comes again, another
+    /// cycle has begun, whichever station is the first of it.
+    came: bool,
+    went: bool,
     out: Outgoing,
     /// Received frames that wait.
     waiting: Option<Ring>,
@@ -117,6 +121,8 @@ impl Wires {
     pub fn new(board: Arc<Board>, stations: impl Iterator<Item = Shape>) -> Self {
         let wire = |shape: Shape| Wire {
             dead: false,
+            came: true,
+            went: true,
             out: Outgoing {
                 latched: shape.latched,
                 newest: shape.last_sent.clone(),
@@ -133,7 +139,7 @@ impl Wires {
             faults: Vec::new(),
             stations: stations.map(wire).collect(),
             sum: Sum::default(),
-            cycle: Fate::Passes(1),
+            fate: Fate::Passes(1),
             repeats: false,
             active: String::new(),
         }
@@ -164,7 +170,11 @@ impl Wires {
     /// Looks which faults are active.
     pub fn look(&mut self) {
         let mut sum = Sum::default();
-        self.stations.iter_mut().for_each(|wire| wire.dead = false);
+        // Chance decides anew: of a fault that is over nothing is left behind.
+        (self.fate, self.repeats) = (Fate::Passes(1), false);
+        for wire in &mut self.stations {
+            (wire.dead, wire.came, wire.went) = (false, true, true);
+        }
         self.faults.retain(|fault| {
             let phase = fault.cell.phase();
             if phase == Phase::Active {
@@ -225,10 +235,13 @@ impl Wires {
         lost
     }
 
-    /// Whether the frames that went out last go out again in place of new ones. Decided with the first station
-    /// of a cycle.
+    /// Whether the frames that went out last go out again in place of new ones. Decided once for all stations of a
+    /// cycle.
     pub fn repeats(&mut self, station: usize) -> bool {
-        if station == 0 {
+        if std::mem::replace(&mut self.stations[station].went, true) {
+            for (index, wire) in self.stations.iter_mut().enumerate() {
+                wire.went = index == station;
+            }
             self.repeats = Self::throw(&mut self.faults, |trouble| match trouble {
                 Trouble::Duplicate(chance, direction) if direction.goes_out() => Some(chance),
                 _ => None,
@@ -284,20 +297,23 @@ impl Wires {
 
     /// Decides what becomes of a frame that came in at `now`, and keeps it if it has to wait.
     pub fn arrives(&mut self, station: usize, now: Nanos, bytes: &[u8]) -> Fate {
-        if station == 0 && !self.sum.down {
-            self.cycle = self.decide();
+        if !self.sum.down && std::mem::replace(&mut self.stations[station].came, true) {
+            for (index, wire) in self.stations.iter_mut().enumerate() {
+                wire.came = index == station;
+            }
+            self.fate = self.decide();
         }
         if self.is_cut(station) {
             return Fate::Lost;
         }
-        let Fate::Passes(times) = self.cycle else {
-            return self.cycle;
+        let Fate::Passes(times) = self.fate else {
+            return self.fate;
         };
         let Some(ring) = &mut self.stations[station].waiting else {
-            return self.cycle;
+            return self.fate;
         };
         if self.sum.delay == Nanos::ZERO && ring.is_empty() {
-            return self.cycle;
+            return self.fate;
         }
         for _ in 0..times {
             // Who hands frames in releases before; a ring that is full nonetheless keeps its order.

@@ -43,10 +43,14 @@ impl Guard {
                 None => "no \"write_to\" names it".to_owned(),
                 Some(other) => format!("\"write_to\" names \"{other}\""),
             };
-            log::warn!(
-                "nothing is written into the PLC \"{identity}\", because {why}; if its outputs may be moved \
-                 from here, write into [fieldbus]: write_to = {}",
-                quoted(identity)
+            port.log(
+                log::Level::Warn,
+                "write_to",
+                format_args!(
+                    "nothing is written into the PLC \"{identity}\", because {why}; if its outputs may be moved \
+                     from here, write into [fieldbus]: write_to = {}",
+                    quoted(identity)
+                ),
             );
         }
         self.may_write
@@ -70,14 +74,16 @@ mod tests {
     use super::*;
     use crate::fieldbus::{LinkStatus, Role};
     use crate::image::image;
+    use crate::os::logged;
     use crate::time::{Manual, Nanos};
 
-    fn port() -> (Port, LinkStatus) {
+    fn port() -> (Port, LinkStatus, logged::Watch) {
+        let logged = logged::Watch::new();
         let status = LinkStatus::new("test", Nanos::from_millis(100));
         let clock: Arc<Manual> = Manual::new();
         let (_, end) = image(Vec::new());
         let port = Port::new(end, clock, Role::Device, None, status.clone());
-        (port, status)
+        (port, status, logged)
     }
 
     fn statistics(status: &LinkStatus) -> String {
@@ -88,7 +94,8 @@ mod tests {
 
     #[test]
     fn only_the_plc_that_was_named_is_written_to() {
-        let (port, status) = port();
+        logged::expect("nothing is written into the PLC \"ACME ");
+        let (port, status, _logged) = port();
         let mut guard = Guard::new(Some("ACME 7"));
         assert!(!guard.may_write(), "nobody was met");
         assert!(!guard.meet(&port, "ACME 8"));

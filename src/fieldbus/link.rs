@@ -1,14 +1,16 @@
 //! How a line is doing: its state, the cause of that, and the reason in words.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::fmt::{Arguments, Write as _};
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::os::one_line;
 use crate::time::{Nanos, Spans};
 
 use super::BusError;
+use super::rarely::Rarely;
 
 /// How a line is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -19,7 +21,7 @@ pub enum LinkState {
     Opening,
     /// The peer is there.
     Running,
-    /// The peer was there, and nothing has come from it for longer than `max_age`.
+    /// The peer was there, and nothing that counts has come from it for longer than `max_age`.
     Stale,
     /// The line broke; it is tried again after a pause.
     Failed,
@@ -74,11 +76,13 @@ pub enum Cause {
     Closed,
     /// A fault was injected, and holds the line down.
     Injected,
+    /// The PLC does not run its program.
+    Stopped,
 }
 
 impl Cause {
     /// All of them; each one's code is its place here.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::NotOpened,
         Self::Waiting,
         Self::Running,
@@ -91,6 +95,7 @@ impl Cause {
         Self::Hung,
         Self::Closed,
         Self::Injected,
+        Self::Stopped,
     ];
 
     /// The cause's name, in lower case.
@@ -108,6 +113,7 @@ impl Cause {
             Self::Hung => "hung",
             Self::Closed => "closed",
             Self::Injected => "injected",
+            Self::Stopped => "stopped",
         }
     }
 }
@@ -144,8 +150,12 @@ pub struct LinkStatus(Arc<Shared>);
 struct Shared {
     driver: String,
     max_age: Nanos,
+    /// The names of the stations where there are several.
+    stations: Vec<String>,
     /// The record's state once more, to be read without its lock.
     state: AtomicU8,
+    /// How many stations were stale when the reason was made.
+    stale: AtomicUsize,
     record: Mutex<Record>,
 }
 
@@ -157,13 +167,17 @@ struct Record {
     call: Option<Call>,
     /// The injected faults of the line that are active, in words.
     injected: String,
+    /// Why data that arrive do not count; `None` while they do.
+    doubt: Option<(Cause, String)>,
     /// What a call that hangs interrupted.
     before_hang: Option<Link>,
     /// How often each state was entered, and each cause given.
     entered: [u64; LinkState::ALL.len()],
     caused: [u64; Cause::ALL.len()],
-    facts: BTreeMap<&'static str, String>,
+    facts: BTreeMap<Cow<'static, str>, String>,
     counts: BTreeMap<&'static str, u64>,
+    /// What the log was told.
+    log: Rarely,
     cycle: Spans,
 }
 
@@ -188,6 +202,12 @@ impl LinkStatus {
     /// The state of the line of the driver called `driver`, which is closed so far. Data older than
     /// `max_age` make it stale.
     pub fn new(driver: &str, max_age: Nanos) -> Self {
+        Self::of_stations(driver, max_age, Vec::new())
+    }
+
+    /// The same for a driver with `stations` of these names: the one that is silent is told by its name, if there
+    /// are several.
+    pub fn of_stations(driver: &str, max_age: Nanos, stations: Vec<String>) -> Self {
         let link = Link {
             state: LinkState::Closed,
             cause: Cause::NotOpened,
@@ -197,17 +217,21 @@ impl LinkStatus {
         Self(Arc::new(Shared {
             driver: driver.to_owned(),
             max_age,
+            stations,
             state: AtomicU8::new(0),
+            stale: AtomicUsize::new(0),
             record: Mutex::new(Record {
                 link,
                 running: String::new(),
                 call: None,
                 injected: String::new(),
+                doubt: None,
                 before_hang: None,
                 entered: [0; LinkState::ALL.len()],
                 caused: [0; Cause::ALL.len()],
                 facts: BTreeMap::new(),
                 counts: BTreeMap::new(),
+                log: Rarely::default(),
                 cycle: Spans::new(),
             }),
         }))
@@ -248,7 +272,7 @@ impl LinkStatus {
 
     /// Enters a state at `now`; entering the present one with the same reason does nothing.
     pub fn enter(&self, now: Nanos, state: LinkState, cause: Cause, reason: &str) {
-        self.0.enter(&mut self.lock(), now, state, cause, reason);
+        self.0.enter(self.lock(), now, state, cause, reason);
     }
 
     /// The peer is there. A line that is running or stale stays so.
@@ -259,37 +283,64 @@ impl LinkStatus {
         let mut record = self.lock();
         reason.clone_into(&mut record.running);
         let (state, cause) = (LinkState::Running, Cause::Running);
-        self.0.enter(&mut record, now, state, cause, reason);
+        let up = self.0.change(&mut record, now, state, cause, reason);
+        let doubt = record.doubt.clone();
+        let doubt = doubt.and_then(|(cause, reason)| {
+            let state = LinkState::Stale;
+            self.0.change(&mut record, now, state, cause, &reason)
+        });
+        drop(record);
+        up.into_iter().chain(doubt).for_each(Message::write);
     }
 
-    /// Looks at the clock: a running line whose newest data are `age` old becomes stale or, when the data
-    /// are young again, running. Lock-free unless something changes.
-    pub fn observe(&self, now: Nanos, age: Nanos) {
+    /// Data that arrive do not count, for a cause and a reason in words, or they do again (`None`). A line that is
+    /// running is stale meanwhile; one that is not will be when it comes up.
+    pub fn doubt(&self, now: Nanos, doubt: Option<(Cause, String)>) {
+        let mut record = self.lock();
+        let before = std::mem::replace(&mut record.doubt, doubt);
+        if !matches!(record.link.state, LinkState::Running | LinkState::Stale) {
+            return;
+        }
+        let (state, cause, reason) = match (record.doubt.clone(), before) {
+            (Some((cause, reason)), _) => (LinkState::Stale, cause, reason),
+            (None, Some((cause, _))) if record.link.cause == cause => {
+                (LinkState::Running, Cause::Running, record.running.clone())
+            }
+            (None, _) => return,
+        };
+        self.0.enter(record, now, state, cause, &reason);
+    }
+
+    /// Looks at the clock: a running line becomes stale when the newest data of a station, whose `ages` these are,
+    /// are too old, and running again when all are young. Lock-free unless something changes.
+    pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
+        let limit = self.0.max_age;
+        let stale = ages.clone().filter(|age| *age > limit).count();
         match self.state() {
-            LinkState::Running if age > self.0.max_age => {}
-            LinkState::Stale if age <= self.0.max_age => {}
+            LinkState::Running if stale > 0 => {}
+            LinkState::Stale if stale == 0 || stale != self.0.stale.load(Ordering::Relaxed) => {}
             _ => return,
         }
         let mut record = self.lock();
-        let silence = age.min(now - record.link.since);
+        let shown = now - record.link.since;
         match record.link.state {
             // A line that has only just come up may still have the old data.
-            LinkState::Running if silence > self.0.max_age => {
-                let mut reason = format!(
-                    "nothing has come from the peer for {}; the limit is max_age = {}",
-                    silence.rounded(),
-                    self.0.max_age
-                );
-                if !record.injected.is_empty() {
-                    let _ = write!(reason, "; injected fault: {}", record.injected);
-                }
+            LinkState::Running if shown > limit && stale > 0 => {
+                let reason = self.0.silence(&record, shown, ages);
+                self.0.stale.store(stale, Ordering::Relaxed);
                 let (state, cause) = (LinkState::Stale, Cause::Silent);
-                self.0.enter(&mut record, now, state, cause, &reason);
+                self.0.enter(record, now, state, cause, &reason);
             }
-            LinkState::Stale if age <= self.0.max_age && !record.is_hung(now) => {
+            LinkState::Stale if stale > 0 => {
+                self.0.stale.store(stale, Ordering::Relaxed);
+                if record.link.cause == Cause::Silent {
+                    record.link.reason = self.0.silence(&record, Nanos::MAX, ages);
+                }
+            }
+            LinkState::Stale if record.doubt.is_none() && !record.is_hung(now) => {
                 let reason = record.running.clone();
                 let (state, cause) = (LinkState::Running, Cause::Running);
-                self.0.enter(&mut record, now, state, cause, &reason);
+                self.0.enter(record, now, state, cause, &reason);
             }
             _ => {}
         }
@@ -312,7 +363,7 @@ impl LinkStatus {
                 record.before_hang = Some(record.link.clone());
             }
             let (state, cause) = (LinkState::Stale, Cause::Hung);
-            self.0.enter(&mut record, now, state, cause, &reason);
+            self.0.enter(record, now, state, cause, &reason);
         }
     }
 
@@ -336,7 +387,7 @@ impl LinkStatus {
         let before = record.before_hang.take();
         if let Some(link) = before.filter(|link| link.state == LinkState::Opening) {
             self.0
-                .enter(&mut record, now, link.state, link.cause, &link.reason);
+                .enter(record, now, link.state, link.cause, &link.reason);
         } else if let Some(call) = call {
             let reason = format!(
                 "{} returned after {}, and nothing has come from the peer since",
@@ -344,18 +395,27 @@ impl LinkStatus {
                 (now - call.since).rounded()
             );
             let (state, cause) = (LinkState::Stale, Cause::Silent);
-            self.0.enter(&mut record, now, state, cause, &reason);
+            self.0.enter(record, now, state, cause, &reason);
         }
     }
 
     /// Notes a fact for the statistics, such as the address that was bound.
-    pub fn tell(&self, key: &'static str, fact: &str) {
-        self.lock().facts.insert(key, one_line(fact));
+    pub fn tell(&self, key: impl Into<Cow<'static, str>>, fact: &str) {
+        self.lock().facts.insert(key.into(), one_line(fact));
     }
 
     /// Counts something for the statistics.
     pub fn count(&self, key: &'static str) {
         *self.lock().counts.entry(key).or_default() += 1;
+    }
+
+    /// Writes a message of which a peer can cause as many as it likes, with the name of the driver. `kind` names what it
+    /// is about: the log has the first 20 of a kind, and then those whose number is a power of two.
+    pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
+        let told = self.lock().log.count(("", kind));
+        if let Some(times) = told {
+            log::log!(level, "driver \"{}\": {message}{times}", self.driver());
+        }
     }
 
     /// A bus cycle was `span` long.
@@ -393,6 +453,7 @@ impl LinkStatus {
         for (key, count) in &record.counts {
             let _ = writeln!(text, "{key}={count}");
         }
+        let _ = writeln!(text, "log.untold={}", record.log.untold());
         record.cycle.write("bus_cycle", text);
     }
 
@@ -402,15 +463,51 @@ impl LinkStatus {
     }
 }
 
+/// A message for the log, made while the record was locked and written when it no longer is.
+#[must_use]
+struct Message(log::Level, String);
+
+impl Message {
+    fn write(self) {
+        log::log!(self.0, "{}", self.1);
+    }
+}
+
 impl Shared {
-    fn enter(&self, record: &mut Record, now: Nanos, state: LinkState, cause: Cause, reason: &str) {
-        let link = &mut record.link;
-        let reason = one_line(reason);
-        if (link.state, link.cause) == (state, cause) {
-            // A state that only tells it in other words, such as how long it has lasted, goes on.
-            link.reason = reason;
-            return;
+    /// Enters a state. The log is told when others have the record again: nobody waits for whoever reads the log.
+    fn enter(
+        &self,
+        mut record: MutexGuard<'_, Record>,
+        now: Nanos,
+        state: LinkState,
+        cause: Cause,
+        reason: &str,
+    ) {
+        let message = self.change(&mut record, now, state, cause, reason);
+        drop(record);
+        if let Some(message) = message {
+            message.write();
         }
+    }
+
+    /// Changes the state, and gives what the log is to know of that.
+    fn change(
+        &self,
+        record: &mut Record,
+        now: Nanos,
+        state: LinkState,
+        cause: Cause,
+        reason: &str,
+    ) -> Option<Message> {
+        let reason = one_line(reason);
+        if (record.link.state, record.link.cause) == (state, cause) {
+            // A state that only tells it in other words, such as how long it has lasted, goes on.
+            record.link.reason = reason;
+            return None;
+        }
+        record.entered[state as usize] += 1;
+        record.caused[cause as usize] += 1;
+        self.state.store(state as u8, Ordering::Relaxed);
         let trouble = matches!(state, LinkState::Stale | LinkState::Failed)
             || (state == LinkState::Opening && cause != Cause::Waiting);
         let level = if trouble {
@@ -418,131 +515,54 @@ impl Shared {
         } else {
             log::Level::Info
         };
-        log::log!(
-            level,
-            "driver \"{}\" is {}: {reason}",
-            self.driver,
-            state.name()
-        );
-        *link = Link {
+        let told = record.log.count((state.name(), cause.name()));
+        let message = told.filter(|_| log::log_enabled!(level)).map(|times| {
+            let (driver, state) = (&self.driver, state.name());
+            Message(
+                level,
+                format!("driver \"{driver}\" is {state}: {reason}{times}"),
+            )
+        });
+        record.link = Link {
             state,
             cause,
             reason,
             since: now,
         };
-        record.entered[state as usize] += 1;
-        record.caused[cause as usize] += 1;
-        self.state.store(state as u8, Ordering::Relaxed);
+        message
+    }
+
+    /// The reason of a silence: whose data are too old, though the line has been up for `shown`.
+    fn silence(
+        &self,
+        record: &Record,
+        shown: Nanos,
+        ages: impl Iterator<Item = Nanos> + Clone,
+    ) -> String {
+        let mut reason = "nothing has come from ".to_owned();
+        // Writing to a string cannot fail.
+        if self.stations.len() < 2 {
+            let age = ages.max().unwrap_or_default().min(shown);
+            let _ = write!(reason, "the peer for {}", age.rounded());
+        } else {
+            let silent = ages.zip(&self.stations);
+            let silent = silent.filter(|(age, _)| *age > self.max_age);
+            for (index, (age, name)) in silent.enumerate() {
+                let comma = if index > 0 { ", " } else { "" };
+                let _ = write!(reason, "{comma}station \"{name}\" ");
+                let _ = match age {
+                    Nanos::MAX => write!(reason, "at all"),
+                    age => write!(reason, "for {}", age.rounded()),
+                };
+            }
+        }
+        let _ = write!(reason, "; the limit is max_age = {}", self.max_age);
+        if !record.injected.is_empty() {
+            let _ = write!(reason, "; injected fault: {}", record.injected);
+        }
+        reason
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const MAX_AGE: Nanos = Nanos::from_millis(100);
-
-    fn at(millis: i64) -> Nanos {
-        Nanos::from_millis(millis)
-    }
-
-    #[test]
-    fn names_and_codes_are_told_apart() {
-        for (code, state) in LinkState::ALL.iter().enumerate() {
-            assert_eq!(*state as usize, code);
-        }
-        for (code, cause) in Cause::ALL.iter().enumerate() {
-            assert_eq!(*cause as usize, code);
-        }
-    }
-
-    #[test]
-    fn a_running_line_becomes_stale_and_running_again_by_age_alone() {
-        let status = LinkStatus::new("test", MAX_AGE);
-        status.running(at(1000), "the peer is there");
-        // Data of an earlier peer, or none at all: it has the time to send its first.
-        status.observe(at(1100), Nanos::MAX);
-        assert_eq!(status.state(), LinkState::Running);
-        status.observe(at(1101), Nanos::MAX);
-        let link = status.link();
-        assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Silent));
-        assert_eq!(
-            link.reason,
-            "nothing has come from the peer for 101ms; the limit is max_age = 100ms"
-        );
-        status.running(at(1102), "the peer is there");
-        assert_eq!(
-            status.state(),
-            LinkState::Stale,
-            "being there is not enough"
-        );
-        status.observe(at(1103), at(3));
-        let link = status.link();
-        assert_eq!(link.state, LinkState::Running);
-        assert_eq!(link.reason, "the peer is there");
-    }
-
-    #[test]
-    fn a_call_that_does_not_return_is_told() {
-        let status = LinkStatus::new("test", MAX_AGE);
-        status.running(at(0), "the peer is there");
-        status.call_begins(at(10), &"exchange() of libx.so".into(), at(50));
-        status.observe_call(at(60));
-        assert_eq!(status.state(), LinkState::Running);
-        status.observe_call(at(3210));
-        let link = status.link();
-        assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Hung));
-        assert_eq!(
-            link.reason,
-            "exchange() of libx.so has not returned for 3200ms; it may take 50ms"
-        );
-        status.call_ends(at(3211));
-        let link = status.link();
-        assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Silent));
-        status.observe(at(3211), at(1));
-        assert_eq!(status.state(), LinkState::Running);
-        assert_eq!(status.link().reason, "the peer is there");
-    }
-
-    #[test]
-    fn a_line_that_waited_when_a_call_hung_waits_on() {
-        let status = LinkStatus::new("test", MAX_AGE);
-        let (state, cause) = (LinkState::Opening, Cause::Waiting);
-        status.enter(at(0), state, cause, "waiting for the peer");
-        status.call_begins(at(10), &"exchange() of libx.so".into(), at(50));
-        status.observe_call(at(100));
-        status.observe_call(at(200));
-        assert_eq!(status.link().cause, Cause::Hung);
-        status.call_ends(at(210));
-        let link = status.link();
-        assert_eq!((link.state, link.cause), (state, cause));
-        assert_eq!(link.reason, "waiting for the peer");
-        status.running(at(211), "the peer is there");
-        assert_eq!(status.link().reason, "the peer is there");
-    }
-
-    #[test]
-    fn statistics_have_one_line_per_key_whatever_the_reason_says() {
-        let status = LinkStatus::new("test", MAX_AGE);
-        let (state, cause) = (LinkState::Failed, Cause::Defect);
-        status.enter(
-            at(5),
-            state,
-            cause,
-            "assertion failed\n  left: 1\n right: 2",
-        );
-        status.tell("address", "127.0.0.1:5");
-        status.count("socket.turned_away");
-        let mut text = String::new();
-        status.write(at(1005), &mut text);
-        assert!(
-            text.starts_with(
-                "state=failed\nstate.code=4\ncause=defect\ncause.code=8\n\
-                 reason=assertion failed left: 1 right: 2\nstate.for_s=1.000\nmax_age=100ms\naddress=127.0.0.1:5\n"
-            ),
-            "{text}"
-        );
-        assert!(text.contains("\nlink.failed=1\ncause.defect=1\nsocket.turned_away=1\n"));
-        assert!(text.lines().all(|line| line.contains('=')), "{text}");
-    }
-}
+mod tests;

@@ -8,8 +8,10 @@ mod identity;
 mod link;
 mod options;
 mod port;
+mod rarely;
 mod role;
 mod troubles;
+mod vitals;
 
 pub mod loopback;
 pub mod modbus;
@@ -28,3 +30,4 @@ pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use options::{KINDS, Options};
 pub use port::{CallWatch, Port};
 pub use role::Role;
+pub use vitals::PlcState;

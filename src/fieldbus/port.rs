@@ -1,5 +1,6 @@
 //! What a bus sees of its driver.
 
+use std::fmt::Arguments;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,7 +9,8 @@ use crate::image::{BusEnd, Event};
 use crate::time::{Clock, Nanos};
 
 use super::troubles::Troubles;
-use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, Role};
+use super::vitals::Vitals;
+use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role};
 
 /// A bus's access to the image, the clock and the state of its driver.
 #[derive(Debug)]
@@ -22,6 +24,7 @@ pub struct Port {
     /// When the first station's last frame arrived, while the line is running.
     last_cycle: Option<Nanos>,
     troubles: Troubles,
+    vitals: Vitals,
 }
 
 impl Port {
@@ -36,6 +39,7 @@ impl Port {
         status: LinkStatus,
     ) -> Self {
         Self {
+            vitals: Vitals::new(image.stations.len()),
             image,
             clock,
             role,
@@ -50,6 +54,11 @@ impl Port {
     /// Lets the line suffer from the faults on `board`.
     pub fn suffer_from(&mut self, board: Arc<Board>) {
         self.troubles = Troubles::of(board);
+    }
+
+    /// Gives the stations the names that reasons and statistics call them, in the order of the signal table.
+    pub fn name_stations<'a>(&mut self, names: impl IntoIterator<Item = &'a str>) {
+        self.vitals.name_stations(names.into_iter());
     }
 
     /// Reports every change between received frames as an event; one watcher per station.
@@ -225,6 +234,9 @@ impl Port {
             self.status.cycle(now - last);
         }
         self.image.stations[station].received(now, bytes);
+        if self.vitals.revives(station) {
+            self.doubt(station, now);
+        }
         if let Some(changes) = self.changes.get_mut(station) {
             changes.observe(now, bytes, &mut self.image.events);
         }
@@ -237,6 +249,28 @@ impl Port {
         if wires.is_none_or(|wires| !wires.is_cut(station) && !wires.holds_back(station)) {
             self.image.stations[station].touch(now);
         }
+    }
+
+    /// The PLC of `station` says that it runs its program, or that it does not: then the station is stale at once,
+    /// however young its data are. Fresh again is what comes after it said that it runs. To be called as often as
+    /// the PLC says it; what it said last stays when the line breaks.
+    pub fn plc_state(&mut self, station: usize, now: Nanos, state: PlcState) {
+        if !self.vitals.plc_says(station, state) {
+            return;
+        }
+        for (key, fact) in self.vitals.facts() {
+            self.status.tell(key, fact);
+        }
+        if state == PlcState::Stop {
+            self.doubt(station, now);
+        }
+    }
+
+    /// Lets image and line follow what is known of the data of `station`.
+    fn doubt(&mut self, station: usize, now: Nanos) {
+        let is_valid = self.vitals.is_valid(station);
+        self.image.stations[station].set_valid(is_valid);
+        self.status.doubt(now, self.vitals.doubt());
     }
 
     /// When the port itself has something to do next, for which [`observe`](Self::observe) is to be called;
@@ -288,6 +322,16 @@ impl Port {
             .unwrap_or_default()
     }
 
+    /// When the next station becomes stale if nothing comes from it; [`Nanos::MAX`] if all are.
+    pub fn stale_at(&self, now: Nanos) -> Nanos {
+        let limit = self.max_age();
+        let ages = self.image.stations.iter();
+        let ages = ages.map(|station| station.peer_age(now));
+        let oldest = ages.filter(|age| *age <= limit).max();
+        // One more than the limit is stale.
+        oldest.map_or(Nanos::MAX, |age| now + (limit - age) + Nanos(1))
+    }
+
     /// How long ago the simulation ticked last; [`Nanos::MAX`] for never.
     pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
         self.image.stations[station].tick_age(now)
@@ -302,7 +346,9 @@ impl Port {
     /// this is for buses that have nothing to send for long.
     pub fn observe(&mut self, now: Nanos) {
         self.attend(now);
-        self.status.observe(now, self.silence(now));
+        let stations = self.image.stations.iter();
+        let ages = stations.map(|station| station.peer_age(now));
+        self.status.observe(now, ages);
     }
 
     /// The line is on its way, or waits for its peer.
@@ -345,6 +391,11 @@ impl Port {
     /// Counts something for the statistics; keys are `<kind of bus>.<what>`.
     pub fn count(&self, key: &'static str) {
         self.status.count(key);
+    }
+
+    /// Writes a message of which a peer can cause as many as it likes; see [`LinkStatus::log`].
+    pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
+        self.status.log(level, kind, message);
     }
 
     /// What another thread needs to look after the [calls](Self::calling) of this one.

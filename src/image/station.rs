@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 
 use super::{EdgeCounter, Frame, LatchedBit, PulseShaper, Reader, Writer, triple_buffer};
 use crate::time::Nanos;
@@ -32,6 +32,8 @@ struct Beside {
     tick_alive: AtomicI64,
     /// Bus cycles received.
     cycles: AtomicU64,
+    /// The peer says that its data do not count, or they do not change as they have to.
+    invalid: AtomicBool,
 }
 
 /// The tick's end of a station.
@@ -106,6 +108,7 @@ pub fn station(directions: Directions) -> (TickStation, BusStation) {
         peer_alive: AtomicI64::new(NEVER),
         tick_alive: AtomicI64::new(NEVER),
         cycles: AtomicU64::new(0),
+        invalid: AtomicBool::new(false),
     });
     let tick = TickStation {
         tx: tx_writer,
@@ -228,6 +231,13 @@ impl TickStation {
         age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
 
+    /// Whether the data of the peer count. To be asked before [`read`](Self::read): once this says yes, that does
+    /// not give a frame from the time when they did not.
+    #[inline]
+    pub fn is_valid(&self) -> bool {
+        !self.beside.invalid.load(Ordering::Acquire)
+    }
+
     /// Whole bus cycles received so far.
     pub fn cycles(&self) -> u64 {
         self.beside.cycles.load(Ordering::Relaxed)
@@ -304,6 +314,12 @@ impl BusStation {
     /// The peer is alive, though it sent no new data.
     pub fn touch(&mut self, now: Nanos) {
         self.beside.peer_alive.store(now.0, Ordering::Relaxed);
+    }
+
+    /// Says whether the data of the peer count. Data that count again are to be handed in before.
+    pub fn set_valid(&mut self, valid: bool) {
+        // Released after the frame: the tick that sees this sees that, too.
+        self.beside.invalid.store(!valid, Ordering::Release);
     }
 
     /// The bytes that went out, or were about to, last.

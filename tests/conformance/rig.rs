@@ -1,5 +1,9 @@
 //! The fixture: a Device and a Controller at two ends of a bus, on one manual clock.
 
+#[allow(dead_code, reason = "each test uses a part of it")]
+#[path = "logged.rs"]
+pub mod logged;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -47,14 +51,21 @@ type      = "INT"
 pub struct End {
     pub driver: Driver,
     pub slots: Vec<Slot>,
+    /// Looks after the log, once the driver is closed.
+    pub _logged: logged::Watch,
 }
 
 impl End {
     pub fn open<C: Clock + 'static>(text: &str, clock: &Arc<C>) -> Self {
+        let logged = logged::Watch::new();
         let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
         let driver = Driver::open(config, Arc::clone(clock) as _).expect("opens");
         let slots = driver.initial_slots();
-        Self { driver, slots }
+        Self {
+            driver,
+            slots,
+            _logged: logged,
+        }
     }
 
     fn index(&self, name: &str) -> usize {
@@ -81,7 +92,16 @@ impl End {
     }
 
     pub fn tick(&mut self) -> Exchange {
-        self.driver.exchange(Nanos::ZERO, &mut self.slots)
+        self.driver.exchange(None, &mut self.slots)
+    }
+
+    /// The two halves of a tick, for a model between them.
+    pub fn receive(&mut self) -> Exchange {
+        self.driver.receive(None, &mut self.slots)
+    }
+
+    pub fn send(&mut self) -> Exchange {
+        self.driver.send(&mut self.slots)
     }
 
     #[track_caller]

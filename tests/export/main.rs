@@ -14,7 +14,6 @@ use std::process::{Command, Output};
 
 use tickbus::driver::Config;
 use tickbus::export::{Target, export};
-use tickbus::fieldbus::KINDS;
 
 fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -53,7 +52,7 @@ fn files(folder: &Path) -> Vec<(String, String)> {
 #[test]
 fn exports_are_their_golden_files() {
     let right = repository().join("tests/export/right");
-    let mut expected = BTreeSet::new();
+    let (mut expected, mut kinds) = (BTreeSet::new(), BTreeSet::new());
     for entry in fs::read_dir(&right).expect("the golden files") {
         let path = entry.expect("an entry").path();
         if path.extension().is_none_or(|extension| extension != "cfg") {
@@ -88,36 +87,13 @@ fn exports_are_their_golden_files() {
             assert_eq!(files(&out), files(&golden), "{}", golden.display());
             expected.insert(golden);
         }
+        kinds.insert(Config::load(&path).expect("a driver.cfg").bus.kind());
     }
-    assert!(
-        expected.len() >= 9 * Target::ALL.len(),
-        "every bus has a file"
-    );
+    assert_eq!(kinds.len(), 9, "each bus that this version has: {kinds:?}");
     let entries = fs::read_dir(&right).expect("the golden files");
     let folders = entries.map(|entry| entry.expect("an entry").path());
     let folders: BTreeSet<PathBuf> = folders.filter(|path| path.is_dir()).collect();
     assert_eq!(folders, expected, "no folder is left over");
-}
-
-#[test]
-fn every_kind_of_bus_is_among_the_golden_files() {
-    let right = repository().join("tests/export/right");
-    let entries = fs::read_dir(right).expect("the golden files");
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    let configs = paths.filter(|path| path.extension() == Some("cfg".as_ref()));
-    let kinds: BTreeSet<&str> = configs
-        .map(|path| {
-            let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
-            config.bus.kind()
-        })
-        .collect();
-    let built = KINDS.iter().copied().filter(|kind| {
-        let text = format!("[driver]\nid = 1\nname = \"a\"\n[fieldbus]\nkind = \"{kind}\"\n");
-        let refused = Config::parse("driver.cfg", &text)
-            .map_or_else(|mistakes| mistakes.to_string(), |_| String::new());
-        !refused.contains("is not in this version")
-    });
-    assert_eq!(kinds, built.collect::<BTreeSet<_>>());
 }
 
 #[test]
@@ -131,6 +107,11 @@ fn every_file_says_where_it_comes_from_and_who_compiled_it() {
                     file.text
                         .starts_with("\u{feff}name;address;type;comment\r\n")
                 );
+                continue;
+            }
+            // TIA Portal takes every line for a tag.
+            if file.name.ends_with("_tags.sdf") {
+                assert!(file.text.lines().all(|line| line.starts_with('"')));
                 continue;
             }
             let head: Vec<&str> = file.text.lines().take(8).collect();
@@ -157,7 +138,7 @@ fn a_file_that_is_there_is_never_overwritten_without_force() {
     let out = folder.path().to_str().unwrap();
     let arguments = ["driver.cfg", "--for", "s7-1500", "--out", out];
     assert_eq!(run(&arguments).status.code(), Some(0));
-    let tags = folder.path().join("Test_rig_tags.csv");
+    let tags = folder.path().join("Test_rig_tags.sdf");
     fs::write(&tags, "mine").unwrap();
     fs::remove_file(folder.path().join("Test_rig_1_data.scl")).unwrap();
 
@@ -166,7 +147,7 @@ fn a_file_that_is_there_is_never_overwritten_without_force() {
     let told = err(&refused);
     assert!(
         told.contains(
-            "Test_rig_tags.csv: this file is there already; name another --out, or add --force"
+            "Test_rig_tags.sdf: this file is there already; name another --out, or add --force"
         ),
         "{told}"
     );

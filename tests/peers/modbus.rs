@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use tickbus::time::Manual;
 
-use crate::conformance::rig::{Bus, Liar};
+use crate::conformance::rig::{Bus, Liar, logged};
 use crate::peers::{Ending, leave, own_address};
 
 /// Modbus TCP at an address of its own.
@@ -52,6 +52,7 @@ impl Bus for Tcp {
 
     /// Half a telegram from a client, or half an answer from a server, and then no more.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        logged::expect("nothing is written into the PLC \"modbus device at ");
         let over = Arc::new(AtomicBool::new(false));
         let address = self.address;
         let listener = (self.server == "controller").then(|| {

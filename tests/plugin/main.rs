@@ -15,9 +15,8 @@ mod isolation;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::sync::Mutex;
 
-use conformance::rig::{CYCLE, await_that};
+use conformance::rig::{CYCLE, await_that, logged};
 use fixture::{HELPER, Misbehaving, Udp, build, misbehaving, until, until_by, until_it_echoes};
 use tickbus::driver::{Code, Config, Driver};
 use tickbus::fieldbus::{Options, plugin};
@@ -168,6 +167,7 @@ fn is_loaded(library: &Path) -> bool {
 
 #[test]
 fn a_plain_call_that_never_returns_is_told_and_closing_leaves_it_behind_with_its_library() {
+    logged::expect("and its thread is left behind");
     for function in ["open", "exchange", "close"] {
         let mut plugin = Misbehaving::new(false, "").with_own_library();
         let release = plugin.file("release");
@@ -193,29 +193,10 @@ fn a_plain_call_that_never_returns_is_told_and_closing_leaves_it_behind_with_its
     }
 }
 
-/// What the log has said, whoever said it.
-static LOGGED: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-struct Logger;
-
-impl log::Log for Logger {
-    fn enabled(&self, _: &log::Metadata<'_>) -> bool {
-        true
-    }
-
-    fn log(&self, record: &log::Record<'_>) {
-        let line = format!("{} {}", record.level(), record.args());
-        LOGGED.lock().expect("no panic").push(line);
-    }
-
-    fn flush(&self) {}
-}
-
 #[test]
 fn a_plain_call_that_never_returns_is_told_though_nobody_asks() {
-    // Another test of this process may not have a logger.
-    log::set_boxed_logger(Box::new(Logger)).expect("the only one");
-    log::set_max_level(log::LevelFilter::Warn);
+    let told = "is stale: tickbus_exchange() of libown.so has not returned";
+    logged::expect(told);
     let mut plugin = Misbehaving::new(false, "").with_own_library();
     let release = plugin.file("release");
     plugin.options = format!("exchange = \"hang\", release = \"{}\"", release.display());
@@ -224,11 +205,7 @@ fn a_plain_call_that_never_returns_is_told_though_nobody_asks() {
     let end = plugin.open(&clock);
     await_that("the log tells it", || {
         clock.advance(Nanos::from_secs(1));
-        let logged = LOGGED.lock().expect("no panic");
-        let told = "is stale: tickbus_exchange() of libown.so has not returned";
-        logged
-            .iter()
-            .any(|line| line.starts_with("WARN") && line.contains(told))
+        logged::times(told) > 0
     });
     fs::write(release, "").expect("written");
     end.driver.close();

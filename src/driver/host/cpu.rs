@@ -75,6 +75,7 @@ impl Cpu {
         if let Some(faults) = faults {
             faults.begin_scan(now, &mut inputs.bytes, outputs);
         }
+        let valid = station.is_valid();
         let arrival = station.read(
             now,
             &mut Taking {
@@ -86,7 +87,7 @@ impl Cpu {
             faults.received(&mut inputs.bytes);
         }
         tally.count(*reads, &inputs.before, &inputs.bytes);
-        let alive = in_time && arrival.age <= *max_age;
+        let alive = in_time && valid && arrival.age <= *max_age;
         outputs_before.copy_from_slice(outputs);
         program.scan(&mut Scan {
             now,

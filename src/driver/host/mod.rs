@@ -5,10 +5,12 @@ mod stepped;
 mod tally;
 mod thread;
 
+use std::fmt::Write as _;
 use std::sync::Arc;
 
 use crate::faults::Injected;
 use crate::fieldbus::{Bus, Link};
+use crate::os::dropped_log_lines;
 use crate::plc::Program;
 use crate::time::{Clock, Nanos};
 
@@ -74,6 +76,8 @@ impl Host {
         self.0.board.tell(self.0.status.driver());
         self.0.board.write(&mut text);
         self.0.write(&mut text);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
         text
     }
 

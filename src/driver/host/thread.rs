@@ -101,6 +101,7 @@ impl HostThread {
             cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
         }
         port.suffer_from(Arc::clone(&board));
+        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
         let reconnect = config.timing.reconnect.clone();
         let bus = BusThread::start(bus, port, reconnect, status.clone(), &name)?;
         let (tally, stop) = (Arc::clone(&cpu.tally), Stop::new());

@@ -40,7 +40,7 @@ impl Editor {
     }
 }
 
-const COMPILED: &str = "Its XML is valid under PLCopen's schema and its statements are read by the parser of another \
+const COMPILED: &str = "Its XML was checked against PLCopen's schema, and its statements are read by the parser of another \
                         project in our tests; it was never compiled in the editor.";
 
 /// The files for `config`.

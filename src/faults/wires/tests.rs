@@ -15,6 +15,10 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
+        Self::of_stations(1)
+    }
+
+    fn of_stations(count: usize) -> Self {
         let board = Arc::<Board>::default();
         let shape = Shape {
             last_sent: Box::new([0, 0]),
@@ -23,7 +27,7 @@ impl Rig {
         };
         Self {
             faults: Faults::new(Arc::clone(&board)),
-            wires: Wires::new(Arc::clone(&board), std::iter::once(shape)),
+            wires: Wires::new(Arc::clone(&board), std::iter::repeat_n(shape, count)),
             board,
             tick: 0,
         }
@@ -198,6 +202,47 @@ fn a_link_that_is_down_takes_nothing_and_gives_nothing_back() {
     assert!(!rig.wires.is_down());
     assert_eq!(rig.receive(2, Some(2)), [2]);
     assert_eq!(rig.send(3, [5, 6], true), ([5, 6], true));
+}
+
+#[test]
+fn a_station_whose_neighbour_is_silent_has_its_own_chances_and_keeps_nothing_of_a_fault_that_is_over()
+ {
+    let mut rig = Rig::of_stations(2);
+    let comes = |rig: &mut Rig| rig.wires.arrives(1, Nanos::ZERO, &[1, 2]);
+    let lost = rig.add(Trouble::Drop(1.0, Direction::In), 1);
+    for _ in 0..10 {
+        assert_eq!(comes(&mut rig), Fate::Lost);
+    }
+    rig.end(lost);
+    assert_eq!(comes(&mut rig), Fate::Passes(1));
+    let repeated = rig.add(Trouble::Duplicate(1.0, Direction::Both), 1);
+    assert!(rig.wires.repeats(1));
+    assert_eq!(comes(&mut rig), Fate::Passes(2));
+    rig.end(repeated);
+    assert!(!rig.wires.repeats(1));
+    assert_eq!(comes(&mut rig), Fate::Passes(1));
+
+    rig.add(Trouble::Drop(0.25, Direction::In), 1);
+    let lost = (0..1000).filter(|_| comes(&mut rig) == Fate::Lost).count();
+    assert!((200..300).contains(&lost), "{lost}");
+}
+
+#[test]
+fn the_stations_of_one_cycle_share_its_fate() {
+    let mut rig = Rig::of_stations(3);
+    rig.add(Trouble::Drop(0.5, Direction::In), 1);
+    rig.add(Trouble::Duplicate(0.5, Direction::Out), 1);
+    let (mut lost, mut repeated) = (0, 0);
+    for now in 0..100 {
+        let fates = [0, 1, 2].map(|station| rig.wires.arrives(station, Nanos(now), &[1, 2]));
+        assert!(fates.iter().all(|fate| *fate == fates[0]), "{fates:?}");
+        lost += usize::from(fates[0] == Fate::Lost);
+        let repeats = [0, 1, 2].map(|station| rig.wires.repeats(station));
+        assert!(repeats.iter().all(|one| *one == repeats[0]), "{repeats:?}");
+        repeated += usize::from(repeats[0]);
+    }
+    assert!((30..70).contains(&lost) && (30..70).contains(&repeated));
+    assert_eq!(rig.board.dropped.load(Ordering::Relaxed), lost as u64);
 }
 
 #[test]

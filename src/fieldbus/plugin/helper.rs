@@ -20,7 +20,8 @@ use super::request::Request;
 use super::setup::Setup;
 use super::wire::{Inbox, Message};
 use crate::fieldbus::BusError;
-use crate::os::SharedMemory;
+use crate::os::{SharedMemory, flush_log};
+use crate::time::Nanos;
 
 /// Serves the host at the other end of stdin until that ends.
 ///
@@ -150,6 +151,7 @@ fn guard(line: &UnixStream, grace: Duration) -> io::Result<mpsc::Sender<()>> {
             while poll(&mut watched, None).is_err() {}
             if end.recv_timeout(grace) == Err(mpsc::RecvTimeoutError::Timeout) {
                 log::error!("the host has gone away, and the library does not end: ending it");
+                flush_log(Nanos::from_millis(100));
                 // Nothing gentler is sure to work against a library that hangs.
                 let _ = kill_process(getpid(), Signal::KILL);
             }

@@ -54,18 +54,27 @@ struct Limits {
     close: Nanos,
 }
 
+/// Why there is no such bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Another driver.cfg would help: what was looked for, and what to do.
+    Config(String),
+    /// This system does not have what the driver.cfg asks for.
+    Unsupported(String),
+}
+
 /// Makes the bus that `options` describe, for `line`.
 ///
 /// # Errors
 ///
 /// The library's file is not there, or there is no helper for it: what was looked for, and what to do.
-pub fn open(options: &Options, line: Line<'_>) -> Result<Box<dyn Free>, String> {
+pub fn open(options: &Options, line: Line<'_>) -> Result<Box<dyn Free>, Refusal> {
     let library = absolute(line.directory, &options.library);
     if !library.is_file() {
-        return Err(format!(
+        return Err(Refusal::Config(format!(
             "there is no library {}; check `library`, which begins at the folder of the driver.cfg",
             library.display()
-        ));
+        )));
     }
     let limits = Limits {
         open: options.open_timeout,
@@ -85,16 +94,19 @@ fn isolated(
     directory: &Path,
     setup: Setup,
     limits: Limits,
-) -> Result<Box<dyn Free>, String> {
+) -> Result<Box<dyn Free>, Refusal> {
     let named = options.helper.as_ref();
     let named = named.map(|path| absolute(directory, path));
-    let program = locate::helper(named, &absolute(directory, Path::new("")))?;
+    let program =
+        locate::helper(named, &absolute(directory, Path::new(""))).map_err(Refusal::Config)?;
     Ok(Box::new(isolated::Isolated::new(setup, limits, program)))
 }
 
 #[cfg(not(unix))]
-fn isolated(_: &Options, _: &Path, _: Setup, _: Limits) -> Result<Box<dyn Free>, String> {
-    Err("isolated = true is not available on this system; remove it".to_owned())
+fn isolated(_: &Options, _: &Path, _: Setup, _: Limits) -> Result<Box<dyn Free>, Refusal> {
+    Err(Refusal::Unsupported(
+        "isolated = true is not available on this system; remove it".to_owned(),
+    ))
 }
 
 /// A path of the driver.cfg, which begins at its folder.

@@ -146,12 +146,15 @@ impl Connection {
     ) -> Result<(), BusError> {
         let mut may_write = writable || self.session.to_write().is_empty();
         loop {
-            if let Some(space) = self.session.due(now)
-                && port.sends_of(frames.stations(), now)
-            {
+            if let Some(space) = self.session.due(now) {
                 frames.fill(now, space, port);
-                self.session
+                let goes = self
+                    .session
                     .made(now, |before, now| frames.differ(before, now));
+                // A look that sends nothing cannot be lost either.
+                if goes && !port.sends_of(frames.stations(), now) {
+                    self.session.lost();
+                }
             }
             let rest = self.session.to_write();
             if rest.is_empty() || !may_write {

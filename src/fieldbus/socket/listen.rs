@@ -3,7 +3,7 @@
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 
-use crate::fieldbus::tcp::{self, Address, bow_out, is_of_the_client, no_wait};
+use crate::fieldbus::tcp::{self, Address, bow_out, is_of_the_client, no_wait, not_accepted};
 use crate::fieldbus::{BusError, Port};
 use crate::os::{Interest, PollSet};
 use crate::time::{Nanos, Stop};
@@ -12,7 +12,7 @@ use super::connection::Connection;
 use super::lines::Lines;
 use super::{Frames, Terms};
 
-/// For how long nobody is accepted beside the served one after the system could not.
+/// For how long nobody is accepted after the system gave no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// What is served at one address.
@@ -30,7 +30,7 @@ pub(super) struct Place<'a> {
 ///
 /// # Errors
 ///
-/// An address cannot be listened on, or the system gives no more sockets.
+/// An address cannot be listened on, or the system cannot wait.
 pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
     let mut lines = Lines::new(places.iter().map(|place| place.name.clone()));
     let mut servers = Vec::new();
@@ -49,7 +49,6 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
             watched: None,
             hears: false,
             deaf_until: Nanos(i64::MIN),
-            told: false,
         });
     }
     let bound: Vec<String> = servers
@@ -75,11 +74,12 @@ fn turn(
     port: &mut Port,
 ) -> Result<(), BusError> {
     let now = port.clock().now();
-    let mut deadline = Nanos::MAX;
+    // Frames that are held back are handed in on time, whether or not somebody is served.
+    let mut deadline = port.due();
     for server in &mut *servers {
         server.watch(now, set).map_err(|error| no_wait(&error))?;
         if let Some(served) = &server.served {
-            deadline = deadline.min(served.deadline()).min(port.due());
+            deadline = deadline.min(served.deadline());
         }
         if server.is_deaf(now) {
             deadline = deadline.min(server.deaf_until);
@@ -93,9 +93,10 @@ fn turn(
         let knocked = ready(server.key() + 1).is_some();
         server.serve(served.unwrap_or_default(), knocked, lines, set, port);
         if knocked {
-            server.accept(lines, set, port)?;
+            server.accept(lines, set, port);
         }
     }
+    port.observe(port.clock().now());
     Ok(())
 }
 
@@ -111,10 +112,8 @@ struct Server<'a> {
     /// What the served connection is waited for, once it is; and whether the listener is.
     watched: Option<Interest>,
     hears: bool,
-    /// Until when nobody is accepted beside the served one, after the system could not.
+    /// Until when nobody is accepted, after the system could not.
     deaf_until: Nanos,
-    /// Whether the log knows that clients are turned away while this one is served.
-    told: bool,
 }
 
 impl Server<'_> {
@@ -157,7 +156,7 @@ impl Server<'_> {
     }
 
     fn is_deaf(&self, now: Nanos) -> bool {
-        self.served.is_some() && now < self.deaf_until
+        now < self.deaf_until
     }
 
     /// Lets the connection do what there is to do.
@@ -190,26 +189,16 @@ impl Server<'_> {
     }
 
     /// Takes the next client from the queue: serves it, or turns it away.
-    fn accept(
-        &mut self,
-        lines: &mut Lines,
-        set: &mut PollSet,
-        port: &mut Port,
-    ) -> Result<(), BusError> {
+    fn accept(&mut self, lines: &mut Lines, set: &mut PollSet, port: &mut Port) {
         let now = port.clock().now();
         let (stream, peer) = match self.listener.accept() {
             Ok(accepted) => accepted,
-            Err(error) if is_of_the_client(&error) => return Ok(()),
-            Err(error) if self.served.is_some() => {
-                log::warn!("a client could not be accepted: {error}");
-                self.deaf_until = now + PAUSE;
-                return Ok(());
-            }
+            Err(error) if is_of_the_client(&error) => return,
             Err(error) => {
-                return Err(BusError::Link(format!(
-                    "a client could not be accepted ({error}); close other programs or raise the \
-                     limit of open files"
-                )));
+                // Peers at other addresses are served on.
+                not_accepted(&error, port);
+                self.deaf_until = now + PAUSE;
+                return;
             }
         };
         if let Some(served) = &self.served {
@@ -218,8 +207,8 @@ impl Server<'_> {
                 if stream.set_nonblocking(true).is_ok() {
                     bow_out(&stream);
                 }
-                self.turn_away(peer, served, port);
-                return Ok(());
+                turn_away(peer, served, port);
+                return;
             };
             let error = BusError::Link(format!(
                 "{} has been silent for {}",
@@ -235,27 +224,22 @@ impl Server<'_> {
                 lines.opening(self.line, &reason, port);
                 self.frames.begin();
                 self.served = Some(connection);
-                self.told = false;
             }
             // Gone again before it was there.
             Err(error) => log::debug!("{error}"),
         }
-        Ok(())
     }
+}
 
-    /// Tells that `peer`, whose connection is closed, was not served.
-    fn turn_away(&mut self, peer: SocketAddr, served: SocketAddr, port: &Port) {
-        port.count("socket.turned_away");
-        // A client that comes again and again shall not fill the log.
-        let level = if std::mem::replace(&mut self.told, true) {
-            log::Level::Debug
-        } else {
-            log::Level::Warn
-        };
-        log::log!(
-            level,
+/// Tells that `peer`, whose connection is closed, was not served.
+fn turn_away(peer: SocketAddr, served: SocketAddr, port: &Port) {
+    port.count("socket.turned_away");
+    port.log(
+        log::Level::Warn,
+        "turned away",
+        format_args!(
             "{peer} was turned away, since one client is served at a time, and that is {served}; end \
              that one first"
-        );
-    }
+        ),
+    );
 }

@@ -205,8 +205,8 @@ impl Session {
     }
 
     /// The image of `now` stands where [`due`](Self::due) wanted it. When changes decide, `differs` is
-    /// asked to compare the record that went out last with it.
-    pub fn made(&mut self, now: Nanos, differs: impl FnOnce(&[u8], &[u8]) -> bool) {
+    /// asked to compare the record that went out last with it. True if the record is to go out.
+    pub fn made(&mut self, now: Nanos, differs: impl FnOnce(&[u8], &[u8]) -> bool) -> bool {
         let life = self.sign_of_life();
         let outbox = &mut self.outbox;
         let goes = match (self.terms.sending, outbox.waiting_since, outbox.made) {
@@ -220,6 +220,15 @@ impl Session {
         if goes {
             outbox.waiting_since.get_or_insert(now);
             outbox.made = Some(now);
+        }
+        goes
+    }
+
+    /// The record that was [made](Self::made) last gets lost on the way: it counts as sent, and the peer never has it.
+    pub fn lost(&mut self) {
+        let outbox = &mut self.outbox;
+        if outbox.written == 0 && outbox.waiting_since.take().is_some() && !outbox.last.is_empty() {
+            outbox.last.copy_from_slice(&outbox.record);
         }
     }
 

@@ -47,6 +47,18 @@ pub(crate) fn listen(
     Ok(Some((listener, bound)))
 }
 
+/// Counts a client for which the system gave no socket, and tells the log.
+pub(crate) fn not_accepted(error: &io::Error, port: &Port) {
+    port.count("clients.not_accepted");
+    port.log(
+        log::Level::Warn,
+        "not accepted",
+        format_args!(
+            "a client could not be accepted ({error}); close other programs or raise the limit of open files"
+        ),
+    );
+}
+
 /// Whether accepting failed for a reason that lies with the one client.
 pub(crate) fn is_of_the_client(error: &io::Error) -> bool {
     matches!(

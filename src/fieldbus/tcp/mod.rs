@@ -12,7 +12,7 @@ use super::BusError;
 
 pub use address::{Address, AddressError, Host};
 pub(crate) use connect::connect;
-pub(crate) use listen::{is_of_the_client, listen};
+pub(crate) use listen::{is_of_the_client, listen, not_accepted};
 pub(crate) use server::serve;
 pub use server::{Limits, Service};
 pub(crate) use stream::{bow_out, is_for_later, prepare};

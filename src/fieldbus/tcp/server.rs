@@ -7,7 +7,9 @@ use crate::fieldbus::{BusError, Port};
 use crate::os::{Interest, PollSet, Ready};
 use crate::time::{Nanos, Stop};
 
-use super::{Address, bow_out, is_for_later, is_of_the_client, listen, no_wait, prepare};
+use super::{
+    Address, bow_out, is_for_later, is_of_the_client, listen, no_wait, not_accepted, prepare,
+};
 
 /// The key of the listener in the poll set; those of clients are their places.
 const LISTENER: usize = usize::MAX - 1;
@@ -91,7 +93,6 @@ pub(crate) fn serve<S: Service>(
         reply: Vec::with_capacity(BUFFER),
         ready: Vec::new(),
         deaf_until: None,
-        told: false,
         gone: None,
     };
     let limit = server.limits.telegram;
@@ -121,8 +122,6 @@ struct Server<'a, S: Service> {
     ready: Vec<Ready>,
     /// Until when nobody is accepted, after the system could not.
     deaf_until: Option<Nanos>,
-    /// Whether the log knows that clients are turned away.
-    told: bool,
     /// When and why the last one that spoke took leave, while it may yet come back: many a client connects anew
     /// for each request, and its line is no broken one.
     gone: Option<(Nanos, BusError)>,
@@ -242,12 +241,7 @@ impl<S: Service> Server<'_, S> {
     fn deadline(&self, port: &Port) -> Nanos {
         let mut deadline = port.due().min(self.deaf_until.unwrap_or(Nanos::MAX));
         if self.clients.speakers > 0 {
-            let now = port.clock().now();
-            let silence = port.silence(now);
-            if silence <= port.max_age() {
-                // One more than the limit is stale.
-                deadline = deadline.min(now + (port.max_age() - silence) + Nanos(1));
-            }
+            deadline = deadline.min(port.stale_at(port.clock().now()));
         }
         if let Some((since, _)) = self.gone {
             deadline = deadline.min(since + port.max_age());
@@ -384,10 +378,7 @@ impl<S: Service> Server<'_, S> {
                 Err(error) if is_for_later(&error) => return,
                 Err(error) if is_of_the_client(&error) => continue,
                 Err(error) => {
-                    log::warn!(
-                        "a client could not be accepted ({error}); close other programs or raise the limit \
-                         of open files"
-                    );
+                    not_accepted(&error, port);
                     self.deaf_until = Some(now + PAUSE);
                     // Removing cannot fail.
                     let _ = self.listen(false);
@@ -397,15 +388,10 @@ impl<S: Service> Server<'_, S> {
             if self.clients.count >= self.limits.clients && !self.make_room(now, port) {
                 port.count("clients.turned_away");
                 let most = self.limits.clients;
-                // A client that comes again and again shall not fill the log.
-                let level = if std::mem::replace(&mut self.told, true) {
-                    log::Level::Debug
-                } else {
-                    log::Level::Warn
-                };
-                log::log!(
-                    level,
-                    "{peer} was turned away: {most} clients are served, and no more"
+                port.log(
+                    log::Level::Warn,
+                    "turned away",
+                    format_args!("{peer} was turned away: {most} clients are served, and no more"),
                 );
                 continue;
             }
@@ -433,11 +419,14 @@ impl<S: Service> Server<'_, S> {
             .as_ref()
             .expect("it was just put there");
         if let Err(error) = self.set.add(place, &client.stream, Interest::Read) {
-            log::warn!("{peer} cannot be served: {}", no_wait(&error));
+            port.log(
+                log::Level::Warn,
+                "not served",
+                format_args!("{peer} cannot be served: {}", no_wait(&error)),
+            );
             self.clients.remove(place);
             return;
         }
-        self.told = false;
         port.count("clients.accepted");
         self.tell(port);
         if self.clients.speakers == 0 && self.gone.is_none() {
@@ -487,7 +476,11 @@ impl<S: Service> Server<'_, S> {
             self.gone = None;
             port.lost(error, &self.waiting);
         } else {
-            log::info!("{error}; {} clients are served on", self.clients.count);
+            port.log(
+                log::Level::Info,
+                "dropped",
+                format_args!("{error}; {} clients are served on", self.clients.count),
+            );
         }
     }
 

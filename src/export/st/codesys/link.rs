@@ -72,6 +72,14 @@ impl Link {
                 }
             }
             Options::ModbusServer(options) => modbus::link(config, options, editor, list),
+            Options::ModbusClient(_) if editor == Editor::Codesys => Self::of_steps([
+                format!(
+                    "Device tree: Ethernet > ModbusTCP Server Device. Its holding registers are what the simulation writes: map \
+                     them to {list}.In. Its input registers are what the simulation reads: map them to {list}.Out."
+                ),
+                "So in driver.cfg write inputs = \"holding-register offset:0\" and outputs = \"input-register offset:0\"."
+                    .to_owned(),
+            ]),
             Options::OpcuaClient(_) | Options::OpcuaServer(_) => Self::of_steps([format!(
                 "OPC UA carries the variables themselves: share {list} with its server (in CODESYS the symbol configuration, \
                  in TwinCAT the attribute OPC.UA.DA). The registers In and Out and the two programs are not needed then."

@@ -5,7 +5,6 @@ use crate::export::plcopen::{Kind, variable};
 
 pub(super) fn link(stream: &Stream<'_>) -> Link {
     let Stream {
-        list,
         host,
         port,
         bytes: [received, sent],
@@ -20,12 +19,12 @@ pub(super) fn link(stream: &Stream<'_>) -> Link {
         steps: vec![
             "Library Manager > Add Library: CAA Net Base Services (namespace NBS).".to_owned(),
             format!(
-                "In {list}'s first program check the address of the simulation's computer, '{host}', port {port}; let its \
+                "In the first program check the address of the simulation's computer, '{host}', port {port}; let its \
                  firewall pass the port. Records have {received} bytes from the simulation, {sent} bytes to it."
             ),
             format!(
-                "Let the task run at least every {}: one record is taken in each call, and what comes faster grows old in \
-                 the buffers.",
+                "Give the task an interval of at most {}: one record is taken in each call, and what comes faster grows old \
+                 in the buffers.",
                 stream.cycle
             ),
         ],

@@ -5,7 +5,6 @@ use crate::export::plcopen::{Kind, variable};
 
 pub(super) fn link(stream: &Stream<'_>) -> Link {
     let Stream {
-        list,
         host,
         port,
         bytes: [received, sent],
@@ -24,7 +23,7 @@ pub(super) fn link(stream: &Stream<'_>) -> Link {
         steps: vec![
             "Install TF6310 (TCP/IP) with its licence on the target; References > Add library: Tc2_TcpIp.".to_owned(),
             format!(
-                "In {list}'s first program check the address of the simulation's computer, '{host}', port {port}; let its \
+                "In the first program check the address of the simulation's computer, '{host}', port {port}; let its \
                  firewall pass the port. Records have {received} bytes from the simulation, {sent} bytes to it."
             ),
             "Each call of TF6310 is answered by a service of Windows or TwinCAT/BSD after some cycles of the task: expect \

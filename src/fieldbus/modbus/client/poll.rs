@@ -312,7 +312,11 @@ impl<'a> Poll<'a> {
         let unit = self.named(station);
         if matches!(query, Query::Both { .. }) {
             // Many a server does not know it, or knows it for some registers alone.
-            log::info!("{unit} refused to {query}: {exception}; it is asked in two requests");
+            port.log(
+                log::Level::Info,
+                "refused",
+                format_args!("{unit} refused to {query}: {exception}; it is asked in two requests"),
+            );
             self.stations[station].combine = false;
             self.prepare(station);
             return self.begin(station, now, port);

@@ -70,6 +70,33 @@ impl Session {
 }
 
 #[test]
+fn a_record_that_gets_lost_counts_as_sent_and_none_is_due_before_its_time() {
+    let mut session = session(Sending::OnChange);
+    assert_eq!(session.speak(0, 1, usize::MAX).1, 1);
+    let (mut now, mut lost) = (0, Vec::new());
+    while now < 300 {
+        now = session.deadline().0;
+        if let Some(record) = session.due(Nanos(now)) {
+            record.fill(2);
+            if session.made(Nanos(now), |before, now| before != now) {
+                session.lost();
+                lost.push(now);
+            }
+        }
+        assert!(session.to_write().is_empty());
+        session.hear(now, &[0; 4]);
+        session.check(Nanos(now)).expect("the connection may go on");
+        assert!(
+            session.deadline().0 > now,
+            "a deadline in the past at {now}"
+        );
+    }
+    assert_eq!(lost, [10, 110, 210], "the change, and signs of life");
+    assert_eq!(session.speak(305, 3, usize::MAX).1, 0);
+    assert_eq!(session.speak(310, 3, usize::MAX).1, 1);
+}
+
+#[test]
 fn a_cyclic_end_sends_at_once_and_on_every_beat() {
     let mut session = session(Sending::Cyclic);
     assert_eq!(session.sends_until(45, |_| 0), [0, 10, 20, 30, 40]);

@@ -7,6 +7,7 @@ use std::time::Duration;
 use super::*;
 use crate::fieldbus::{LinkState, LinkStatus, Role};
 use crate::image::image;
+use crate::os::logged;
 use crate::time::{Clock, Manual, Monotonic};
 
 /// Telegrams of a length byte and so many more, which come back; one of 255 is against the protocol, and one
@@ -67,6 +68,8 @@ struct Running {
     status: LinkStatus,
     address: SocketAddr,
     thread: Option<JoinHandle<Result<(), BusError>>>,
+    /// Looks after the log, once the thread has ended.
+    _logged: logged::Watch,
 }
 
 /// Waits in real time have an end.
@@ -90,6 +93,7 @@ impl Waiting {
 
 impl Running {
     fn new() -> Self {
+        let logged = logged::Watch::new();
         let clock = Manual::new();
         let stop = Stop::new();
         let status = LinkStatus::new("test", MAX_AGE);
@@ -111,6 +115,7 @@ impl Running {
             status,
             address: "127.0.0.1:0".parse().expect("an address"),
             thread: Some(thread),
+            _logged: logged,
         };
         server.until(|server| server.fact("address").is_some());
         server.address = server
@@ -295,6 +300,7 @@ fn who_does_not_read_is_not_read_and_dropped_in_the_end() {
 
 #[test]
 fn a_full_house_turns_newcomers_away_until_somebody_is_silent_for_long() {
+    logged::expect("was turned away");
     let server = Running::new();
     let mut clients: Vec<_> = (0..LIMITS.clients).map(|_| server.client()).collect();
     for client in &mut clients {

@@ -96,12 +96,8 @@ impl Host {
         self.0.fault()
     }
 
-    /// Stops scanning and closes the bus.
-    ///
-    /// # Errors
-    ///
-    /// The scan under way does not end; its thread is left behind.
-    pub fn close(mut self) -> Result<(), String> {
+    /// Stops scanning and closes the bus. Why the program did not end, if it did not.
+    pub fn close(mut self) -> Option<String> {
         self.0.end()
     }
 }

@@ -5,6 +5,7 @@ mod modbus;
 mod socket;
 mod tcpip;
 
+use super::life::{self, ALIVE, Life};
 use super::registers::{BITS_OF, REAL_OF, kind};
 use super::{comment, copies, records, remark, taken, temporaries};
 use crate::driver::Config;
@@ -53,11 +54,18 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
         Options::ModbusServer(_) | Options::ModbusClient(_) => 2,
         _ => 1,
     };
-    let link = Link::of(config, editor, &list);
+    let mut link = Link::of(config, editor, &list);
     let declared = [&list, &begin, &end].map(String::clone);
     let own = link.globals.iter().map(|own| own.name.clone());
     let fixed = [REAL_OF, BITS_OF].map(str::to_owned);
-    let mut names = taken(declared.into_iter().chain(own).chain(fixed));
+    let life_names = life::declared(config);
+    let mut names = taken(
+        declared
+            .into_iter()
+            .chain(own)
+            .chain(fixed)
+            .chain(life_names),
+    );
     let records = records(config, aligned, &mut names);
     let [bring, take] = copies(
         &records,
@@ -65,6 +73,20 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
         &|register| format!("{list}.In[{register}]"),
         &|register| format!("{list}.Out[{register}]"),
     );
+    let is_known = link.globals.iter().any(|own| own.name == ALIVE);
+    let life = Life::of(
+        config,
+        &records,
+        &|name| format!("{list}.{name}"),
+        [&format!("{list}.{ALIVE}"), &format!("{list}.Simulated")],
+        is_known,
+    );
+    if life.is_beating() && !is_known {
+        link.globals.push(Variable {
+            comment: "the heartbeat of the simulation was seen lately".to_owned(),
+            ..variable(ALIVE, Kind::Basic("BOOL"))
+        });
+    }
     let is_real = |place: &Place<'_>| place.data_type() == DataType::Real;
     let mut units = Vec::new();
     if records
@@ -79,20 +101,31 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
         &bring,
         "copy the real inputs into the same variables here",
     ));
+    lines.extend(life.before.clone());
+    let mut locals = link.before.locals.clone();
+    locals.extend(life.locals.iter().map(|(name, kind)| {
+        let kind = if *kind == "TON" {
+            Kind::Block(kind)
+        } else {
+            Kind::Basic(kind)
+        };
+        variable(name, kind)
+    }));
     units.push(Unit {
         name: begin.clone(),
         returns: None,
         inputs: Vec::new(),
-        locals: link.before.locals.clone(),
+        locals,
         lines,
         comment: "The first program of the task: the simulated inputs come into their variables."
             .to_owned(),
     });
-    let mut lines = simulated(
+    let mut lines = life.after.clone();
+    lines.extend(simulated(
         &list,
         &take,
         "copy the variables to the real outputs here; while simulated they stay as they are",
-    );
+    ));
     lines.extend(link.after.lines.clone());
     let mut locals: Vec<Variable> = temporaries(&records[1])
         .into_iter()

@@ -4,6 +4,7 @@
 //! signal.
 
 pub(super) mod codesys;
+mod life;
 pub(super) mod openplc;
 mod registers;
 mod telegrams;

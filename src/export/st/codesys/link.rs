@@ -3,6 +3,7 @@
 use super::{Editor, modbus, socket, tcpip};
 use crate::driver::Config;
 use crate::export::plcopen::{Kind, Variable, variable};
+use crate::export::st::life::{ALIVE, time};
 use crate::fieldbus::Options;
 use crate::fieldbus::socket::{Message, TcpRole};
 use crate::fieldbus::tcp::{Address, Host};
@@ -109,7 +110,7 @@ impl Link {
     /// The counters and the sign of life of a route that sees what comes and goes.
     pub(super) fn counters() -> Vec<Variable> {
         [
-            ("Alive", "BOOL", "the simulation was heard of lately"),
+            (ALIVE, "BOOL", "the simulation was heard of lately"),
             ("Received", "UDINT", "images that came"),
             ("Sent", "UDINT", "images that went"),
             (
@@ -133,11 +134,6 @@ pub(super) fn dialled(address: &Address) -> String {
         Host::Ip(_) => "192.168.0.20".to_owned(),
         Host::Name(name) => name.clone(),
     }
-}
-
-/// A span of time as a literal, in whole milliseconds, at least one.
-pub(super) fn time(span: Nanos) -> String {
-    format!("T#{}MS", span.0.div_euclid(1_000_000).max(1))
 }
 
 /// What tells that nothing came for too long.

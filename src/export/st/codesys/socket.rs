@@ -1,7 +1,8 @@
 //! Records over TCP in CODESYS: the library CAA Net Base Services, which every CODESYS has.
 
-use super::link::{Link, Part, Stream, registers, silence, time};
+use super::link::{Link, Part, Stream, registers, silence};
 use crate::export::plcopen::{Kind, variable};
+use crate::export::st::life::time;
 
 pub(super) fn link(stream: &Stream<'_>) -> Link {
     let Stream {

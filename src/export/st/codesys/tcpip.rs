@@ -1,7 +1,8 @@
 //! Records over TCP in TwinCAT: the library `Tc2_TcpIp` of TF6310.
 
-use super::link::{Link, Part, Stream, registers, silence, time};
+use super::link::{Link, Part, Stream, registers, silence};
 use crate::export::plcopen::{Kind, variable};
+use crate::export::st::life::time;
 
 pub(super) fn link(stream: &Stream<'_>) -> Link {
     let Stream {

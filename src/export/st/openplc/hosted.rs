@@ -3,11 +3,12 @@
 use super::{COMPILED, EDITOR, configuration, declared, program, remarks};
 use crate::driver::Config;
 use crate::export::record::Place;
-use crate::export::st::{add, comment, records, source};
+use crate::export::st::life::{self, ALIVE, Life};
+use crate::export::st::{add, comment, records, source, taken};
 use crate::signal::DataType;
 
 pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
-    let mut names = super::super::taken(declared(config));
+    let mut names = taken(declared(config).chain(life::declared(config)));
     let records = records(config, 1, &mut names);
     let mut text = source(
         config,
@@ -60,7 +61,22 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
             "{odd} signals do not begin at a multiple of their size, where no element does: they are there as bytes"
         ));
     }
+    let life = Life::of(config, &records, &str::to_owned, [ALIVE, "TRUE"], false);
+    if life.is_beating() {
+        add(&mut text, "  VAR");
+        add(
+            &mut text,
+            &format!("    {ALIVE} : BOOL; (* the heartbeat of the simulation was seen lately *)"),
+        );
+        for (name, kind) in &life.locals {
+            add(&mut text, &format!("    {name} : {kind};"));
+        }
+        add(&mut text, "  END_VAR");
+    }
     add(&mut text, "");
+    for line in life.before.iter().chain(&life.after) {
+        add(&mut text, &format!("  {line}"));
+    }
     // A program without a statement is none for iec2c, nor is a lone semicolon a statement.
     add(
         &mut text,

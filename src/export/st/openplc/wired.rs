@@ -4,6 +4,7 @@ use super::real::FUNCTIONS;
 use super::{COMPILED, EDITOR, configuration, declared, program, remarks};
 use crate::driver::Config;
 use crate::export::record::Record;
+use crate::export::st::life::{self, ALIVE, Life};
 use crate::export::st::registers::kind;
 use crate::export::st::{add, comment, copies, records, remark, source, taken, temporaries};
 use crate::signal::DataType;
@@ -32,7 +33,7 @@ pub(super) fn text(config: &Config, wires: &Wires) -> String {
         })
         .collect();
     let own = registers.iter().map(|(name, _)| name.clone());
-    let mut names = taken(declared(config).chain(own));
+    let mut names = taken(declared(config).chain(life::declared(config)).chain(own));
     let records = records(config, 2, &mut names);
     let [inputs, outputs] = &records;
     let mut text = source(config, 2, wires.what, EDITOR, COMPILED);
@@ -73,7 +74,24 @@ pub(super) fn text(config: &Config, wires: &Wires) -> String {
         &mut text,
         "    Simulated : BOOL := TRUE; (* FALSE: neither inputs nor outputs are copied *)",
     );
-    for (name, kind) in temporaries(outputs) {
+    let life = Life::of(
+        config,
+        &records,
+        &str::to_owned,
+        [ALIVE, "Simulated"],
+        false,
+    );
+    if life.is_beating() {
+        add(
+            &mut text,
+            &format!("    {ALIVE} : BOOL; (* the heartbeat of the simulation was seen lately *)"),
+        );
+    }
+    let own = life
+        .locals
+        .iter()
+        .map(|(name, kind)| (name.as_str(), *kind));
+    for (name, kind) in temporaries(outputs).into_iter().chain(own) {
         add(&mut text, &format!("    {name} : {kind};"));
     }
     add(&mut text, "  END_VAR");
@@ -85,11 +103,17 @@ pub(super) fn text(config: &Config, wires: &Wires) -> String {
         &|register| format!("out_{register}"),
     );
     guarded(&mut text, &bring);
+    for line in &life.before {
+        add(&mut text, &format!("  {line}"));
+    }
     add(
         &mut text,
         "  (* Your program goes here: it reads the inputs above and writes the outputs. *)",
     );
     add(&mut text, "");
+    for line in &life.after {
+        add(&mut text, &format!("  {line}"));
+    }
     guarded(&mut text, &take);
     if bring.is_empty() && take.is_empty() {
         // A program without a statement is none for iec2c.

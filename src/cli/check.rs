@@ -13,7 +13,7 @@ use crate::driver::{Config, Timing};
 use crate::fieldbus::socket::{self, Sending, TcpRole};
 use crate::fieldbus::{Options, Role, loopback, plugin, s7};
 use crate::record;
-use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
+use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width};
 use crate::time::Nanos;
 
 /// Read a driver.cfg; print its signal table, or every mistake in it.
@@ -53,11 +53,12 @@ fn report(config: &Config) -> String {
     };
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
-    line("bus", &bus(&config.bus, config.role));
+    line("bus", &bus(&config.bus, config.role, &config.table));
     for request in config.bus.requests(&config.table) {
         line("request", &request);
     }
     line("timing", &timing(&config.timing));
+    life_signs(config, &mut line);
     if let Some(record) = &config.record {
         line("record", &recording(record));
     }
@@ -131,14 +132,14 @@ fn role(config: &Config) -> &'static str {
     }
 }
 
-fn bus(options: &Options, role: Role) -> String {
+fn bus(options: &Options, role: Role, table: &SignalTable) -> String {
     let mut parts = vec![options.kind().to_owned()];
     match options {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
-        Options::ModbusServer(options) => parts.extend(options.shown()),
-        Options::ModbusClient(options) => parts.extend(options.shown(role)),
+        Options::ModbusServer(options) => parts.extend(options.shown(table)),
+        Options::ModbusClient(options) => parts.extend(options.shown(role, table)),
         Options::S7Server(options) => parts.extend(s7_server(options)),
         Options::S7Client(options) => parts.extend(s7_client(options)),
         Options::OpcuaClient(options) => parts.extend(options.summary()),
@@ -257,6 +258,31 @@ fn timing(timing: &Timing) -> String {
         timing.max_age,
         waits.join(" ")
     )
+}
+
+/// A line for each signal by which the ends see that the other one lives, as this end has it.
+fn life_signs(config: &Config, line: &mut impl FnMut(&str, &str)) {
+    let name = |signal: usize| &config.table.signals[signal].name;
+    for watch in config
+        .life_signs
+        .watches(&config.table, config.role, config.timing.max_age)
+    {
+        line(
+            "alive",
+            &format!(
+                "\"{}\" has to change within {}, or its station is stale",
+                watch.name, watch.within
+            ),
+        );
+    }
+    for beat in config.life_signs.beats(&config.table, config.role) {
+        let counts = format!(
+            "\"{}\" counts every {} while the simulation ticks",
+            name(beat.signal),
+            beat.every
+        );
+        line("heartbeat", &counts);
+    }
 }
 
 fn recording(options: &record::Options) -> String {

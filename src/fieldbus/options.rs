@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::tcp::Address;
-use super::{At, Role, loopback, modbus, opcua, plugin, s7, socket};
+use super::{At, CYCLE, Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::{Signal, SignalTable, Station};
+use crate::time::Nanos;
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -105,6 +106,20 @@ impl Options {
         }
     }
 
+    /// The bus cycle where a driver.cfg states none; `None` for a bus whose peer gives the rhythm.
+    pub const fn cycle(&self) -> Option<Nanos> {
+        match self {
+            Self::Loopback(_) => Some(loopback::CYCLE),
+            Self::Socket(_) | Self::Plugin(_) | Self::ModbusClient(_) | Self::S7Client(_) => {
+                Some(CYCLE)
+            }
+            Self::ModbusServer(_)
+            | Self::S7Server(_)
+            | Self::OpcuaClient(_)
+            | Self::OpcuaServer(_) => None,
+        }
+    }
+
     /// Whether both ends of the bus are in one process.
     pub const fn is_in_process(&self) -> bool {
         matches!(self, Self::Loopback(_))
@@ -150,6 +165,7 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.place(signal),
             Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            Self::OpcuaClient(options) => options.place(signal, station),
             Self::S7Client(options) => options
                 .variable(signal)
                 .map(|variable| variable.to_string())
@@ -161,6 +177,7 @@ impl Options {
     /// What a bus that polls asks for in each cycle, a line for each request; empty for others.
     pub fn requests(&self, table: &SignalTable) -> Vec<String> {
         match self {
+            Self::ModbusClient(options) => options.shown_requests(table),
             Self::S7Client(options) => options.shown_requests(table),
             _ => Vec::new(),
         }
@@ -171,6 +188,10 @@ impl Options {
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let kind = self.kind();
         if let Self::S7Client(options) = self {
+            options.place_signals(lines, table);
+        } else if let Self::ModbusClient(options) = self {
+            options.place_signals(lines, table);
+        } else if let Self::OpcuaClient(options) = self {
             options.place_signals(lines, table);
         } else if let Some(first) = lines.first() {
             first.wrong(
@@ -184,6 +205,7 @@ impl Options {
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
             Self::Socket(options) => options.fit(table, axes, collector),
+            Self::ModbusServer(options) => options.fit(table, collector),
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),

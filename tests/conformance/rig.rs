@@ -154,13 +154,16 @@ pub struct Rig {
 
 /// The bus cycle of both ends.
 pub const CYCLE: Nanos = Nanos::from_millis(1);
+
+/// The pause before a broken line is tried again: the least that a driver.cfg may name.
+pub const PAUSE: Nanos = Nanos::from_millis(10);
 /// Data older than this are stale.
 pub const MAX_AGE: Nanos = Nanos::from_millis(300);
 
 pub fn config(bus: &impl Bus, role: &str, extra: &str) -> String {
     format!(
         "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n{extra}\n{SIGNALS}{}",
+         max_age = \"300ms\"\nreconnect = [\"10ms\"]\n{extra}\n{SIGNALS}{}",
         bus.fieldbus(role),
         bus.faults(),
     )

@@ -154,9 +154,21 @@ impl Options {
         }
     }
 
+    /// What a bus that polls asks for in each cycle, a line for each request; empty for others.
+    pub fn requests(&self, table: &SignalTable) -> Vec<String> {
+        match self {
+            Self::ModbusClient(options) => options.shown_requests(table),
+            _ => Vec::new(),
+        }
+    }
+
     /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
     /// are none, and that the bus has no addresses of its own.
-    pub fn place_signals(&mut self, lines: &[At<'_>], _table: &SignalTable) {
+    pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        if let Self::ModbusClient(options) = self {
+            options.place_signals(lines, table);
+            return;
+        }
         let kind = self.kind();
         if let Some(first) = lines.first() {
             first.wrong(
@@ -170,6 +182,7 @@ impl Options {
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
             Self::Socket(options) => options.fit(table, axes, collector),
+            Self::ModbusServer(options) => options.fit(table, collector),
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),

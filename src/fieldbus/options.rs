@@ -150,6 +150,10 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.place(signal),
             Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            Self::S7Client(options) => options
+                .variable(signal)
+                .map(|variable| variable.to_string())
+                .unwrap_or_default(),
             _ => String::new(),
         }
     }
@@ -158,6 +162,7 @@ impl Options {
     pub fn requests(&self, table: &SignalTable) -> Vec<String> {
         match self {
             Self::ModbusClient(options) => options.shown_requests(table),
+            Self::S7Client(options) => options.shown_requests(table),
             _ => Vec::new(),
         }
     }
@@ -170,7 +175,9 @@ impl Options {
             return;
         }
         let kind = self.kind();
-        if let Some(first) = lines.first() {
+        if let Self::S7Client(options) = self {
+            options.place_signals(lines, table);
+        } else if let Some(first) = lines.first() {
             first.wrong(
                 format!("the bus \"{kind}\" has no addresses of its own"),
                 "remove [fieldbus.at]; each signal lies where its \"address\" says",
@@ -204,7 +211,7 @@ impl Options {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
             Some("s7-server") => s7::ServerOptions::read(table).map(Self::S7Server),
-            Some("s7-client") => s7::ClientOptions::read(moved, table).map(Self::S7Client),
+            Some("s7-client") => s7::ClientOptions::read(role, moved, table).map(Self::S7Client),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
             Some("modbus-server") => {
                 modbus::ServerOptions::read(role, table).map(Self::ModbusServer)

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::tcp::Address;
-use super::{At, Role, loopback, modbus, opcua, plugin, s7, socket};
+use super::{At, CYCLE, Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::{Signal, SignalTable, Station};
+use crate::time::Nanos;
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -102,6 +103,20 @@ impl Options {
                 ..
             }) => Some(file),
             _ => None,
+        }
+    }
+
+    /// The bus cycle where a driver.cfg states none; `None` for a bus whose peer gives the rhythm.
+    pub const fn cycle(&self) -> Option<Nanos> {
+        match self {
+            Self::Loopback(_) => Some(loopback::CYCLE),
+            Self::Socket(_) | Self::Plugin(_) | Self::ModbusClient(_) | Self::S7Client(_) => {
+                Some(CYCLE)
+            }
+            Self::ModbusServer(_)
+            | Self::S7Server(_)
+            | Self::OpcuaClient(_)
+            | Self::OpcuaServer(_) => None,
         }
     }
 

@@ -10,7 +10,7 @@ mod terms;
 
 use crate::fieldbus::rarely::Rarely;
 use crate::fieldbus::tcp::{self, no_wait};
-use crate::fieldbus::{BusError, Free, Guard, Port, Role};
+use crate::fieldbus::{BusError, CYCLE, Free, Guard, Port, Role};
 use crate::os::Poller;
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Stop};
@@ -21,9 +21,6 @@ pub use frames::Frames;
 pub use options::ClientOptions;
 pub use refusal::Refusal;
 pub use terms::{End, News, Terms};
-
-/// The bus cycle where a driver.cfg names none.
-const CYCLE: Nanos = Nanos::from_millis(10);
 
 /// How long an answer may take at least; in other cases four times `max_age`.
 const PATIENCE: Nanos = Nanos::from_secs(2);

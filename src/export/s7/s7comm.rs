@@ -207,10 +207,10 @@ fn places<'p>(
 ) -> impl Iterator<Item = (Area, &'p Image<'p>, Start)> {
     let images = [(Area::Output, &plan.outputs), (Area::Input, &plan.inputs)];
     let places = images.map(|(area, image)| Some((area, image, options.place(0, area)?)));
-    places
-        .into_iter()
-        .flatten()
-        .filter(|(_, image, _)| image.record.bytes > 0)
+    places.into_iter().flatten().filter(|(_, image, _)| {
+        let mut signals = image.record.places.iter().map(|place| place.signal);
+        signals.any(|signal| !options.variables.contains_key(&signal.name))
+    })
 }
 
 /// The simulation dials and reads and writes the data blocks by itself.
@@ -228,6 +228,16 @@ pub(super) fn nothing(plan: &Plan<'_>, options: &ClientOptions) -> Body {
                 image.block
             ),
         });
+    }
+    for image in [&plan.outputs, &plan.inputs] {
+        for place in &image.record.places {
+            if let Some(variable) = options.variable(place.signal)
+                && options.variables.contains_key(&place.signal.name)
+            {
+                let name = &place.signal.name;
+                code.push(format!("    // \"{name}\" at {variable}, where the program has it: nothing is to be copied"));
+            }
+        }
     }
     Body {
         what: "The simulation reads and writes the data blocks by S7 communication; no call is needed here.".to_owned(),

@@ -79,7 +79,8 @@ impl Line {
     ) -> Option<Self> {
         let stated = table.take("address");
         let device = table.take("device");
-        let serial = ["baud", "parity", "stop_bits", "silence", "echo", "rs485"].map(|key| (key, table.take(key)));
+        let serial = ["baud", "parity", "stop_bits", "silence", "echo", "rs485"]
+            .map(|key| (key, table.take(key)));
         let Some(device) = device else {
             for (key, value) in &serial {
                 if let Some(value) = value

@@ -174,7 +174,9 @@ impl Echo {
             self.expected.clear();
         }
         let pairs = self.expected.iter().zip(bytes);
-        let count = pairs.take_while(|(expected, came)| expected == came).count();
+        let count = pairs
+            .take_while(|(expected, came)| expected == came)
+            .count();
         if count < bytes.len() {
             self.expected.clear();
         } else {

@@ -10,7 +10,13 @@ impl ServerOptions {
     pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
         parts.extend(self.stations.shown(None));
-        let bytes = |area| signals.stations.iter().map(move |station| station.bytes(area)).max();
+        let bytes = |area| {
+            signals
+                .stations
+                .iter()
+                .map(move |station| station.bytes(area))
+                .max()
+        };
         let outputs = bytes(Area::Output).unwrap_or_default();
         let table = Table::HoldingRegisters;
         if bytes(Area::Input) > Some(0)
@@ -63,9 +69,8 @@ impl ClientOptions {
             }
             let places: Vec<String> = self.places(area).map(|place| place.to_string()).collect();
             let places = places.join(" and from ");
-            let elsewhere = |signal: &Signal| {
-                signal.area == area && self.at.contains_key(&signal.name)
-            };
+            let elsewhere =
+                |signal: &Signal| signal.area == area && self.at.contains_key(&signal.name);
             if table.signals.iter().any(elsewhere) {
                 format!("{does} {area} where [fieldbus.at] says, the rest from {places} on")
             } else {

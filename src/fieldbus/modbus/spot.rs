@@ -98,7 +98,11 @@ impl FromStr for Spot {
         }?;
         if bit.is_some() && place.table.is_bits() {
             return Err(wrong(
-                format!("\"{}\" names a bit of a {}", shown(text), place.table.element()),
+                format!(
+                    "\"{}\" names a bit of a {}",
+                    shown(text),
+                    place.table.element()
+                ),
                 "that is one bit itself; remove the dot and what follows it",
             ));
         }

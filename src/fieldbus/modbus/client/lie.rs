@@ -1,9 +1,9 @@
 //! Where an area of the image lies as a whole: `inputs` and `outputs` of a driver.cfg.
 
 use crate::config::Value;
+use crate::fieldbus::modbus::Place;
 use crate::fieldbus::modbus::place::SHAPE;
 use crate::fieldbus::modbus::table::{ADDRESSES, Span, Table};
-use crate::fieldbus::modbus::Place;
 use crate::signal::Area;
 
 /// The most parts that an area may have.

@@ -86,7 +86,9 @@ impl Piece {
         {
             return Err((
                 format!("the address says {stated}, and the signal is {data_type}"),
-                format!("write \"type\" in its [[signal]] section as the device has it, or \":{data_type}\""),
+                format!(
+                    "write \"type\" in its [[signal]] section as the device has it, or \":{data_type}\""
+                ),
             ));
         }
         let bits = signal.address().bits();
@@ -114,7 +116,8 @@ impl Piece {
                 (8, _) => {
                     return Err((
                         format!("a {data_type} is half of a {}", table.element()),
-                        "write \"400021.0\" for the low byte and \"400021.8\" for the high one".to_owned(),
+                        "write \"400021.0\" for the low byte and \"400021.8\" for the high one"
+                            .to_owned(),
                     ));
                 }
                 (_, Some(_)) => {
@@ -135,7 +138,10 @@ impl Piece {
         };
         if piece.span().end() > ADDRESSES {
             return Err((
-                format!("a {data_type} from {} on reaches beyond the table", spot.place),
+                format!(
+                    "a {data_type} from {} on reaches beyond the table",
+                    spot.place
+                ),
                 "the last offset is 65535".to_owned(),
             ));
         }

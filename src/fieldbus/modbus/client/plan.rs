@@ -7,8 +7,8 @@ use crate::fieldbus::modbus::function::{
 };
 use crate::fieldbus::modbus::table::{Span, Table};
 
-use super::query::{Query, Region};
 use super::Piece;
+use super::query::{Query, Region};
 
 /// What is known of a device, and how its requests are to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

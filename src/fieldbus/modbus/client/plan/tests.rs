@@ -84,14 +84,8 @@ fn no_value_is_divided_between_two_requests_if_that_can_be() {
     let longs: Vec<Piece> = (0..40)
         .map(|n| piece(HOLDING, 64 * n, 64 * n, 64, true))
         .collect();
-    assert_eq!(
-        spans(&queries(&[], &longs, &USUAL)),
-        [(0, 120), (120, 40)]
-    );
-    assert_eq!(
-        spans(&queries(&longs, &[], &USUAL)),
-        [(0, 124), (124, 36)]
-    );
+    assert_eq!(spans(&queries(&[], &longs, &USUAL)), [(0, 120), (120, 40)]);
+    assert_eq!(spans(&queries(&longs, &[], &USUAL)), [(0, 124), (124, 36)]);
 }
 
 #[test]
@@ -112,7 +106,8 @@ fn gaps_are_read_and_never_written() {
 }
 
 #[test]
-fn a_register_of_which_signals_have_some_bits_is_masked_and_one_of_which_they_have_all_is_written() {
+fn a_register_of_which_signals_have_some_bits_is_masked_and_one_of_which_they_have_all_is_written()
+{
     let bit = |bit| piece(HOLDING, 16 + bit, bit, 1, false);
     let some: Vec<Piece> = (0..15).map(bit).collect();
     assert_eq!(
@@ -161,7 +156,13 @@ fn a_device_without_the_functions_for_many_is_written_one_by_one() {
 
 /// A frame's signals one behind the other, each somewhere in a table; those that are written do not meet.
 fn pieces(writes: bool) -> impl Strategy<Value = Vec<Piece>> {
-    let one = (0_usize..4, 0_usize..700, 0_usize..6, any::<bool>(), 0_usize..16);
+    let one = (
+        0_usize..4,
+        0_usize..700,
+        0_usize..6,
+        any::<bool>(),
+        0_usize..16,
+    );
     prop::collection::vec(one, 0..120).prop_map(move |all| {
         let (mut pieces, mut frame) = (Vec::new(), 0_usize);
         let mut claimed = BTreeSet::new();
@@ -171,7 +172,11 @@ fn pieces(writes: bool) -> impl Strategy<Value = Vec<Piece>> {
             } else {
                 Table::ALL[table]
             };
-            let bits = if table.is_bits() { 1 } else { [1, 8, 16, 32, 64, 64][size] };
+            let bits = if table.is_bits() {
+                1
+            } else {
+                [1, 8, 16, 32, 64, 64][size]
+            };
             // What lies as a whole may begin at any byte, what has a place of its own at its register.
             let within = match (table.is_bits(), bits, fills) {
                 (true, ..) => 0,

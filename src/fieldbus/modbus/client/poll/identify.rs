@@ -88,9 +88,7 @@ impl Poll<'_> {
                 | Exception::GATEWAY_PATH_UNAVAILABLE
                 | Exception::GATEWAY_TARGET_FAILED,
             )) => {
-                if let Identity::Unknown { not_before, .. } =
-                    &mut self.stations[station].identity
-                {
+                if let Identity::Unknown { not_before, .. } = &mut self.stations[station].identity {
                     *not_before = now + PAUSE;
                 }
                 return self.begin(station + 1, now, port);

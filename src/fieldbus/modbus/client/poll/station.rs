@@ -3,9 +3,9 @@
 use crate::fieldbus::modbus::table::Span;
 use crate::time::Nanos;
 
+use super::super::Piece;
 use super::super::plan::{Abilities, queries};
 use super::super::query::{Query, Region};
-use super::super::Piece;
 use super::Identity;
 use super::trouble::Trouble;
 

@@ -43,12 +43,7 @@ struct Client {
 
 impl Client {
     /// Units from 1 on that have two bytes each way and are allowed to write into `write_to`.
-    fn new(
-        stations: usize,
-        reads: &[Piece],
-        writes: &[Piece],
-        write_to: Option<&str>,
-    ) -> Self {
+    fn new(stations: usize, reads: &[Piece], writes: &[Piece], write_to: Option<&str>) -> Self {
         let directions = || Directions {
             tx_fail_safe: Box::new([0; 2]),
             tx_latched: Box::new([]),
@@ -389,7 +384,11 @@ fn where_no_station_is_in_order_the_line_is_lost_and_comes_back() {
     }
     let link = line.status.link();
     assert_eq!(link.cause.name(), "link");
-    assert!(link.reason.contains("unit 2 of the line"), "{}", link.reason);
+    assert!(
+        link.reason.contains("unit 2 of the line"),
+        "{}",
+        link.reason
+    );
     let before = line.now;
     let (unit, _) = line.asked_of();
     line.answer_as(unit, &[3, 2, 0, 7]);

@@ -146,13 +146,7 @@ impl Poll<'_> {
     }
 
     /// Whether the device can be asked in another way, which is taken from now on.
-    fn adapts(
-        &mut self,
-        station: usize,
-        index: usize,
-        exception: Exception,
-        port: &Port,
-    ) -> bool {
+    fn adapts(&mut self, station: usize, index: usize, exception: Exception, port: &Port) -> bool {
         let unit = self.named(station);
         let polled = &mut self.stations[station];
         let (query, able) = (&polled.queries[index], &mut polled.able);
@@ -202,7 +196,11 @@ impl Poll<'_> {
             rests_until: now + REST,
             rest: 0,
         };
-        if self.stations.iter().all(|polled| polled.trouble.kind.is_some()) {
+        if self
+            .stations
+            .iter()
+            .all(|polled| polled.trouble.kind.is_some())
+        {
             self.lose(&error, "it is asked again every second", port);
         } else {
             tell(&error, REST, port);

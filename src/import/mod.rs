@@ -194,7 +194,13 @@ fn tags_of(
         Told::add(&mut told.wrong, sheet.name.as_deref(), wrong);
         Told::add(&mut told.skipped, sheet.name.as_deref(), skipped);
     }
-    let Told { wrong, mut skipped } = told;
+    let Told {
+        mut wrong,
+        mut skipped,
+    } = told;
+    if sheets.len() == 1 {
+        wrong.sort_by_key(|mistake| mistake.place);
+    }
     if !wrong.is_empty() {
         if !reading.lenient {
             return Err(Mistakes::of_list(file, wrong));

@@ -405,7 +405,12 @@ impl Taken {
                     "{} ({address}) overlaps the tag on line {first}",
                     quoted(name)
                 ),
-                "each bit belongs to one signal: keep one of the two; if the numbers count elements, as in CODESYS, add --iec",
+                if address.width.bytes() > 1 {
+                    "each bit belongs to one signal: keep one of the two; if the numbers count elements, as in CODESYS, \
+                     add --iec"
+                } else {
+                    "each bit belongs to one signal: keep one of the two"
+                },
             );
             return None;
         }

@@ -2,6 +2,7 @@
 
 use super::link::counting;
 use super::members::Path;
+use super::s7comm::direct;
 use super::{Image, Plan, line, source};
 use crate::export::record::Place;
 use crate::export::siemens::address;
@@ -25,7 +26,9 @@ pub(super) fn text(plan: &Plan<'_>) -> String {
         line(text, &format!("   \"{prefix}_link_DB\"();"));
         only_if_simulated(text);
         for place in &plan.inputs.record.places {
-            put(text, place, plan);
+            if direct(plan, place).is_none() {
+                put(text, place, plan);
+            }
         }
     });
     line(&mut text, "");
@@ -35,7 +38,7 @@ pub(super) fn text(plan: &Plan<'_>) -> String {
         for place in &plan.outputs.record.places {
             if is_watched(place, plan) {
                 count(text, place, plan);
-            } else {
+            } else if direct(plan, place).is_none() {
                 take(text, place, plan);
             }
         }
@@ -151,8 +154,7 @@ fn is_watched(place: &Place<'_>, plan: &Plan<'_>) -> bool {
 
 /// Changes the value of a signal in every scan: a BOOL toggles, others count and begin again at 100.
 fn count(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
-    let (name, kind) = counting(place, plan.cpu);
-    let value = plan.outputs.member(&name);
+    let (value, kind) = counting(plan, &plan.outputs, place);
     let remark = format!("   // \"{}\": alive in driver.cfg", place.signal.name);
     let next = match kind {
         "Bool" => format!("NOT {value}"),

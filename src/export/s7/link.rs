@@ -1,13 +1,14 @@
 //! The block that talks to the simulation: one body for each bus.
 
 use super::members::Path;
-use super::{Cpu, Plan, line, modbus, s7comm, socket, source};
+use super::{Image, Plan, line, modbus, s7comm, socket, source};
 use crate::driver::Config;
 use crate::export::record::Place;
 use crate::export::siemens::spelling;
+use crate::fieldbus::s7::Variable;
 use crate::fieldbus::socket::Message;
 use crate::fieldbus::{Options, Role};
-use crate::signal::DataType;
+use crate::signal::{DataType, Width};
 
 /// A body: what it declares and what it does.
 #[derive(Default)]
@@ -102,8 +103,7 @@ fn watch(plan: &Plan<'_>, body: &mut Body) {
             continue;
         };
         let number = watched.len() + 1;
-        let (name, kind) = counting(place, plan.cpu);
-        let value = plan.inputs.member(&name);
+        let (value, kind) = counting(plan, &plan.inputs, place);
         body.variables.push(format!("Last_beat_{number} : {kind};"));
         // A beat may come late, and a few be missed.
         let within = timing.max_age.max(beat.every.times(5));
@@ -147,14 +147,29 @@ fn watch(plan: &Plan<'_>, body: &mut Body) {
     }
 }
 
-/// The member of a signal that changes with every count: itself, or its least significant byte; and its type.
-pub(super) fn counting(place: &Place<'_>, cpu: Cpu) -> (String, &'static str) {
-    match Path::of(place, cpu) {
-        Path::Value(name) => (name, spelling(place.data_type())),
-        Path::Bytes(names) => {
-            let least = place.signal.order.byte_position(names.len(), 0);
-            (names[least].clone(), spelling(DataType::Byte))
+/// What changes of a signal with every count, and its type: the signal itself or its least significant byte, where the
+/// simulation reads or writes it.
+pub(super) fn counting(
+    plan: &Plan<'_>,
+    image: &Image<'_>,
+    place: &Place<'_>,
+) -> (String, &'static str) {
+    let least = place.signal.order.byte_position(place.size(), 0);
+    if let Some(variable) = s7comm::direct(plan, place) {
+        if place.data_type() == DataType::Bool {
+            return (variable.to_string(), spelling(DataType::Bool));
         }
+        let byte = Variable {
+            byte: variable.byte + least,
+            width: Width::Byte,
+            data_type: None,
+            ..variable
+        };
+        return (byte.to_string(), spelling(DataType::Byte));
+    }
+    match Path::of(place, plan.cpu) {
+        Path::Value(name) => (image.member(&name), spelling(place.data_type())),
+        Path::Bytes(names) => (image.member(&names[least]), spelling(DataType::Byte)),
     }
 }
 

@@ -185,12 +185,10 @@ impl Options {
     /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
     /// are none, and that the bus has no addresses of its own.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
-        if let Self::ModbusClient(options) = self {
-            options.place_signals(lines, table);
-            return;
-        }
         let kind = self.kind();
         if let Self::S7Client(options) = self {
+            options.place_signals(lines, table);
+        } else if let Self::ModbusClient(options) = self {
             options.place_signals(lines, table);
         } else if let Some(first) = lines.first() {
             first.wrong(

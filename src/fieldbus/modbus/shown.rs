@@ -104,7 +104,7 @@ impl ClientOptions {
             };
             let blocked = match self.stations.write_to(station) {
                 Some(_) => "",
-                None => ", once \"write_to\" names the device",
+                None => "; written once \"write_to\" names the device",
             };
             for query in self.requests(table, station) {
                 let Some(write) = query.write() else {
@@ -117,8 +117,8 @@ impl ClientOptions {
                 };
                 let rest = match zeros {
                     0 => String::new(),
-                    1 => ", of which 1 bit has no signal and becomes 0".to_owned(),
-                    bits => format!(", of which {bits} bits have no signal and become 0"),
+                    1 => "; 1 of the bits written has no signal and becomes 0".to_owned(),
+                    bits => format!("; {bits} of the bits written have no signal and become 0"),
                 };
                 lines.push(format!("{unit}{query}{rest}{blocked}"));
             }

@@ -39,7 +39,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// The elements of its table.
+    /// The elements of the table.
     pub fn span(self) -> Span {
         Span {
             first: self.first,

@@ -50,7 +50,6 @@ pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<S
         receives: inputs > 0,
         sends: outputs > 0,
         heard: "#Client.DONE".to_owned(),
-        ..Body::default()
     }
 }
 
@@ -148,7 +147,10 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         return by_hand("modbus-client with several units", notes);
     }
     if !options.at.is_empty() {
-        return by_hand("modbus-client with [fieldbus.at]", notes);
+        return by_hand(
+            "modbus-client with [fieldbus.at], whose signals lie where the program has them",
+            notes,
+        );
     }
     let place = |area| {
         let bytes = plan.config.table.stations[0].bytes(area);
@@ -224,7 +226,6 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         receives: inputs > 0,
         sends: outputs > 0,
         heard: "#Server.NDR OR #Server.DR".to_owned(),
-        ..Body::default()
     }
 }
 

@@ -52,6 +52,7 @@ impl Line<'_> {
 
 #[test]
 fn a_device_that_was_away_is_asked_who_it_is_before_it_is_written_to() {
+    crate::os::logged::expect("nothing is written into the PLC \"tickbus ");
     let (_tick, end) = image(vec![Directions {
         tx_fail_safe: Box::new([0; 2]),
         tx_latched: Box::new([]),

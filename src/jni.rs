@@ -1,8 +1,8 @@
 //! The native methods of the Java class `tickbus.Tickbus`.
 //!
-//! Each is one line into the rooms above. `xChangeData` is the tick: a raw function that takes no
-//! lock, makes no system call, allocates nothing and never throws. All the others go through the jni
-//! crate, and throw `tickbus.FieldbusException`.
+//! Each is one line into the rooms above. `xChangeData` is the tick, `receiveNative` and `sendNative` are its
+//! halves: raw functions that take no lock, make no system call, allocate nothing and never throw. All the others go
+//! through the jni crate, and throw `tickbus.FieldbusException`.
 
 #![allow(
     unsafe_code,
@@ -80,6 +80,30 @@ extern "system" fn Java_tickbus_Tickbus_xChangeData(
     // The table catches a panic of the driver; nothing around it can panic.
     DRIVERS
         .with(handle, Device::exchange)
+        .unwrap_or_else(Code::code)
+}
+
+/// `static native int receiveNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_receiveNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jint {
+    DRIVERS
+        .with(handle, Device::receive)
+        .unwrap_or_else(Code::code)
+}
+
+/// `static native int sendNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_sendNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jint {
+    DRIVERS
+        .with(handle, Device::send)
         .unwrap_or_else(Code::code)
 }
 

@@ -29,6 +29,8 @@ fn the_native_methods_of_tickbus_are_exported() {
         "JNI_OnLoad",
         "Java_tickbus_Tickbus_initializeNative",
         "Java_tickbus_Tickbus_xChangeData",
+        "Java_tickbus_Tickbus_receiveNative",
+        "Java_tickbus_Tickbus_sendNative",
         "Java_tickbus_Tickbus_finalizeNative",
         "Java_tickbus_Tickbus_statisticsNative",
         "Java_tickbus_Tickbus_eventsNative",

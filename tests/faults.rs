@@ -152,6 +152,30 @@ fn sections_of_a_driver_cfg_begin_and_end_by_time_tick_and_condition() {
 }
 
 #[test]
+fn faults_are_right_in_both_halves_of_a_tick() {
+    let mut bus = Stepped::new(
+        "[[fault]]\nkind = \"stuck\"\nsignal = \"position\"\nvalue = \"50 mm\"\ntick = 3\nticks = 2\n\
+         [[fault]]\nkind = \"offset\"\nsignal = \"speed\"\nby = 100\ntick = 6\nticks = 2\n",
+    );
+    let mut seen = Vec::new();
+    for tick in 0..9_i32 {
+        let end = &mut bus.end;
+        let time = Nanos::from_millis(10 * i64::from(tick));
+        end.driver.receive(time, &mut end.slots);
+        seen.push(end.get("speed"));
+        end.set("position", f64::from(tick + 1));
+        end.send();
+        assert_eq!(
+            end.get("position"),
+            f64::from(tick + 1),
+            "the simulation keeps its own value"
+        );
+    }
+    // What tick n sends comes back in tick n + 1: wrong when it was sent, or wrong when it was read.
+    assert_eq!(seen, [0.0, 1.0, 2.0, 50.0, 50.0, 105.0, 106.0, 7.0, 8.0]);
+}
+
+#[test]
 fn without_simulation_time_the_clock_of_a_free_bus_counts() {
     let (link, clock) = (Link::new(), Manual::new());
     clock.advance(Nanos::from_secs(5));

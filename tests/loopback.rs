@@ -217,3 +217,122 @@ fn a_jump_of_simulation_time_is_refused_and_the_next_tick_goes_on() {
     let after = end.driver.exchange(Nanos::from_secs(2_001), &mut end.slots);
     assert_eq!(after.code, Code::Fresh);
 }
+
+#[test]
+fn simulation_time_that_goes_back_is_refused_and_goes_on_from_where_it_was() {
+    let mut end = mirror("stepped", &Manual::new());
+    for tick in 0..1_000 {
+        let time = Nanos::from_millis(10 * tick);
+        assert_eq!(end.driver.exchange(time, &mut end.slots).code, Code::Fresh);
+    }
+    for half in [false, true] {
+        let begun_anew = if half {
+            end.driver.receive(Nanos::ZERO, &mut end.slots)
+        } else {
+            end.driver.exchange(Nanos::ZERO, &mut end.slots)
+        };
+        assert_eq!(begun_anew.code, Code::BusFailed);
+        assert_eq!(begun_anew.granted, Nanos::from_millis(9_990));
+    }
+    let reason = end.statistic("reason");
+    assert!(
+        reason.contains("went back from 9990ms to 0s") && reason.contains("open the driver again"),
+        "{reason}"
+    );
+    assert_eq!(end.statistic("cause"), "refused");
+    assert_eq!(end.statistic("plc.scans"), "1000");
+    let on = Nanos::from_secs(10);
+    assert_eq!(end.driver.exchange(on, &mut end.slots).code, Code::Fresh);
+    assert_eq!(end.statistic("plc.scans"), "1001");
+    assert_eq!(end.statistic("state"), "running");
+}
+
+#[test]
+fn at_the_end_of_all_time_every_exchange_still_returns() {
+    let mut end = mirror("stepped", &Manual::new());
+    let exchange = |end: &mut End| end.driver.exchange(Nanos::MAX, &mut end.slots);
+    end.tick();
+    assert_eq!(exchange(&mut end).code, Code::BusFailed, "a jump");
+    for _ in 0..3 {
+        assert_eq!(exchange(&mut end).code, Code::Fresh);
+    }
+    assert_eq!(end.statistic("plc.scans"), "4");
+}
+
+#[test]
+fn without_simulation_time_a_stepped_program_is_scanned_once_in_each_tick() {
+    let mut end = mirror("stepped", &Manual::new());
+    for tick in 1..=5 {
+        assert_eq!(end.tick().granted, Nanos::from_millis(10 * tick));
+    }
+    assert_eq!(end.statistic("plc.scans"), "5");
+    // Once there was a time, it stands.
+    end.driver.exchange(Nanos::from_millis(60), &mut end.slots);
+    end.tick();
+    assert_eq!(end.statistic("plc.scans"), "7");
+}
+
+#[test]
+fn a_stepped_program_scans_between_two_ticks_of_halves() {
+    let mut end = mirror("stepped", &Manual::new());
+    let (mut seen, mut edges) = (String::new(), 0.0);
+    for tick in 0..30 {
+        let found = end.driver.receive(Nanos::from_millis(tick), &mut end.slots);
+        assert_eq!((found.code, found.age), (Code::Fresh, Nanos::ZERO));
+        assert_eq!(found.granted, Nanos::from_millis((tick / 10 + 1) * 10));
+        edges += end.edges("out");
+        seen.push(if end.get("out") == 1.0 { '1' } else { '0' });
+        // A pulse of one tick, between two scans.
+        end.set("in", if tick == 13 { 1.0 } else { 0.0 });
+        assert_eq!(end.send(), found);
+    }
+    assert_eq!(seen, "000000000000000000001111111111");
+    assert_eq!(edges, 1.0);
+    assert_eq!(end.statistic("plc.scans"), "3");
+    assert_eq!(end.statistic("ticks"), "30");
+}
+
+#[test]
+fn a_machine_that_steps_in_large_steps_is_there_all_along() {
+    let mut end = mirror("stepped", &Manual::new());
+    for tick in 0..5 {
+        end.driver.receive(Nanos::from_secs(tick), &mut end.slots);
+        end.set("in", 1.0);
+        end.send();
+    }
+    assert_eq!(end.get("out"), 1.0);
+    // Before it had ever sent there was nothing to see.
+    assert_eq!(end.statistic("plc.stale"), "1");
+    assert_eq!(end.statistic("plc.scans"), "401");
+}
+
+#[test]
+fn stepped_ends_of_halves_see_each_other_within_the_tick() {
+    let mut rig = Rig::with(&Link::new(), "mode = \"stepped\"");
+    rig.device.send();
+    rig.controller.set("speed", 3.0);
+    rig.controller.tick();
+    assert_eq!(rig.device.receive().code, Code::Fresh);
+    assert_eq!(rig.device.get("speed"), 3.0);
+    rig.device.set("position", 3.0);
+    rig.device.send();
+    rig.controller.tick();
+    assert_eq!(rig.controller.get("position"), 3.0);
+}
+
+#[test]
+fn a_tick_is_a_receive_and_the_first_send_after_it() {
+    let mut end = mirror("stepped", &Manual::new());
+    assert_eq!(end.send().code, Code::Stale, "nothing was received yet");
+    assert_eq!(end.statistic("ticks"), "0");
+    end.receive();
+    end.send();
+    end.send();
+    assert_eq!(end.statistic("ticks"), "1");
+    end.receive();
+    end.receive();
+    end.send();
+    end.tick();
+    assert_eq!(end.statistic("ticks"), "4");
+    assert_eq!(end.statistic("fresh"), "4");
+}

@@ -226,6 +226,93 @@ fn a_replay_of_a_replay_is_the_recording() {
     }
 }
 
+/// Ticks of two halves: the model answers in each to what it received in the same.
+fn answers(run: &mut Run, ticks: u64, step: u64) {
+    for tick in 1..=ticks {
+        let time = Nanos::from_millis(i64::try_from(step * tick).expect("small"));
+        run.driver.receive(time, &mut run.slots);
+        run.machine();
+        run.driver.send(&mut run.slots);
+    }
+}
+
+#[test]
+fn ticks_of_two_halves_are_rows_that_replay_without_a_difference() {
+    let folder = Folder::new();
+    for file in ["run.vcd", "run.csv"] {
+        let mut run = Run::open(&folder, &rig(RIG, file));
+        answers(&mut run, 3_000, 2);
+        assert_eq!(run.statistic("ticks"), "3000");
+        let config = run.driver.config().clone();
+        run.driver.close();
+        let rows = read(&folder.path(file), &config);
+        assert_eq!(rows.len(), 3_000, "one row a tick");
+        let mut run = Run::open(&folder, &rig(&format!("replay = \"{file}\""), "again.vcd"));
+        answers(&mut run, 3_000, 2);
+        assert_eq!(run.statistic("replay.ticks"), "3000");
+        assert_eq!(run.statistic("replay.compared"), "3000");
+        assert_eq!(run.statistic("replay.differences"), "0");
+        run.driver.close();
+        let again = read(&folder.path("again.vcd"), &config);
+        for (was, is) in rows.iter().zip(&again) {
+            assert_eq!((was.number, was.time), (is.number, is.time));
+            assert_eq!(was.values, is.values, "tick {}", was.number);
+        }
+    }
+}
+
+#[test]
+fn a_row_has_the_answer_beside_the_question() {
+    let folder = Folder::new();
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                scan = \"1ms\"\nmode = \"stepped\"\n[record]\nfile = \"row.csv\"\n\
+                [[signal]]\nname = \"in\"\naddress = \"%IW0\"\n[[signal]]\nname = \"out\"\naddress = \"%QW0\"\n";
+    let mut run = Run::open(&folder, text);
+    for tick in 0..4 {
+        run.driver.receive(Nanos::from_millis(tick), &mut run.slots);
+        let out = run.index("out");
+        run.set("in", run.slots[out].real() + 1.0);
+        run.driver.send(&mut run.slots);
+    }
+    // Its answer is never sent, and it is a tick all the same.
+    run.driver.receive(Nanos::from_millis(4), &mut run.slots);
+    run.driver.receive(Nanos::from_millis(5), &mut run.slots);
+    run.driver.close();
+    let rows = folder.text("row.csv");
+    let rows: Vec<&str> = rows.lines().skip(1).collect();
+    assert_eq!(
+        rows,
+        [
+            "1,0,0,0,1,0",
+            "2,1000000,0,0,2,1",
+            "3,2000000,0,0,3,2",
+            "4,3000000,0,0,4,3",
+            "5,4000000,0,0,4,4",
+        ]
+    );
+}
+
+#[test]
+fn without_simulation_time_a_recording_on_a_free_bus_has_the_clocks() {
+    let folder = Folder::new();
+    let clock = Manual::new();
+    clock.advance(Nanos::from_secs(7));
+    let text = free(
+        "link = \"record-untimed\"",
+        "[record]\nfile = \"untimed.csv\"",
+    );
+    let mut run = Run::on(&folder, &text, &clock);
+    for _ in 0..4 {
+        run.driver.exchange(None, &mut run.slots);
+        clock.advance(Nanos::from_millis(3));
+    }
+    let config = run.driver.config().clone();
+    run.driver.close();
+    let rows = read(&folder.path("untimed.csv"), &config);
+    let times: Vec<i64> = rows.iter().map(|row| row.time.0).collect();
+    assert_eq!(times, [0, 3_000_000, 6_000_000, 9_000_000]);
+}
+
 #[test]
 fn differences_are_listed_with_tick_signal_expected_and_seen() {
     let folder = Folder::new();

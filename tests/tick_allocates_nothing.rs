@@ -80,7 +80,7 @@ const FAULTS: &str = "
 [[fault]]\nkind = \"slow-answers\"\nby = \"30ms\"\n
 ";
 
-/// Ticks with moving values; gives the allocations of 10,000 ticks after a warm-up.
+/// Ticks with moving values; gives the allocations of 10,000 ticks after a warm-up, exchanges and ticks of two halves.
 fn allocations(fieldbus: &str, faults: &str) -> u64 {
     let clock = Manual::new();
     let mut driver =
@@ -99,7 +99,13 @@ fn allocations(fieldbus: &str, faults: &str) -> u64 {
             };
             *slot = Slot::from_real(value);
         }
-        driver.exchange(Nanos::from_millis(tick.into()), &mut slots);
+        let time = Nanos::from_millis(tick.into());
+        if tick % 2 == 0 {
+            driver.exchange(time, &mut slots);
+        } else {
+            driver.receive(time, &mut slots);
+            driver.send(&mut slots);
+        }
     }
     ALLOCATIONS.get() - before
 }

@@ -71,6 +71,15 @@ impl Reflexes {
         }
     }
 
+    /// After they were encoded: what was sent in the place of a value of the simulation is no more.
+    pub fn sent(&mut self, slots: &mut [Slot]) {
+        for axis in &mut self.axes {
+            if let Some(numbers) = &mut axis.numbers {
+                numbers.sent(slots);
+            }
+        }
+    }
+
     /// After the PLC's values were decoded.
     pub fn received(&mut self, slots: &mut [Slot]) {
         for axis in &mut self.axes {
@@ -166,9 +175,6 @@ impl Reflex {
 impl Numbers {
     /// Puts the command that the PLC names in the place of what it sent.
     fn received(&mut self, slots: &mut [Slot], execute: usize) {
-        if let (Some(error), Some(own)) = (self.error, self.error_of_simulation.take()) {
-            slots[error] = own;
-        }
         self.unknown = false;
         let number = slots[self.number].real();
         if number == 0.0 {
@@ -222,6 +228,13 @@ impl Numbers {
         {
             self.error_of_simulation = Some(slots[error]);
             slots[error] = Slot::from_real(f64::from(UNKNOWN_COMMAND));
+        }
+    }
+
+    /// The simulation finds its own error again.
+    fn sent(&mut self, slots: &mut [Slot]) {
+        if let (Some(error), Some(own)) = (self.error, self.error_of_simulation.take()) {
+            slots[error] = own;
         }
     }
 }

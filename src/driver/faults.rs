@@ -57,17 +57,6 @@ impl Driver {
     }
 }
 
-/// The moment of a tick: simulation time since the first tick. A simulation on a free bus that hands in no
-/// time gets the clock's.
-pub(super) fn moment(first: (Nanos, Nanos), simulation: Nanos, now: Nanos, tick: u64) -> Moment {
-    let time = if simulation == first.0 {
-        now - first.1
-    } else {
-        simulation - first.0
-    };
-    Moment { time, tick }
-}
-
 /// The faults of a program that works on frames, not on slots.
 #[derive(Debug)]
 pub(super) struct FrameFaults {

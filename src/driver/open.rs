@@ -10,9 +10,10 @@ use crate::os::dropped_log_lines;
 use crate::plc;
 use crate::record::{Columns, Recorder, When};
 use crate::signal::Slot;
-use crate::time::{Clock, CoarseTime, Manual, Nanos};
+use crate::time::{Clock, Manual, Nanos};
 
 use super::bus::{self, Program};
+use super::exchange::{Exchange, Tick};
 use super::frames::directions;
 use super::station::Station;
 use super::statistics::Samples;
@@ -26,14 +27,20 @@ pub struct Driver {
     pub(super) slots: SlotMap,
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
-    pub(super) time: CoarseTime,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
     pub(super) samples: Samples,
-    /// Simulation time and the clock's at the first exchange.
-    pub(super) first: (Nanos, Nanos),
+    /// The clock's time, and the tick's, at the first tick.
+    pub(super) first_now: Nanos,
+    pub(super) first_time: Nanos,
+    /// Simulation time as it was given last.
+    pub(super) given: Option<Nanos>,
+    /// The tick that is under way.
+    pub(super) tick: Option<Tick>,
+    /// What the last tick found.
+    pub(super) last: Exchange,
     /// Faults to inject; none for most drivers.
     pub(super) faults: Option<Box<Faults>>,
     pub(super) board: Arc<Board>,
@@ -175,13 +182,16 @@ impl Driver {
             recorder,
             stations,
             line,
-            time: clock.coarse(),
             clock,
             max_age: config.timing.max_age,
             status,
             counters: Counters::default(),
             samples: Samples::default(),
-            first: (Nanos::ZERO, Nanos::ZERO),
+            first_now: Nanos::ZERO,
+            first_time: Nanos::ZERO,
+            given: None,
+            tick: None,
+            last: Exchange::NONE,
             faults: None,
             board,
             // They are the machine's: a PLC has its own.

@@ -74,6 +74,10 @@ pub(super) struct Replay {
     present: Tick,
     /// The slots of this driver as the recording has them.
     slots: Vec<Slot>,
+    /// When this end sent last.
+    sent: Option<Nanos>,
+    /// The present tick is yet to be compared.
+    uncompared: bool,
     /// Simulation time when the replay began, less that of the recording.
     offset: Option<Nanos>,
     max_age: Nanos,
@@ -133,6 +137,8 @@ impl Replay {
             more,
             broken: None,
             slots,
+            sent: None,
+            uncompared: false,
             offset: None,
             max_age: config.timing.max_age,
             differences: Differences::new(path),
@@ -193,8 +199,13 @@ impl Replay {
         Ok(())
     }
 
-    /// Compares what this end sends with what it sent then.
+    /// Compares what this end sends with what it sent then, once the present tick has both: a simulation that
+    /// exchanges has sent before it receives, one that answers within its tick sends afterwards.
     fn compare(&mut self, now: Nanos) {
+        if !self.uncompared || self.sent != Some(now) {
+            return;
+        }
+        self.uncompared = false;
         self.tally.compared.fetch_add(1, Ordering::Relaxed);
         let (map, tick, list) = (&self.map.signals, &self.present, &mut self.differences);
         let mut found = 0;
@@ -219,11 +230,17 @@ const UNCHANGED: i32 = 1;
 const STALE: i32 = 2;
 
 impl Stepped for Replay {
-    fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         for (index, station) in self.stations.iter_mut().enumerate() {
             station.sees(port.outgoing(index, now));
             port.sent(index);
         }
+        self.sent = Some(now);
+        self.compare(now);
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
         let mut taken = false;
         while let Some(due) = self.due(now).filter(|due| *due <= now) {
             self.offset.get_or_insert(due - self.next.time);
@@ -233,6 +250,7 @@ impl Stepped for Replay {
         }
         if taken {
             port.running("the recording is replayed");
+            self.uncompared = true;
             self.compare(now);
             if self.present.status < 0 {
                 return Err(BusError::Link(format!(

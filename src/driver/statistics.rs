@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::Code;
-use crate::time::{Clock, Nanos, Spans};
+use crate::time::{Nanos, Spans};
 
 /// Counters of the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,7 +59,7 @@ impl fmt::Display for Counters {
     }
 }
 
-/// One tick in so many is timed: looking at the clock twice takes as long as a small exchange.
+/// One tick in so many is timed: a second look at the clock takes half as long as a small exchange.
 const SAMPLED: u64 = 32;
 
 /// Distributions over the ticks, from samples.
@@ -72,16 +72,16 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// When the exchange begins, if this tick is one of the sample.
+    /// Whether this tick is one of the sample.
     #[inline]
-    pub(super) fn begin(tick: u64, clock: &dyn Clock) -> Option<Nanos> {
-        tick.is_multiple_of(SAMPLED).then(|| clock.now())
+    pub(super) const fn takes(tick: u64) -> bool {
+        tick.is_multiple_of(SAMPLED)
     }
 
-    /// Takes the sample of the exchange that was `begun`, and delivered data of `age` by the coarse
-    /// clock; `Nanos::MAX` where there never were any.
-    pub(super) fn end(&mut self, begun: Nanos, age: Nanos, clock: &dyn Clock) {
-        self.exchange.record(clock.now() - begun);
+    /// Takes the sample of a tick whose calls took `span`, and delivered data of `age`; `Nanos::MAX` where there
+    /// never were any.
+    pub(super) fn add(&mut self, span: Nanos, age: Nanos) {
+        self.exchange.record(span);
         if age != Nanos::MAX {
             self.age.record(age);
         }

@@ -31,7 +31,8 @@ pub struct Slots<'a> {
 }
 
 /// The faults of one end. Its tick calls [`begin_tick`](Self::begin_tick), [`sending`](Self::sending), sends,
-/// calls [`sent`](Self::sent), receives, and calls [`received`](Self::received).
+/// calls [`sent`](Self::sent), receives, and calls [`received`](Self::received). One that answers within itself
+/// receives first.
 #[derive(Debug)]
 pub struct Faults {
     entries: Vec<Entry>,
@@ -122,8 +123,8 @@ impl Faults {
 
     /// A tick begins: what was bent is true again, and faults begin and end.
     ///
-    /// Conditions are judged on true values: of what this end writes, those of this tick; of what it reads,
-    /// those of the tick before.
+    /// Conditions are judged on true values: of what this end writes, those of this tick (of the tick before where
+    /// the tick receives first); of what it reads, those of the tick before.
     pub fn begin_tick(&mut self, moment: Moment, slots: &mut [Slot]) {
         // Time that jumps back would begin nothing and end nothing.
         self.time = self.time.max(moment.time);

@@ -37,14 +37,24 @@ pub trait Free: Send {
 }
 
 /// A bus that runs on the tick's own thread and may make the tick wait: for virtual time, and tests.
+///
+/// A bus cycle has two halves, each at a simulation time that never falls. A tick that exchanges makes both at once,
+/// sending first; a tick that answers within itself receives, computes, and sends at the same time.
 pub trait Stepped: Send {
-    /// Makes one bus cycle at simulation time `now`; gives the time up to which the simulation may
-    /// go on without the next one.
+    /// Sends what the simulation has written, at `now`.
     ///
     /// # Errors
     ///
-    /// Why there was no cycle.
-    fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError>;
+    /// Why it was not sent.
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError>;
+
+    /// Runs the peer up to `now` and brings what it sends; gives the time up to which the simulation may
+    /// go on without the next cycle.
+    ///
+    /// # Errors
+    ///
+    /// Why nothing came.
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError>;
 }
 
 /// Why a bus cannot go on, apart by whose fault it is.

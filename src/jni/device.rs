@@ -4,12 +4,12 @@
 use std::fmt::Write as _;
 
 use crate::config::Mistakes;
-use crate::driver::Driver;
+use crate::driver::{Driver, Exchange};
 use crate::faults::Injected;
 use crate::image::Event;
 use crate::time::Nanos;
 
-use super::shared::{Shared, Word};
+use super::shared::{NO_TIME, Shared, Word};
 
 /// Events handed over in one call at most.
 pub(super) const EVENTS: usize = 64;
@@ -39,9 +39,35 @@ impl<K> Device<K> {
     /// One tick: takes the slots that the simulation wrote, fills those that it reads, and the header.
     #[inline]
     pub(super) fn exchange(&mut self) -> i32 {
-        let time = Nanos(self.shared.read(Word::SimulationTime).cast_signed());
-        let done = self.driver.exchange(time, self.shared.slots());
         self.ticks += 1;
+        let done = self.driver.exchange(self.time(), self.shared.slots());
+        self.tell(done)
+    }
+
+    /// The half that begins a tick: fills the slots that the simulation reads, and the header.
+    #[inline]
+    pub(super) fn receive(&mut self) -> i32 {
+        self.ticks += 1;
+        let done = self.driver.receive(self.time(), self.shared.slots());
+        self.tell(done)
+    }
+
+    /// The half that ends it: takes the slots that the simulation wrote.
+    #[inline]
+    pub(super) fn send(&mut self) -> i32 {
+        let done = self.driver.send(self.shared.slots());
+        self.tell(done)
+    }
+
+    /// The time that Java wrote, if it wrote one.
+    #[inline]
+    fn time(&self) -> Option<Nanos> {
+        let time = self.shared.read(Word::SimulationTime);
+        (time != NO_TIME).then_some(Nanos(time.cast_signed()))
+    }
+
+    #[inline]
+    fn tell(&mut self, done: Exchange) -> i32 {
         self.shared
             .write(Word::Status, i64::from(done.code.code()).cast_unsigned());
         self.shared.write(Word::Sequence, done.sequence);

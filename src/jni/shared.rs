@@ -1,8 +1,8 @@
 //! The buffer that Java and the driver share: a header, then the slots.
 //!
 //! Words of 8 bytes in native byte order. Word 0 version of this layout, 1 status, 2 sequence, 3 age
-//! in nanoseconds, 4 simulation time in nanoseconds (Java writes it), 5 granted time in nanoseconds,
-//! 6 exchanges so far, 7 number of slots; the slots begin at word 8.
+//! in nanoseconds, 4 simulation time in nanoseconds (Java writes it; [`NO_TIME`] until then), 5 granted time in
+//! nanoseconds, 6 ticks so far, 7 number of slots; the slots begin at word 8.
 
 #![allow(
     unsafe_code,
@@ -16,6 +16,9 @@ use crate::signal::Slot;
 
 /// Version of the layout; Java compares it with its own.
 pub(super) const VERSION: u64 = 1;
+
+/// What stands for the simulation time while none was given.
+pub(super) const NO_TIME: u64 = i64::MIN.cast_unsigned();
 
 /// Words before the first slot.
 const HEADER: usize = 8;
@@ -73,6 +76,7 @@ impl<K> Shared<K> {
             shared.header(word).store(0, Ordering::Relaxed);
         }
         shared.write(Word::Version, VERSION);
+        shared.write(Word::SimulationTime, NO_TIME);
         shared.write(Word::SlotCount, slots as u64);
         Some(shared)
     }
@@ -123,7 +127,7 @@ mod tests {
         shared.write(Word::Sequence, 5);
         assert_eq!(shared.read(Word::Sequence), 5);
         assert_eq!(Shared::<()>::bytes(3), 88);
-        assert_eq!(memory, [VERSION, 0, 5, 0, 0, 0, 0, 3, 0, 0, 42]);
+        assert_eq!(memory, [VERSION, 0, 5, 0, NO_TIME, 0, 0, 3, 0, 0, 42]);
     }
 
     #[test]

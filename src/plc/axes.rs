@@ -141,5 +141,8 @@ impl Program for Axes {
             reflexes.sending(slots);
         }
         encode.encode(slots, outputs);
+        if let Some(reflexes) = &mut self.reflexes {
+            reflexes.sent(slots);
+        }
     }
 }

@@ -89,6 +89,70 @@ pub fn keeps_edges_both_ways(bus: &impl Bus) {
     }
 }
 
+/// A simulation that receives, computes and sends: its answer goes out with the tick that brought the
+/// question, no pulse is lost, and age and watchdog are those of any other tick.
+pub fn answers_within_the_tick(bus: &impl Bus) {
+    let mut rig = Rig::with(bus, "watchdog = \"50ms\"");
+    rig.connect();
+    for value in [3.0, 4.0] {
+        rig.controller.set("speed", value);
+        rig.until("the question arrives", |rig| {
+            rig.controller.tick();
+            rig.device.receive();
+            rig.device.get("speed") == value
+        });
+        rig.device.set("position", value);
+        rig.device.send();
+        let mut watched = 0;
+        rig.until("the answer arrives without another tick", |rig| {
+            rig.controller.tick();
+            watched += 1;
+            rig.controller.get("position") == value || watched == 40
+        });
+        assert_eq!(rig.controller.get("position"), value);
+    }
+    let (mut run, mut sensor) = (0.0, 0.0);
+    for _ in 0..10 {
+        for level in [1.0, 0.0] {
+            rig.controller.set("run", level);
+            rig.controller.tick();
+        }
+        let (mut there, mut back) = (false, false);
+        rig.until("the pulse is answered, and over", |rig| {
+            rig.device.receive();
+            run += rig.device.edges("run");
+            let level = rig.device.get("run");
+            there |= level == 1.0;
+            rig.device.set("sensor", level);
+            rig.device.send();
+            rig.controller.tick();
+            sensor += rig.controller.edges("sensor");
+            back |= rig.controller.get("sensor") == 1.0;
+            there && back && level == 0.0 && rig.controller.get("sensor") == 0.0
+        });
+    }
+    assert_eq!((run, sensor), (10.0, 10.0));
+    rig.until("who only receives lets the watchdog bite", |rig| {
+        rig.device.receive();
+        rig.controller.tick();
+        rig.controller.get("position") == 77.0
+    });
+    let Rig {
+        clock,
+        mut device,
+        controller,
+    } = rig;
+    controller.driver.close();
+    await_that("the data are stale", || {
+        pass(&clock, 1);
+        let found = device.receive();
+        assert_eq!(device.send().code, found.code);
+        assert_eq!(found.code == Code::Stale, found.age > MAX_AGE);
+        found.code == Code::Stale
+    });
+    assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
+}
+
 pub fn keeps_events_in_order(bus: &impl Bus) {
     let mut rig = Rig::with(bus, "events = true");
     rig.connect();
@@ -356,7 +420,7 @@ macro_rules! conformance {
         mod $name {
             $crate::conformance!(@tests $bus;
                 opens_and_exchanges_both_ways exchanges_whole_images_only keeps_edges_both_ways
-                keeps_events_in_order is_stale_without_its_peer_and_recovers
+                answers_within_the_tick keeps_events_in_order is_stale_without_its_peer_and_recovers
                 the_watchdog_bites_when_the_simulation_stops sees_through_a_peer_that_lies
                 opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
                 refuses_bad_configuration

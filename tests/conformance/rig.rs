@@ -92,7 +92,16 @@ impl End {
     }
 
     pub fn tick(&mut self) -> Exchange {
-        self.driver.exchange(Nanos::ZERO, &mut self.slots)
+        self.driver.exchange(None, &mut self.slots)
+    }
+
+    /// The two halves of a tick, for a model between them.
+    pub fn receive(&mut self) -> Exchange {
+        self.driver.receive(None, &mut self.slots)
+    }
+
+    pub fn send(&mut self) -> Exchange {
+        self.driver.send(&mut self.slots)
     }
 
     #[track_caller]

@@ -102,6 +102,7 @@ impl Line {
             if alive {
                 end.reflexes.sending(&mut end.slots);
                 end.encode.encode(&end.slots, &mut end.inputs);
+                end.reflexes.sent(&mut end.slots);
             }
             end.program.scan(&mut Scan {
                 now: self.now,

@@ -21,6 +21,8 @@ pub(in crate::driver) struct SteppedHost {
     interval: Nanos,
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
+    /// Whether the program was sent what the machine wrote last.
+    carried: bool,
     /// One frame on its way from one port to the other.
     wire: Box<[u8]>,
 }
@@ -44,6 +46,7 @@ impl SteppedHost {
                 port,
                 interval,
                 due: None,
+                carried: false,
                 wire,
             },
             tally,
@@ -51,39 +54,54 @@ impl SteppedHost {
     }
 }
 
-/// Carries the frame that `from` sends over to `to`.
-fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) {
+/// Carries the frame that `from` sends over to `to`; false if an injected fault swallows it.
+fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) -> bool {
     if !from.sends(now) {
-        return;
+        return false;
     }
     let frame = from.outgoing(0, now);
     let wire = &mut wire[..frame.len()];
     wire.copy_from_slice(frame);
     to.received(0, now, wire);
     from.sent(0);
+    true
 }
 
 impl Stepped for SteppedHost {
-    fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
-        let is_down = port.is_down(now);
-        if !is_down {
-            carry(port, &mut self.port, now, &mut self.wire);
-        }
+        self.carried = !port.is_down(now) && carry(port, &mut self.port, now, &mut self.wire);
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+        port.running("the hosted program is there");
         let mut due = self.due.unwrap_or(now);
-        if due + self.interval.times(MOST_SCANS) < now {
+        let late = now - due;
+        if late > self.interval.times(MOST_SCANS) {
             self.due = Some(now);
             return Err(BusError::Refused(format!(
                 "simulation time jumped from {due} to {now}, over more than {MOST_SCANS} scans of the \
                  hosted program; hand in the nanoseconds since the simulation began, tick by tick",
             )));
         }
-        while due <= now {
+        // Counted, since at the end of all time the next scan is due at the same time as the last.
+        let scans = if late < Nanos::ZERO {
+            0
+        } else {
+            late.0 / self.interval.0 + 1
+        };
+        for _ in 0..scans {
+            if self.carried {
+                // Between two ticks simulation time passes and nothing else: the machine is there all along,
+                // however large the steps are.
+                self.port.touch(0, due);
+            }
             self.cpu.scan(due, true);
             due += self.interval;
         }
         self.due = Some(due);
-        if !is_down {
+        if !port.is_down(now) {
             carry(&mut self.port, port, now, &mut self.wire);
         }
         Ok(due)

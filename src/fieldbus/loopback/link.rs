@@ -126,31 +126,36 @@ impl End {
     }
 
     /// One bus cycle at `now`: takes what the other end sent, offers what the port has.
-    ///
-    /// Frames that the other end has not taken yet are overwritten, since the newest counts; their
-    /// pulses are not confirmed before it has taken a frame that shows them.
     pub fn cycle(&mut self, now: Nanos, port: &mut Port) {
-        if port.is_down(now) {
+        self.take(now, port);
+        self.offer(now, port);
+    }
+
+    /// Takes what the other end sent.
+    pub fn take(&mut self, now: Nanos, port: &mut Port) {
+        if !self.meets(now, port) {
             return;
         }
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
-        if !theirs.attached {
-            // What the former other end did not take is old news to the next one.
-            line.lanes[lane(self.role)].waiting = false;
-            self.sent = false;
-            drop(line);
-            if std::mem::take(&mut self.met) {
-                let left = BusError::Left("the other end of the link was closed".to_owned());
-                port.lost(&left, "waiting for the next");
-            }
-            return;
-        }
         if std::mem::take(&mut theirs.waiting) {
             for (station, frame) in theirs.frames.iter().enumerate() {
                 port.received(station, now, frame);
             }
         }
+        drop(line);
+        port.running("the other end is there");
+    }
+
+    /// Offers what the port has.
+    ///
+    /// Frames that the other end has not taken yet are overwritten, since the newest counts; their
+    /// pulses are not confirmed before it has taken a frame that shows them.
+    pub fn offer(&mut self, now: Nanos, port: &mut Port) {
+        if !self.meets(now, port) {
+            return;
+        }
+        let mut line = lock(&self.line);
         let mine = &mut line.lanes[lane(self.role)];
         if self.sent && !mine.waiting {
             (0..mine.frames.len()).for_each(|station| port.sent(station));
@@ -163,9 +168,27 @@ impl End {
             mine.waiting = true;
             self.sent = true;
         }
+    }
+
+    /// Whether the line is up and the other end is there.
+    fn meets(&mut self, now: Nanos, port: &mut Port) -> bool {
+        if port.is_down(now) {
+            return false;
+        }
+        let mut line = lock(&self.line);
+        if line.lanes[lane(other(self.role))].attached {
+            self.met = true;
+            return true;
+        }
+        // What the former other end did not take is old news to the next one.
+        line.lanes[lane(self.role)].waiting = false;
+        self.sent = false;
         drop(line);
-        self.met = true;
-        port.running("the other end is there");
+        if std::mem::take(&mut self.met) {
+            let left = BusError::Left("the other end of the link was closed".to_owned());
+            port.lost(&left, "waiting for the next");
+        }
+        false
     }
 }
 

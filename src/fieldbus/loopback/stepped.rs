@@ -21,18 +21,26 @@ impl SteppedLoopback {
             end: None,
         }
     }
+
+    fn end(&mut self, port: &mut Port) -> Result<&mut End, BusError> {
+        match &mut self.end {
+            Some(end) => Ok(end),
+            none => {
+                port.opening("waiting for the other end of the link");
+                Ok(none.insert(End::join(&self.name, port)?))
+            }
+        }
+    }
 }
 
 impl Stepped for SteppedLoopback {
-    fn exchange(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
-        let end = match &mut self.end {
-            Some(end) => end,
-            none => {
-                port.opening("waiting for the other end of the link");
-                none.insert(End::join(&self.name, port)?)
-            }
-        };
-        end.cycle(now, port);
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        self.end(port)?.offer(now, port);
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+        self.end(port)?.take(now, port);
         Ok(now)
     }
 }

@@ -7,7 +7,8 @@ import java.nio.LongBuffer;
  *
  * <p>Get it once by {@link Tickbus#signal(String)} and keep it; getters and setters neither allocate nor
  * look anything up. They work on the memory shared with the driver: what is set goes to the PLC with the
- * next {@link Tickbus#exchange()}, what is got came with the last one. They belong to the thread that ticks
+ * next {@link Tickbus#send()} or {@link Tickbus#exchange()}, what is got came with the last {@link Tickbus#receive()} or
+ * {@code exchange()}. They belong to the thread that ticks
  * the driver, and throw {@link FieldbusException} with {@link Status#CLOSED} once it is closed.
  */
 public final class Signal {
@@ -61,7 +62,7 @@ public final class Signal {
     }
 
     /**
-     * Sets the signal, to be sent with the next exchange.
+     * Sets the signal, to be sent with the next exchange or {@link Tickbus#send()}.
      *
      * <p>The native library scales, rounds half away from zero, and saturates at the ends of the type's range.
      *
@@ -152,7 +153,7 @@ public final class Signal {
     }
 
     /**
-     * How many edges came with the last exchange, of the kind that {@code latch} in driver.cfg names.
+     * How many edges came with the last exchange or {@link Tickbus#receive()}, of the kind that {@code latch} in driver.cfg names.
      *
      * @return zero and above
      * @throws IllegalStateException if the signal is not latched, or the simulation writes it

@@ -12,6 +12,7 @@ import java.util.Locale;
 import java.util.Map;
 import java.util.Objects;
 import java.util.Optional;
+import java.util.function.LongToIntFunction;
 import java.util.function.Supplier;
 import java.util.stream.Collectors;
 import java.util.stream.Stream;
@@ -24,21 +25,34 @@ import java.util.stream.Stream;
  *     Signal run = bus.signal("LA1 run");
  *     Signal position = bus.signal("LA1 position");
  *     while (simulating) {
- *         position.set(machine.position());
- *         bus.exchange();
+ *         bus.receive();
  *         machine.run(run.getBoolean());
+ *         machine.move();
+ *         position.set(machine.position());
+ *         bus.send();
  *     }
  * }
  * }</pre>
  *
- * <p><b>Threads.</b> The first thread that exchanges becomes the driver's ticking thread: exchanges, events and the
- * getters and setters of the signals belong to it. Another thread's exchange throws {@link Status#BUSY} and does
- * nothing, until the ticking thread has ended or has called {@link #releaseThread}. {@link #statistics}, {@link #inject},
- * {@link #faults} and {@link #close} can be called by any thread; while an exchange is running they throw {@link Status#BUSY}, and an
- * exchange that meets one of them waits for its end. Different drivers are independent of each other.
+ * <p><b>A tick</b> is either {@link #receive()}, the model, {@link #send()}, or one {@link #exchange()}. The first answers
+ * within the tick: what the PLC sent is in the model at once, and the model's answer on the line at the end of the same tick.
+ * {@code exchange()} sends first and receives then, so that an answer goes out with the next tick. It suits simulators that hand
+ * over all values at one place. Edges, age and status are the same with both. {@link #receive()}, {@link #send()} and
+ * {@link #exchange()} take no lock, make no system call, and allocate nothing, in either language; they never wait for the bus
+ * unless driver.cfg says {@code mode = "stepped"}.
  *
- * <p><b>The tick</b>, {@link #exchange()}, takes no lock, makes no system call, and allocates nothing, in
- * either language; it never waits for the bus unless driver.cfg says {@code mode = "stepped"}.
+ * <p><b>Time.</b> {@link #exchange(long)} and {@link #receive(long)} are given the simulation's time. Stepped buses run the PLC by
+ * it, recordings and faults are timed by it. Without it a tick has the computer's time since the first tick, which is right where the
+ * simulation keeps pace with that. A simulation that runs as fast as it can, or stands still, outruns a PLC that has a clock of its
+ * own: between two of the PLC's scans thousands of ticks pass, and the machine has long gone where the PLC would have stopped it.
+ * Let such a simulation keep pace with the clock, or run the PLC by simulation time, with {@code mode = "stepped"}.
+ *
+ * <p><b>Threads.</b> The first thread that ticks becomes the driver's ticking thread: ticks, events and the
+ * getters and setters of the signals belong to it. Another thread's tick throws {@link Status#BUSY} and does
+ * nothing, until the ticking thread has ended or has called {@link #releaseThread}. A simulation engine whose events run on changing
+ * threads calls that at the end of each of its events that ticks. {@link #statistics}, {@link #inject},
+ * {@link #faults} and {@link #close} can be called by any thread; while a tick's call is running they throw {@link Status#BUSY}, and a
+ * tick that meets one of them waits for its end. Different drivers are independent of each other.
  *
  * <p>After {@link #close} every method but {@link #close}, {@link #id}, {@link #name} and {@link #toString}
  * throws {@link FieldbusException} with {@link Status#CLOSED}.
@@ -143,7 +157,8 @@ public final class Tickbus implements AutoCloseable {
     /**
      * One tick: sends the signals that this end writes, and takes those that it reads.
      *
-     * <p>In stepped mode the simulation time last given to {@link #exchange(long)} stands.
+     * <p>The simulation time given last stands. Where none was ever given, the tick has the computer's time since the
+     * first one; a stepped fieldbus then goes on by one step, to what it granted last.
      *
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
      * @throws FieldbusException {@link Status#BUS_FAILED}, {@link Status#BUSY}, {@link Status#CLOSED} or
@@ -151,36 +166,76 @@ public final class Tickbus implements AutoCloseable {
      */
     public int exchange() {
         mustBeTicker();
-        return move();
+        int code = xChangeData(handle);
+        return code >= 0 ? code : after(code, Tickbus::xChangeData);
     }
 
     /**
      * One tick at a given simulation time, which stepped fieldbuses and recordings need.
      *
-     * @param simulationNanos nanoseconds since the simulation began, not falling
+     * @param simulationNanos nanoseconds since the simulation began, not falling; a stepped fieldbus refuses a time before the last
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
      * @throws FieldbusException as {@link #exchange()}
      */
     public int exchange(long simulationNanos) {
         mustBeTicker();
         words.put(Layout.WORD_SIMULATION_TIME, simulationNanos);
-        return move();
+        return exchange();
     }
 
-    private int move() {
-        int code = xChangeData(handle);
-        return code >= 0 ? code : moveAfter(code);
+    /**
+     * Begins a tick: takes the signals that this end reads. The model computes, and {@link #send()} ends the tick.
+     *
+     * <p>Time is as in {@link #exchange()}. On a stepped fieldbus the PLC runs up to it, with what was sent in the tick
+     * before. To receive again without having sent begins another tick; the one before has no answer then.
+     *
+     * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
+     * @throws FieldbusException as {@link #exchange()}
+     */
+    public int receive() {
+        mustBeTicker();
+        int code = receiveNative(handle);
+        return code >= 0 ? code : after(code, Tickbus::receiveNative);
+    }
+
+    /**
+     * Begins a tick at a given simulation time, which stepped fieldbuses and recordings need.
+     *
+     * @param simulationNanos nanoseconds since the simulation began, not falling; a stepped fieldbus refuses a time before the last
+     * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
+     * @throws FieldbusException as {@link #exchange()}
+     */
+    public int receive(long simulationNanos) {
+        mustBeTicker();
+        words.put(Layout.WORD_SIMULATION_TIME, simulationNanos);
+        return receive();
+    }
+
+    /**
+     * Ends the tick that {@link #receive()} began: sends the signals that this end writes.
+     *
+     * <p>To send again in the same tick hands over the newer values; that is no tick of its own.
+     *
+     * @throws FieldbusException as {@link #exchange()}; also if the {@code receive()} of this tick failed, and
+     *     nothing is sent then
+     */
+    public void send() {
+        mustBeTicker();
+        int code = sendNative(handle);
+        if (code < 0) {
+            after(code, Tickbus::sendNative);
+        }
     }
 
     /**
      * Goes on where {@link #statistics} or {@link #close} of another thread was in the way: the one ends within
      * microseconds, the other in {@link Status#CLOSED}.
      */
-    private int moveAfter(int refusal) {
+    private int after(int refusal, LongToIntFunction call) {
         int code = refusal;
         while (code == Status.BUSY.code()) {
             Thread.onSpinWait();
-            code = xChangeData(handle);
+            code = call.applyAsInt(handle);
         }
         if (code < 0) {
             throw failure(code);
@@ -417,7 +472,7 @@ public final class Tickbus implements AutoCloseable {
 
     /**
      * Lets another thread become the ticking thread. To be called by the ticking thread; by any other, it does
-     * nothing.
+     * nothing. Whoever lets the next thread go on must also order its memory, as every executor, lock and queue does.
      */
     public void releaseThread() {
         TICKER.compareAndSet(this, Thread.currentThread(), null);
@@ -511,6 +566,12 @@ public final class Tickbus implements AutoCloseable {
 
     /** The tick; gives a status code and never throws, whatever the handle. */
     static native int xChangeData(long handle);
+
+    /** The half of the tick that receives; as {@link #xChangeData}. */
+    static native int receiveNative(long handle);
+
+    /** The half of the tick that sends; as {@link #xChangeData}. */
+    static native int sendNative(long handle);
 
     /** Closes a driver; throws {@link FieldbusException}. */
     static native void finalizeNative(long handle);

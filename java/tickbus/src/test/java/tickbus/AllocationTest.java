@@ -36,6 +36,7 @@ class AllocationTest {
             EventHandler handler = (signal, value, time) -> { };
             double sum = 0;
             long allocated = Long.MAX_VALUE;
+            long now = 0;
             // The JVM itself allocates a little now and then, as classes are initialised and code is
             // compiled; a tick that did would do so in every round.
             for (int round = 0; round < 4; round++) {
@@ -44,11 +45,17 @@ class AllocationTest {
                     in.setBoolean(i % 2 == 0);
                     height.set(i % 1000);
                     wide.setLong(i);
-                    bus.exchange(i * 1_000_000L);
+                    now += 1_000_000;
+                    bus.exchange(now);
                     sum += heightOut.get() + wideOut.getLong() + out.edges() + (out.getBoolean() ? 1 : 0);
                     bus.setAll(written);
                     bus.exchange();
                     bus.getAll(read);
+                    now += 1_000_000;
+                    sum += bus.receive(now);
+                    bus.send();
+                    sum += bus.receive();
+                    bus.send();
                     sum += bus.ageNanos() + bus.sequence() + bus.grantedNanos() + bus.pollEvents(handler);
                 }
                 allocated = Math.min(allocated, threads.getCurrentThreadAllocatedBytes() - before);

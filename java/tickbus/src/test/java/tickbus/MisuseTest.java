@@ -52,6 +52,8 @@ class MisuseTest {
         for (int i = 0; i < 100_000; i++) {
             long handle = i < 1000 ? -i : random.nextLong() | Long.MIN_VALUE >>> random.nextInt(8);
             assertEquals(Status.NOT_OPEN.code(), Tickbus.xChangeData(handle), () -> Long.toHexString(handle));
+            assertEquals(Status.NOT_OPEN.code(), Tickbus.receiveNative(handle), () -> Long.toHexString(handle));
+            assertEquals(Status.NOT_OPEN.code(), Tickbus.sendNative(handle), () -> Long.toHexString(handle));
         }
         for (long handle : new long[] {0, 1, -1, 64, 255, Long.MIN_VALUE, Long.MAX_VALUE}) {
             assertStatus(Status.NOT_OPEN, () -> Tickbus.finalizeNative(handle));
@@ -72,6 +74,8 @@ class MisuseTest {
         Tickbus.finalizeNative(handle);
         try (Tickbus tenantOfTheSamePlace = Tickbus.open(mirror())) {
             assertEquals(Status.CLOSED.code(), Tickbus.xChangeData(handle));
+            assertEquals(Status.CLOSED.code(), Tickbus.receiveNative(handle));
+            assertEquals(Status.CLOSED.code(), Tickbus.sendNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.statisticsNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.eventsNative(handle, new long[3]));
@@ -110,7 +114,8 @@ class MisuseTest {
         Signal out = bus.signal("out");
         bus.close();
         bus.close();
-        List<Executable> calls = List.of(bus::exchange, () -> bus.exchange(1), bus::signals, () -> bus.signal("in"),
+        List<Executable> calls = List.of(bus::exchange, () -> bus.exchange(1), bus::receive,
+            () -> bus.receive(1), bus::send, bus::signals, () -> bus.signal("in"),
             bus::ageNanos, bus::sequence, bus::grantedNanos, bus::statistics, () -> bus.pollEvents((s, v, t) -> { }),
             () -> bus.setAll(new double[1]), () -> bus.getAll(new double[1]), in::get, () -> in.set(1), in::getBoolean,
             () -> in.setBoolean(true), in::getLong, () -> in.setLong(1), out::edges);
@@ -144,7 +149,8 @@ class MisuseTest {
             String owner = Thread.currentThread().getName();
             assertTrue(bus.exchange() >= 0);
             elsewhere(() -> {
-                for (Executable call : List.<Executable>of(bus::exchange, () -> bus.exchange(1),
+                for (Executable call : List.<Executable>of(bus::exchange, () -> bus.exchange(1), bus::receive,
+                    () -> bus.receive(1), bus::send,
                     () -> bus.pollEvents((s, v, t) -> { }))) {
                     FieldbusException busy = assertThrows(FieldbusException.class, call);
                     assertEquals(Status.BUSY, busy.status());

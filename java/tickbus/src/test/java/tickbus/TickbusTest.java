@@ -14,6 +14,7 @@ import java.util.List;
 import java.util.function.BooleanSupplier;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.function.Executable;
 import org.junit.jupiter.api.io.TempDir;
 
 @Tag("native")
@@ -223,6 +224,73 @@ class TickbusTest {
             assertEquals(1, edges[0]);
             assertNotEquals(0, machine.sequence());
             assertTrue(machine.ageNanos() < 20_000_000_000L);
+        }
+    }
+
+    @Test
+    void aModelBetweenTheHalvesAnswersWithinTheTick() {
+        String link = DriverCfg.freshLink();
+        try (Tickbus machine = DriverCfg.link(1, link, "device").signal("sensor", "%IX0.0", "latch = \"rising\"")
+                .signal("motor", "%QX0.0", "latch = \"rising\"").open(directory);
+            Tickbus plc = DriverCfg.link(2, link, "controller").signal("sensor", "%IX0.0", "latch = \"rising\"")
+                .signal("motor", "%QX0.0", "latch = \"rising\"").open(directory)) {
+            Signal motor = machine.signal("motor");
+            plc.signal("motor").setBoolean(true);
+            exchangeUntil(() -> {
+                assertTrue(machine.receive() >= 0);
+                if (motor.edges() == 0) {
+                    machine.send();
+                    return false;
+                }
+                assertTrue(motor.getBoolean());
+                machine.signal("sensor").setBoolean(true);
+                machine.send();
+                return true;
+            }, plc);
+            // The machine does not tick any more: its answer is on the line.
+            exchangeUntil(() -> plc.signal("sensor").getBoolean(), plc);
+            assertEquals(1, plc.signal("sensor").edges());
+        }
+    }
+
+    @Test
+    void halvesAreOneTickOnASteppedBus() {
+        try (Tickbus bus = DriverCfg.mirror(1).signal("in", "%IW0", "type = \"INT\"")
+            .signal("out", "%QW0", "type = \"INT\"").open(directory)) {
+            for (int tick = 0; tick < 20; tick++) {
+                assertEquals(Status.FRESH.code(), bus.receive(tick * TICK));
+                assertEquals(tick, bus.signal("out").get());
+                assertEquals((tick + 1) * TICK, bus.grantedNanos());
+                bus.signal("in").set(tick + 1);
+                bus.send();
+            }
+            assertEquals("20", bus.statistics().get("ticks"));
+        }
+    }
+
+    @Test
+    void timeThatGoesBackIsRefusedOnASteppedBus() {
+        try (Tickbus bus = DriverCfg.mirror(1).signal("in", "%IX0.0").open(directory)) {
+            bus.exchange(5 * TICK);
+            List<Executable> back = List.of(() -> bus.exchange(TICK), () -> bus.receive(TICK), bus::send);
+            for (Executable call : back) {
+                FieldbusException refused = assertThrows(FieldbusException.class, call);
+                assertEquals(Status.BUS_FAILED, refused.status());
+                assertTrue(refused.getMessage().contains("simulation time went back from 5ms to 1ms"),
+                    refused::getMessage);
+            }
+            assertEquals(Status.FRESH.code(), bus.exchange(6 * TICK));
+        }
+    }
+
+    @Test
+    void withoutATimeAnExchangeIsOneStep() {
+        try (Tickbus bus = DriverCfg.mirror(1).signal("in", "%IX0.0").open(directory)) {
+            for (int tick = 1; tick <= 3; tick++) {
+                bus.exchange();
+                assertEquals(tick * TICK, bus.grantedNanos());
+            }
+            assertEquals("3", bus.statistics().get("plc.scans"));
         }
     }
 

@@ -7,7 +7,6 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The log of this process, as far as it is not expected yet.
-#[derive(Default)]
 struct Ledger {
     /// Drivers that are open.
     open: usize,

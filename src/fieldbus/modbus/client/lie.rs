@@ -39,7 +39,7 @@ pub struct Block {
 }
 
 impl Block {
-    fn span(self) -> Span {
+    pub(crate) fn span(self) -> Span {
         Span {
             first: self.first,
             count: self.table.elements(self.bytes),

@@ -50,6 +50,7 @@ pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<S
         receives: inputs > 0,
         sends: outputs > 0,
         heard: "#Client.DONE".to_owned(),
+        ..Body::default()
     }
 }
 
@@ -146,6 +147,12 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
     if plan.config.table.stations.len() > 1 {
         return by_hand("modbus-client with several units", notes);
     }
+    if !options.at.is_empty() {
+        return by_hand(
+            "modbus-client with [fieldbus.at], whose signals lie where the program has them",
+            notes,
+        );
+    }
     let place = |area| {
         let bytes = plan.config.table.stations[0].bytes(area);
         let blocks = options.blocks(area, bytes).ok()?;
@@ -220,6 +227,7 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         receives: inputs > 0,
         sends: outputs > 0,
         heard: "#Server.NDR OR #Server.DR".to_owned(),
+        ..Body::default()
     }
 }
 

@@ -82,9 +82,9 @@ without_debug_tables() {
     tables=$DEBUG_TABLES/$(basename "$2").debug
     if have objcopy; then
         objcopy --only-keep-debug "$1" "$tables"
-        objcopy --strip-debug --add-gnu-debuglink="$tables" "$1" "$2"
+        objcopy --strip-all --add-gnu-debuglink="$tables" "$1" "$2"
     elif have strip; then
-        strip -S -o "$2" "$1"
+        strip -x -o "$2" "$1"
     else
         cp "$1" "$2"
     fi

@@ -15,8 +15,8 @@ import tickbus.Tickbus;
  *
  * <p>Threads: one thread ticks a driver. An event that is over lets go of it, so that the next one may be on another.
  *
- * <p>Run it with {@code java -cp java/tickbus-0.1.0.jar examples/event-engine/EventEngine.java} (in a checkout,
- * {@code java/tickbus/target/tickbus-0.1.0.jar}).
+ * <p>Run it with {@code java -cp java/tickbus/target/tickbus-0.1.0.jar examples/event-engine/EventEngine.java} in a
+ * checkout; the zip's README names its jar.
  */
 class EventEngine {
     private record Event(long nanos, Runnable action) { }

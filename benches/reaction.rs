@@ -148,7 +148,7 @@ impl Running {
 /// The median reaction in microseconds, of a machine and a PLC with these driver.cfg; without one of its own
 /// the PLC has the machine's.
 fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usize) -> f64 {
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let config = Config::parse("device.cfg", device).unwrap_or_else(|why| panic!("{why}"));
     let shared = Arc::clone(&clock) as Arc<dyn Clock>;
     let mut machine = match machine {

@@ -69,7 +69,7 @@ fn reals(count: usize) -> String {
 }
 
 fn exchange(criterion: &mut Criterion) {
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let mut group = criterion.benchmark_group("exchange");
     let latched = bits("latch = \"rising\"");
     // Faults that wait, and faults that are active.

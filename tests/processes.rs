@@ -123,7 +123,7 @@ fn await_that(what: &str, mut done: impl FnMut() -> bool) {
 fn device() -> (Driver, Vec<Slot>, String) {
     let text = config("address = \"127.0.0.1:0\"\nmax_age = \"100ms\"");
     let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut address = None;
     await_that("the device listens", || {

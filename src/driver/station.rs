@@ -1,7 +1,5 @@
 //! One station of an open driver, as the tick sees it.
 
-use std::fmt::Write as _;
-
 use super::{Code, Counters, SlotMap};
 use crate::image::{Arrival, TickStation};
 use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
@@ -42,17 +40,6 @@ impl Station {
 
     pub(super) fn peer_age(&self, now: Nanos) -> Nanos {
         self.tick.peer_age(now)
-    }
-
-    /// Appends how old its data are and how many bus cycles it has sent, one `key=value` a line.
-    pub(super) fn write(&self, name: &str, now: Nanos, max_age: Nanos, text: &mut String) {
-        let age = self.peer_age(now);
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "station.{name}.stale={}", age > max_age);
-        if age != Nanos::MAX {
-            let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
-        }
-        let _ = writeln!(text, "station.{name}.bus_cycles={}", self.cycles());
     }
 
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {

@@ -10,7 +10,7 @@ mod pace;
 mod spans;
 mod stop;
 
-pub use clock::{Clock, CoarseTime, Manual, Monotonic};
+pub use clock::{Clock, Manual, Monotonic};
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
 pub use spans::Spans;

@@ -73,7 +73,7 @@ mod plugin {
         };
         let text = format!(
             "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"plugin\"\nlibrary = \"{}\"\n\
-             cycle = \"1ns\"\nmax_age = \"1h\"\ninput_bytes = {INPUT}\noutput_bytes = {OUTPUT}\n{isolation}\n\
+             cycle = \"50us\"\nmax_age = \"1h\"\ninput_bytes = {INPUT}\noutput_bytes = {OUTPUT}\n{isolation}\n\
              [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n",
             library.display()
         );

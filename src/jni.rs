@@ -231,7 +231,7 @@ fn initialize(
     } else {
         tables.try_to_string(env)?
     };
-    let device = open::open(env, Path::new(&path), &tables, layout)?;
+    let device = open::open(env, &open::file_of(&path), &tables, layout)?;
     Ok(place.fill(device))
 }
 

@@ -191,3 +191,24 @@ fn wrong_usage_is_exit_code_2() {
         assert!(output.stdout.is_empty(), "{arguments:?}");
     }
 }
+
+/// A folder whose name is Latin-1, as an old disc has it.
+#[test]
+#[cfg(target_os = "linux")]
+fn files_beside_a_driver_cfg_are_found_in_a_folder_whose_name_is_no_utf_8() {
+    use std::os::unix::ffi::OsStrExt as _;
+
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary
+        .path()
+        .join(std::ffi::OsStr::from_bytes(b"pr\xfcfung"));
+    fs::create_dir(&folder).expect("made");
+    let text = "[driver]\nid = 1\nname = \"x\"\nfaults = \"f.toml\"\n[fieldbus]\nkind = \"socket\"\n\
+                [[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\n";
+    fs::write(folder.join("driver.cfg"), text).expect("written");
+    let fault = "[[fault]]\nkind = \"stuck\"\nsignal = \"a\"\nvalue = true\nat = \"1s\"\n";
+    fs::write(folder.join("f.toml"), fault).expect("written");
+    let output = check(temporary.path(), folder.join("driver.cfg"));
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+}

@@ -1,4 +1,4 @@
-//! S7 with the programs of others at the other end: python-snap7, rust7, and tshark looking on.
+//! S7 with the programs of others at the other end: Snap7 in Python and in C, rust7, and tshark looking on.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -11,9 +11,9 @@ mod foreign;
 #[path = "peers/pcap.rs"]
 mod pcap;
 
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::{Child, ChildStdout, Command, ExitCode, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -31,6 +31,14 @@ fn main() -> ExitCode {
         (
             "our_client_reads_and_writes_a_server_of_python_snap7",
             our_client_reads_and_writes_a_server_of_python_snap7,
+        ),
+        (
+            "snap7_in_c_reads_writes_and_asks_the_server",
+            snap7_in_c_reads_writes_and_asks_the_server,
+        ),
+        (
+            "our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop",
+            our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop,
         ),
         (
             "rust7_reads_and_writes_the_server",
@@ -198,29 +206,48 @@ fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
     Ok(())
 }
 
-/// A server of python-snap7 with data blocks 1 and 2 of 600 bytes.
+/// A server of Snap7 with data blocks 1 and 2.
 struct Cpu {
     process: Child,
     port: u16,
+    out: BufReader<ChildStdout>,
 }
 
 impl Cpu {
-    fn start(mut python: Command) -> Self {
+    fn start(mut python: Command, script: &str) -> Self {
         let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
         let port = free.local_addr().expect("it is bound").port();
         drop(free);
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/snap7_server.py");
+        let path = format!(
+            concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/{}"),
+            script
+        );
         let mut process = python
-            .args([path, &port.to_string()])
+            .args([path, port.to_string()])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .expect("python starts");
         let mut line = String::new();
         let out = process.stdout.take().expect("it was piped");
-        BufReader::new(out).read_line(&mut line).expect("text");
+        let mut out = BufReader::new(out);
+        out.read_line(&mut line).expect("text");
         assert_eq!(line, "ready\n");
-        Self { process, port }
+        Self { process, port, out }
+    }
+
+    /// Tells it something by a line of its stdin.
+    fn tell(&mut self, line: &str) {
+        let stdin = self.process.stdin.as_mut().expect("it was piped");
+        writeln!(stdin, "{line}").expect("it reads");
+    }
+
+    /// Ends it; gives what it says at its end.
+    fn end(mut self) -> String {
+        drop(self.process.stdin.take());
+        let mut rest = String::new();
+        self.out.read_to_string(&mut rest).expect("text");
+        rest
     }
 }
 
@@ -233,7 +260,7 @@ impl Drop for Cpu {
 }
 
 fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> {
-    let cpu = Cpu::start(foreign::python_with("main", &["snap7"])?);
+    let cpu = Cpu::start(foreign::python_with("main", &["snap7"])?, "snap7_server.py");
     let who = "6ES7 315-2EH14-0AB0 CPU 315-2 PN/DP S C-C2UR28922012";
     let fieldbus = |further: &str| {
         format!(
@@ -242,8 +269,18 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             cpu.port
         )
     };
-    let last = "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
-                [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n";
+    // That server does the first item of a job that writes, and no other: so what is written lies without gaps.
+    let mut further = String::from(
+        "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n",
+    );
+    let bits = (1..8).map(|bit| format!("%IX0.{bit}"));
+    let longs = (8..592).step_by(8).map(|byte| format!("%IL{byte}"));
+    let words = (592..598).step_by(2).map(|byte| format!("%IW{byte}"));
+    for address in bits.chain(["%IB1".to_owned()]).chain(longs).chain(words) {
+        further += &format!("[[signal]]\nname = \"{address}\"\naddress = \"{address}\"\n");
+    }
+    let last = &*further;
     let mut end = End::open_with(&fieldbus(""), last);
     end.set("position", 70.0);
     end.until("it reads", |end| end.get("speed") == 1.0);
@@ -273,6 +310,65 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             && reason.contains("optimized block access")
     });
     assert_eq!(end.driver.link().cause.name(), "refused");
+    Ok(())
+}
+
+/// The environment of the wheel that brings the C library.
+fn snap7_in_c() -> Result<Command, Absent> {
+    foreign::python_with("snap7", &["snap7.common", "snap7.protocol"])
+}
+
+fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
+    let python = snap7_in_c()?;
+    let mut end = End::open(SERVER);
+    end.set("sensor", 1.0);
+    end.set("position", -2.0);
+    end.set("pressure", 1.5);
+    let port = end.port().to_string();
+    let told = run(&mut end, python, "snap7c_client.py", &[port]);
+    assert!(told.ends_with("snap7c_client: ok\n"), "{told}");
+    end.tick();
+    assert_eq!(
+        (end.get("run"), end.get("speed"), end.get("setpoint")),
+        (1.0, 1234.0, 2.5)
+    );
+    Ok(())
+}
+
+fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result<(), Absent> {
+    let mut cpu = Cpu::start(snap7_in_c()?, "snap7c_server.py");
+    let fieldbus = |further: &str| {
+        format!(
+            "kind = \"s7-client\"\naddress = \"127.0.0.1:{}\"\ncycle = \"2ms\"\nslot = 2\n\
+             input = \"DB2\"\noutput = \"DB1\"\n{further}\n[fieldbus.at]\n\"sensor\" = \"%DB2.DBX20.4\"\n\
+             \"pressure\" = \"DB2,REAL40\"\n",
+            cpu.port
+        )
+    };
+    let mut end = End::open(&fieldbus(""));
+    // What its data block holds before anybody has written, plus 1.
+    end.until("it reads", |end| end.get("speed") == 28_399.0);
+    let who = end.statistic("identity").expect("it was met");
+    end.driver.close();
+
+    let mut end = End::open(&fieldbus(&format!("write_to = \"{who}\"")));
+    for value in [70.0, 71.0] {
+        end.set("position", value);
+        end.set("pressure", 1.5);
+        end.set("sensor", 1.0);
+        end.until("it comes back", |end| end.get("speed") == value + 1.0);
+    }
+    assert_eq!(end.statistic("cpu").as_deref(), Some("run"));
+    cpu.tell("stop");
+    end.until("it is in STOP", |end| {
+        end.driver.link().cause.name() == "stopped" && end.get("speed") == -1.0
+    });
+    assert_eq!(end.statistic("cpu").as_deref(), Some("stop"));
+    cpu.tell("run");
+    end.until("it runs again", |end| end.get("speed") == 72.0);
+    end.driver.close();
+    // A word, a bit that was 0 in 0xEE, and a REAL of 1.5.
+    assert_eq!(cpu.end(), "changed 2 3 20 40 41 42 43\n");
     Ok(())
 }
 

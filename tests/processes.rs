@@ -36,7 +36,7 @@ address = "%IB1"
 fn config(fieldbus: &str) -> String {
     format!(
         "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"socket\"\ncycle = \"1ms\"\n\
-         reconnect = [\"5ms\"]\n{fieldbus}\n{SIGNALS}"
+         reconnect = [\"10ms\"]\n{fieldbus}\n{SIGNALS}"
     )
 }
 

@@ -735,3 +735,71 @@ fn a_recording_that_cannot_be_made_is_wrong_input() {
         assert_eq!(output.status.code(), Some(1));
     }
 }
+
+/// A file that is replayed, by another name, by a link, and by another driver.
+#[test]
+fn nothing_is_recorded_over_what_is_replayed() {
+    let folder = Folder::new();
+    let mut run = Run::open(&folder, &rig(RIG, "run.csv"));
+    run.ticks(1..=200);
+    run.driver.close();
+    let recorded = folder.bytes("run.csv");
+    fs::create_dir(folder.path("beside")).expect("made");
+    fs::hard_link(folder.path("run.csv"), folder.path("link.csv")).expect("linked");
+    let destroys =
+        "run.csv: this file is being replayed, and recording would destroy it; name another file";
+    let replay = "replay = \"run.csv\"";
+    let refused = folder.refusal(&rig(replay, "beside/../run.csv"));
+    assert!(refused.contains(destroys), "{refused}");
+    let linked = folder.refusal(&rig(replay, "link.csv"));
+    assert!(
+        linked.contains("link.csv: this file is being replayed"),
+        "{linked}"
+    );
+    let mut replaying = Run::open(&folder, &rig(replay, ""));
+    let other = folder.refusal(&rig(RIG, "run.csv"));
+    assert!(other.contains(destroys), "{other}");
+    let again = Run::open(&folder, &rig(replay, ""));
+    again.driver.close();
+    let still = folder.refusal(&rig(RIG, "run.csv"));
+    assert!(
+        still.contains(destroys),
+        "one of two replays goes on: {still}"
+    );
+    replaying.ticks(1..=200);
+    assert_eq!(replaying.statistic("replay.ticks"), "200");
+    replaying.driver.close();
+    assert!(folder.bytes("run.csv") == recorded, "it is as it was");
+    let recording = Run::open(&folder, &rig(RIG, "run.csv"));
+    let early = folder.refusal(&rig("replay = \"link.csv\"", ""));
+    assert!(
+        early.contains("link.csv: a driver of this process records to this file"),
+        "{early}"
+    );
+    recording.driver.close();
+}
+
+/// Recorded in the plant, replayed in a test: the same driver.cfg.
+#[test]
+fn a_test_that_replays_the_plant_s_recording_leaves_it_as_it_is() {
+    let folder = Folder::new();
+    let plant = rig(RIG, "run.csv");
+    let mut run = Run::open(&folder, &plant);
+    run.ticks(1..=200);
+    run.driver.close();
+    let recorded = folder.bytes("run.csv");
+    let replay = "[fieldbus]\nkind = \"loopback\"\nreplay = \"run.csv\"\n";
+    let config = folder.config(&plant).overlaid("a test", replay);
+    let config = config.unwrap_or_else(|wrong| panic!("{wrong}"));
+    let driver = Driver::open(config, Manual::new()).expect("opens");
+    let slots = driver.initial_slots();
+    let mut test = Run {
+        driver,
+        slots,
+        random: 1,
+    };
+    test.ticks(1..=200);
+    assert_eq!(test.statistic("replay.ticks"), "200");
+    test.driver.close();
+    assert!(folder.bytes("run.csv") == recorded, "it is as it was");
+}

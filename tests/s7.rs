@@ -392,6 +392,7 @@ fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
 /// A CPU by hand that answers a client of ours; one that is asked who it is hangs up.
 #[test]
 fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
+    logged::expect("nothing is written into the PLC");
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let pair = Pair {
         address: listener.local_addr().expect("it is bound"),
@@ -469,4 +470,265 @@ fn the_stations_of_a_client_lie_where_their_tables_say() {
         values(end, ["a", "b"]) == [258.0, 3.0] && values(&plc, ["c", "d"]) == [4.0, 5.0]
     });
     assert_eq!(plc.statistic("pdu"), "960");
+}
+
+/// Signals in the memory of a CPU of which each byte was 0xA5.
+#[test]
+fn nothing_is_written_but_the_bits_that_signals_cover() {
+    let (device, at) = server("m_bytes = 256");
+    let mut panel = Client::new(at);
+    panel.write(FLAGS, 0, &[0xA5; 256]);
+    let text = format!(
+        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\n\
+         cycle = \"1ms\"\nmax_age = \"300ms\"\nwrite_to = \"tickbus device\"\ninput = \"%MB100\"\n\
+         [fieldbus.at]\n\"level\" = \"%MW20\"\n\"open\" = \"%M30.3\"\n\"shut\" = \"M30.4:BOOL\"\n\
+         [[signal]]\nname = \"level\"\naddress = \"%IW0\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"open\"\naddress = \"%IX2.0\"\n\
+         [[signal]]\nname = \"shut\"\naddress = \"%IX2.1\"\n\
+         [[signal]]\nname = \"far\"\naddress = \"%IW8\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"echo\"\naddress = \"%QW4\"\ntype = \"INT\"\n"
+    );
+    let mut machine = conformance::rig::End::open(&text, &device.clock);
+    machine.set("level", 0x0102.into());
+    machine.set("open", 1.0);
+    machine.set("shut", 1.0);
+    machine.set("far", 0x0304.into());
+    let mut expected = [0xA5; 256];
+    expected[20..22].copy_from_slice(&[1, 2]);
+    expected[30] = 0xA5 | 0b1_1000;
+    expected[108..110].copy_from_slice(&[3, 4]);
+    await_that("the values are there", || {
+        pass(&device.clock, 2);
+        machine.tick();
+        panel.read(FLAGS, 20, 2) == [1, 2]
+    });
+    assert_eq!(panel.read(FLAGS, 0, 256), expected);
+    machine.set("open", 0.0);
+    // A neighbour that somebody else writes meanwhile is his.
+    panel.write(FLAGS, 30, &[0xFF]);
+    expected[30] = 0xFF & !0b1000;
+    await_that("the bit is cleared", || {
+        pass(&device.clock, 2);
+        machine.tick();
+        panel.read(FLAGS, 30, 1) == [expected[30]]
+    });
+    assert_eq!(panel.read(FLAGS, 0, 256), expected);
+}
+
+#[test]
+fn a_signal_is_read_where_its_line_says_and_else_in_its_area() {
+    logged::expect("nothing is written into the PLC");
+    let (mut device, at) = server("");
+    let text = format!(
+        "[driver]\nid = 1\nname = \"plc\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\nrole = \"controller\"\n\
+         cycle = \"1ms\"\nmax_age = \"300ms\"\n[fieldbus.at]\n\"where\" = \"%IW2\"\n\"low\" = \"%I3.0\"\n\
+         [[signal]]\nname = \"where\"\naddress = \"%IW100\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"low\"\naddress = \"%IX102.7\"\n\
+         [[signal]]\nname = \"copy\"\naddress = \"%IW4\"\ntype = \"INT\"\n"
+    );
+    let mut plc = conformance::rig::End::open(&text, &device.clock);
+    device.end.set("position", 515.0);
+    device.end.set("copy", 7.0);
+    device.until("the values arrive", |_| {
+        plc.tick();
+        (plc.get("where"), plc.get("low"), plc.get("copy")) == (515.0, 1.0, 7.0)
+    });
+}
+
+/// A CPU by hand: its blocks, its state, and what it was asked.
+struct Cpu {
+    /// Blocks that are there; each of their bytes is their number.
+    blocks: Vec<u8>,
+    /// What its list 0x0424 says; none where it refuses the list.
+    state: Option<u8>,
+    /// How often it was asked for that list.
+    asked: u32,
+}
+
+/// Serves one client after the other, until the listener's last client has gone.
+fn serve(listener: std::net::TcpListener, cpu: std::sync::Arc<std::sync::Mutex<Cpu>>) {
+    std::thread::spawn(move || {
+        while let Ok((stream, _)) = listener.accept() {
+            let mut client = Client(stream);
+            while let Some(packet) = client.receive() {
+                let cpu = &mut cpu.lock().expect("no panic");
+                client.send(&cpu.answer(&packet));
+            }
+        }
+    });
+}
+
+impl Cpu {
+    fn answer(&mut self, request: &[u8]) -> Vec<u8> {
+        if request[5] == 0xE0 {
+            return CONFIRM.to_vec();
+        }
+        let reference = [request[11], request[12]];
+        let unit = |kind: u8, parameters: &[u8], data: &[u8]| {
+            let length = |bytes: &[u8]| u16::try_from(bytes.len()).expect("short").to_be_bytes();
+            let mut unit = vec![0x32, kind, 0, 0];
+            for word in [reference, length(parameters), length(data)] {
+                unit.extend_from_slice(&word);
+            }
+            if kind == 3 {
+                unit.extend_from_slice(&[0, 0]);
+            }
+            packet(&[&unit, parameters, data].concat())
+        };
+        let parameters = &request[17..];
+        match (request[8], parameters[0]) {
+            (1, 0xF0) => unit(3, &[0xF0, 0, 0, 1, 0, 1, 1, 0xE0], &[]),
+            (1, 4) => {
+                let count = parameters[1];
+                let mut data: Vec<u8> = Vec::new();
+                for item in parameters[2..].chunks(12) {
+                    if data.len() % 2 == 1 {
+                        data.push(0);
+                    }
+                    let (length, block) = (item[5], item[7]);
+                    if self.blocks.contains(&block) {
+                        data.extend([0xFF, 4, 0, length * 8]);
+                        data.extend(vec![block; length.into()]);
+                    } else {
+                        data.extend([0x0A, 0, 0, 0]);
+                    }
+                }
+                unit(3, &[4, count], &data)
+            }
+            (7, _) => {
+                let is_state = request[request.len() - 4..][..2] == [0x04, 0x24];
+                self.asked += u32::from(is_state);
+                let Some(state) = self.state.filter(|_| is_state) else {
+                    let refuses = [0, 1, 0x12, 8, 0x12, 0x84, 1, 0, 0, 0, 0xD4, 1];
+                    return unit(7, &refuses, &[0x0A, 0, 0, 0]);
+                };
+                let mut data = vec![
+                    0xFF, 9, 0, 28, 4, 0x24, 0, 0, 0, 20, 0, 1, 0x51, 0x44, 0xFF, state,
+                ];
+                data.resize(32, 0);
+                unit(7, &[0, 1, 0x12, 8, 0x12, 0x84, 1, 0, 0, 0, 0, 0], &data)
+            }
+            other => panic!("{other:?} was not expected"),
+        }
+    }
+}
+
+/// A machine with two stations in data blocks 5 and 7 of `cpu`.
+fn machine_of_two(cpu: Cpu) -> (Alone, std::sync::Arc<std::sync::Mutex<Cpu>>) {
+    logged::expect("nothing is written into the PLC");
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let at = listener.local_addr().expect("it is bound");
+    let cpu = std::sync::Arc::new(std::sync::Mutex::new(cpu));
+    serve(listener, std::sync::Arc::clone(&cpu));
+    let machine = Alone::open(&format!(
+        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\ncycle = \"1ms\"\n\
+         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n\
+         [[station]]\nname = \"left\"\noutput = \"DB5\"\n[[station]]\nname = \"right\"\noutput = \"DB7\"\n\
+         [[signal]]\nname = \"l\"\nstation = \"left\"\naddress = \"%QB0\"\nfail_safe = 99\n\
+         [[signal]]\nname = \"r\"\nstation = \"right\"\naddress = \"%QB0\"\nfail_safe = 99\n"
+    ));
+    (machine, cpu)
+}
+
+fn both(end: &conformance::rig::End) -> (f64, f64) {
+    (end.get("l"), end.get("r"))
+}
+
+#[test]
+fn a_cpu_in_stop_is_stale_with_that_cause_until_it_runs() {
+    let (mut machine, cpu) = machine_of_two(Cpu {
+        blocks: vec![5, 7],
+        state: Some(0x04),
+        asked: 0,
+    });
+    machine.until("it is in STOP from the beginning", |end| {
+        end.link().cause.name() == "stopped"
+    });
+    assert_eq!(machine.end.statistic("cpu"), "stop");
+    assert_eq!(both(&machine.end), (99.0, 99.0), "its values never counted");
+    for state in [0x08, 0x04, 0x68, 0x0A] {
+        cpu.lock().expect("no panic").state = Some(state);
+        let runs = state & 0x0F == 8;
+        machine.until("the new state has come", |end| {
+            let is_fresh = end.tick().code != Code::Stale;
+            is_fresh == runs && both(end) == if runs { (5.0, 7.0) } else { (99.0, 99.0) }
+        });
+        assert_eq!(
+            machine.end.statistic("cpu"),
+            if runs { "run" } else { "stop" }
+        );
+    }
+    assert!(machine.end.link().reason.contains("STOP"));
+}
+
+#[test]
+fn a_cpu_that_does_not_tell_its_state_is_asked_once_a_connection() {
+    logged::expect("does not say whether it is in RUN");
+    let (mut machine, cpu) = machine_of_two(Cpu {
+        blocks: vec![5, 7],
+        state: None,
+        asked: 0,
+    });
+    machine.until("values come", |end| both(end) == (5.0, 7.0));
+    for _ in 0..1000 {
+        pass(&machine.clock, 1);
+    }
+    machine.end.tick();
+    assert_eq!(both(&machine.end), (5.0, 7.0));
+    assert_eq!(machine.end.statistic("cpu"), "unknown");
+    assert_eq!(cpu.lock().expect("no panic").asked, 1);
+}
+
+#[test]
+fn a_station_of_which_something_is_refused_is_stale_alone_and_tried_again() {
+    logged::expect("it is stale, and is tried again");
+    let (mut machine, cpu) = machine_of_two(Cpu {
+        blocks: vec![5],
+        state: Some(8),
+        asked: 0,
+    });
+    machine.until("one station is served, the other one told", |end| {
+        let told = end
+            .driver
+            .statistics()
+            .contains("refused=station \"right\"");
+        told && both(end) == (5.0, 99.0)
+    });
+    let refused = machine.end.statistic("refused");
+    assert!(
+        refused.contains("reading DB7 byte") && refused.contains("code 0x0A"),
+        "{refused}"
+    );
+    assert_eq!(machine.end.statistic("link.failed"), "0");
+    cpu.lock().expect("no panic").blocks = vec![5, 7];
+    machine.until("both are served", |end| both(end) == (5.0, 7.0));
+    assert_eq!(machine.end.statistic("refused"), "nothing");
+    // And the other way round.
+    cpu.lock().expect("no panic").blocks = vec![7];
+    machine.until("the other one is left out", |end| both(end) == (99.0, 7.0));
+    cpu.lock().expect("no panic").blocks = Vec::new();
+    assert_eq!(machine.until_reason("refuses reading DB"), "refused");
+}
+
+#[test]
+fn the_age_of_a_slot_is_its_own() {
+    let text = "[driver]\nid = 1\nname = \"two\"\n[fieldbus]\nkind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n\
+        max_age = \"300ms\"\n[[station]]\nname = \"one\"\nslot = 1\n[[station]]\nname = \"two\"\nslot = 2\n\
+        [[signal]]\nname = \"a\"\nstation = \"one\"\naddress = \"%QB0\"\nfail_safe = 99\n\
+        [[signal]]\nname = \"b\"\nstation = \"two\"\naddress = \"%QB0\"\nfail_safe = 99\n";
+    let mut device = Alone::open(text);
+    let at = device.address();
+    let mut one = Client::in_slot(at, 1);
+    let mut two = Client::in_slot(at, 2);
+    one.write(OUTPUTS, 0, &[11]);
+    two.write(OUTPUTS, 0, &[12]);
+    device.end.tick();
+    assert_eq!((device.end.get("a"), device.end.get("b")), (11.0, 12.0));
+    drop(one);
+    device.until("the slot that is gone has its fail-safe value", |end| {
+        two.write(OUTPUTS, 0, &[13]);
+        end.tick();
+        end.get("a") == 99.0
+    });
+    assert_eq!(device.end.get("b"), 13.0);
 }

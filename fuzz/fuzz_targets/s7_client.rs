@@ -1,19 +1,25 @@
 //! Any bytes as what a CPU answers to an S7 client, in pieces of any size.
 //!
 //! The first byte chooses what is asked; then come pieces, each with its length before it. Nothing may panic or go
-//! on without end, and what the client sends is well made.
+//! on without end, what the client sends is well made, and it writes no byte that no signal covers.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use tickbus::driver::Config;
-use tickbus::fieldbus::s7::{Frames, News, Terms, Tsap, pdu::Pdu, transport};
+use tickbus::fieldbus::s7::item;
+use tickbus::fieldbus::s7::pdu::{Pdu, function};
+use tickbus::fieldbus::s7::{Frames, News, Terms, Tsap, transport};
 use tickbus::fieldbus::{Options, Role};
 use tickbus::time::Nanos;
 
 const CONFIG: &str = "[driver]\nid = 1\nname = \"fuzz\"\n[fieldbus]\nkind = \"s7-client\"\n\
-    address = \"127.0.0.1:1\"\ninput_bytes = 700\noutput_bytes = 500\ninput = \"DB1\"\noutput = \"%DB2.DBB3\"\n\
-    [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n";
+    address = \"127.0.0.1:1\"\ninput = \"DB1\"\noutput = \"%DB2.DBB3\"\n\
+    [fieldbus.at]\n\"bit\" = \"%M3.4\"\n\"back\" = \"%M3.5\"\n\"wide\" = \"DB7,LREAL8\"\n\
+    [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"far\"\naddress = \"%QL492\"\n\
+    [[signal]]\nname = \"back\"\naddress = \"%QX1.0\"\n[[signal]]\nname = \"bit\"\naddress = \"%IX1.0\"\n\
+    [[signal]]\nname = \"word\"\naddress = \"%IW690\"\n[[signal]]\nname = \"wide\"\naddress = \"%IL8\"\n\
+    type = \"LREAL\"\n";
 
 thread_local! {
     static FRAMES: Frames = {
@@ -47,7 +53,12 @@ fuzz_target!(|data: &[u8]| {
             match dialog.hear(now, bytes) {
                 Ok(None) => break,
                 Ok(Some(News::Met(..))) => dialog.allow(choice & 2 == 0),
-                Ok(Some(News::Done)) => assert!(dialog.is_idle()),
+                Ok(Some(News::Done)) => {
+                    assert!(dialog.is_idle());
+                    let is_refused = dialog.refusal(0).is_some();
+                    dialog.suspend(0, is_refused);
+                }
+                Ok(Some(News::State(_))) => assert!(dialog.is_idle()),
                 Err(end) => {
                     assert!(!end.into_error("peer").to_string().is_empty());
                     return;
@@ -55,8 +66,11 @@ fuzz_target!(|data: &[u8]| {
             }
             bytes = &[];
         }
-        if dialog.is_idle() {
-            dialog.begin(now);
+        if dialog.is_idle() && choice & 4 != 0 && now.0 % 3 == 0 {
+            dialog.ask_state(now);
+        } else if dialog.is_idle() && dialog.begin(now).is_some() {
+            // All that there is was left out.
+            dialog.suspend(0, false);
         }
         check(dialog.to_write());
         let count = dialog.to_write().len();
@@ -76,10 +90,28 @@ fn check(mut sent: &[u8]) {
             message.extend_from_slice(bytes);
             if last {
                 assert!(message.len() <= 960);
-                Pdu::read(&message).expect("well made");
+                check_writing(&Pdu::read(&message).expect("well made"));
                 message.clear();
             }
         }
     }
     assert!(message.is_empty());
+}
+
+/// What is written are signals.
+fn check_writing(pdu: &Pdu<'_>) {
+    let [function::WRITE, _, items @ ..] = pdu.parameters else {
+        return;
+    };
+    for item in items.chunks_exact(item::ADDRESS) {
+        let (element, count) = (item[3], item[5]);
+        let address = u32::from_be_bytes([0, item[9], item[10], item[11]]);
+        match (item[8], item[7], element, address) {
+            // A bit of the flags; a word of data block 1; 8 bytes of data block 7.
+            (0x83, 0, 1, 28) => assert_eq!(count, 1),
+            (0x84, 1, 2, 5520) => assert_eq!(count, 2),
+            (0x84, 7, 2, 64) => assert_eq!(count, 8),
+            other => panic!("no signal is at {other:?}"),
+        }
+    }
 }

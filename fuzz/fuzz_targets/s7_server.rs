@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use libfuzzer_sys::fuzz_target;
 use tickbus::fieldbus::s7::item::{Code, Object};
-use tickbus::fieldbus::s7::lists::{Facts, Identity};
+use tickbus::fieldbus::s7::szl::{Facts, Identity};
 use tickbus::fieldbus::s7::pdu::Pdu;
 use tickbus::fieldbus::s7::transport::{self, Tpdu};
 use tickbus::fieldbus::s7::{Conversation, Fault, Memory};
@@ -62,7 +62,7 @@ impl Memory for Bytes {
 fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<Fault>) {
     let mut conversation = Conversation::default();
     let mut memory = Bytes { outputs: [0; 64], inputs: [7; 700] };
-    let facts = Facts { identity: Identity::of_driver("fuzz"), pdu: 480, clients: 1 };
+    let facts = Facts { identity: Identity::of_driver("fuzz"), pdu: 480, clients: 1, epoch: Facts::NEVER_SET };
     let (mut begun, mut answers) = (Vec::new(), Vec::new());
     for piece in bytes.chunks(piece) {
         begun.extend_from_slice(piece);

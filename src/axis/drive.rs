@@ -1,6 +1,6 @@
 //! What a command means to an axis: one drive, stepped through time.
 
-use super::{Limits, Motion, Profile};
+use super::{Kind, Limits, Motion, Profile};
 
 /// How near to its target an axis counts as there, in its unit.
 const THERE: f64 = 1e-9;
@@ -14,9 +14,9 @@ const THERE: f64 = 1e-9;
 pub struct Demand {
     /// Its rising edge gives a command.
     pub execute: bool,
-    /// Follow, or close.
+    /// Follow; on an axis of kind `torque`: close.
     pub tracking: bool,
-    /// Open.
+    /// On an axis of kind `torque`: open. Of no sense on others.
     pub torque_control: bool,
     /// Run.
     pub speed_control: bool,
@@ -49,7 +49,8 @@ pub struct Feedback {
 impl Feedback {
     /// The target was beyond the limits; the axis went as far as it could.
     pub const BEYOND: u16 = 1;
-    /// The numbers of the command make no sense: no speed, or no acceleration.
+    /// The command makes no sense: numbers without a speed or an acceleration, or bits that this kind of axis does not
+    /// have, or that contradict one another.
     pub const NONSENSE: u16 = 2;
     /// The axis is broken.
     pub const UNHEALTHY: u16 = 4;
@@ -64,6 +65,7 @@ impl Feedback {
 /// jerk.
 #[derive(Clone, Debug)]
 pub struct Drive {
+    kind: Kind,
     limits: Option<[f64; 2]>,
     /// A test breaks it by this.
     pub healthy: bool,
@@ -105,9 +107,10 @@ enum Doing {
 const SQUEEZE: f64 = 400.0;
 
 impl Drive {
-    /// An axis at rest.
-    pub fn new(position: f64, limits: Option<[f64; 2]>) -> Self {
+    /// An axis of a kind, at rest.
+    pub fn new(kind: Kind, position: f64, limits: Option<[f64; 2]>) -> Self {
         Self {
+            kind,
             limits,
             healthy: true,
             position,
@@ -165,10 +168,11 @@ impl Drive {
             deceleration: motion.deceleration.abs(),
             jerk: (demand.jerk > 0.0).then_some(demand.jerk),
         };
-        let squeeze = demand.torque_control || (demand.tracking && motion.speed <= 0.0);
-        let moves = !squeeze && !demand.tracking;
+        let is_torque = self.kind == Kind::Torque;
+        let impossible = demand.torque_control && (!is_torque || demand.tracking);
+        let moves = !demand.torque_control && !demand.tracking;
         // A REAL from the wire may be no number, or infinite: the axis would never be anywhere again.
-        if !motion.is_finite() || (moves && !limits.make_sense()) {
+        if impossible || !motion.is_finite() || (moves && !limits.make_sense()) {
             self.error = Feedback::NONSENSE;
             // It brakes as the command before said.
             self.doing = Doing::Run { speed: 0.0 };
@@ -178,10 +182,12 @@ impl Drive {
         let way = motion.position - self.position;
         if demand.torque_control {
             self.doing = Doing::Squeeze { speed: SQUEEZE };
-        } else if squeeze {
-            self.doing = Doing::Squeeze { speed: -SQUEEZE };
         } else if demand.tracking {
-            self.doing = Doing::Follow;
+            self.doing = if is_torque {
+                Doing::Squeeze { speed: -SQUEEZE }
+            } else {
+                Doing::Follow
+            };
         } else if demand.speed_control {
             let speed = limits.speed.copysign(way);
             self.doing = Doing::Run { speed };
@@ -351,7 +357,7 @@ mod tests {
 
     #[test]
     fn a_position_command_takes_the_time_of_its_profile_and_ends_in_position() {
-        let mut drive = Drive::new(50.0, Some([0.0, 400.0]));
+        let mut drive = Drive::new(Kind::Position, 50.0, Some([0.0, 400.0]));
         let seconds = arrives(&mut drive, &demand(250.0));
         assert!(
             (2.1 - SCAN..=2.1 + 2.0 * SCAN).contains(&seconds),
@@ -366,7 +372,7 @@ mod tests {
 
     #[test]
     fn nothing_moves_without_enable_and_a_command_is_gone_with_it() {
-        let mut drive = Drive::new(0.0, None);
+        let mut drive = Drive::new(Kind::Position, 0.0, None);
         let off = Demand {
             enable: false,
             ..demand(10.0)
@@ -386,7 +392,7 @@ mod tests {
 
     #[test]
     fn a_command_in_mid_move_brakes_turns_and_arrives() {
-        let mut drive = Drive::new(0.0, Some([0.0, 400.0]));
+        let mut drive = Drive::new(Kind::Position, 0.0, Some([0.0, 400.0]));
         for _ in 0..50 {
             drive.step(SCAN, &demand(300.0), 0.0, 0.0);
         }
@@ -408,7 +414,7 @@ mod tests {
 
     #[test]
     fn a_jog_runs_for_as_long_as_its_bit_and_ends_at_the_limit() {
-        let mut drive = Drive::new(0.0, Some([0.0, 100.0]));
+        let mut drive = Drive::new(Kind::Position, 0.0, Some([0.0, 100.0]));
         let jog = Demand {
             speed_control: true,
             ..demand(1e9)
@@ -429,7 +435,7 @@ mod tests {
 
     #[test]
     fn a_clamp_closes_on_what_is_there_and_opens_to_its_end() {
-        let mut drive = Drive::new(800.0, Some([0.0, 800.0]));
+        let mut drive = Drive::new(Kind::Torque, 800.0, Some([0.0, 800.0]));
         let close = Demand {
             execute: true,
             enable: true,
@@ -469,7 +475,12 @@ mod tests {
         for (tracking, torque_control, speed_control) in modes {
             for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                 for field in 0..5 {
-                    let mut drive = Drive::new(20.0, Some([0.0, 100.0]));
+                    let kind = if torque_control {
+                        Kind::Torque
+                    } else {
+                        Kind::Position
+                    };
+                    let mut drive = Drive::new(kind, 20.0, Some([0.0, 100.0]));
                     let mut numbers = [50.0, 10.0, 10.0, 10.0, 1.0];
                     numbers[field] = wrong;
                     let [position, speed, acceleration, deceleration, torque] = numbers;
@@ -507,7 +518,7 @@ mod tests {
 
     #[test]
     fn an_axis_that_tracked_without_a_deceleration_stops_when_it_tracks_no_more() {
-        let mut drive = Drive::new(0.0, None);
+        let mut drive = Drive::new(Kind::Tracking, 0.0, None);
         let track = Demand {
             tracking: true,
             motion: Motion {
@@ -527,7 +538,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_command_is_told() {
-        let mut drive = Drive::new(0.0, Some([0.0, 100.0]));
+        let mut drive = Drive::new(Kind::Position, 0.0, Some([0.0, 100.0]));
         let none = Demand {
             motion: Motion {
                 position: 10.0,
@@ -543,5 +554,55 @@ mod tests {
         );
         drive.healthy = false;
         assert!(!drive.step(SCAN, &demand(101.0), 0.0, 0.0).healthy);
+    }
+
+    #[test]
+    fn a_clamp_closes_whatever_the_numbers_of_its_command_say() {
+        for speed in [-1.0, 0.0, 100.0] {
+            let mut drive = Drive::new(Kind::Torque, 800.0, Some([0.0, 800.0]));
+            let mut close = demand(500.0);
+            (close.tracking, close.motion.speed) = (true, speed);
+            let mut told = Feedback::default();
+            for _ in 0..300 {
+                told = drive.step(SCAN, &close, 500.0, 0.0);
+            }
+            assert_eq!((told.position, told.error), (0.0, 0), "at speed {speed}");
+        }
+    }
+
+    #[test]
+    fn an_axis_without_a_clamp_does_not_open_and_none_opens_and_closes_at_once() {
+        let open = Demand {
+            torque_control: true,
+            ..demand(500.0)
+        };
+        let both = Demand {
+            tracking: true,
+            ..open
+        };
+        let kinds = [Kind::Position, Kind::Speed, Kind::Tracking];
+        let wrong = kinds.map(|kind| (kind, open));
+        for (kind, command) in wrong.into_iter().chain([(Kind::Torque, both)]) {
+            let mut drive = Drive::new(kind, 20.0, Some([0.0, 100.0]));
+            for _ in 0..5 {
+                let told = drive.step(SCAN, &command, 20.0, 0.0);
+                assert_eq!(
+                    (told.position, told.error),
+                    (20.0, Feedback::NONSENSE),
+                    "{kind:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_tracks_at_speed_0_stays_where_it_is() {
+        let mut drive = Drive::new(Kind::Tracking, 20.0, Some([0.0, 100.0]));
+        let mut track = demand(0.0);
+        (track.tracking, track.motion.speed) = (true, 0.0);
+        for _ in 0..5 {
+            let told = drive.step(SCAN, &track, 80.0, 0.0);
+            assert_eq!((told.position, told.error), (20.0, 0));
+        }
     }
 }

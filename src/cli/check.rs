@@ -54,7 +54,11 @@ fn report(config: &Config) -> String {
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
     line("bus", &bus(&config.bus, config.role));
+    for request in config.bus.requests(&config.table) {
+        line("request", &request);
+    }
     line("timing", &timing(&config.timing));
+    life_signs(config, &mut line);
     if let Some(record) = &config.record {
         line("record", &recording(record));
     }
@@ -254,6 +258,31 @@ fn timing(timing: &Timing) -> String {
         timing.max_age,
         waits.join(" ")
     )
+}
+
+/// A line for each signal by which the ends see that the other one lives, as this end has it.
+fn life_signs(config: &Config, line: &mut impl FnMut(&str, &str)) {
+    let name = |signal: usize| &config.table.signals[signal].name;
+    for watch in config
+        .life_signs
+        .watches(&config.table, config.role, config.timing.max_age)
+    {
+        line(
+            "alive",
+            &format!(
+                "\"{}\" has to change within {}, or its station is stale",
+                watch.name, watch.within
+            ),
+        );
+    }
+    for beat in config.life_signs.beats(&config.table, config.role) {
+        let counts = format!(
+            "\"{}\" counts every {} while the simulation ticks",
+            name(beat.signal),
+            beat.every
+        );
+        line("heartbeat", &counts);
+    }
 }
 
 fn recording(options: &record::Options) -> String {

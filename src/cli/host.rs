@@ -135,7 +135,8 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let statistics = host.statistics();
     let (scans, stale) = host.scans();
     let fault = host.fault();
-    host.close();
+    // A scan that never ends is noticed here, if the command was too short to notice it before.
+    let fault = host.close().or(fault);
     let failure = fault.or_else(|| report.as_ref().and_then(|report| report.failure()));
     if told.is_ok() {
         let mut out = io::stdout().lock();

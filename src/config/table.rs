@@ -49,6 +49,17 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// Lets `read` look into a table that stands nowhere in the text, so that what it has to have is told at `at`.
+    pub fn absent<R>(
+        collector: &Collector<'_>,
+        title: &str,
+        at: usize,
+        read: impl FnOnce(Table<'_>) -> R,
+    ) -> R {
+        let nothing = DeTable::new();
+        read(Table::new(collector, title.to_owned(), at, &nothing, true))
+    }
+
     /// The value of `key`, if it is there.
     pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
         self.known.push(key);
@@ -329,6 +340,19 @@ impl<'a> Value<'a> {
                 None
             }
         }
+    }
+
+    /// A duration of at least `least`; `why` no shorter one makes sense.
+    pub fn duration_from(&self, least: Nanos, why: &str) -> Option<Nanos> {
+        let span = self.duration()?;
+        if span < least {
+            self.wrong(
+                format!("{} is {span}, and {why}", self.key),
+                format!("write at least \"{least}\""),
+            );
+            return None;
+        }
+        Some(span)
     }
 
     /// One of the names in `choices`; `kinds` is what they are called together, such as "roles".

@@ -10,15 +10,12 @@ use crate::fieldbus::socket::Socket;
 use crate::fieldbus::{Bus, Free, Options, Role, plugin};
 use crate::plc;
 use crate::signal::Area;
-use crate::time::{Clock, Nanos};
+use crate::time::Clock;
 
 use super::frames::area_bytes;
 use super::host::{HostTally, HostThread, Hosted, SteppedHost, Tally};
 use super::replay::{Replay, ReplayTally};
 use super::{Config, DriverError};
-
-/// The bus cycle of a loopback whose driver.cfg names none.
-const LOOPBACK_CYCLE: Nanos = Nanos::from_millis(1);
 
 /// What stands at the other end in this process: a PLC program, or a recording.
 #[derive(Debug)]
@@ -150,7 +147,7 @@ fn open_loopback(
     options: &loopback::Options,
     clock: &Arc<dyn Clock>,
 ) -> Result<(Bus, Option<Program>), DriverError> {
-    let cycle = config.timing.cycle.unwrap_or(LOOPBACK_CYCLE);
+    let cycle = config.timing.cycle.unwrap_or(loopback::CYCLE);
     let (name, program_options, scan) = match (&options.peer, options.mode) {
         (Peer::Link(name), Mode::Free) => {
             return Ok((Bus::Free(Box::new(FreeLoopback::named(name, cycle))), None));

@@ -6,7 +6,7 @@ use super::layout;
 use crate::axis::{self, Axis};
 use crate::config::{Collector, Mistakes, Table, Value, load_text, read_text};
 use crate::faults::{self, Fault};
-use crate::fieldbus::{At, Options, Role};
+use crate::fieldbus::{At, LifeSigns, Options, Role, Written};
 use crate::record;
 use crate::signal::{Addressing, SignalTable, Station};
 use crate::time::Nanos;
@@ -23,6 +23,15 @@ const RECONNECT: [Nanos; 6] = [
 
 /// The least age at which data become stale, where a driver.cfg states none.
 const LEAST_MAX_AGE: Nanos = Nanos::from_millis(250);
+
+/// The shortest bus cycle that an operating system keeps to.
+const LEAST_CYCLE: Nanos = Nanos::from_micros(50);
+
+/// The shortest `watchdog`: the pauses of a busy machine are no stop of the simulation.
+const LEAST_WATCHDOG: Nanos = Nanos::from_millis(10);
+
+/// The shortest pause of `reconnect`: each attempt is a line in the log.
+const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 
 /// The longest name of a driver, in characters.
 const NAME_LIMIT: usize = 120;
@@ -54,6 +63,8 @@ pub struct Config {
     pub timing: Timing,
     /// What the bus itself needs to know.
     pub bus: Options,
+    /// Signals by which each end sees that the other one lives.
+    pub life_signs: LifeSigns,
     /// Faults to inject at this end.
     pub faults: Vec<Fault>,
     /// The file that has more of them; [`load`](Self::load) reads it.
@@ -108,7 +119,7 @@ impl Config {
     /// As [`load`](Self::load); the file states the other role; or its bus never leaves the process.
     pub fn load_as(path: &Path, asked: Option<Asked>) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
-        let mut config = Self::parse_as(&path.display().to_string(), &text, asked)?;
+        let mut config = Self::parse_at(path, &path.display().to_string(), &text, asked)?;
         if let Some(file) = config.fault_file.take() {
             config.add_faults(&file)?;
         }
@@ -148,10 +159,18 @@ impl Config {
     ///
     /// With every mistake in the text.
     pub fn parse_as(file_name: &str, text: &str, asked: Option<Asked>) -> Result<Self, Mistakes> {
-        let mut collector = Collector::new(file_name, text);
-        let config = read_text(&mut collector, text, |root| {
-            read(Path::new(file_name), root, asked)
-        });
+        Self::parse_at(Path::new(file_name), file_name, text, asked)
+    }
+
+    /// The same for a file at `path`, which need not be a text: `shown` is what mistakes call it.
+    fn parse_at(
+        path: &Path,
+        shown: &str,
+        text: &str,
+        asked: Option<Asked>,
+    ) -> Result<Self, Mistakes> {
+        let mut collector = Collector::new(shown, text);
+        let config = read_text(&mut collector, text, |root| read(path, root, asked));
         match collector.finish() {
             Some(mistakes) => Err(mistakes),
             None => Ok(config.expect("what is not read has a mistake")),
@@ -217,6 +236,13 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     {
         bus.place_signals(&At::read(at, table), table);
     }
+    let mut life_signs = LifeSigns::default();
+    if let (Some(fieldbus), Some(table)) = (&fieldbus, &table) {
+        let of_bus = fieldbus.bus.as_ref().and_then(Options::cycle);
+        let cycle = fieldbus.timing.as_ref().and_then(|timing| timing.cycle);
+        let (role, signs) = (fieldbus.own_role, &fieldbus.life_signs);
+        signs.read(table, role, cycle.or(of_bus), &mut life_signs);
+    }
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
         bus.fit(table, &axes, root.collector());
@@ -258,6 +284,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
         axes,
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
+        life_signs,
         faults,
         fault_file,
         record: match record {
@@ -307,6 +334,9 @@ struct FieldbusTable<'a> {
     role: Role,
     /// Whether the file states no role and serves both ends.
     is_for_both: bool,
+    /// The end that the file describes.
+    own_role: Role,
+    life_signs: Written<'a>,
     timing: Option<Timing>,
     sizes: layout::Sizes<'a>,
     /// `[fieldbus.at]`, to be read when the signals are.
@@ -317,7 +347,8 @@ struct FieldbusTable<'a> {
 fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_> {
     let kind = table.require("kind", "write the kind of bus, such as kind = \"loopback\"");
     let role = table.take("role");
-    let timing = read_timing(&mut table);
+    let life_signs = Written::take(&mut table);
+    let spans = Spans::take(&mut table);
     let sizes = layout::Sizes::take(&mut table);
     let at = table.take("at");
     let roles = Role::ALL.map(|role| (role.name(), role));
@@ -356,42 +387,76 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_
     FieldbusTable {
         role,
         is_for_both: stated.is_none(),
-        timing,
+        own_role: stated.unwrap_or_default(),
+        life_signs,
+        timing: spans.read(bus.as_ref().and_then(Options::cycle)),
         sizes,
         at,
         bus,
     }
 }
 
-fn read_timing(table: &mut Table<'_>) -> Option<Timing> {
-    let [cycle, max_age, watchdog] = ["cycle", "max_age", "watchdog"].map(|key| table.take(key));
-    let reconnect = table.take("reconnect");
-    let span = |value: &Option<Value<'_>>| match value {
-        None => Some(None),
-        Some(value) => value.duration().map(Some),
-    };
-    let spans = (span(&cycle), span(&max_age), span(&watchdog));
-    let reconnect = match reconnect {
-        None => Some(RECONNECT.to_vec()),
-        Some(value) => read_reconnect(&value),
-    };
-    let (cycle, stated, watchdog) = (spans.0?, spans.1?, spans.2?);
-    if let (Some(cycle), Some(stated), Some(value)) = (cycle, stated, &max_age)
-        && stated < cycle
-    {
-        value.wrong(
-            format!("\"max_age\" is {stated}, shorter than one bus cycle of {cycle}"),
-            "write some cycles, or all data are stale",
-        );
+/// Cycle times and time-outs as they stand in the file.
+struct Spans<'a> {
+    cycle: Option<Value<'a>>,
+    max_age: Option<Value<'a>>,
+    watchdog: Option<Value<'a>>,
+    reconnect: Option<Value<'a>>,
+}
+
+impl<'a> Spans<'a> {
+    fn take(table: &mut Table<'a>) -> Self {
+        let [cycle, max_age, watchdog] =
+            ["cycle", "max_age", "watchdog"].map(|key| table.take(key));
+        Self {
+            cycle,
+            max_age,
+            watchdog,
+            reconnect: table.take("reconnect"),
+        }
     }
-    let ten_cycles = Nanos(cycle.unwrap_or_default().0.saturating_mul(10));
-    let max_age = stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE));
-    Some(Timing {
-        cycle,
-        max_age,
-        watchdog,
-        reconnect: reconnect?,
-    })
+
+    /// Reads them, for a bus whose cycle is `of_bus` where none is stated.
+    fn read(&self, of_bus: Option<Nanos>) -> Option<Timing> {
+        let span = |value: &Option<Value<'_>>, least, why| match value {
+            None => Some(None),
+            Some(value) => value.duration_from(least, why).map(Some),
+        };
+        let no_rhythm = "no operating system keeps to a shorter bus cycle than 50us";
+        let no_stop = "a pause of a few milliseconds is no stop of the simulation";
+        let spans = (
+            span(&self.cycle, LEAST_CYCLE, no_rhythm),
+            span(&self.max_age, Nanos(1), ""),
+            span(&self.watchdog, LEAST_WATCHDOG, no_stop),
+        );
+        let reconnect = match &self.reconnect {
+            None => Some(RECONNECT.to_vec()),
+            Some(value) => read_reconnect(value),
+        };
+        let (stated_cycle, stated, watchdog) = (spans.0?, spans.1?, spans.2?);
+        if let (Some(cycle), Some(stated), Some(value)) =
+            (stated_cycle.or(of_bus), stated, &self.max_age)
+            && stated < cycle
+        {
+            let whose = if stated_cycle.is_some() {
+                ""
+            } else {
+                ", which is that of the bus where no \"cycle\" is stated"
+            };
+            value.wrong(
+                format!("\"max_age\" is {stated}, shorter than one bus cycle of {cycle}{whose}"),
+                "write some cycles, or all data are stale",
+            );
+        }
+        let ten_cycles = stated_cycle.unwrap_or_default().times(10);
+        let max_age = stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE));
+        Some(Timing {
+            cycle: stated_cycle,
+            max_age,
+            watchdog,
+            reconnect: reconnect?,
+        })
+    }
 }
 
 fn read_reconnect(value: &Value<'_>) -> Option<Vec<Nanos>> {
@@ -404,7 +469,10 @@ fn read_reconnect(value: &Value<'_>) -> Option<Vec<Nanos>> {
         );
         return None;
     }
-    let spans: Vec<Option<Nanos>> = list.iter().map(Value::duration).collect();
+    let pause = |value: &Value<'_>| {
+        value.duration_from(LEAST_PAUSE, "attempts that often only burden both ends")
+    };
+    let spans: Vec<Option<Nanos>> = list.iter().map(pause).collect();
     spans.into_iter().collect()
 }
 

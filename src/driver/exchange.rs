@@ -188,6 +188,9 @@ impl Driver {
 
     /// The half that sends.
     fn put(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
+        for beat in &mut self.beats {
+            beat.beat(now, slots);
+        }
         if let Some(faults) = &mut self.faults {
             faults.sending(slots);
         }

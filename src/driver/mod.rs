@@ -5,6 +5,7 @@ mod config;
 mod exchange;
 mod faults;
 mod frames;
+mod heartbeat;
 mod host;
 mod layout;
 mod open;

@@ -7,13 +7,14 @@ use crate::faults::{Board, Faults};
 use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
 use crate::plc;
-use crate::record::{Columns, Recorder, When};
+use crate::record::{Columns, Recorder, RecorderError, When};
 use crate::signal::Slot;
 use crate::time::{Clock, Manual, Nanos};
 
 use super::bus::{self, Program};
 use super::exchange::{Exchange, Tick};
 use super::frames::directions;
+use super::heartbeat::Beat;
 use super::station::Station;
 use super::statistics::{Samples, Snapshot};
 use super::supervise::BusThread;
@@ -45,6 +46,8 @@ pub struct Driver {
     pub(super) board: Arc<Board>,
     /// What the axes need done on every tick; none for most drivers.
     pub(super) reflexes: Option<Reflexes>,
+    /// The heartbeats of this end; none for most drivers.
+    pub(super) beats: Box<[Beat]>,
     events: Consumer,
     program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
@@ -88,6 +91,9 @@ pub enum DriverError {
         /// What is wrong with it.
         source: plc::ProgramError,
     },
+    /// What is to be recorded cannot be.
+    #[error("{0}")]
+    Recording(#[from] RecorderError),
     /// What the program needs and what the signal table has do not fit.
     #[error("{0}")]
     Config(String),
@@ -105,8 +111,10 @@ impl DriverError {
     /// The status code for it.
     pub fn code(&self) -> Code {
         match self {
-            Self::Thread(_) => Code::BusFailed,
-            Self::Program { .. } | Self::Config(_) => Code::BadConfig,
+            Self::Thread(_) | Self::Recording(RecorderError::Thread(_)) => Code::BusFailed,
+            Self::Program { .. } | Self::Config(_) | Self::Recording(RecorderError::File(_)) => {
+                Code::BadConfig
+            }
             Self::Unsupported(_) => Code::Unsupported,
         }
     }
@@ -145,6 +153,8 @@ impl Driver {
         );
         let board = Arc::<Board>::default();
         port.suffer_from(Arc::clone(&board));
+        let (signs, max_age) = (&config.life_signs, config.timing.max_age);
+        port.watch_life(signs.watches(&config.table, config.role, max_age));
         port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
         if config.bus.events() {
             let stations = 0..config.table.stations.len();
@@ -197,6 +207,7 @@ impl Driver {
             reflexes: (config.role == Role::Device)
                 .then(|| Reflexes::new(&config.axes))
                 .flatten(),
+            beats: Beat::all(&config, config.role),
             events: tick.events,
             program,
             config: Arc::new(config),
@@ -311,7 +322,21 @@ pub(super) fn recorder(
         &config.table,
         &slots.edges,
     );
-    Recorder::start(options, config.folder(), columns, lossless)
-        .map(Some)
-        .map_err(DriverError::Config)
+    let recorder = Recorder::start(options, config.folder(), columns, lossless)?;
+    Ok(Some(recorder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_system_refuses_is_not_told_as_wrong_input() {
+        let refused = || std::io::Error::from(std::io::ErrorKind::WouldBlock);
+        let error = DriverError::from(RecorderError::Thread(refused()));
+        assert!(!error.is_wrong_input(), "{error}");
+        assert_eq!(error.code(), Code::BusFailed);
+        let error = DriverError::from(RecorderError::File("run.csv: no".to_owned()));
+        assert_eq!(error.code(), Code::BadConfig);
+    }
 }

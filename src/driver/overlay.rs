@@ -1,17 +1,20 @@
 //! Tables that stand instead of those of a driver.cfg: the same device, on another line.
 
 use super::Config;
-use crate::config::{Collector, Mistakes, Table, read_text};
-use crate::fieldbus::{Options, Role, loopback};
+use crate::config::{Collector, Mistakes, Table, Value, did_you_mean, read_text, shown};
+use crate::fieldbus::{At, Options, Role, loopback};
 use crate::record;
+use crate::signal::SignalTable;
 
 impl Config {
     /// The same driver with other tables: `text` is TOML as in a driver.cfg, and `origin` is what its
     /// mistakes call it. So a test runs on the plant's own signal table, but on simulation time.
     ///
     /// A `[fieldbus]` with a `kind` stands instead of the file's own, but for what belongs to the device and
-    /// not to the bus: sizes, cycle times and time-outs stay. One without changes only the `mode` of the
-    /// file's own loopback. A `[record]` stands instead of the file's own.
+    /// not to the bus: sizes, cycle times, time-outs and signs of life stay. `[[station]]` tables bring what that bus
+    /// has to know of the file's stations, by their names. One without a `kind` changes only the `mode` of the
+    /// file's own loopback. A `[record]` stands instead of the file's own; a bus that replays a recording takes the
+    /// file's own away, which is that of the plant.
     ///
     /// # Errors
     ///
@@ -28,29 +31,58 @@ impl Config {
 
 fn read(mut config: Config, mut root: Table<'_>) -> Option<Config> {
     let fieldbus = root.take("fieldbus");
+    let stations = root.take("station");
     let record = root.take("record");
     root.finish();
-    if let Some(value) = record {
-        let table = value.table("[record]", "write a [record] table")?;
-        config.record = Some(record::Options::read(table, None)?);
-    }
+    let stations = stations.map(|value| value.tables("[[station]]"));
     if let Some(value) = fieldbus {
         let table = value.table("[fieldbus]", "write a [fieldbus] table")?;
-        read_fieldbus(&mut config, table)?;
+        read_fieldbus(&mut config, table, stations.unwrap_or_default())?;
+    } else if let Some(table) = stations.unwrap_or_default().first() {
+        table.wrong(
+            "[[station]] says what another bus has to know, and there is no [fieldbus]",
+            "write a [fieldbus] with its kind, or leave the stations as they are",
+        );
+        return None;
+    }
+    if let Some(value) = record {
+        let table = value.table("[record]", "write a [record] table")?;
+        config.record = Some(record::Options::read(table, config.bus.replayed())?);
     }
     Some(config)
 }
 
-fn read_fieldbus(config: &mut Config, mut table: Table<'_>) -> Option<()> {
+fn read_fieldbus(
+    config: &mut Config,
+    mut table: Table<'_>,
+    stations: Vec<Table<'_>>,
+) -> Option<()> {
     if let Some(kind) = table.take("kind") {
+        let collector = table.collector();
+        let at = table.take("at");
         let roles = Role::ALL.map(|role| (role.name(), role));
         let role = match table.take("role") {
             None => config.role,
             Some(value) => value.choice("roles", &roles)?,
         };
-        config.bus = Options::read(&kind, role, false, table)?;
+        let mut bus = Options::read(&kind, role, false, table)?;
+        read_stations(&mut bus, &config.table, stations, &kind, collector);
+        if let Some(at) = &at {
+            bus.place_signals(&At::read(at, &config.table), &config.table);
+        }
+        bus.fit(&config.table, &config.axes, collector);
+        if bus.replayed().is_some() {
+            config.record = None;
+        }
+        config.bus = bus;
         config.role = role;
         return Some(());
+    }
+    for table in stations {
+        table.wrong(
+            "[[station]] says what another bus has to know, and [fieldbus] has no \"kind\"",
+            "name the kind of bus, or leave the stations as they are",
+        );
     }
     let mode = table.require("mode", "write the mode of the file's own bus, or a kind");
     table.finish();
@@ -66,6 +98,58 @@ fn read_fieldbus(config: &mut Config, mut table: Table<'_>) -> Option<()> {
         "name a PLC program to be at the other end instead",
     );
     None
+}
+
+/// Lets `bus` read what it has to know of each station of the driver, in their order.
+fn read_stations(
+    bus: &mut Options,
+    table: &SignalTable,
+    stations: Vec<Table<'_>>,
+    kind: &Value<'_>,
+    collector: &Collector<'_>,
+) {
+    let names: Vec<&str> = table.stations.iter().map(|s| s.name.as_str()).collect();
+    // A file without [[station]] tables has one station, which has no name.
+    let declared = names.iter().any(|name| !name.is_empty());
+    let mut named: Vec<Option<Table<'_>>> = names.iter().map(|_| None).collect();
+    for mut station in stations {
+        let right = "write the name of a station of the driver.cfg";
+        let Some(value) = station.require("name", right) else {
+            station.finish_open();
+            continue;
+        };
+        let name = value.text(right).unwrap_or_default();
+        let place = names.iter().position(|known| declared && *known == name);
+        match place.map(|place| &mut named[place]) {
+            Some(place @ None) => *place = Some(station),
+            Some(Some(_)) => {
+                value.wrong(
+                    format!("the station \"{}\" is there twice", shown(name)),
+                    "name it once",
+                );
+            }
+            None if declared => {
+                let what = format!("the driver.cfg has no station \"{}\"", shown(name));
+                value.wrong(what, did_you_mean(name, "stations", &names));
+            }
+            None => value.wrong("the driver.cfg declares no stations", "remove the table"),
+        }
+    }
+    if !declared {
+        return;
+    }
+    for (name, station) in names.iter().zip(named) {
+        if let Some(mut station) = station {
+            bus.read_station(names.len(), &mut station);
+            station.finish();
+        } else {
+            let title = format!("[[station]] \"{}\"", shown(name));
+            Table::absent(collector, &title, kind.at(), |mut station| {
+                bus.read_station(names.len(), &mut station);
+                station.finish();
+            });
+        }
+    }
 }
 
 #[cfg(test)]
@@ -133,5 +217,68 @@ mod tests {
             "other tables:1:1: [fieldbus] has no \"mode\"; write the mode of the file's own bus, or a kind\n\
              other tables:2:1: unknown key \"scan\" in [fieldbus]; keys here are kind, mode"
         );
+    }
+
+    const TWO_PLCS: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                            [[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n\
+                            [[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\nstation = \"A\"\n\
+                            [[signal]]\nname = \"b\"\naddress = \"%QX0.0\"\nstation = \"B\"\n";
+
+    fn with_two_plcs(tables: &str) -> Result<Config, String> {
+        let plant = Config::parse("plant.cfg", TWO_PLCS).unwrap_or_else(|wrong| panic!("{wrong}"));
+        let overlaid = plant.overlaid("other tables", tables);
+        overlaid.map_err(|mistakes| mistakes.to_string())
+    }
+
+    #[test]
+    fn another_bus_is_told_of_the_stations_and_what_it_lacks_of_them_is_a_mistake() {
+        let told =
+            with_two_plcs("[fieldbus]\nkind = \"modbus-client\"\naddress = \"10.0.0.1:502\"\n");
+        let told = told.expect_err("stations have units");
+        for name in ["A", "B"] {
+            let lacks = format!("other tables:2:8: [[station]] \"{name}\" has no \"unit\"");
+            assert!(told.contains(&lacks), "{told}");
+        }
+        let units = "[[station]]\nname = \"B\"\nunit = 2\n[[station]]\nname = \"A\"\nunit = 1\n";
+        let table = "[fieldbus]\nkind = \"modbus-server\"\n";
+        let right = with_two_plcs(&format!("{table}{units}")).expect("right");
+        let told = format!("{:?}", right.bus);
+        let place = |unit: &str| {
+            told.find(unit)
+                .unwrap_or_else(|| panic!("no {unit} in {told}"))
+        };
+        assert!(
+            place("unit: Some(1)") < place("unit: Some(2)"),
+            "A is the first"
+        );
+        let told = with_two_plcs(&format!("{table}{}", units.replace("\"B\"", "\"C\"")));
+        assert!(
+            told.expect_err("no C")
+                .contains("the driver.cfg has no station \"C\"")
+        );
+    }
+
+    #[test]
+    fn another_bus_has_to_fit_the_signals() {
+        let told = with_two_plcs("[fieldbus]\nkind = \"socket\"\nmessage = \"axis\"\n");
+        assert!(told.expect_err("no axes").starts_with("other tables:"));
+    }
+
+    #[test]
+    fn a_replay_takes_the_recording_of_the_plant_away_and_may_not_record_over_what_it_replays() {
+        let plant = || {
+            let mut plant = plant("kind = \"loopback\"\nlink = \"cell\"");
+            let file = std::path::Path::new("run.csv");
+            plant.record = Some(record::Options::to(file).expect("a format"));
+            plant
+        };
+        let replay = "[fieldbus]\nkind = \"loopback\"\nreplay = \"run.csv\"\n";
+        let test = plant().overlaid("test", replay).expect("right");
+        assert_eq!(test.record, None);
+        let over = format!("{replay}[record]\nfile = \"./run.csv\"\n");
+        let told = plant()
+            .overlaid("test", &over)
+            .expect_err("it would be lost");
+        assert!(told.to_string().contains("would be overwritten"), "{told}");
     }
 }

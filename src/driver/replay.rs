@@ -15,7 +15,7 @@ use self::station::Station;
 use super::{Config, DriverError};
 use crate::config::did_you_mean;
 use crate::fieldbus::{BusError, Port, Stepped};
-use crate::record::{Columns, Kind, Recording, RecordingError, Tick};
+use crate::record::{Columns, Kind, Place, Recording, RecordingError, Tick};
 use crate::signal::{Signal, Slot};
 use crate::time::Nanos;
 
@@ -83,6 +83,8 @@ pub(super) struct Replay {
     max_age: Nanos,
     differences: Differences,
     tally: Arc<ReplayTally>,
+    /// No recorder of this process gets the file meanwhile.
+    _place: Place,
 }
 
 impl Replay {
@@ -96,6 +98,7 @@ impl Replay {
         path: &Path,
     ) -> Result<(Self, Arc<ReplayTally>), DriverError> {
         let refused = |error: RecordingError| DriverError::Config(error.to_string());
+        let place = Place::to_replay(path).map_err(DriverError::Config)?;
         let mut recording = Recording::open(path, Some(&config.table)).map_err(refused)?;
         let map = Map::new(config, recording.columns()).map_err(|what| {
             DriverError::Config(format!(
@@ -145,6 +148,7 @@ impl Replay {
             tally: Arc::clone(&tally),
             recording,
             map,
+            _place: place,
         };
         Ok((replay, tally))
     }

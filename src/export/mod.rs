@@ -17,8 +17,10 @@ use crate::fieldbus::{Options, Role};
 /// The editors that sources are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
-    /// TIA Portal: SCL for an S7-1500 or S7-1200.
+    /// TIA Portal: SCL for an S7-1500.
     S71500,
+    /// TIA Portal: SCL for an S7-1200, which has fewer types and shorter jobs.
+    S71200,
     /// CODESYS V3: Structured Text to paste.
     Codesys,
     /// `OpenPLC`: one program in Structured Text.
@@ -27,12 +29,13 @@ pub enum Target {
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::S71500, Self::Codesys, Self::OpenPlc];
+    pub const ALL: [Self; 4] = [Self::S71500, Self::S71200, Self::Codesys, Self::OpenPlc];
 
     /// As the command line names it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::S71500 => "s7-1500",
+            Self::S71200 => "s7-1200",
             Self::Codesys => "codesys",
             Self::OpenPlc => "openplc",
         }
@@ -80,8 +83,10 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
             "export from a driver.cfg for each PLC, with the signals of its station",
         ));
     }
+    // TIA Portal imports its tags in a format of its own.
     let mut export = match target {
-        Target::S71500 => s7::export(config),
+        Target::S71500 => return Ok(s7::export(config, s7::Cpu::S71500)),
+        Target::S71200 => return Ok(s7::export(config, s7::Cpu::S71200)),
         Target::Codesys => st::codesys::export(config),
         Target::OpenPlc => st::openplc::export(config),
     };

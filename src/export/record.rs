@@ -1,7 +1,5 @@
 //! The record of one direction: the images of all stations, one after another, as they lie in the PLC.
 
-use std::collections::HashMap;
-
 use super::names::{Names, legal};
 use crate::config::short_number;
 use crate::signal::{Address, Area, ByteOrder, DataType, Signal, SignalTable};
@@ -137,118 +135,6 @@ impl<'a> Record<'a> {
             starts.1 += station.output_bytes;
         }
         lines
-    }
-}
-
-/// Suffix, offset, bit, type and byte order of each member of a group.
-pub(super) type Shape = Vec<(String, usize, u8, DataType, ByteOrder)>;
-
-/// Signals that belong together, told by the part of their names before the last dot.
-#[derive(Debug)]
-pub(super) struct Group<'r, 'a> {
-    /// That part.
-    pub(super) name: String,
-    pub(super) byte: usize,
-    pub(super) bytes: usize,
-    pub(super) places: &'r [Place<'a>],
-}
-
-impl Group<'_, '_> {
-    /// What tells its shape.
-    pub(super) fn shape(&self) -> Shape {
-        let members = self.places.iter().map(|place| {
-            let suffix = suffix(&place.signal.name).to_owned();
-            let order = place.signal.order;
-            (
-                suffix,
-                place.byte - self.byte,
-                place.bit(),
-                place.data_type(),
-                order,
-            )
-        });
-        members.collect()
-    }
-
-    /// The names of its members, in order.
-    pub(super) fn members(&self) -> Vec<String> {
-        let mut names = Names::default();
-        let suffixes = self.places.iter().map(|place| suffix(&place.signal.name));
-        suffixes.map(|suffix| names.give(suffix)).collect()
-    }
-}
-
-fn prefix(name: &str) -> Option<&str> {
-    name.rsplit_once('.')
-        .map(|(prefix, _)| prefix)
-        .filter(|prefix| !prefix.is_empty())
-}
-
-fn suffix(name: &str) -> &str {
-    name.rsplit_once('.').map_or(name, |(_, suffix)| suffix)
-}
-
-impl<'a> Record<'a> {
-    /// The runs of two signals and more with one prefix that can be a structure of the PLC: on an even byte, of an
-    /// even size, nothing else in between. Equal ones in a row get the whole distance to the next, so that the
-    /// reserve at their ends belongs to them.
-    pub(super) fn groups(&self) -> Vec<Group<'_, 'a>> {
-        let key = |place: &Place<'a>| {
-            prefix(&place.signal.name).map(|prefix| (place.signal.station, prefix.to_owned()))
-        };
-        let mut groups: Vec<Group<'_, 'a>> = Vec::new();
-        let mut counts = HashMap::new();
-        for run in self.places.chunk_by(|one, other| key(one) == key(other)) {
-            let Some((station, name)) = key(&run[0]) else {
-                continue;
-            };
-            *counts.entry((station, name.clone())).or_insert(0) += 1;
-            let byte = run[0].byte;
-            let end = run.iter().map(Place::end).max().unwrap_or(byte);
-            groups.push(Group {
-                name,
-                byte,
-                bytes: end - byte,
-                places: run,
-            });
-        }
-        // A prefix in two places is not one structure; a bit of a stranger in its first or last byte neither.
-        let begins = |byte: usize| self.places.partition_point(|place| place.byte < byte);
-        groups.retain(|group| {
-            let inside = begins(group.byte)..begins(group.byte + group.bytes);
-            group.places.len() > 1
-                && group.byte % 2 == 0
-                && counts[&(group.places[0].signal.station, group.name.clone())] == 1
-                && inside.len() == group.places.len()
-        });
-        self.stretch(&mut groups);
-        groups.retain(|group| group.bytes % 2 == 0);
-        groups
-    }
-
-    fn stretch(&self, groups: &mut [Group<'_, 'a>]) {
-        let shapes: Vec<Shape> = groups.iter().map(Group::shape).collect();
-        // How many there are of a shape, and the shortest way from one to the next.
-        let mut alike: HashMap<&Shape, (usize, usize)> = HashMap::new();
-        for (group, shape) in groups.iter().zip(&shapes) {
-            let next = self
-                .places
-                .partition_point(|place| place.byte < group.byte + group.bytes);
-            let next = self.places.get(next).map_or(self.bytes, |place| place.byte);
-            let (count, reach) = alike.entry(shape).or_insert((0, usize::MAX));
-            *count += 1;
-            *reach = (*reach).min(next - group.byte);
-        }
-        for (group, shape) in groups.iter_mut().zip(&shapes) {
-            let (count, reach) = alike[shape];
-            // The reserve behind a single one may be anybody's: it only gets what makes its size even.
-            let wanted = if count > 1 {
-                reach & !1
-            } else {
-                group.bytes.next_multiple_of(2).min(reach)
-            };
-            group.bytes = group.bytes.max(wanted);
-        }
     }
 }
 

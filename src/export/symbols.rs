@@ -1,4 +1,4 @@
-//! The symbol table as CSV: what a spreadsheet opens, a tag table takes, and `tickbus import` reads again.
+//! The symbol table as CSV: what a spreadsheet opens, and `tickbus import` reads again.
 
 use std::fmt::Write as _;
 
@@ -29,7 +29,8 @@ pub(super) fn file(config: &Config) -> File {
     File { name, text }
 }
 
-fn comment(place: &Place<'_>, area: Area) -> String {
+/// Direction, station, unit and scale of a signal.
+pub(super) fn comment(place: &Place<'_>, area: Area) -> String {
     let mut parts = vec![
         match area {
             Area::Input => "simulation to PLC",

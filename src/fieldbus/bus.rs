@@ -4,6 +4,9 @@ use crate::time::{Nanos, Stop};
 
 use super::Port;
 
+/// The bus cycle of a bus with a rhythm of its own, where a driver.cfg states none.
+pub const CYCLE: Nanos = Nanos::from_millis(10);
+
 /// A bus, of one of the two kinds.
 pub enum Bus {
     /// Owns the one thread of its line.

@@ -78,11 +78,13 @@ pub enum Cause {
     Injected,
     /// The PLC does not run its program.
     Stopped,
+    /// A signal that has to change does not.
+    Frozen,
 }
 
 impl Cause {
     /// All of them; each one's code is its place here.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::NotOpened,
         Self::Waiting,
         Self::Running,
@@ -96,6 +98,7 @@ impl Cause {
         Self::Closed,
         Self::Injected,
         Self::Stopped,
+        Self::Frozen,
     ];
 
     /// The cause's name, in lower case.
@@ -114,6 +117,7 @@ impl Cause {
             Self::Closed => "closed",
             Self::Injected => "injected",
             Self::Stopped => "stopped",
+            Self::Frozen => "frozen",
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The bus traits, and one room per bus.
 
+mod alive;
 mod at;
 mod bus;
 mod changes;
@@ -21,8 +22,9 @@ pub mod s7;
 pub mod socket;
 pub mod tcp;
 
+pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
 pub use at::At;
-pub use bus::{Bus, BusError, Free, Stepped};
+pub use bus::{Bus, BusError, CYCLE, Free, Stepped};
 pub use changes::ChangeEvents;
 pub use dead_band::DeadBands;
 pub use identity::Guard;

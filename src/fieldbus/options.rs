@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::tcp::Address;
-use super::{At, Role, loopback, modbus, opcua, plugin, s7, socket};
+use super::{At, CYCLE, Role, loopback, modbus, opcua, plugin, s7, socket};
 use crate::axis::Axis;
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
 use crate::signal::{Signal, SignalTable, Station};
+use crate::time::Nanos;
 
 /// Every bus kind that a driver.cfg may name, in this version or a later one.
 pub const KINDS: [&str; 15] = [
@@ -105,6 +106,20 @@ impl Options {
         }
     }
 
+    /// The bus cycle where a driver.cfg states none; `None` for a bus whose peer gives the rhythm.
+    pub const fn cycle(&self) -> Option<Nanos> {
+        match self {
+            Self::Loopback(_) => Some(loopback::CYCLE),
+            Self::Socket(_) | Self::Plugin(_) | Self::ModbusClient(_) | Self::S7Client(_) => {
+                Some(CYCLE)
+            }
+            Self::ModbusServer(_)
+            | Self::S7Server(_)
+            | Self::OpcuaClient(_)
+            | Self::OpcuaServer(_) => None,
+        }
+    }
+
     /// Whether both ends of the bus are in one process.
     pub const fn is_in_process(&self) -> bool {
         matches!(self, Self::Loopback(_))
@@ -150,15 +165,29 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.place(signal),
             Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            Self::S7Client(options) => options
+                .variable(signal)
+                .map(|variable| variable.to_string())
+                .unwrap_or_default(),
             _ => String::new(),
+        }
+    }
+
+    /// What a bus that polls asks for in each cycle, a line for each request; empty for others.
+    pub fn requests(&self, table: &SignalTable) -> Vec<String> {
+        match self {
+            Self::S7Client(options) => options.shown_requests(table),
+            _ => Vec::new(),
         }
     }
 
     /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
     /// are none, and that the bus has no addresses of its own.
-    pub fn place_signals(&mut self, lines: &[At<'_>], _table: &SignalTable) {
+    pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let kind = self.kind();
-        if let Some(first) = lines.first() {
+        if let Self::S7Client(options) = self {
+            options.place_signals(lines, table);
+        } else if let Some(first) = lines.first() {
             first.wrong(
                 format!("the bus \"{kind}\" has no addresses of its own"),
                 "remove [fieldbus.at]; each signal lies where its \"address\" says",
@@ -191,7 +220,7 @@ impl Options {
             Some("loopback") => loopback::Options::read(role, table).map(Self::Loopback),
             Some("socket") => socket::Options::read(role, moved, table).map(Self::Socket),
             Some("s7-server") => s7::ServerOptions::read(table).map(Self::S7Server),
-            Some("s7-client") => s7::ClientOptions::read(moved, table).map(Self::S7Client),
+            Some("s7-client") => s7::ClientOptions::read(role, moved, table).map(Self::S7Client),
             Some("plugin") => plugin::Options::read(table).map(Self::Plugin),
             Some("modbus-server") => {
                 modbus::ServerOptions::read(role, table).map(Self::ModbusServer)

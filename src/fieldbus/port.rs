@@ -10,7 +10,7 @@ use crate::time::{Clock, Nanos};
 
 use super::troubles::Troubles;
 use super::vitals::Vitals;
-use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role};
+use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role, Watch};
 
 /// A bus's access to the image, the clock and the state of its driver.
 #[derive(Debug)]
@@ -59,6 +59,11 @@ impl Port {
     /// Gives the stations the names that reasons and statistics call them, in the order of the signal table.
     pub fn name_stations<'a>(&mut self, names: impl IntoIterator<Item = &'a str>) {
         self.vitals.name_stations(names.into_iter());
+    }
+
+    /// Lets the data of a station count only while these signals change.
+    pub fn watch_life(&mut self, watches: Vec<Watch>) {
+        self.vitals.watch(watches);
     }
 
     /// Reports every change between received frames as an event; one watcher per station.
@@ -234,7 +239,7 @@ impl Port {
             self.status.cycle(now - last);
         }
         self.image.stations[station].received(now, bytes);
-        if self.vitals.revives(station) {
+        if self.vitals.arrived(station, now, bytes) {
             self.doubt(station, now);
         }
         if let Some(changes) = self.changes.get_mut(station) {
@@ -276,7 +281,7 @@ impl Port {
     /// When the port itself has something to do next, for which [`observe`](Self::observe) is to be called;
     /// [`Nanos::MAX`] if nothing.
     pub fn due(&self) -> Nanos {
-        self.troubles.due()
+        self.troubles.due().min(self.vitals.due())
     }
 
     /// Looks after the injected faults: takes over new ones, and hands in what was held back long enough.
@@ -346,6 +351,9 @@ impl Port {
     /// this is for buses that have nothing to send for long.
     pub fn observe(&mut self, now: Nanos) {
         self.attend(now);
+        while let Some(station) = self.vitals.look(now) {
+            self.doubt(station, now);
+        }
         let stations = self.image.stations.iter();
         let ages = stations.map(|station| station.peer_age(now));
         self.status.observe(now, ages);

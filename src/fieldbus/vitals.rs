@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::Cause;
+use super::{Cause, alive::Watch};
+use crate::time::Nanos;
 
 /// What a PLC says of itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -25,7 +26,10 @@ impl PlcState {
 
 /// The stations' signs of life beyond frames.
 #[derive(Debug)]
-pub(super) struct Vitals(Vec<Station>);
+pub(super) struct Vitals {
+    stations: Vec<Station>,
+    watched: Vec<Watched>,
+}
 
 #[derive(Debug, Default)]
 struct Station {
@@ -34,6 +38,47 @@ struct Station {
     plc: Option<PlcState>,
     /// Its PLC stopped, and has sent nothing since it runs again.
     is_stopped: bool,
+}
+
+/// A signal that has to change.
+#[derive(Debug)]
+struct Watched {
+    watch: Watch,
+    /// Its bytes as they came last.
+    last: Vec<u8>,
+    /// When they changed, or came for the first time.
+    changed: Option<Nanos>,
+    /// They have not changed for too long.
+    is_frozen: bool,
+}
+
+impl Watched {
+    /// The moment from which on the signal has stood still for too long.
+    fn due(&self) -> Option<Nanos> {
+        let changed = self.changed.filter(|_| !self.is_frozen)?;
+        Some(changed + self.watch.within + Nanos(1))
+    }
+
+    /// Looks at a frame that arrived at `now`; whether that changes what is thought of the station.
+    fn arrived(&mut self, now: Nanos, frame: &[u8]) -> bool {
+        let mask = self.watch.mask;
+        let bytes = &frame[self.watch.bytes.clone()];
+        let news = bytes.iter().map(|byte| byte & mask);
+        if self.changed.is_some() && news.clone().eq(self.last.iter().copied()) {
+            return self.look(now);
+        }
+        self.last.clear();
+        self.last.extend(news);
+        self.changed = Some(now);
+        std::mem::take(&mut self.is_frozen)
+    }
+
+    /// Looks at the clock; whether the signal has just been found to stand still.
+    fn look(&mut self, now: Nanos) -> bool {
+        let freezes = self.due().is_some_and(|due| due <= now);
+        self.is_frozen |= freezes;
+        freezes
+    }
 }
 
 impl Vitals {
@@ -45,13 +90,27 @@ impl Vitals {
             },
             ..Station::default()
         });
-        Self(stations.collect())
+        Self {
+            stations: stations.collect(),
+            watched: Vec::new(),
+        }
+    }
+
+    /// Watches these signals from their first frame on.
+    pub(super) fn watch(&mut self, watches: Vec<Watch>) {
+        let watched = watches.into_iter().map(|watch| Watched {
+            watch,
+            last: Vec::new(),
+            changed: None,
+            is_frozen: false,
+        });
+        self.watched = watched.collect();
     }
 
     /// Gives the stations the names that messages call them.
     pub(super) fn name_stations<'a>(&mut self, names: impl Iterator<Item = &'a str>) {
-        if self.0.len() > 1 {
-            for (station, name) in self.0.iter_mut().zip(names) {
+        if self.stations.len() > 1 {
+            for (station, name) in self.stations.iter_mut().zip(names) {
                 name.clone_into(&mut station.name);
             }
         }
@@ -59,29 +118,51 @@ impl Vitals {
 
     /// Takes down what a station's PLC says of itself; whether that is news.
     pub(super) fn plc_says(&mut self, station: usize, state: PlcState) -> bool {
-        let station = &mut self.0[station];
+        let station = &mut self.stations[station];
         let is_news = station.plc.replace(state) != Some(state);
         station.is_stopped |= state == PlcState::Stop;
         is_news
     }
 
-    /// A whole frame of `station` arrived. Gives whether the station's data count again from this one on.
-    pub(super) fn revives(&mut self, station: usize) -> bool {
-        let station = &mut self.0[station];
+    /// A whole frame of `station` arrived at `now`. Gives whether that changes what is thought of its data.
+    pub(super) fn arrived(&mut self, station: usize, now: Nanos, frame: &[u8]) -> bool {
+        let mut changes = false;
+        for watched in &mut self.watched {
+            if watched.watch.station == station {
+                changes |= watched.arrived(now, frame);
+            }
+        }
+        let station = &mut self.stations[station];
         let revives = station.is_stopped && station.plc == Some(PlcState::Run);
         station.is_stopped &= !revives;
-        revives
+        changes | revives
+    }
+
+    /// Looks at the clock; gives a station, if there is one, of which a signal has just been found to stand still.
+    pub(super) fn look(&mut self, now: Nanos) -> Option<usize> {
+        let found = self.watched.iter_mut().find_map(|watched| {
+            let station = watched.watch.station;
+            watched.look(now).then_some(station)
+        });
+        found
+    }
+
+    /// When to look next; [`Nanos::MAX`] for never.
+    pub(super) fn due(&self) -> Nanos {
+        let due = self.watched.iter().filter_map(Watched::due);
+        due.min().unwrap_or(Nanos::MAX)
     }
 
     /// Whether the data of `station` count.
     pub(super) fn is_valid(&self, station: usize) -> bool {
-        !self.0[station].is_stopped
+        let is_frozen = |watched: &Watched| watched.watch.station == station && watched.is_frozen;
+        !self.stations[station].is_stopped && !self.watched.iter().any(is_frozen)
     }
 
     /// The keys and facts of the statistics: `cpu`, and `cpu.<station>` where there are several.
     pub(super) fn facts(&self) -> Vec<(String, &'static str)> {
         let known = || {
-            self.0
+            self.stations
                 .iter()
                 .filter_map(|station| Some((&station.name, station.plc?)))
         };
@@ -92,7 +173,7 @@ impl Vitals {
             PlcState::Run
         };
         let mut facts = vec![("cpu".to_owned(), all.name())];
-        if self.0.len() > 1 {
+        if self.stations.len() > 1 {
             facts.extend(known().map(|(name, state)| (format!("cpu.{name}"), state.name())));
         }
         facts
@@ -100,8 +181,10 @@ impl Vitals {
 
     /// Why data that arrive do not count, for programs and for people; `None` while all do.
     pub(super) fn doubt(&self) -> Option<(Cause, String)> {
-        let stopped: Vec<&Station> = self.0.iter().filter(|s| s.is_stopped).collect();
-        let (first, others) = stopped.split_first()?;
+        let stopped: Vec<&Station> = self.stations.iter().filter(|s| s.is_stopped).collect();
+        let Some((first, others)) = stopped.split_first() else {
+            return self.standstill();
+        };
         let mut reason = if first.name.is_empty() {
             "the PLC".to_owned()
         } else {
@@ -116,6 +199,30 @@ impl Vitals {
             " {is} in STOP; put it into RUN, and its next data count"
         );
         Some((Cause::Stopped, reason))
+    }
+
+    /// The signals that have not changed as they have to.
+    fn standstill(&self) -> Option<(Cause, String)> {
+        let mut reason = String::new();
+        for Watched { watch, .. } in self.watched.iter().filter(|watched| watched.is_frozen) {
+            let name = &self.stations[watch.station].name;
+            let of = if name.is_empty() {
+                String::new()
+            } else {
+                format!(" of station \"{name}\"")
+            };
+            let more = if reason.is_empty() { "" } else { "; " };
+            let _ = write!(
+                reason,
+                "{more}the signal \"{}\"{of} has not changed for {}, though data arrive",
+                watch.name, watch.within
+            );
+        }
+        if reason.is_empty() {
+            return None;
+        }
+        reason.push_str("; see whether the program that changes it runs");
+        Some((Cause::Frozen, reason))
     }
 }
 
@@ -216,5 +323,75 @@ mod tests {
         port.running("it is back");
         assert_eq!(status.link().cause, Cause::Stopped);
         assert_eq!(status.runs(), 1, "it came up, though");
+    }
+
+    fn watch(port: &mut Port, station: usize) {
+        port.watch_life(vec![Watch {
+            name: "Life".to_owned(),
+            station,
+            bytes: 0..1,
+            mask: 1,
+            within: at(10),
+        }]);
+    }
+
+    #[test]
+    fn a_signal_that_stands_still_makes_its_station_stale_by_the_clock_alone_until_it_changes() {
+        let (tick, mut port, status) = line(&["charger", "lathe"]);
+        port.running("both are there");
+        watch(&mut port, 1);
+        assert_eq!(port.due(), Nanos::MAX, "nothing has come yet");
+        port.received(0, at(0), &[0]);
+        port.received(1, at(0), &[0]);
+        port.received(1, at(5), &[1]);
+        assert_eq!(port.due(), at(15) + Nanos(1), "it changed");
+        port.observe(at(15));
+        assert!(tick.stations[1].is_valid(), "just in time");
+        port.observe(at(15) + Nanos(1));
+        assert!(tick.stations[0].is_valid() && !tick.stations[1].is_valid());
+        assert_eq!(port.due(), Nanos::MAX, "nothing to look for any more");
+        let link = status.link();
+        assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Frozen));
+        assert_eq!(
+            link.reason,
+            "the signal \"Life\" of station \"lathe\" has not changed for 10ms, though data arrive; see whether the \
+             program that changes it runs"
+        );
+        port.received(1, at(20), &[3]);
+        assert!(
+            !tick.stations[1].is_valid(),
+            "another bit of its byte changed"
+        );
+        port.received(1, at(21), &[2]);
+        assert!(tick.stations[1].is_valid());
+        assert_eq!(status.link().reason, "both are there");
+    }
+
+    #[test]
+    fn a_frame_that_comes_late_and_unchanged_is_stale_at_once() {
+        let (tick, mut port, _status) = line(&[""]);
+        watch(&mut port, 0);
+        port.received(0, at(0), &[1]);
+        port.received(0, at(50), &[1]);
+        assert!(!tick.stations[0].is_valid());
+    }
+
+    #[test]
+    fn a_plc_in_stop_is_told_before_a_signal_that_stands_still_and_both_have_to_be_over() {
+        let (tick, mut port, status) = line(&[""]);
+        port.running("the peer is there");
+        watch(&mut port, 0);
+        port.received(0, at(0), &[1]);
+        port.observe(at(11));
+        assert_eq!(status.link().cause, Cause::Frozen);
+        port.plc_state(0, at(12), PlcState::Stop);
+        assert_eq!(status.link().cause, Cause::Stopped);
+        port.plc_state(0, at(13), PlcState::Run);
+        port.received(0, at(13), &[1]);
+        assert_eq!(status.link().cause, Cause::Frozen);
+        assert!(!tick.stations[0].is_valid());
+        port.received(0, at(14), &[0]);
+        assert_eq!(status.link().cause, Cause::Running);
+        assert!(tick.stations[0].is_valid());
     }
 }

@@ -3,7 +3,7 @@
 
 #![allow(unsafe_code, reason = "the shared buffer is memory that the JVM gives")]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
 
 use jni::objects::{JByteBuffer, JObject, JValue};
@@ -24,6 +24,39 @@ pub(super) type Keep = Global<JByteBuffer<'static>>;
 
 /// What mistakes in the tables that Java hands in are called by.
 const TABLES: &str = "tables instead of driver.cfg's";
+
+/// The file that Java names: a path, or a `file:` URI where the path is no text to the JVM. It then still has the
+/// bytes of the name, as percent escapes.
+pub(super) fn file_of(name: &str) -> PathBuf {
+    let Some(escaped) = name.strip_prefix("file://") else {
+        return PathBuf::from(name);
+    };
+    let mut bytes = Vec::with_capacity(escaped.len());
+    let mut rest = escaped.as_bytes();
+    while let Some((first, after)) = rest.split_first() {
+        let escape = after.get(..2).filter(|_| *first == b'%');
+        let escape = escape.and_then(|digits| std::str::from_utf8(digits).ok());
+        if let Some(byte) = escape.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
+            bytes.push(byte);
+            rest = &after[2..];
+        } else {
+            bytes.push(*first);
+            rest = after;
+        }
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStringExt as _;
+
+        std::ffi::OsString::from_vec(bytes).into()
+    }
+    #[cfg(not(unix))]
+    {
+        // Names are texts there, and begin behind the slash: /C:/cell.
+        let name = String::from_utf8_lossy(&bytes).into_owned();
+        PathBuf::from(name.strip_prefix('/').unwrap_or(&name))
+    }
+}
 
 /// Opens the driver that the file describes, with `tables` instead of its own, and describes it to `layout`.
 pub(super) fn open(
@@ -143,4 +176,21 @@ fn buffer(env: &mut Env<'_>, slots: usize, layout: &JObject<'_>) -> Result<Share
     // the driver, as its documentation demands; no slot is ever an address, index or length.
     unsafe { Shared::new(address, slots, keep) }
         .ok_or_else(|| unusable("is not aligned for 8-byte words".into()))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::ffi::OsStrExt as _;
+
+    use super::*;
+
+    #[test]
+    fn a_file_whose_name_is_no_text_to_the_jvm_comes_as_a_uri() {
+        let bytes = |name: &str| file_of(name).as_os_str().as_bytes().to_vec();
+        assert_eq!(bytes("cell/100%.cfg"), b"cell/100%.cfg");
+        assert_eq!(
+            bytes("file:///a%20b/pr%FCfung/%zz%2"),
+            b"/a b/pr\xfcfung/%zz%2"
+        );
+    }
 }

@@ -42,7 +42,7 @@ impl Axes {
             let middle = axis
                 .limits
                 .map_or(0.0, |[low, high]| f64::midpoint(low, high));
-            Drive::new(middle, axis.limits)
+            Drive::new(axis.kind, middle, axis.limits)
         };
         Self {
             drives: axes

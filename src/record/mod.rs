@@ -8,6 +8,7 @@ mod columns;
 mod csv;
 mod file;
 mod options;
+mod places;
 mod reading;
 mod recorder;
 mod ring;
@@ -24,8 +25,9 @@ mod tests;
 
 pub use columns::{Column, Columns, Kind, Tick};
 pub use options::{Format, Options, When, file_of};
+pub use places::Place;
 pub use reading::{Recording, RecordingError};
-pub use recorder::{Recorder, Tally};
+pub use recorder::{Recorder, RecorderError, Tally};
 pub use ring::{TickReader, TickWriter, tick_ring};
 
 /// The version of the files' own layout, which stands at their beginning.

@@ -116,14 +116,19 @@ impl Options {
         })
     }
 
-    /// Ticks of the ring, for ticks of so many words.
+    /// Ticks of the ring, for ticks of `words` words each: a power of two, as the ring wants it, within the limits.
     pub fn ticks(&self, words: usize) -> usize {
         let bytes = words.max(1) * size_of::<u64>();
         match self.ring {
-            Some(ticks) => ticks.min(MOST_RING_BYTES / bytes).max(1),
-            None => TICKS.min(RING_BYTES / bytes).max(16),
+            Some(ticks) => within(ticks.next_power_of_two(), MOST_RING_BYTES / bytes),
+            None => within(TICKS, RING_BYTES / bytes).max(16),
         }
     }
+}
+
+/// A power of two, halved until it is at most `most`, or 1.
+fn within(power: usize, most: usize) -> usize {
+    power.min(1 << most.max(1).ilog2())
 }
 
 /// The name of a recording, and its format.
@@ -181,5 +186,14 @@ mod tests {
         options.ring = Some(1 << 20);
         assert_eq!(options.ticks(40), 1 << 20);
         assert_eq!(options.ticks(1 << 13), 1 << 14);
+        options.ring = Some(MOST_TICKS);
+        for words in [1, 40, 2047, 100_003, 1 << 28] {
+            let ticks = options.ticks(words);
+            assert!(ticks.is_power_of_two(), "{words} {ticks}");
+            assert!(
+                ticks == 1 || ticks * words * 8 <= MOST_RING_BYTES,
+                "{words} {ticks}"
+            );
+        }
     }
 }

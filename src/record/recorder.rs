@@ -1,8 +1,7 @@
 //! The recorder: what the tick hands over, and the thread that writes it down.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -12,6 +11,7 @@ use std::time::Duration;
 use super::columns::{Columns, Tick};
 use super::csv::CsvSink;
 use super::file::{Out, Target};
+use super::places::Place;
 use super::ring::{TickReader, TickWriter, tick_ring};
 use super::vcd::VcdSink;
 use super::{Format, Options};
@@ -30,9 +30,6 @@ const CHUNK: usize = 64 << 10;
 
 /// Words of a tick in the ring before the statuses of the stations: number, time, status.
 const HEAD: usize = 3;
-
-/// The files that are being recorded to in this process.
-static OPEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Turns ticks into the bytes of a file.
 pub(super) trait Sink: Send {
@@ -144,6 +141,47 @@ pub struct Recorder {
     thread: Option<JoinHandle<()>>,
 }
 
+/// Why nothing can be recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecorderError {
+    /// Another file, or another moment, would do.
+    #[error("{0}")]
+    File(String),
+    /// The system refused a thread.
+    #[error(
+        "the system refused a thread for the recording: {0}; close other programs or raise the limit"
+    )]
+    Thread(std::io::Error),
+}
+
+/// Makes the file at `path` anew, once it is certain that nobody else of this process uses it. A device or a pipe
+/// is taken as it is.
+fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
+    let shown = path.display();
+    let cannot = |error: std::io::Error| {
+        RecorderError::File(format!(
+            "{shown}: the recording cannot be made: {error}; check the folder and its permissions"
+        ))
+    };
+    // Nothing is cut before it is known to be nobody's.
+    let open = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path);
+    let file = open.map_err(cannot)?;
+    if !file.metadata().map_err(cannot)?.is_file() {
+        return Ok((file, None));
+    }
+    let place = Place::to_record(path, &file)
+        .map_err(cannot)?
+        .map_err(|why| {
+            RecorderError::File(format!("{shown}: {why}; name another file in [record]"))
+        })?;
+    file.set_len(0).map_err(cannot)?;
+    Ok((file, Some(place)))
+}
+
 impl Recorder {
     /// Creates the file that `options` name, relative to `folder`, and starts the thread that writes it.
     ///
@@ -152,26 +190,15 @@ impl Recorder {
     ///
     /// # Errors
     ///
-    /// The file cannot be made, another driver records to it, or the system refused a thread; the text says
-    /// what to do.
+    /// The file cannot be made or is in use, or the system refused a thread; the text says what to do.
     pub fn start(
         options: &Options,
         folder: &Path,
         columns: Columns,
         lossless: bool,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, RecorderError> {
         let path = folder.join(&options.file);
-        let shown = path.display();
-        let place = Place::take(&path).ok_or_else(|| {
-            format!(
-                "{shown}: another driver of this process records to this file; give each its own"
-            )
-        })?;
-        let file = File::create(&path).map_err(|error| {
-            format!(
-                "{shown}: the recording cannot be made: {error}; check the folder and its permissions"
-            )
-        })?;
+        let (file, place) = create(&path)?;
         let words = HEAD + columns.stations.len() + columns.columns.len();
         let ticks = options.ticks(words);
         let target = Box::new(file);
@@ -182,11 +209,9 @@ impl Recorder {
             ticks,
             lossless,
             path,
-            Some(place),
+            place,
         )
-        .map_err(|error| {
-            format!("the system refused a thread for the recording: {error}; close other programs")
-        })
+        .map_err(RecorderError::Thread)
     }
 
     /// The same over any target.
@@ -294,34 +319,6 @@ impl Drop for Recorder {
         {
             log::error!("{}: the recording panicked", self.tally.file.display());
         }
-    }
-}
-
-/// A file that one recorder of this process has to itself.
-#[derive(Debug)]
-pub(super) struct Place(PathBuf);
-
-impl Place {
-    fn take(path: &Path) -> Option<Self> {
-        let path = match (path.canonicalize(), path.parent(), path.file_name()) {
-            (Ok(path), _, _) => path,
-            // A file that is not there yet: its folder is.
-            (_, Some(folder), Some(name)) => folder
-                .canonicalize()
-                .unwrap_or_else(|_| folder.to_owned())
-                .join(name),
-            _ => path.to_owned(),
-        };
-        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
-        // Not `then_some`: the place that is not taken would be given back.
-        open.insert(path.clone()).then(|| Self(path))
-    }
-}
-
-impl Drop for Place {
-    fn drop(&mut self) {
-        let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
-        open.remove(&self.0);
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::stop::Shared;
 use super::{Nanos, Stop};
@@ -21,6 +21,12 @@ pub trait Clock: Send + Sync + fmt::Debug {
     /// `sleep` gets the longest that it may wait; `None` means until the [waker](Stop::set_waker) of
     /// `stop` wakes it. It may end early; who waits looks at the clock again.
     fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>));
+
+    /// The date at which this clock showed zero, as the time since 1 January 1970 UTC; `None` for a clock that has no
+    /// dates.
+    fn epoch(&self) -> Option<Nanos> {
+        None
+    }
 }
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
@@ -65,6 +71,12 @@ impl Clock for Monotonic {
 
     fn wait_with(&self, deadline: Nanos, _stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
         sleep((deadline != Nanos::MAX).then(|| (deadline - monotonic_now()).to_duration()));
+    }
+
+    fn epoch(&self) -> Option<Nanos> {
+        let date = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
+        let date = i64::try_from(date.as_nanos()).ok()?;
+        Some(Nanos(date) - monotonic_now())
     }
 }
 

@@ -406,6 +406,54 @@ pub fn keeps_several_instances_apart(bus: &impl Bus, other: &impl Bus) {
     }
 }
 
+/// Each end sees by a signal of the other one whether that one works: the PLC by a heartbeat of the simulation.
+pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
+    let within = "within = \"100ms\"";
+    let watched = format!(
+        "alive = {{ signal = \"speed\", {within} }}\nheartbeat = {{ signal = \"copy\", every = \"10ms\" }}"
+    );
+    let watches = format!("alive = {{ signal = \"copy\", {within} }}");
+    let clock = Manual::new();
+    let mut rig = Rig {
+        device: End::open(&config(bus, "device", &watched), &clock),
+        controller: End::open(&config(bus, "controller", &watches), &clock),
+        clock,
+    };
+    let mut speed = 0.0;
+    let mut change = |rig: &mut Rig| {
+        speed = (speed + 1.0) % 100.0;
+        rig.controller.set("speed", speed);
+    };
+    let is_good = |rig: &mut Rig| {
+        let codes = [rig.controller.tick().code, rig.device.tick().code];
+        codes.iter().all(|code| *code != Code::Stale)
+    };
+    rig.until("what changes is fresh at both ends", |rig| {
+        change(rig);
+        is_good(rig)
+    });
+    let frozen = |end: &End| end.statistic("cause") == "frozen";
+    rig.until("a signal that stands still makes the device stale", |rig| {
+        rig.controller.tick();
+        rig.device.tick().code == Code::Stale && frozen(&rig.device)
+    });
+    assert_eq!(rig.device.get("speed"), -1.0, "its fail-safe value");
+    assert!(rig.device.statistic("reason").contains("\"speed\""));
+    assert!(!frozen(&rig.controller), "the heartbeat goes on");
+    rig.until("it is fresh as soon as the signal changes", |rig| {
+        change(rig);
+        is_good(rig)
+    });
+    rig.until("a simulation that does not tick has no heartbeat", |rig| {
+        change(rig);
+        rig.controller.tick().code == Code::Stale && frozen(&rig.controller)
+    });
+    rig.until("it ticks again", |rig| {
+        change(rig);
+        is_good(rig)
+    });
+}
+
 /// The clock stands still, and yet closing ends every thread.
 pub fn closes_while_its_peer_is_silent(bus: &impl Bus) {
     let clock = Manual::new();
@@ -423,7 +471,7 @@ macro_rules! conformance {
                 answers_within_the_tick keeps_events_in_order is_stale_without_its_peer_and_recovers
                 the_watchdog_bites_when_the_simulation_stops sees_through_a_peer_that_lies
                 opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
-                refuses_bad_configuration
+                refuses_bad_configuration is_stale_while_a_signal_that_has_to_change_does_not
             );
 
             #[test]

@@ -160,7 +160,7 @@ pub const MAX_AGE: Nanos = Nanos::from_millis(300);
 pub fn config(bus: &impl Bus, role: &str, extra: &str) -> String {
     format!(
         "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n{extra}\n{SIGNALS}{}",
+         max_age = \"300ms\"\nreconnect = [\"10ms\"]\n{extra}\n{SIGNALS}{}",
         bus.fieldbus(role),
         bus.faults(),
     )

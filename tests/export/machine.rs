@@ -275,6 +275,7 @@ fn binary(left: Value, op: BinaryOp, right: Value) -> Value {
                 BinaryOp::Ne => return Value::Bool(left != right),
                 BinaryOp::Gt => return Value::Bool(left > right),
                 BinaryOp::Lt => return Value::Bool(left < right),
+                BinaryOp::Ge => return Value::Bool(left >= right),
                 other => panic!("{other:?} of whole numbers"),
             };
             Value::Whole(data_type, number)
@@ -289,6 +290,11 @@ fn binary(left: Value, op: BinaryOp, right: Value) -> Value {
             BinaryOp::Ge => Value::Bool(left >= right),
             other => panic!("{other:?} of reals"),
         },
+        (Value::Bool(left), Value::Bool(right)) => Value::Bool(match op {
+            BinaryOp::And => left & right,
+            BinaryOp::Or => left | right,
+            other => panic!("{other:?} of truths"),
+        }),
         other => panic!("{op:?} of {other:?}"),
     }
 }

@@ -7,6 +7,7 @@ use tickbus::driver::Config;
 use tickbus::export::{Target, export};
 use tickbus::signal::{Area, ByteOrder, DataType};
 
+use crate::machine::{Machine, Value, units};
 use crate::tables;
 
 /// A structure as S7 lays it out with standard access.
@@ -43,14 +44,6 @@ fn structures(source: &str) -> HashMap<String, Structure> {
                     .members
                     .push((name.to_owned(), at, kind.to_owned()));
                 at += 1;
-            } else if let Some(inner) = all.get(kind) {
-                at = at.next_multiple_of(16);
-                for (path, offset, kind) in &inner.members {
-                    structure
-                        .members
-                        .push((format!("{name}.{path}"), at + offset, kind.clone()));
-                }
-                at += inner.bytes * 8;
             } else if let Some(last) = kind.strip_prefix("Array[0..") {
                 let last: usize = last
                     .strip_suffix("] of Byte")
@@ -78,7 +71,11 @@ fn structures(source: &str) -> HashMap<String, Structure> {
 }
 
 fn source(config: &Config, which: &str) -> String {
-    let made = export(config, Target::S71500).expect("sources");
+    source_for(config, Target::S71500, which)
+}
+
+fn source_for(config: &Config, target: Target, which: &str) -> String {
+    let made = export(config, target).expect("sources");
     let file = made
         .files
         .into_iter()
@@ -106,10 +103,10 @@ fn expected(config: &Config) -> Vec<(Area, usize, &tickbus::signal::Signal)> {
 }
 
 /// Asserts that S7 lays each signal where the bus has it, once, and that the copies go between the right places.
-fn assert_laid(config: &Config) {
-    let data = source(config, "data");
+fn assert_laid(config: &Config, target: Target) {
+    let data = source_for(config, target, "data");
     let structures = structures(&data);
-    let copy = source(config, "copy");
+    let copy = source_for(config, target, "copy");
     let (begin, end) = copy.split_once("END_FUNCTION").expect("two functions");
     let prefix = config.name.replace(' ', "_");
     for (area, name, block, body) in [
@@ -141,8 +138,11 @@ fn assert_laid(config: &Config) {
             .collect();
         let mut covered = 0;
         for (_, at, signal) in &signals {
-            let native = signal.data_type.size_bytes() == 1
-                || (signal.order == ByteOrder::Abcd && (at / 8).is_multiple_of(2));
+            let size = signal.data_type.size_bytes();
+            let native = size == 1
+                || (signal.order == ByteOrder::Abcd
+                    && (at / 8).is_multiple_of(2)
+                    && (target == Target::S71500 || size < 8));
             let pieces: Vec<(usize, String)> = if native {
                 vec![(*at, signal.data_type.to_string())]
             } else {
@@ -184,71 +184,6 @@ fn assert_laid(config: &Config) {
 }
 
 #[test]
-fn axes_become_structures_of_one_type() {
-    let config = tables::axes();
-    assert_laid(&config);
-    let data = source(&config, "data");
-    let structures = structures(&data);
-    assert_eq!(structures["\"Cell_1_command_1\""].bytes, 30, "{data}");
-    assert_eq!(structures["\"Cell_1_feedback_1\""].bytes, 10, "{data}");
-    for axis in 0..3 {
-        assert!(
-            data.contains(&format!("\"axis_{axis}\" : \"Cell_1_command_1\"")),
-            "{data}"
-        );
-    }
-    for axis in 0..4 {
-        assert!(
-            data.contains(&format!("\"axis_{axis}\" : \"Cell_1_feedback_1\"")),
-            "{data}"
-        );
-    }
-    assert!(
-        data.contains("\"axis_3\" : \"Cell_1_command_axis_3\""),
-        "{data}"
-    );
-}
-
-#[test]
-fn the_peeling_line_has_its_axes_as_structures() {
-    for (file, axes) in [("charger", 12), ("lathe", 13)] {
-        let path = format!("{}/plc/peeler/{file}.cfg", env!("CARGO_MANIFEST_DIR"));
-        let config = Config::load(path.as_ref()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
-        assert_laid(&config);
-        let structures = structures(&source(&config, "data"));
-        let of_size = |bytes: usize, kind: &str| {
-            let types = structures
-                .iter()
-                .filter(|(name, s)| name.contains(kind) && s.bytes == bytes);
-            types.count()
-        };
-        assert!(
-            of_size(30, "_command_") > 0 && of_size(10, "_feedback_") > 0,
-            "{structures:?}"
-        );
-        let data = source(&config, "data");
-        // The first axis of either lends bits of its reserve to signals between the two PLCs, and is no structure.
-        let members = data.matches("\" : \"").count();
-        assert!(
-            members >= 2 * (axes - 1),
-            "{members} structures for {axes} axes\n{data}"
-        );
-    }
-}
-
-#[test]
-fn a_stranger_between_two_members_keeps_them_out_of_a_structure() {
-    let config = tables::parse(
-        "",
-        "[[signal]]\nname = \"a.x\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"b\"\naddress = \"%QX0.1\"\n\
-         [[signal]]\nname = \"a.y\"\naddress = \"%QX0.2\"\n[[signal]]\nname = \"c.x\"\naddress = \"%QX2.0\"\n\
-         [[signal]]\nname = \"c.y\"\naddress = \"%QX2.1\"\n[[signal]]\nname = \"d\"\naddress = \"%QX2.2\"\n",
-    );
-    assert_laid(&config);
-    assert_eq!(structures(&source(&config, "data")).len(), 1);
-}
-
-#[test]
 fn the_connection_follows_role_tcp() {
     let signal = "[[signal]]\nname = \"a\"\naddress = \"%QW0\"\n[[signal]]\nname = \"b\"\naddress = \"%ID0\"\n";
     let link = source(&tables::parse("", signal), "link");
@@ -283,7 +218,7 @@ fn the_connection_follows_role_tcp() {
 #[test]
 fn a_direction_without_bytes_has_no_block() {
     let config = tables::parse("", "[[signal]]\nname = \"a\"\naddress = \"%QW0\"\n");
-    assert_laid(&config);
+    assert_laid(&config, Target::S71500);
     let (data, link) = (source(&config, "data"), source(&config, "link"));
     assert!(!data.contains("Cell_1_in") && !link.contains("TRCV_C") && link.contains("TSEND_C"));
 }
@@ -291,7 +226,27 @@ fn a_direction_without_bytes_has_no_block() {
 proptest! {
     #[test]
     fn any_table_is_laid_where_the_bus_has_it(config in tables::any_table()) {
-        assert_laid(&config);
+        assert_laid(&config, Target::S71500);
+        assert_laid(&config, Target::S71200);
+    }
+
+    /// `LWord`, `LInt`, `ULInt` do not exist there, and an `LReal` has no address.
+    #[test]
+    fn nothing_of_64_bits_is_in_the_sources_for_an_s7_1200(config in tables::any_table()) {
+        for file in export(&config, Target::S71200).expect("sources").files {
+            if file.name.ends_with("README.txt") {
+                continue;
+            }
+            for line in file.text.split("\r\n") {
+                let code = line.split_once("//").map_or(line, |(code, _)| code);
+                // Names and comments of tags are the user's.
+                let code = if file.name.ends_with(".sdf") { code.split(',').nth(2).unwrap_or_default() } else { code };
+                for word in ["LWord", "LInt", "LReal", "LWORD", "LINT", "LREAL"] {
+                    let found = code.split(|c: char| !c.is_ascii_alphanumeric()).any(|piece| piece == word);
+                    prop_assert!(!found, "{}: {}", file.name, line);
+                }
+            }
+        }
     }
 
     #[test]
@@ -308,6 +263,217 @@ proptest! {
                 let code = line.split_once("//").map_or(line, |(code, _)| code);
                 prop_assert!(code.is_ascii(), "{}", code);
                 prop_assert!(code.matches('"').count() % 2 == 0, "{}", code);
+            }
+        }
+    }
+}
+
+/// The statements of the link block that decide when a record goes out, run with OB1 taking `scan` milliseconds, and a job of
+/// TSEND_C `busy` calls: when each record was asked for.
+fn sent_at(scan: i128, busy: u32, until: i128) -> Vec<i128> {
+    let config = tables::parse(
+        "cycle = \"10ms\"",
+        "[[signal]]\nname = \"a\"\naddress = \"%QW0\"\n",
+    );
+    let link = source(&config, "link");
+    let piece = |from: &str, to: &str| {
+        let start = link.find(from).unwrap_or_else(|| panic!("{from}\n{link}"));
+        let end = start
+            + link[start..]
+                .find(to)
+                .unwrap_or_else(|| panic!("{to}\n{link}"));
+        link[start..end]
+            .lines()
+            .map(|line| line.split_once("//").map_or(line, |(code, _)| code))
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
+    let unit = |name: &str, code: &str| {
+        let code = code
+            .replace('#', "")
+            .replace("\"Cell_1\".", "")
+            .replace("T0ms", "0")
+            .replace("T10ms", "10");
+        units(&format!("PROGRAM {name}\n{code}\nEND_PROGRAM\n")).remove(0)
+    };
+    let before = unit(
+        "before",
+        &(piece("#Now := ", "// What is being sent") + &piece("#Is_asked := ", "#Send(")),
+    );
+    let after = unit("after", &piece("#Is_busy := ", "IF #Send.DONE"));
+    let mut machine = Machine::with_functions(&[]);
+    for name in ["Now", "Last"] {
+        machine
+            .variables
+            .insert(name.to_owned(), Value::Whole(None, 0));
+    }
+    for name in ["Is_due", "Is_asked", "Is_busy"] {
+        machine
+            .variables
+            .insert(name.to_owned(), Value::Bool(false));
+    }
+    machine
+        .variables
+        .insert("Simulated".to_owned(), Value::Bool(true));
+    let (mut sent, mut left, mut asked) = (Vec::new(), 0, false);
+    let mut now = 0;
+    while now < until {
+        machine
+            .variables
+            .insert("Clock.ET".to_owned(), Value::Whole(None, now));
+        machine.run(&before.body);
+        // TSEND_C begins a job on a rising edge of REQ, and is busy for some calls.
+        let asks = machine.variables["Is_asked"] == Value::Bool(true);
+        left = if asks && !asked {
+            busy
+        } else {
+            u32::saturating_sub(left, 1)
+        };
+        if asks {
+            assert!(!asked, "REQ rises at {now}");
+            sent.push(now);
+        }
+        asked = asks;
+        machine
+            .variables
+            .insert("Send.BUSY".to_owned(), Value::Bool(left > 0));
+        machine.run(&after.body);
+        now += scan;
+    }
+    sent
+}
+
+#[test]
+fn the_socket_block_keeps_its_cycle_whatever_ob1_takes() {
+    for scan in [1, 2, 3, 4, 5] {
+        for busy in [0, 1] {
+            let sent = sent_at(scan, busy, 10_000);
+            let count = sent.len();
+            assert!(
+                (998..=1000).contains(&count),
+                "{count} records in 10 s with {scan} ms"
+            );
+        }
+    }
+    // Slower than that, it sends in every other call, and never stands still.
+    let sent = sent_at(20, 1, 10_000);
+    assert!((249..=250).contains(&sent.len()), "{}", sent.len());
+}
+
+#[test]
+fn a_long_pause_of_the_plc_is_not_made_up_for_in_a_burst() {
+    // 25 ms a call: each is late by more than a whole cycle.
+    let sent = sent_at(25, 0, 1_000);
+    assert!(
+        sent.windows(2).all(|pair| pair[1] - pair[0] >= 25),
+        "{sent:?}"
+    );
+}
+
+/// A driver.cfg on the bus `kind` with `inputs` and `outputs` bytes.
+fn sized(kind: &str, inputs: usize, outputs: usize) -> Config {
+    let text = format!(
+        "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"{kind}\"\ninput_bytes = {inputs}\n\
+         output_bytes = {outputs}\n[[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n[[signal]]\nname = \"b\"\n\
+         address = \"%QX0.0\"\n"
+    );
+    Config::parse("driver.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
+}
+
+/// First byte, length, and length of the local array of each PUT (`Q`) or GET (`I`).
+fn jobs(link: &str, area: char, parts: &str) -> Vec<(usize, usize, usize)> {
+    let addresses = link
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix(&format!("ADDR_1 := P#{area}")));
+    let addresses = addresses.map(|rest| {
+        let (first, length) = rest.split_once(".0 BYTE ").expect("whole bytes");
+        let length = length.trim_end_matches(',');
+        (
+            first.parse().expect("a byte"),
+            length.parse().expect("a length"),
+        )
+    });
+    let view = link
+        .split_once(&format!("{parts}_parts AT"))
+        .map_or("", |(_, view)| view);
+    let view = view.split_once("END_STRUCT").map_or("", |(view, _)| view);
+    let arrays: Vec<usize> = view
+        .lines()
+        .filter_map(|line| line.split_once("Array[0.."))
+        .map(|(_, rest)| {
+            rest.split_once(']')
+                .expect("an end")
+                .0
+                .parse::<usize>()
+                .expect("a number")
+                + 1
+        })
+        .collect();
+    let jobs: Vec<(usize, usize, usize)> = addresses
+        .zip(arrays)
+        .map(|((first, length), array)| (first, length, array))
+        .collect();
+    assert_eq!(
+        jobs.len(),
+        link.matches(&format!("ADDR_1 := P#{area}")).count()
+    );
+    jobs
+}
+
+#[test]
+fn no_put_and_no_get_is_longer_than_the_cpu_takes_and_both_ends_have_the_same_length() {
+    for (target, get, put) in [(Target::S71200, 222, 212), (Target::S71500, 400, 400)] {
+        for bytes in [1, 25, 212, 213, 222, 223, 360, 401, 1000] {
+            let link = source_for(&sized("s7-server", bytes, bytes), target, "link");
+            for (area, parts, most) in [('I', "Incoming", get), ('Q', "Outgoing", put)] {
+                let mut next = 0;
+                for (first, length, array) in jobs(&link, area, parts) {
+                    assert_eq!((first, length), (next, array), "{link}");
+                    assert!(length <= most, "{length} bytes\n{link}");
+                    next += length;
+                }
+                assert_eq!(next, bytes, "all bytes are carried\n{link}");
+            }
+        }
+    }
+}
+
+/// What the control block declares beside `Simulated` is set by the link block, on every bus.
+#[test]
+fn no_member_of_the_control_block_is_one_that_nothing_sets() {
+    for kind in [
+        "socket",
+        "modbus-server",
+        "modbus-client",
+        "s7-server",
+        "s7-client",
+        "opcua-server",
+        "loopback",
+    ] {
+        let address = match kind {
+            "modbus-client" => "address = \"192.168.0.1:502\"\n",
+            "s7-client" => "address = \"192.168.0.1\"\n",
+            "opcua-server" => "anonymous = true\n",
+            "loopback" => "link = \"cell\"\n",
+            _ => "",
+        };
+        for (bytes, letter) in [((4, 0), 'I'), ((0, 4), 'Q'), ((4, 4), 'I')] {
+            let text = format!(
+                "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"{kind}\"\n{address}input_bytes = {}\n\
+                 output_bytes = {}\n[[signal]]\nname = \"a\"\naddress = \"%{letter}X0.0\"\n",
+                bytes.0, bytes.1
+            );
+            let config =
+                Config::parse("driver.cfg", &text).unwrap_or_else(|m| panic!("{m}\n{text}"));
+            let (data, link) = (source(&config, "data"), source(&config, "link"));
+            let control = data
+                .split_once("DATA_BLOCK \"Cell_1\"")
+                .expect("the control block")
+                .1;
+            for member in ["Alive", "Received", "Sent", "Errors", "Last_error"] {
+                let sets = link.contains(&format!("\"Cell_1\".{member} := "));
+                let declares = control.contains(&format!("{member} : "));
+                assert_eq!(sets, declares, "{member} on {kind}\n{link}\n{control}");
             }
         }
     }

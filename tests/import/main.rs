@@ -214,18 +214,24 @@ fn what_an_export_lists_is_read_as_the_same_table() {
     assert_same(&rig);
 }
 
-/// The symbols of `config`'s export make the same signals; in the order in which they lie.
+/// The symbols of `config`'s exports, as CSV and as SDF, make the same signals; in the order in which they lie.
 fn assert_same(config: &Config) {
-    let made = export(config, Target::S71500).expect("symbols");
+    for target in [Target::OpenPlc, Target::S71500] {
+        assert_same_of(config, target);
+    }
+}
+
+fn assert_same_of(config: &Config, target: Target) {
+    let made = export(config, target).expect("symbols");
     let tags = made
         .files
         .iter()
-        .find(|file| file.name.ends_with("_tags.csv"))
+        .find(|file| file.name.contains("_tags."))
         .expect("tags");
     if config.table.signals.is_empty() {
         return;
     }
-    let imported = import("tags.csv", tags.text.as_bytes(), Reading::default())
+    let imported = import(&tags.name, tags.text.as_bytes(), Reading::default())
         .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", tags.text));
     let mut read = signals(&imported);
     let mut expected: Vec<_> = config

@@ -545,18 +545,29 @@ fn a_loop_that_never_ends_is_a_fault_of_the_program() {
         "addressing = \"iec\"",
         "kind = \"socket\"\naddress = \"127.0.0.1:1\"\ninput_bytes = 10",
     );
-    let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
-        .current_dir(folder.path())
-        .args(["plc", "./program.so", "--config", "driver.cfg"])
-        .output()
-        .expect("tickbus runs");
-    let out = String::from_utf8_lossy(&output.stdout).into_owned();
-    let last = out.lines().last().expect("a line");
-    assert!(
-        last.starts_with("plc: failed reason=the PLC program has been in one scan for "),
-        "{out}"
-    );
-    assert_eq!(output.status.code(), Some(3));
+    let runs: [(&[&str], &str); 2] = [
+        (
+            &[],
+            "plc: failed reason=the PLC program has been in one scan for ",
+        ),
+        // Told to stop before that is noticed.
+        (
+            &["--duration", "500ms"],
+            "plc: failed reason=the PLC program's scan did not end within 3s",
+        ),
+    ];
+    for (more, reason) in runs {
+        let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .current_dir(folder.path())
+            .args(["plc", "./program.so", "--config", "driver.cfg"])
+            .args(more)
+            .output()
+            .expect("tickbus runs");
+        let out = String::from_utf8_lossy(&output.stdout).into_owned();
+        let last = out.lines().last().expect("a line");
+        assert!(last.starts_with(reason), "{out}");
+        assert_eq!(output.status.code(), Some(3));
+    }
 }
 
 #[test]

@@ -107,7 +107,7 @@ impl Plant {
             number += 1;
             let drives = config.axes.iter().zip(begins);
             let drives: Vec<Drive> = drives
-                .map(|(axis, position)| Drive::new(*position, axis.limits))
+                .map(|(axis, position)| Drive::new(axis.kind, *position, axis.limits))
                 .collect();
             Side {
                 told: vec![Feedback::default(); drives.len()],

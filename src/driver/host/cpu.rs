@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use crate::driver::Code;
+use crate::driver::Config;
 use crate::driver::faults::FrameFaults;
 use crate::driver::frames::{area_bytes, directions};
+use crate::driver::heartbeat::FrameBeats;
 use crate::driver::tape::Tape;
 use crate::fieldbus::Role;
 use crate::image::{BusEnd, Receiver, TickEnd, image};
 use crate::plc::{Program, Scan};
-use crate::signal::{Area, SignalTable};
+use crate::signal::Area;
 use crate::time::Nanos;
 
 use super::Tally;
@@ -28,6 +30,7 @@ pub(super) struct Cpu {
     /// The faults to inject at this end.
     pub(super) faults: Option<FrameFaults>,
     pub(super) tape: Option<Tape>,
+    beats: FrameBeats,
 }
 
 /// The inputs as the program sees them, and as it saw them a scan before.
@@ -69,6 +72,7 @@ impl Cpu {
             tally,
             faults,
             tape,
+            beats,
         } = self;
         let station = &mut tick.stations[0];
         inputs.before.copy_from_slice(&inputs.bytes);
@@ -96,6 +100,7 @@ impl Cpu {
             inputs: &inputs.bytes,
             outputs,
         });
+        beats.beat(now, outputs);
         tally.count(*writes, outputs_before, outputs);
         station.write(now, |frame| {
             frame.copy_from_slice(outputs);
@@ -116,12 +121,8 @@ impl Cpu {
 }
 
 /// Makes the half of a line that has the program: its processor, the bus's end of its image, its tally.
-pub(super) fn half(
-    program: Box<dyn Program>,
-    table: &SignalTable,
-    role: Role,
-    max_age: Nanos,
-) -> (Cpu, BusEnd) {
+pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
+    let table = &config.table;
     let tally = Arc::new(Tally::new(table));
     let (tick, bus) = image(directions(table, role));
     let (writes, reads) = role.areas();
@@ -136,11 +137,12 @@ pub(super) fn half(
         },
         outputs_before: outputs.clone(),
         outputs,
-        max_age,
+        max_age: config.timing.max_age,
         areas: (writes, reads),
         tally,
         faults: None,
         tape: None,
+        beats: FrameBeats::new(config, role),
     };
     (cpu, bus)
 }
@@ -179,8 +181,7 @@ mod tests {
         let config = crate::driver::Config::parse("driver.cfg", text).expect("right");
         let told = Arc::new(Mutex::new(Vec::new()));
         let program = Box::new(Witness(Arc::clone(&told)));
-        let limit = Nanos::from_millis(100);
-        let (mut cpu, mut bus) = half(program, &config.table, Role::Controller, limit);
+        let (mut cpu, mut bus) = half(program, &config, Role::Controller);
         for (millis, in_time) in [(10, true), (500, false), (510, true)] {
             let now = Nanos::from_millis(millis);
             // The peer is quicker than the scan that was held up.

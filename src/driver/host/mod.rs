@@ -96,8 +96,8 @@ impl Host {
         self.0.told.fault()
     }
 
-    /// Stops scanning and closes the bus.
-    pub fn close(self) {
-        drop(self);
+    /// Stops scanning and closes the bus. Why the program did not end, if it did not.
+    pub fn close(mut self) -> Option<String> {
+        self.0.end()
     }
 }

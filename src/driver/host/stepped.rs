@@ -34,10 +34,14 @@ impl SteppedHost {
         interval: Nanos,
     ) -> (Self, Arc<Tally>) {
         let max_age = config.timing.max_age;
-        let (cpu, bus) = half(program, &config.table, Role::Controller, max_age);
+        let (cpu, bus) = half(program, config, Role::Controller);
         let tally = Arc::clone(&cpu.tally);
         let status = LinkStatus::new(cpu.program.name(), max_age);
-        let port = Port::new(bus, Manual::new(), Role::Controller, None, status);
+        let mut port = Port::new(bus, Manual::new(), Role::Controller, None, status);
+        let watches = config
+            .life_signs
+            .watches(&config.table, Role::Controller, max_age);
+        port.watch_life(watches);
         let (tx, rx) = port.sizes(0);
         let wire = vec![0; tx.max(rx)].into();
         (

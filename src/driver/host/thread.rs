@@ -91,7 +91,7 @@ impl HostThread {
         let max_age = config.timing.max_age;
         let interval = hosted.interval;
         let report = hosted.program.report();
-        let (mut cpu, bus_end) = half(hosted.program, &config.table, role, max_age);
+        let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(Tape::tally);
         let status = LinkStatus::new(&name, max_age);
@@ -107,6 +107,7 @@ impl HostThread {
             cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
         }
         port.suffer_from(Arc::clone(&board));
+        port.watch_life(config.life_signs.watches(&config.table, role, max_age));
         port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
         let reconnect = config.timing.reconnect.clone();
         let bus = BusThread::start(bus, port, reconnect, status.clone(), &name)?;
@@ -177,19 +178,25 @@ impl HostTally {
     }
 }
 
-impl Drop for HostThread {
-    fn drop(&mut self) {
+impl HostThread {
+    /// Stops scanning. Why the program did not end, if it did not: its thread is then left behind.
+    pub(super) fn end(&mut self) -> Option<String> {
+        let thread = self.thread.take()?;
         self.stop.stop();
         if self.ended.recv_timeout(LONGEST_SCAN.to_duration()) == Err(Timeout) {
-            log::error!(
-                "a PLC program's scan did not end within {LONGEST_SCAN}, and its thread is left behind"
-            );
-            return;
+            let why = format!("the PLC program's scan did not end within {LONGEST_SCAN}");
+            log::error!("{why}, and its thread is left behind");
+            return Some(why);
         }
-        if let Some(thread) = self.thread.take() {
-            // Its panics are caught and recorded on the thread itself.
-            let _ = thread.join();
-        }
+        // Its panics are caught and recorded on the thread itself.
+        let _ = thread.join();
+        None
+    }
+}
+
+impl Drop for HostThread {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 

@@ -1,6 +1,7 @@
 //! The blocks for the beginning and the end of OB1.
 
-use super::{Path, Plan, line, source};
+use super::members::Path;
+use super::{Image, Plan, line, source};
 use crate::export::record::Place;
 use crate::export::siemens::address;
 use crate::signal::{DataType, Width};
@@ -13,46 +14,46 @@ pub(super) fn text(plan: &Plan<'_>) -> String {
          while Simulated is TRUE.",
     );
     let prefix = &plan.prefix;
-    function(
-        &mut text,
-        &format!("{prefix}_begin"),
-        &plan.inputs.record.places,
-        |text| {
-            line(text, &format!("   \"{prefix}_link_DB\"();"));
-            line(text, &format!("   IF NOT \"{prefix}\".Simulated THEN"));
-            line(text, "      RETURN;");
-            line(text, "   END_IF;");
-            for (place, path) in plan.inputs.record.places.iter().zip(&plan.inputs.paths) {
-                put(text, place, path, &plan.inputs.block);
-            }
-        },
-    );
+    let only_if_simulated = |text: &mut String| {
+        line(text, &format!("   IF NOT \"{prefix}\".Simulated THEN"));
+        line(text, "      RETURN;");
+        line(text, "   END_IF;");
+    };
+    let begin = format!("{prefix}_begin");
+    function(&mut text, plan, &begin, &plan.inputs, |text| {
+        line(text, &format!("   \"{prefix}_link_DB\"();"));
+        only_if_simulated(text);
+        for place in &plan.inputs.record.places {
+            put(text, place, plan);
+        }
+    });
     line(&mut text, "");
-    function(
-        &mut text,
-        &format!("{prefix}_end"),
-        &plan.outputs.record.places,
-        |text| {
-            line(text, &format!("   IF NOT \"{prefix}\".Simulated THEN"));
-            line(text, "      RETURN;");
-            line(text, "   END_IF;");
-            for (place, path) in plan.outputs.record.places.iter().zip(&plan.outputs.paths) {
-                take(text, place, path, &plan.outputs.block);
-            }
-        },
-    );
+    let end = format!("{prefix}_end");
+    function(&mut text, plan, &end, &plan.outputs, |text| {
+        only_if_simulated(text);
+        for place in &plan.outputs.record.places {
+            take(text, place, plan);
+        }
+    });
     text
 }
 
-fn function(text: &mut String, name: &str, places: &[Place<'_>], body: impl FnOnce(&mut String)) {
+fn function(
+    text: &mut String,
+    plan: &Plan<'_>,
+    name: &str,
+    image: &Image<'_>,
+    body: impl FnOnce(&mut String),
+) {
     line(text, &format!("FUNCTION \"{name}\" : Void"));
     line(text, "{ S7_Optimized_Access := 'TRUE' }");
     line(text, "VERSION : 0.1");
     // 64 bits have no address of their own in %I and %Q: they go as two halves.
-    if places
-        .iter()
-        .any(|place| place.data_type().width() == Width::Long)
-    {
+    let is_long = |place: &Place<'_>| {
+        place.data_type().width() == Width::Long
+            && matches!(Path::of(place, plan.cpu), Path::Value(_))
+    };
+    if image.record.places.iter().any(is_long) {
         line(text, "   VAR_TEMP");
         line(text, "      Long : LWord;");
         line(text, "   END_VAR");
@@ -77,22 +78,19 @@ fn bits(data_type: DataType) -> Option<&'static str> {
 }
 
 /// Copies a value from the image into %I.
-fn put(text: &mut String, place: &Place<'_>, path: &Path, block: &str) {
+fn put(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     let remark = format!("   // \"{}\"", place.signal.name);
-    match path {
-        Path::Bytes(paths) => {
-            for (number, path) in paths.iter().enumerate() {
+    match Path::of(place, plan.cpu) {
+        Path::Bytes(names) => {
+            for (number, name) in names.iter().enumerate() {
                 let remark = if number == 0 { &remark } else { "" };
-                let byte = place.byte + number;
-                line(
-                    text,
-                    &format!("   %IB{byte} := \"{block}\".Image.{path};{remark}"),
-                );
+                let (byte, value) = (place.byte + number, plan.inputs.member(name));
+                line(text, &format!("   %IB{byte} := {value};{remark}"));
             }
         }
-        Path::Value(path) => {
+        Path::Value(name) => {
             let data_type = place.data_type();
-            let value = format!("\"{block}\".Image.{path}");
+            let value = plan.inputs.member(&name);
             let value = bits(data_type).map_or_else(
                 || value.clone(),
                 |bits| format!("{data_type}_TO_{bits}({value})"),
@@ -110,20 +108,17 @@ fn put(text: &mut String, place: &Place<'_>, path: &Path, block: &str) {
 }
 
 /// Copies a value from %Q into the image.
-fn take(text: &mut String, place: &Place<'_>, path: &Path, block: &str) {
+fn take(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     let remark = format!("   // \"{}\"", place.signal.name);
-    match path {
-        Path::Bytes(paths) => {
-            for (number, path) in paths.iter().enumerate() {
+    match Path::of(place, plan.cpu) {
+        Path::Bytes(names) => {
+            for (number, name) in names.iter().enumerate() {
                 let remark = if number == 0 { &remark } else { "" };
-                let byte = place.byte + number;
-                line(
-                    text,
-                    &format!("   \"{block}\".Image.{path} := %QB{byte};{remark}"),
-                );
+                let (byte, target) = (place.byte + number, plan.outputs.member(name));
+                line(text, &format!("   {target} := %QB{byte};{remark}"));
             }
         }
-        Path::Value(path) => {
+        Path::Value(name) => {
             let data_type = place.data_type();
             let source = if data_type.width() == Width::Long {
                 line(text, &format!("   #Long.%D1 := %QD{};", place.byte));
@@ -136,10 +131,8 @@ fn take(text: &mut String, place: &Place<'_>, path: &Path, block: &str) {
                 || source.clone(),
                 |bits| format!("{bits}_TO_{data_type}({source})"),
             );
-            line(
-                text,
-                &format!("   \"{block}\".Image.{path} := {value};{remark}"),
-            );
+            let target = plan.outputs.member(&name);
+            line(text, &format!("   {target} := {value};{remark}"));
         }
     }
 }

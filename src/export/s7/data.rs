@@ -1,19 +1,17 @@
 //! Types and data blocks: both images, each signal at its own offset.
 
+use super::link::Body;
 use super::members::{Kind, Member};
 use super::{Image, Plan, line, source};
 use crate::export::siemens::spelling;
 
 /// The first source.
-pub(super) fn text(plan: &Plan<'_>) -> String {
+pub(super) fn text(plan: &Plan<'_>, link: &Body) -> String {
     let mut text = source(
         plan,
         "Both images as structures with standard (non-optimised) access: each signal at the offset that it has on the bus.",
     );
     for image in [&plan.inputs, &plan.outputs] {
-        for (name, members) in &image.types {
-            structure(&mut text, name, members);
-        }
         if !image.members.is_empty() {
             structure(&mut text, &image.type_name, &image.members);
         }
@@ -23,7 +21,7 @@ pub(super) fn text(plan: &Plan<'_>) -> String {
             block(&mut text, image);
         }
     }
-    control(&mut text, plan);
+    control(&mut text, plan, link);
     text
 }
 
@@ -35,7 +33,6 @@ fn structure(text: &mut String, name: &str, members: &[Member]) {
         let kind = match &member.kind {
             Kind::Value(data_type) => spelling(*data_type).to_owned(),
             Kind::Bytes(count) => format!("Array[0..{}] of Byte", count - 1),
-            Kind::Structure(name) => format!("\"{name}\""),
         };
         let place = match member.kind {
             Kind::Value(crate::signal::DataType::Bool) => format!("{}.{}", member.byte, member.bit),
@@ -76,20 +73,17 @@ fn block(text: &mut String, image: &Image<'_>) {
     line(text, "");
 }
 
-fn control(text: &mut String, plan: &Plan<'_>) {
+fn control(text: &mut String, plan: &Plan<'_>, link: &Body) {
     line(text, &format!("DATA_BLOCK \"{}\"", plan.prefix));
     line(text, "{ S7_Optimized_Access := 'TRUE' }");
     line(text, "VERSION : 0.1");
     line(text, "NON_RETAIN");
     line(text, "   STRUCT");
-    for member in [
-        "Simulated : Bool;   // TRUE: the simulation stands in for the machine",
-        "Alive : Bool;   // the simulation was heard of not longer ago than the driver's max_age",
-        "Received : UDInt;   // images that have come since Simulated was set",
-        "Sent : UDInt;   // images that have gone since then",
-        "Errors : UDInt;   // jobs that failed",
-        "Last_error : Word;   // STATUS of the last of them",
-    ] {
+    line(
+        text,
+        "      Simulated : Bool;   // TRUE: the simulation stands in for the machine",
+    );
+    for member in link.status() {
         line(text, &format!("      {member}"));
     }
     line(text, "   END_STRUCT;");

@@ -14,11 +14,47 @@ pub(super) struct Body {
     /// Lines between `VAR_TEMP` and `END_VAR`.
     pub(super) temporary: Vec<String>,
     pub(super) code: Vec<String>,
+    /// It counts images that came, in `Received`.
+    pub(super) receives: bool,
+    /// It counts images that went, in `Sent`.
+    pub(super) sends: bool,
+    /// What is TRUE in each call in which the simulation was heard of; empty where nothing here can know.
+    pub(super) heard: String,
 }
 
-/// The second source.
-pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
-    let body = match &plan.config.bus {
+impl Body {
+    /// Declarations of the members that the control block has beside `Simulated`: those that something sets.
+    pub(super) fn status(&self) -> Vec<&'static str> {
+        let members = [
+            (
+                !self.heard.is_empty(),
+                "Alive : Bool;   // the simulation was heard of not longer ago than the driver's max_age",
+            ),
+            (
+                self.receives,
+                "Received : UDInt;   // images that have come since Simulated was set",
+            ),
+            (
+                self.sends,
+                "Sent : UDInt;   // images that have gone since then",
+            ),
+            (
+                self.receives || self.sends,
+                "Errors : UDInt;   // jobs that failed",
+            ),
+            (
+                self.receives || self.sends,
+                "Last_error : Word;   // STATUS of the last of them",
+            ),
+        ];
+        let members = members.into_iter().filter(|(is_set, _)| *is_set);
+        members.map(|(_, member)| member).collect()
+    }
+}
+
+/// The body for the bus of the driver.cfg.
+pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
+    let mut body = match &plan.config.bus {
         Options::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
             by_hand("socket with message = \"axis\"", notes)
         }
@@ -27,9 +63,36 @@ pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
         Options::ModbusClient(options) => modbus::server(plan, options, notes),
         Options::S7Server(options) => s7comm::puts_and_gets(plan, options, notes),
         Options::S7Client(options) => s7comm::nothing(plan, options),
-        Options::OpcuaClient(_) | Options::OpcuaServer(_) => opcua(plan),
+        Options::OpcuaClient(_) => opcua_server(plan),
+        Options::OpcuaServer(options) => opcua_client(plan, &options.address.to_string()),
         bus @ (Options::Loopback(_) | Options::Plugin(_)) => by_hand(bus.kind(), notes),
     };
+    if !body.heard.is_empty() {
+        body.variables.extend([
+            "Silence : TON_TIME;".to_owned(),
+            "Is_heard : Bool;".to_owned(),
+        ]);
+        let (prefix, heard) = (&plan.prefix, &body.heard);
+        body.code.extend([
+            String::new(),
+            format!("IF {heard} THEN"),
+            "   #Is_heard := TRUE;".to_owned(),
+            "END_IF;".to_owned(),
+            format!(
+                "#Silence(IN := \"{prefix}\".Simulated AND NOT ({heard}), PT := {});",
+                time(plan.config.timing.max_age)
+            ),
+            format!("IF #Silence.Q OR NOT \"{prefix}\".Simulated THEN"),
+            "   #Is_heard := FALSE;".to_owned(),
+            "END_IF;".to_owned(),
+            format!("\"{prefix}\".Alive := #Is_heard;"),
+        ]);
+    }
+    body
+}
+
+/// The second source.
+pub(super) fn text(plan: &Plan<'_>, body: &Body) -> String {
     let mut text = source(plan, &body.what);
     let name = format!("{}_link", plan.prefix);
     line(&mut text, &format!("FUNCTION_BLOCK \"{name}\""));
@@ -47,16 +110,17 @@ pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
     }
     line(&mut text, "");
     line(&mut text, "BEGIN");
-    let prefix = &plan.prefix;
-    for content in [
-        format!("IF NOT \"{prefix}\".Simulated THEN"),
-        format!("   \"{prefix}\".Received := 0;"),
-        format!("   \"{prefix}\".Sent := 0;"),
-        "END_IF;".to_owned(),
-    ]
-    .iter()
-    .chain(&body.code)
-    {
+    let mut code = Vec::new();
+    if body.receives || body.sends {
+        code.push(format!("IF NOT \"{}\".Simulated THEN", plan.prefix));
+        for (counts, member) in [(body.receives, "Received"), (body.sends, "Sent")] {
+            if counts {
+                code.push(format!("   \"{}\".{member} := 0;", plan.prefix));
+            }
+        }
+        code.push("END_IF;".to_owned());
+    }
+    for content in code.iter().chain(&body.code) {
         line(&mut text, format!("   {content}").trim_end());
     }
     line(&mut text, "END_FUNCTION_BLOCK");
@@ -74,9 +138,9 @@ pub(super) fn text(plan: &Plan<'_>, notes: &mut Vec<String>) -> String {
 /// What is to be set in the project beside the sources.
 pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
     match &plan.config.bus {
-        Options::Socket(options) => socket::steps(options),
+        Options::Socket(options) => socket::steps(plan, options),
         Options::S7Server(_) => s7comm::steps_for_puts_and_gets(),
-        Options::S7Client(_) => s7comm::steps_for_nothing(plan),
+        Options::S7Client(options) => s7comm::steps_for_nothing(plan, options),
         _ => Vec::new(),
     }
 }
@@ -95,8 +159,8 @@ pub(super) fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
     }
 }
 
-/// OPC UA carries single variables, by name: those of both images.
-fn opcua(plan: &Plan<'_>) -> Body {
+/// The CPU is the OPC UA server, which carries single variables by name: those of both images.
+fn opcua_server(plan: &Plan<'_>) -> Body {
     Body {
         what: "OPC UA carries the members of both images by themselves; no call is needed here."
             .to_owned(),
@@ -107,6 +171,25 @@ fn opcua(plan: &Plan<'_>) -> Body {
             ),
             "    // accessible (and, the inputs, writable) from OPC UA, member by member."
                 .to_owned(),
+        ],
+        ..Body::default()
+    }
+}
+
+/// The CPU is the OPC UA client: TIA Portal makes the calls from what the simulation's server shows.
+fn opcua_client(plan: &Plan<'_>, address: &str) -> Body {
+    Body {
+        what: "The PLC is the OPC UA client: its calls are made in TIA Portal.".to_owned(),
+        code: vec![
+            format!(
+                ";   // OPC UA communication > Client interfaces: add one for the simulation's server (driver.cfg: {address}),"
+            ),
+            "    // with a read list of the inputs and a write list of the outputs; the nodes are ns=2;s=<signal>."
+                .to_owned(),
+            format!(
+                "    // Here call OPC_UA_ReadList into \"{}\".Image and OPC_UA_WriteList from \"{}\".Image.",
+                plan.inputs.block, plan.outputs.block
+            ),
         ],
         ..Body::default()
     }

@@ -1,11 +1,12 @@
 //! Members of S7 structures with standard (non-optimised) access, laid so that each signal gets its own offset.
 //!
 //! The rules of that layout: BOOLs fill the bits of a byte one after another; a value of one byte begins on a byte;
-//! wider ones, arrays and structures on an even byte; structures and arrays end on an even byte.
+//! wider ones and arrays on an even byte; structures and arrays end on an even byte.
 
-use crate::export::record::{Group, Place, Record};
+use super::Cpu;
+use crate::export::record::{Place, Record};
 use crate::export::siemens::spelling;
-use crate::signal::{ByteOrder, DataType};
+use crate::signal::{ByteOrder, DataType, Width};
 
 /// One member.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,21 +27,47 @@ pub(super) enum Kind {
     Value(DataType),
     /// Nobody's bytes, of which there is an even number.
     Bytes(usize),
-    /// A structure of its own.
-    Structure(String),
 }
 
-/// Whether a member of the signal's own type holds its value: in the byte order of S7, and where S7 puts such a
-/// value. The others lie there as bytes.
-pub(super) fn is_native(place: &Place<'_>, byte: usize) -> bool {
-    place.size() == 1 || (place.signal.order == ByteOrder::Abcd && byte.is_multiple_of(2))
+/// Whether a member of the signal's own type holds its value: of a type that the CPU has, in the byte order of S7, and
+/// where S7 puts such a value. The others lie there as bytes.
+fn is_native(place: &Place<'_>, cpu: Cpu) -> bool {
+    place.size() == 1
+        || (place.signal.order == ByteOrder::Abcd
+            && place.byte.is_multiple_of(2)
+            && (cpu.has_long() || place.data_type().width() != Width::Long))
 }
 
-/// The names of the bytes as which a value that is not native lies there.
-pub(super) fn byte_names(name: &str, size: usize) -> Vec<String> {
-    (0..size)
-        .map(|number| format!("{name}__{number}"))
-        .collect()
+/// Where a signal's value is in the structure.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Path {
+    /// One member of its own type.
+    Value(String),
+    /// A member for each byte, the first byte of the bus first.
+    Bytes(Vec<String>),
+}
+
+impl Path {
+    /// Where the value of `place` is.
+    pub(super) fn of(place: &Place<'_>, cpu: Cpu) -> Self {
+        let name = &place.name;
+        if is_native(place, cpu) {
+            return Self::Value(name.clone());
+        }
+        Self::Bytes(
+            (0..place.size())
+                .map(|number| format!("{name}__{number}"))
+                .collect(),
+        )
+    }
+
+    /// Its members.
+    pub(super) fn members(&self) -> &[String] {
+        match self {
+            Self::Value(name) => std::slice::from_ref(name),
+            Self::Bytes(names) => names,
+        }
+    }
 }
 
 /// Members in the making.
@@ -52,66 +79,33 @@ pub(super) struct Members {
 }
 
 impl Members {
-    /// The members of one structure.
-    pub(super) fn of_group(group: &Group<'_, '_>) -> Vec<Member> {
+    /// The members of a record.
+    pub(super) fn of(record: &Record<'_>, cpu: Cpu) -> Vec<Member> {
         let mut members = Self::default();
-        for (place, name) in group.places.iter().zip(group.members()) {
-            members.put(place, &name, place.byte - group.byte, String::new());
-        }
-        members.finish(group.bytes)
-    }
-
-    /// The members of a record whose `groups` are structures of the types that `types` names.
-    pub(super) fn of_record(
-        record: &Record<'_>,
-        groups: &[Group<'_, '_>],
-        types: &[String],
-        group_names: &[String],
-    ) -> Vec<Member> {
-        let mut members = Self::default();
-        let mut places = record.places.iter().peekable();
-        let mut groups = groups.iter().zip(types).zip(group_names).peekable();
-        while let Some(place) = places.peek() {
-            if let Some(((group, type_name), name)) =
-                groups.next_if(|((group, _), _)| group.byte == place.byte)
-            {
-                members.fill(group.byte * 8);
-                let first = &group.places[0];
-                members.push(
-                    name.clone(),
-                    Kind::Structure(type_name.clone()),
-                    group.bytes * 8,
-                    format!("{} on: \"{}\"", first.address(), group.name),
-                );
-                for _ in 0..group.places.len() {
-                    places.next();
-                }
-            } else if let Some(place) = places.next() {
-                members.put(place, &place.name, place.byte, place.remark());
-            }
+        for place in &record.places {
+            members.put(place, cpu);
         }
         members.finish(record.bytes)
     }
 
-    fn put(&mut self, place: &Place<'_>, name: &str, byte: usize, remark: String) {
-        if is_native(place, byte) {
-            self.fill(byte * 8 + usize::from(place.bit()));
-            let bits = place.data_type().width().bits();
+    fn put(&mut self, place: &Place<'_>, cpu: Cpu) {
+        self.fill(place.byte * 8 + usize::from(place.bit()));
+        let path = Path::of(place, cpu);
+        let (kind, mut remark) = match &path {
+            Path::Value(_) => (place.data_type(), place.remark()),
+            Path::Bytes(_) => {
+                let whole = spelling(place.data_type());
+                (
+                    DataType::Byte,
+                    format!("{}, {whole} as bytes", place.remark()),
+                )
+            }
+        };
+        for name in path.members() {
             self.push(
-                name.to_owned(),
-                Kind::Value(place.data_type()),
-                bits,
-                remark,
-            );
-            return;
-        }
-        self.fill(byte * 8);
-        let mut remark = format!("{remark}, {} as bytes", spelling(place.data_type()));
-        for name in byte_names(name, place.size()) {
-            self.push(
-                name,
-                Kind::Value(DataType::Byte),
-                8,
+                name.clone(),
+                Kind::Value(kind),
+                kind.width().bits(),
                 std::mem::take(&mut remark),
             );
         }

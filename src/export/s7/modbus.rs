@@ -2,7 +2,7 @@
 
 use super::Plan;
 use super::connection;
-use super::link::{Body, by_hand, time};
+use super::link::{Body, by_hand};
 use crate::fieldbus::modbus::{ClientOptions, Line, ServerOptions, Table};
 use crate::signal::Area;
 
@@ -33,7 +33,6 @@ pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<S
         "First : UDInt;".to_owned(),
         "Count : UInt;".to_owned(),
         "Is_asking : Bool;".to_owned(),
-        "Silence : TON_TIME;".to_owned(),
     ];
     views(plan, &mut variables, inputs, outputs);
     let mut code = connection::lines(address, true, notes);
@@ -48,6 +47,9 @@ pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<S
         variables,
         temporary: vec!["Register : Int;".to_owned()],
         code,
+        receives: inputs > 0,
+        sends: outputs > 0,
+        heard: "#Client.DONE".to_owned(),
     }
 }
 
@@ -114,14 +116,17 @@ fn turns(plan: &Plan<'_>, inputs: usize, outputs: usize) -> Vec<String> {
         "      #Job := 0;",
     ]);
     if inputs > 0 {
+        add(&[
+            &format!("      \"{}\".Image := #Incoming;", plan.inputs.block),
+            &format!("      \"{prefix}\".Received := \"{prefix}\".Received + 1;"),
+        ]);
+    }
+    if outputs > 0 {
         add(&[&format!(
-            "      \"{}\".Image := #Incoming;",
-            plan.inputs.block
+            "      \"{prefix}\".Sent := \"{prefix}\".Sent + 1;"
         )]);
     }
     add(&[
-        &format!("      \"{prefix}\".Received := \"{prefix}\".Received + 1;"),
-        &format!("      \"{prefix}\".Sent := \"{prefix}\".Sent + 1;"),
         "   END_IF;",
         "ELSIF #Client.ERROR THEN",
         "   #Is_asking := FALSE;",
@@ -129,13 +134,6 @@ fn turns(plan: &Plan<'_>, inputs: usize, outputs: usize) -> Vec<String> {
         &format!("   \"{prefix}\".Errors := \"{prefix}\".Errors + 1;"),
         &format!("   \"{prefix}\".Last_error := #Client.STATUS;"),
         "END_IF;",
-        &format!(
-            "#Silence(IN := \"{prefix}\".Simulated AND NOT #Client.DONE, PT := {});",
-            time(plan.config.timing.max_age)
-        ),
-        &format!(
-            "\"{prefix}\".Alive := \"{prefix}\".Simulated AND \"{prefix}\".Received > 0 AND NOT #Silence.Q;"
-        ),
     ]);
     code
 }
@@ -170,7 +168,6 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         "Is_prepared : Bool;".to_owned(),
         "Server : MB_SERVER;".to_owned(),
         format!("Registers : Array[0..{last}] of Word;"),
-        "Silence : TON_TIME;".to_owned(),
     ];
     views(plan, &mut variables, inputs, outputs);
     let mut code = connection::lines(address, false, notes);
@@ -188,33 +185,30 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         &format!("#Server(DISCONNECT := NOT \"{prefix}\".Simulated,"),
         "        MB_HOLD_REG := #Registers,",
         "        CONNECT := #Connection);",
-        "IF #Server.NDR THEN",
-        &format!("   \"{prefix}\".Received := \"{prefix}\".Received + 1;"),
     ]);
     if inputs > 0 {
         add(&[
+            "IF #Server.NDR THEN",
+            &format!("   \"{prefix}\".Received := \"{prefix}\".Received + 1;"),
             &format!("   FOR #Register := 0 TO {} DO", inputs - 1),
             &format!("      #Incoming_words[#Register] := #Registers[{to} + #Register];"),
             "   END_FOR;",
             &format!("   \"{}\".Image := #Incoming;", plan.inputs.block),
+            "END_IF;",
+        ]);
+    }
+    if outputs > 0 {
+        add(&[
+            "IF #Server.DR THEN",
+            &format!("   \"{prefix}\".Sent := \"{prefix}\".Sent + 1;"),
+            "END_IF;",
         ]);
     }
     add(&[
-        "END_IF;",
-        "IF #Server.DR THEN",
-        &format!("   \"{prefix}\".Sent := \"{prefix}\".Sent + 1;"),
-        "END_IF;",
         "IF #Server.ERROR THEN",
         &format!("   \"{prefix}\".Errors := \"{prefix}\".Errors + 1;"),
         &format!("   \"{prefix}\".Last_error := #Server.STATUS;"),
         "END_IF;",
-        &format!(
-            "#Silence(IN := \"{prefix}\".Simulated AND NOT (#Server.NDR OR #Server.DR), PT := {});",
-            time(plan.config.timing.max_age)
-        ),
-        &format!(
-            "\"{prefix}\".Alive := \"{prefix}\".Simulated AND \"{prefix}\".Received > 0 AND NOT #Silence.Q;"
-        ),
     ]);
     Body {
         what: format!(
@@ -223,6 +217,9 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         variables,
         temporary: vec!["Register : Int;".to_owned()],
         code,
+        receives: inputs > 0,
+        sends: outputs > 0,
+        heard: "#Server.NDR OR #Server.DR".to_owned(),
     }
 }
 

@@ -32,7 +32,6 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         variables.extend([
             "Receive : TRCV_C;".to_owned(),
             format!("Incoming : \"{}\";", plan.inputs.type_name),
-            "Silence : TON_TIME;".to_owned(),
         ]);
         add(&[
             "",
@@ -51,13 +50,6 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
             &format!("   \"{prefix}\".Errors := \"{prefix}\".Errors + 1;"),
             &format!("   \"{prefix}\".Last_error := #Receive.STATUS;"),
             "END_IF;",
-            &format!(
-                "#Silence(IN := \"{prefix}\".Simulated AND NOT #Receive.DONE, PT := {});",
-                time(plan.config.timing.max_age)
-            ),
-            &format!(
-                "\"{prefix}\".Alive := \"{prefix}\".Simulated AND \"{prefix}\".Received > 0 AND NOT #Silence.Q;"
-            ),
         ]);
     }
     if sent > 0 {
@@ -65,26 +57,41 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
             "Send : TSEND_C;".to_owned(),
             format!("Outgoing : \"{}\";", plan.outputs.type_name),
             "Clock : TON_TIME;".to_owned(),
+            "Last : Time;".to_owned(),
             "Is_due : Bool;".to_owned(),
+            "Is_asked : Bool;".to_owned(),
             "Is_busy : Bool;".to_owned(),
         ]);
+        let cycle = time(cycle);
         add(&[
             "",
-            "// A record goes out in each cycle. What is being sent must not change until it is gone.",
-            &format!("#Clock(IN := NOT #Clock.Q, PT := {});", time(cycle)),
-            "IF #Clock.Q THEN",
+            "// A record goes out in each cycle. The time is counted on, so that the calls of OB1 add nothing to it.",
+            "#Clock(IN := NOT #Clock.Q, PT := T#24D);",
+            "#Now := #Clock.ET;",
+            "IF #Now < #Last THEN",
+            "   #Last := T#0ms;   // the clock has begun anew",
+            "END_IF;",
+            &format!("IF #Now - #Last >= {cycle} THEN"),
+            &format!("   #Last := #Last + {cycle};"),
+            &format!("   IF #Now - #Last >= {cycle} THEN"),
+            "      #Last := #Now;   // late by a whole cycle: what was missed is not sent in a burst",
+            "   END_IF;",
             "   #Is_due := TRUE;",
             "END_IF;",
+            "// What is being sent must not change until it is gone, and REQ needs a rising edge.",
             "IF NOT #Is_busy THEN",
             &format!("   #Outgoing := \"{}\".Image;", plan.outputs.block),
             "END_IF;",
-            "#Send(REQ := #Is_due AND NOT #Is_busy,",
+            &format!(
+                "#Is_asked := #Is_due AND NOT #Is_busy AND NOT #Is_asked AND \"{prefix}\".Simulated;"
+            ),
+            "#Send(REQ := #Is_asked,",
             &format!("      CONT := \"{prefix}\".Simulated,"),
             &format!("      LEN := {sent},"),
             "      CONNECT := #Connection,",
             "      DATA := #Outgoing);",
             "#Is_busy := #Send.BUSY;",
-            "IF #Send.BUSY OR #Send.DONE OR #Send.ERROR THEN",
+            "IF #Is_asked THEN",
             "   #Is_due := FALSE;",
             "END_IF;",
             "IF #Send.DONE THEN",
@@ -101,22 +108,37 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
             "Records over TCP: {sent} bytes to the simulation every {cycle}, {received} bytes from it."
         ),
         variables,
-        temporary: Vec::new(),
+        temporary: if sent > 0 {
+            vec!["Now : Time;".to_owned()]
+        } else {
+            Vec::new()
+        },
         code,
+        receives: received > 0,
+        sends: sent > 0,
+        // That TCP has taken a record tells nothing of the other end.
+        heard: if received > 0 {
+            "#Receive.DONE".to_owned()
+        } else {
+            String::new()
+        },
     }
 }
 
-pub(super) fn steps(options: &Options) -> Vec<String> {
+pub(super) fn steps(plan: &Plan<'_>, options: &Options) -> Vec<String> {
     let mut steps = vec![
         "In the link source, check InterfaceId (the hardware identifier of the interface, 64 on most CPUs), ID and \
          address."
             .to_owned(),
     ];
-    steps.push(
-        "Let OB1 run more often than the driver's cycle: one record is taken in each call, and what comes faster than it \
-         is taken grows old in the buffers."
-            .to_owned(),
-    );
+    steps.push(format!(
+        "Let OB1 take less than half of the driver's cycle ({}). One record is taken in each call: what comes faster grows \
+         old in the buffers. Sending counts the time: on average one record per cycle, each at most one OB1 late. For \
+         even distances call \"{}_link_DB\" in a cyclic interrupt OB of that period instead of in \"{}_begin\".",
+        plan.config.timing.cycle.unwrap_or(CYCLE),
+        plan.prefix,
+        plan.prefix
+    ));
     if options.tcp == TcpRole::Listen {
         steps.push("Let the firewall of the simulator's computer pass the port.".to_owned());
     }

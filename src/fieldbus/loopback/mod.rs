@@ -13,3 +13,8 @@ pub use free::FreeLoopback;
 pub use link::{End, private_link};
 pub use options::{Mode, Options, Peer};
 pub use stepped::SteppedLoopback;
+
+use crate::time::Nanos;
+
+/// The bus cycle of a loopback whose driver.cfg states none.
+pub const CYCLE: Nanos = Nanos::from_millis(1);

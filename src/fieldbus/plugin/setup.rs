@@ -3,12 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::Options;
-use crate::fieldbus::Role;
+use crate::fieldbus::{CYCLE, Role};
 use crate::signal::{Area, SignalTable};
 use crate::time::Nanos;
-
-/// The bus cycle where a driver.cfg states none.
-const CYCLE: Nanos = Nanos::from_millis(10);
 
 /// The least time-out of an exchange where a driver.cfg states none.
 const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);

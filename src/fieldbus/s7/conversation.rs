@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::item::{self, Addresses, Code, Data, Element, Item, Object};
-use super::lists::Facts;
 use super::pdu::{Draft, Kind, LONGEST, Pdu, SHORTEST, error, function};
+use super::szl::Facts;
 use super::transport::{self, Connect, Tpdu};
 use super::userdata::{self, Ask, Rest};
 use super::{Fault, Tsap};

@@ -24,7 +24,7 @@ mod counted {
 }
 
 /// What a CPU keeps, by the area code of an address.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Object {
     /// The inputs, `%I`.
     Inputs,
@@ -195,6 +195,22 @@ impl Item {
             element: Element::Byte,
             count: u16::try_from(range.len()).expect("a unit holds far fewer"),
         }
+    }
+
+    /// One bit of an object.
+    pub const fn bit_of(object: Object, byte: usize, bit: u8) -> Self {
+        Self {
+            object,
+            byte,
+            bit,
+            element: Element::Bit,
+            count: 1,
+        }
+    }
+
+    /// The bit that it is; none where it is made of bytes.
+    pub fn bit(&self) -> Option<u8> {
+        (self.element == Element::Bit).then_some(self.bit)
     }
 
     /// Its bytes in the object.

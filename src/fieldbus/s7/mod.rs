@@ -1,20 +1,21 @@
 //! S7 communication over ISO on TCP, as CPUs of the S7 family speak it with PUT and GET, panels and libraries.
 //!
 //! The core has no I/O: [`transport`] are the packets, [`pdu`] the units within them, [`item`] the variables,
-//! [`lists`] the system status lists. [`Conversation`] is a server's side of one connection, [`Dialog`] a client's. The
+//! [`szl`] the system status lists. [`Conversation`] is a server's side of one connection, [`Dialog`] a client's. The
 //! buses [`S7Server`] and [`S7Client`] stand around them.
 
 mod client;
 mod conversation;
 mod fault;
 pub mod item;
-pub mod lists;
 pub mod pdu;
 mod place;
 mod server;
+pub mod szl;
 pub mod transport;
 mod tsap;
 mod userdata;
+mod variable;
 
 pub use client::{ClientOptions, Dialog, End, Frames, News, Refusal, S7Client, Terms};
 pub use conversation::{Conversation, Memory};
@@ -22,6 +23,7 @@ pub use fault::Fault;
 pub use place::Start;
 pub use server::{Block, S7Server, ServerOptions};
 pub use tsap::Tsap;
+pub use variable::Variable;
 
 /// Reads the longest unit that is to be agreed to.
 fn read_pdu(value: &crate::config::Value<'_>) -> Option<u16> {

@@ -7,7 +7,7 @@ use super::item::Object;
 use crate::config::shown;
 
 /// The last byte that an address reaches.
-const LAST: usize = 65_535;
+pub(super) const LAST: usize = 65_535;
 
 /// The first byte of something in a CPU: `%QB0`, `%DB10.DBB4`, `DB10`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,8 +1,8 @@
 //! Questions about the system: status lists, the clock, which blocks there are.
 
 use super::item::{self, Code};
-use super::lists::{self, Facts};
 use super::pdu::{Draft, JOB_HEADER, Kind, Pdu, error};
+use super::szl::{self, Facts};
 use crate::time::Nanos;
 
 /// Bytes of the parameters of an answer.
@@ -65,8 +65,14 @@ impl<'a> Question<'a> {
         if pdu.parameters.len() != 4 + usize::from(length) || group >> 4 != 4 {
             return None;
         }
-        let mut data = item::Data::new(1, pdu.data);
-        let data = data.as_mut().and_then(Iterator::next);
+        // Some clients state more bytes than follow: Apache PLC4X does in its first question.
+        let data = match *pdu.data {
+            [_, _, high, low, ref bytes @ ..] => {
+                let stated = usize::from(u16::from_be_bytes([high, low]));
+                &bytes[..stated.min(bytes.len())]
+            }
+            _ => &[],
+        };
         let follows = match (method, length) {
             (REQUEST, 4) => false,
             (RESPONSE, 8) => true,
@@ -77,7 +83,7 @@ impl<'a> Question<'a> {
             function,
             sequence,
             follows,
-            data: data.map_or(&[], |datum| datum.bytes),
+            data,
         })
     }
 }
@@ -178,10 +184,10 @@ fn say(question: &Question<'_>, ask: &Ask<'_>) -> Result<Vec<u8>, u16> {
     match (question.group, question.function, question.data) {
         (group::LISTS, 1, &[i0, i1, n0, n1]) => {
             let (id, index) = (u16::from_be_bytes([i0, i1]), u16::from_be_bytes([n0, n1]));
-            lists::write(id, index, ask.facts, ask.now, &mut out)?;
+            szl::write(id, index, ask.facts, ask.now, &mut out)?;
         }
         (group::CLOCK, 1 | 3, _) => {
-            let clock = lists::clock(ask.now);
+            let clock = ask.facts.clock(ask.now);
             out.extend_from_slice(&[0, 0x19]);
             out.extend_from_slice(&clock);
         }

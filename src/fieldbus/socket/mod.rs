@@ -22,7 +22,7 @@ use crate::axis::{Axis, COMMAND_BYTES};
 use crate::signal::{Area, SignalTable};
 use crate::time::{Nanos, Stop};
 
-use super::{BusError, Free, Port, Role};
+use super::{BusError, CYCLE, Free, Port, Role};
 
 pub use fault::Fault;
 use frames::Frames;
@@ -30,9 +30,6 @@ pub use options::{Message, Options, TcpRole};
 pub use parts::Parts;
 pub use record::{Partial, Records};
 pub use session::{Sending, Session, Terms};
-
-/// The bus cycle where a driver.cfg names none.
-const CYCLE: Nanos = Nanos::from_millis(10);
 
 /// The bus of kind `socket`: TCP connections, made by this end or by the other. There is one, or one for each station.
 #[derive(Debug)]

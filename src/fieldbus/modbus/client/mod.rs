@@ -11,7 +11,7 @@ use rustix::fd::AsFd;
 
 use crate::fieldbus::identity::Guard;
 use crate::fieldbus::tcp::{bow_out, connect, is_for_later, no_wait, prepare};
-use crate::fieldbus::{BusError, Free, Port, Role};
+use crate::fieldbus::{BusError, CYCLE, Free, Port, Role};
 use crate::os::{Interest, Poller, Source};
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Stop};
@@ -20,9 +20,6 @@ use super::Line;
 pub use options::ClientOptions;
 use poll::{Framing, Poll, Station};
 pub use query::{Block, Fault, Query, queries};
-
-/// The bus cycle where a driver.cfg names none.
-const CYCLE: Nanos = Nanos::from_millis(10);
 
 /// So many times `max_age` a server may leave what it was sent unacknowledged.
 const PATIENCE: i64 = 4;

@@ -1,12 +1,12 @@
 //! A client's side of one connection, without I/O: time and bytes are handed in, bytes and the next deadline come
 //! out.
 
-use super::plan::{self, Image, Job, Piece, Way};
-use super::{End, News, Refusal, Terms};
+use super::plan::{self, Field, Job, Piece, Way};
+use super::{End, Frames, News, Refusal, Terms};
 use crate::fieldbus::s7::Fault;
 use crate::fieldbus::s7::item::{self, Code, Data};
-use crate::fieldbus::s7::lists::{self, Identity};
 use crate::fieldbus::s7::pdu::{Draft, Kind, LONGEST, Pdu, SHORTEST, error, function};
+use crate::fieldbus::s7::szl::{self, Identity};
 use crate::fieldbus::s7::transport::{self, Connect, Tpdu};
 use crate::time::Nanos;
 
@@ -19,15 +19,19 @@ const TPDU: u8 = 10;
 /// The longest list that is fetched; an identity is shorter by far.
 const LIST_LIMIT: usize = 16_384;
 
-/// The lists that tell who a CPU is.
-const LISTS: [u16; 2] = [0x0011, 0x001C];
+/// The lists that tell who a CPU is, and the one that tells whether it runs.
+const LISTS: [u16; 3] = [0x0011, 0x001C, szl::STATE];
+
+/// Where the last of them stands.
+const STATE: usize = 2;
 
 /// One connection with a CPU.
 ///
 /// The owner of the socket hands what it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write) and says
 /// how much the system took by [`wrote`](Self::wrote), and asks [`check`](Self::check) whether the connection may go
-/// on. Once [`News::Met`] was heard, it begins a cycle by [`begin`](Self::begin) whenever the dialog
-/// [is idle](Self::is_idle); [`News::Done`] ends the cycle.
+/// on. Once [`News::Met`] was heard, it begins a cycle by [`begin`](Self::begin), or asks whether the CPU runs by
+/// [`ask_state`](Self::ask_state), whenever the dialog [is idle](Self::is_idle); [`News::Done`] ends the cycle,
+/// [`News::State`] the question.
 #[derive(Debug)]
 pub struct Dialog {
     terms: Terms,
@@ -46,7 +50,7 @@ pub struct Dialog {
     identity: Identity,
     /// What has come of the list that is being fetched.
     list: Vec<u8>,
-    images: Images,
+    traffic: Traffic,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,37 +67,69 @@ enum Phase {
     Working(usize),
 }
 
-/// The images of all stations, and the jobs that carry them.
-#[derive(Debug, Default)]
-struct Images {
-    written: Vec<Image>,
-    read: Vec<Image>,
+/// The frames of all stations, and the jobs that carry them.
+#[derive(Debug)]
+struct Traffic {
+    fields: Frames,
     jobs: Vec<Job>,
     /// The frames of this cycle, by station: those to be written, and those read.
     out: Vec<Box<[u8]>>,
     into: Vec<Box<[u8]>>,
+    /// What the CPU refused in this cycle, by station.
+    refused: Vec<Option<Refusal>>,
+    /// Stations that the cycles leave out.
+    suspended: Vec<bool>,
     may_write: bool,
 }
 
+impl Traffic {
+    fn new(fields: Frames) -> Self {
+        let frames = |side: usize| {
+            let lengths = fields.lengths.iter();
+            lengths.map(|length| vec![0; length[side]].into()).collect()
+        };
+        let stations = fields.lengths.len();
+        Self {
+            out: frames(0),
+            into: frames(1),
+            refused: vec![None; stations],
+            suspended: vec![false; stations],
+            jobs: Vec::new(),
+            may_write: false,
+            fields,
+        }
+    }
+
+    /// Divides what is to be carried into jobs with units of at most `limit` bytes.
+    fn plan(&mut self, limit: usize) {
+        let active = |fields: &[Field]| -> Vec<Field> {
+            let fields = fields.iter();
+            let fields = fields.filter(|field| !self.suspended[field.station]);
+            fields.copied().collect()
+        };
+        let mut jobs = Vec::new();
+        if self.may_write {
+            jobs = plan::jobs(Way::Write, &active(&self.fields.written), limit);
+        }
+        jobs.extend(plan::jobs(Way::Read, &active(&self.fields.read), limit));
+        self.jobs = jobs;
+    }
+
+    /// Takes down that the CPU refused a piece, unless it did not.
+    fn judge(&mut self, job: usize, piece: usize, code: Code) -> bool {
+        let Job { way, pieces } = &self.jobs[job];
+        let piece = &pieces[piece];
+        if code != Code::OK {
+            let refusal = Refusal::item(*way, piece.item, code);
+            self.refused[piece.station].get_or_insert(refusal);
+        }
+        code == Code::OK
+    }
+}
+
 impl Dialog {
-    /// A dialog that begins at `now`. For each station: what it writes and where, what it reads.
-    pub(super) fn new(terms: Terms, now: Nanos, written: Vec<Image>, read: Vec<Image>) -> Self {
-        let frames = |images: &[Image]| {
-            let stations = images.iter().map(|image| image.station + 1).max();
-            let length = |station| {
-                let mut own = images.iter().filter(move |image| image.station == station);
-                own.next().map_or(0, |image| image.length)
-            };
-            let all = 0..stations.unwrap_or(0);
-            all.map(|station| vec![0; length(station)].into()).collect()
-        };
-        let images = Images {
-            out: frames(&written),
-            into: frames(&read),
-            written,
-            read,
-            ..Images::default()
-        };
+    /// A dialog that begins at `now` and carries these frames.
+    pub(super) fn new(terms: Terms, now: Nanos, frames: Frames) -> Self {
         let mut dialog = Self {
             phase: Phase::Connecting,
             inbox: Vec::new(),
@@ -105,7 +141,7 @@ impl Dialog {
             asked: Some(now),
             identity: Identity::default(),
             list: Vec::new(),
-            images,
+            traffic: Traffic::new(frames),
             terms,
         };
         let connect = Connect {
@@ -119,23 +155,27 @@ impl Dialog {
         dialog
     }
 
-    /// Lets images be written from now on, or not. The dialog has to be idle.
+    /// Lets frames be written from now on, or not. The dialog has to be idle.
     pub fn allow(&mut self, may_write: bool) {
-        let images = &mut self.images;
-        images.may_write = may_write;
-        let limit = usize::from(self.pdu);
-        images.jobs.clear();
-        if may_write {
-            let jobs = plan::jobs(Way::Write, &images.written, limit);
-            images.jobs.extend(jobs);
+        self.traffic.may_write = may_write;
+        self.traffic.plan(usize::from(self.pdu));
+    }
+
+    /// Leaves a station out of the cycles, or takes it in again. The dialog has to be idle.
+    pub fn suspend(&mut self, station: usize, is_out: bool) {
+        if std::mem::replace(&mut self.traffic.suspended[station], is_out) != is_out {
+            self.traffic.plan(usize::from(self.pdu));
         }
-        let jobs = plan::jobs(Way::Read, &images.read, limit);
-        images.jobs.extend(jobs);
     }
 
     /// Whether the CPU is being asked who it is.
     pub fn asks_who(&self) -> bool {
-        matches!(self.phase, Phase::Asking(_))
+        matches!(self.phase, Phase::Asking(list) if list < STATE)
+    }
+
+    /// Whether the CPU is being asked if it runs.
+    pub fn asks_state(&self) -> bool {
+        self.phase == Phase::Asking(STATE)
     }
 
     /// Whether a cycle may begin.
@@ -143,16 +183,19 @@ impl Dialog {
         self.phase == Phase::Idle
     }
 
-    /// Where the frame of a station goes that the next cycle writes; empty if it writes none.
+    /// Where the frame of a station goes that the next cycle writes.
     pub fn frame_to_write(&mut self, station: usize) -> &mut [u8] {
-        let frame = self.images.out.get_mut(station);
-        frame.map_or(&mut [], |frame| frame)
+        &mut self.traffic.out[station]
     }
 
-    /// The frame of a station that the last cycle read; empty if it reads none.
+    /// The frame of a station that the last cycle read: the bits of its signals.
     pub fn frame_read(&self, station: usize) -> &[u8] {
-        let frame = self.images.into.get(station);
-        frame.map_or(&[], |frame| frame)
+        &self.traffic.into[station]
+    }
+
+    /// What the CPU refused to a station in the last cycle: all else of it was done.
+    pub fn refusal(&self, station: usize) -> Option<&Refusal> {
+        self.traffic.refused[station].as_ref()
     }
 
     /// Begins a cycle at `now`; news when there is nothing to be done in one.
@@ -162,7 +205,18 @@ impl Dialog {
     /// When the dialog is not idle.
     pub fn begin(&mut self, now: Nanos) -> Option<News> {
         assert!(self.is_idle(), "one cycle at a time");
+        self.traffic.refused.fill(None);
         self.work(now, 0)
+    }
+
+    /// Asks at `now` whether the CPU runs.
+    ///
+    /// # Panics
+    ///
+    /// When the dialog is not idle.
+    pub fn ask_state(&mut self, now: Nanos) {
+        assert!(self.is_idle(), "one question at a time");
+        self.ask_list(now, STATE);
     }
 
     /// What is to be written; empty when there is nothing to send.
@@ -312,7 +366,7 @@ impl Dialog {
         }
         self.pdu = length;
         if self.terms.asks_who {
-            self.ask_who(now, 0);
+            self.ask_list(now, 0);
             return Ok(None);
         }
         Ok(Some(self.meet(None)))
@@ -325,7 +379,7 @@ impl Dialog {
     }
 
     /// Asks for the list with this index.
-    fn ask_who(&mut self, now: Nanos, index: usize) {
+    fn ask_list(&mut self, now: Nanos, index: usize) {
         self.phase = Phase::Asking(index);
         self.list.clear();
         let [high, low] = LISTS[index].to_be_bytes();
@@ -369,9 +423,13 @@ impl Dialog {
             });
             return Ok(None);
         }
-        lists::learn(&mut self.identity, &self.list);
-        if index + 1 < LISTS.len() {
-            self.ask_who(now, index + 1);
+        if index == STATE {
+            self.phase = Phase::Idle;
+            return Ok(Some(News::State(szl::state(&self.list))));
+        }
+        szl::learn(&mut self.identity, &self.list);
+        if index + 1 < STATE {
+            self.ask_list(now, index + 1);
             return Ok(None);
         }
         let identity = std::mem::take(&mut self.identity);
@@ -380,42 +438,35 @@ impl Dialog {
 
     /// Asks for the job with this index to be done; news when there is none.
     fn work(&mut self, now: Nanos, index: usize) -> Option<News> {
-        if index == self.images.jobs.len() {
+        if index == self.traffic.jobs.len() {
             self.phase = Phase::Idle;
             return Some(News::Done);
         }
         self.phase = Phase::Working(index);
-        let images = std::mem::take(&mut self.images);
-        let Job { way, pieces } = &images.jobs[index];
-        let count = u8::try_from(pieces.len()).expect("20 at most");
+        let jobs = std::mem::take(&mut self.traffic.jobs);
+        let frames = std::mem::take(&mut self.traffic.out);
+        let Job { way, pieces } = &jobs[index];
+        let [code, count] = function_of(*way, pieces);
         self.ask(now, Kind::Job, |draft, out| {
-            let code = match way {
-                Way::Write => function::WRITE,
-                Way::Read => function::READ,
-            };
             out.extend_from_slice(&[code, count]);
             for piece in pieces {
                 piece.item.write(out);
             }
             draft.data(out);
             if *way == Way::Write {
-                write_data(pieces, &images.out, out);
+                write_data(pieces, &frames, out);
             }
         });
-        self.images = images;
+        self.traffic.jobs = jobs;
+        self.traffic.out = frames;
         None
     }
 
     /// A job was done.
     fn done(&mut self, now: Nanos, index: usize, answer: &Pdu<'_>) -> Result<Option<News>, End> {
         whole(answer)?;
-        let Images { jobs, into, .. } = &mut self.images;
-        let Job { way, pieces } = &jobs[index];
-        let count = u8::try_from(pieces.len()).expect("20 at most");
-        let asked = match way {
-            Way::Write => [function::WRITE, count],
-            Way::Read => [function::READ, count],
-        };
+        let Job { way, pieces } = &self.traffic.jobs[index];
+        let asked = function_of(*way, pieces);
         if answer.parameters != asked {
             return Err(Fault::Answer("another function, or another number of items").into());
         }
@@ -424,25 +475,37 @@ impl Dialog {
                 if answer.data.len() != pieces.len() {
                     return Err(Fault::Answer("another number of codes").into());
                 }
-                for (piece, code) in pieces.iter().zip(answer.data) {
-                    good(*way, piece, Code(*code))?;
+                for (piece, code) in answer.data.iter().enumerate() {
+                    self.traffic.judge(index, piece, Code(*code));
                 }
             }
             Way::Read => {
-                let data = Data::new(count, answer.data);
+                let data = Data::new(asked[1], answer.data);
                 let data = data.ok_or(Fault::Answer("data that do not add up"))?;
-                for (piece, datum) in pieces.iter().zip(data) {
-                    good(*way, piece, datum.code)?;
-                    let place = &mut into[piece.station][piece.frame.clone()];
-                    if datum.bytes.len() != place.len() {
+                for (piece, datum) in data.enumerate() {
+                    if !self.traffic.judge(index, piece, datum.code) {
+                        continue;
+                    }
+                    let Traffic { jobs, into, .. } = &mut self.traffic;
+                    let piece = &jobs[index].pieces[piece];
+                    if datum.bytes.len() != piece.item.range().len() {
                         return Err(Fault::Answer("another number of bytes").into());
                     }
-                    place.copy_from_slice(datum.bytes);
+                    piece.scatter(datum.bytes, &mut into[piece.station]);
                 }
             }
         }
         Ok(self.work(now, index + 1))
     }
+}
+
+/// The function of a job, and the number of its items.
+fn function_of(way: Way, pieces: &[Piece]) -> [u8; 2] {
+    let code = match way {
+        Way::Write => function::WRITE,
+        Way::Read => function::READ,
+    };
+    [code, u8::try_from(pieces.len()).expect("20 at most")]
 }
 
 fn write_data(pieces: &[Piece], frames: &[Box<[u8]>], out: &mut Vec<u8>) {
@@ -451,9 +514,11 @@ fn write_data(pieces: &[Piece], frames: &[Box<[u8]>], out: &mut Vec<u8>) {
         if (out.len() - begin) % 2 == 1 {
             out.push(0);
         }
-        let bytes = &frames[piece.station][piece.frame.clone()];
-        item::write_header(Code(0), piece.item.element, bytes.len(), out);
-        out.extend_from_slice(bytes);
+        let length = piece.item.range().len();
+        item::write_header(Code(0), piece.item.element, length, out);
+        let data = out.len();
+        out.resize(data + length, 0);
+        piece.gather(&frames[piece.station], &mut out[data..]);
     }
 }
 
@@ -463,14 +528,6 @@ fn whole(answer: &Pdu<'_>) -> Result<(), End> {
         (Kind::Ack | Kind::AckData, error::NONE) => Ok(()),
         (Kind::Ack | Kind::AckData, code) => Err(End::Refused(Refusal::Job(code))),
         _ => Err(Fault::Answer("a system function").into()),
-    }
-}
-
-fn good(way: Way, piece: &Piece, code: Code) -> Result<(), End> {
-    if code == Code::OK {
-        Ok(())
-    } else {
-        Err(End::Refused(Refusal::item(way, piece.item, code)))
     }
 }
 

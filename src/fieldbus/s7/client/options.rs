@@ -1,12 +1,16 @@
 //! What a driver.cfg says to the bus `s7-client`.
 
+use std::collections::BTreeMap;
+
+use super::Frames;
 use crate::config::{Collector, Table, Value};
 use crate::fieldbus::s7::item::Object;
 use crate::fieldbus::s7::transport::PORT;
 use crate::fieldbus::s7::tsap::{RACK, SLOT};
-use crate::fieldbus::s7::{Start, Tsap, pdu, read_pdu};
+use crate::fieldbus::s7::{Start, Tsap, Variable, pdu, read_pdu};
 use crate::fieldbus::tcp::{Address, AddressError};
-use crate::signal::{Area, SignalTable};
+use crate::fieldbus::{At, Role};
+use crate::signal::{Area, Signal, SignalTable};
 
 /// This end, as libraries and programming devices name themselves.
 const CALLING: [u8; 2] = [1, 0];
@@ -25,6 +29,8 @@ pub struct ClientOptions {
     pub called: Tsap,
     /// Where `%I` and `%Q` of each station lie in the CPU; one pair where there are no `[[station]]` tables.
     pub places: Vec<[Option<Start>; 2]>,
+    /// Where single signals lie, by their names: the lines of `[fieldbus.at]`.
+    pub variables: BTreeMap<String, Variable>,
     /// The longest unit that is asked for.
     pub pdu: u16,
     /// The identity of the CPU that may be written to.
@@ -34,6 +40,7 @@ pub struct ClientOptions {
     /// Where the `[fieldbus]` table stands, for complaints, and whether `[[station]]` tables have been read.
     at: usize,
     has_stations: bool,
+    role: Role,
 }
 
 impl ClientOptions {
@@ -56,9 +63,94 @@ impl ClientOptions {
         }
     }
 
+    /// Where a signal lies: as its line in `[fieldbus.at]` says, or else within its area of its station.
+    pub fn variable(&self, signal: &Signal) -> Option<Variable> {
+        if let Some(variable) = self.variables.get(&signal.name) {
+            return Some(*variable);
+        }
+        let start = self.place(signal.station, signal.area)?;
+        Some(Variable {
+            object: start.object,
+            byte: start.byte + signal.byte,
+            bit: signal.bit,
+            width: signal.data_type.width(),
+            data_type: Some(signal.data_type),
+        })
+    }
+
+    /// What is written and what is read in one cycle, for people.
+    pub(in crate::fieldbus) fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
+        let frames = Frames::new(self, table, self.role);
+        let writes = match self.write_to {
+            Some(_) => "writes",
+            None => "would write",
+        };
+        let ways = [writes, "reads"].into_iter();
+        ways.zip(frames.summary(self.pdu))
+            .map(|(way, what)| format!("{way} {what}"))
+            .collect()
+    }
+
+    /// Takes the lines of `[fieldbus.at]`.
+    pub(in crate::fieldbus) fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        const RIGHT: &str = "write it as TIA Portal does, such as \"%DB10.DBX0.3\", \"%DB10.DBW2\", \"%MD20\" or \
+            \"%I0.0\", with a type behind it if you like, \"%DB10.DBD4:REAL\"; \"DB10,REAL4\" and, for a LOGO!, \
+            \"VW20\" will do, too";
+        for line in lines {
+            let signal = &table.signals[line.signal];
+            let variable: Variable = match line.text.parse() {
+                Ok(variable) => variable,
+                Err(what) => {
+                    line.wrong(what, RIGHT);
+                    continue;
+                }
+            };
+            if let Err((what, right)) = variable.check(signal) {
+                line.wrong(what, right);
+            }
+            self.variables.insert(signal.name.clone(), variable);
+        }
+        self.report_overlaps(lines, table);
+    }
+
+    /// Reports signals that would be written over one another. What is read may be read twice.
+    fn report_overlaps(&self, lines: &[At<'_>], table: &SignalTable) {
+        let (sends, _) = self.role.areas();
+        let written = table.signals.iter().enumerate();
+        let mut written: Vec<_> = written
+            .filter(|(_, signal)| signal.area == sends)
+            .filter_map(|(index, signal)| {
+                let variable = self.variable(signal)?;
+                let (first, bits) = variable.bits();
+                Some((variable.object, first, first + bits, index))
+            })
+            .collect();
+        written.sort_unstable();
+        // The one of those before that reaches farthest.
+        let mut last: Option<(Object, usize, usize)> = None;
+        for (object, first, end, index) in written {
+            if let Some((before, reach, other)) = last
+                && before == object
+                && first < reach
+            {
+                let line = |index| lines.iter().find(|line| line.signal == index);
+                let (one, two) = (&table.signals[index].name, &table.signals[other].name);
+                if let Some(line) = line(index).or_else(|| line(other)) {
+                    line.wrong(
+                        format!("\"{one}\" and \"{two}\" would be written over one another"),
+                        "give each signal that is written bits of its own",
+                    );
+                }
+            }
+            if last.is_none_or(|(before, reach, _)| before != object || end > reach) {
+                last = Some((object, end, index));
+            }
+        }
+    }
+
     /// Reads `address`, `rack`, `slot`, `remote_tsap`, `local_tsap`, `input`, `output`, `pdu`, `write_to` and
     /// `events`. `moved` says that [`set_address`](Self::set_address) follows.
-    pub(in crate::fieldbus) fn read(moved: bool, mut table: Table<'_>) -> Option<Self> {
+    pub(in crate::fieldbus) fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
         let at = table.at();
         let address = if moved {
             table.take("address")
@@ -116,6 +208,7 @@ impl ClientOptions {
                 input.or(Some(first(Object::Inputs))),
                 output.or(Some(first(Object::Outputs))),
             ]],
+            variables: BTreeMap::new(),
             pdu: unit?,
             write_to: match write_to {
                 None => None,
@@ -124,6 +217,7 @@ impl ClientOptions {
             events: events?,
             at,
             has_stations: false,
+            role,
         })
     }
 
@@ -148,14 +242,22 @@ impl ClientOptions {
     pub(in crate::fieldbus) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         for (index, station) in table.stations.iter().enumerate() {
             for (area, key) in [(Area::Input, "input"), (Area::Output, "output")] {
-                if station.bytes(area) > 0 && self.place(index, area).is_none() {
+                let mut signals = table.signals.iter();
+                let is_nowhere = |signal: &Signal| {
+                    (signal.station, signal.area) == (index, area)
+                        && self.variable(signal).is_none()
+                };
+                if signals.any(is_nowhere) {
                     collector.report(
                         self.at,
                         format!(
                             "the station \"{}\" does not say where its {area} lies",
                             station.name
                         ),
-                        format!("add {key} = \"DB10\", or another place, to its [[station]] table"),
+                        format!(
+                            "add {key} = \"DB10\", or another place, to its [[station]] table, or give each of \
+                             its signals there a line in [fieldbus.at]"
+                        ),
                     );
                 }
             }

@@ -1,4 +1,7 @@
-//! From images to jobs: what is written and read in one cycle, as few jobs as the agreed length allows.
+//! From signals to jobs: what is written and read in one cycle, in as few jobs as the agreed length allows.
+//!
+//! What is read may be read together with bytes between that nobody asked for. What is written is what signals
+//! cover, to the bit: a byte of which signals cover some bits is written by those bits, each an item of its own.
 
 use std::ops::Range;
 
@@ -8,12 +11,13 @@ use crate::fieldbus::s7::pdu;
 /// The most items of a job that every CPU takes.
 const ITEMS: usize = 20;
 
-/// Images are cut at multiples of this, so that no value that lies at a multiple of its width is in two jobs.
-const GRAIN: usize = 8;
-
 /// Bytes before the items of a job, and of an answer: header, function, number of items.
 const JOB: usize = pdu::JOB_HEADER + 2;
 const ANSWER: usize = pdu::ANSWER_HEADER + 2;
+
+/// Gaps that may be read over, in bytes. The shortest costs less than an item of its own; a longer one is read over
+/// where that saves a job.
+const GAPS: [usize; 4] = [item::DATA_HEADER, 16, 64, 128];
 
 /// What a job does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,12 +26,15 @@ pub(super) enum Way {
     Read,
 }
 
-/// A piece of a station's frame, and where it lies in the CPU.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Piece {
+/// A signal: where it lies in the frame of its station, and where in the CPU. All in bits; more than one of them are
+/// whole bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Field {
     pub(super) station: usize,
-    pub(super) frame: Range<usize>,
-    pub(super) item: Item,
+    pub(super) frame: usize,
+    pub(super) object: Object,
+    pub(super) first: usize,
+    pub(super) bits: usize,
 }
 
 /// One job.
@@ -37,61 +44,193 @@ pub(super) struct Job {
     pub(super) pieces: Vec<Piece>,
 }
 
-/// A frame and where it lies: station, object, first byte there, length.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Image {
+/// One item of a job, and the bits of a station's frame that it carries.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Piece {
     pub(super) station: usize,
-    pub(super) object: Object,
-    pub(super) byte: usize,
-    pub(super) length: usize,
+    pub(super) item: Item,
+    copies: Vec<Copy>,
 }
 
-/// The jobs that carry `images`, none of which, nor its answer, is longer than `limit`.
-pub(super) fn jobs(way: Way, images: &[Image], limit: usize) -> Vec<Job> {
-    let mut jobs: Vec<Job> = Vec::new();
-    // Lengths of the last job and of its answer.
-    let mut lengths = [0, 0];
-    for image in images {
-        let mut begin = 0;
-        while begin < image.length {
-            let rest = image.length - begin;
-            let open = jobs.last().filter(|job| job.pieces.len() < ITEMS);
-            let room = open.map_or(0, |_| room(way, lengths, limit));
-            // A new job is begun rather than that the rest of an old one is filled with a piece.
-            let (take, is_new) = if rest <= room {
-                (rest, false)
-            } else {
-                let whole = self::room(way, [JOB, ANSWER], limit);
-                let take = if rest <= whole {
-                    rest
-                } else {
-                    whole / GRAIN * GRAIN
-                };
-                (take, true)
-            };
-            if is_new {
-                jobs.push(Job {
-                    way,
-                    pieces: Vec::new(),
-                });
-                lengths = [JOB, ANSWER];
-            }
-            let first = image.byte + begin;
-            let job = jobs.last_mut().expect("one was there, or was made");
-            job.pieces.push(Piece {
-                station: image.station,
-                frame: begin..begin + take,
-                item: Item::bytes(image.object, first..first + take),
-            });
-            let data = item::DATA_HEADER + take.next_multiple_of(2);
-            lengths = match way {
-                Way::Write => [lengths[0] + item::ADDRESS + data, lengths[1] + 1],
-                Way::Read => [lengths[0] + item::ADDRESS, lengths[1] + data],
-            };
-            begin += take;
+/// Bits that lie in the frame and in the data of an item.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Copy {
+    frame: usize,
+    data: usize,
+    bits: usize,
+}
+
+impl Piece {
+    /// Fills `data`, the item's, from a frame.
+    pub(super) fn gather(&self, frame: &[u8], data: &mut [u8]) {
+        for copy in &self.copies {
+            carry(frame, copy.frame, data, copy.data, copy.bits);
         }
     }
-    jobs
+
+    /// Takes `data`, the item's, over into a frame.
+    pub(super) fn scatter(&self, data: &[u8], frame: &mut [u8]) {
+        for copy in &self.copies {
+            carry(data, copy.data, frame, copy.frame, copy.bits);
+        }
+    }
+}
+
+fn carry(from: &[u8], at: usize, to: &mut [u8], into: usize, bits: usize) {
+    if bits == 1 {
+        let bit = from[at / 8] >> (at % 8) & 1;
+        let byte = &mut to[into / 8];
+        *byte = *byte & !(1 << (into % 8)) | bit << (into % 8);
+    } else {
+        let (at, into, count) = (at / 8, into / 8, bits / 8);
+        to[into..into + count].copy_from_slice(&from[at..at + count]);
+    }
+}
+
+/// What cannot be divided: the bytes of a value or of BOOLs side by side, or one bit.
+struct Cell {
+    station: usize,
+    object: Object,
+    bytes: Range<usize>,
+    bit: Option<u8>,
+    fields: Vec<Field>,
+}
+
+/// The jobs that carry `fields`, none of which, nor its answer, is longer than `limit`.
+pub(super) fn jobs(way: Way, fields: &[Field], limit: usize) -> Vec<Job> {
+    let cells = cells(way, fields);
+    let plan = |gap| pack(way, pieces(way, &cells, gap, limit), limit);
+    match way {
+        Way::Write => plan(0),
+        Way::Read => {
+            let plans = GAPS.map(plan).into_iter();
+            plans.min_by_key(Vec::len).unwrap_or_default()
+        }
+    }
+}
+
+fn cells(way: Way, fields: &[Field]) -> Vec<Cell> {
+    let mut sorted = fields.to_vec();
+    // The BOOLs of a byte are neighbours, even where somebody reads them as a word, too.
+    sorted.sort_by_key(|field| {
+        let Field { first, bits, .. } = *field;
+        (field.station, field.object, first / 8, bits > 1, first)
+    });
+    let same = |a: &Field, b: &Field| {
+        let byte = |field: &Field| (field.station, field.object, field.first / 8);
+        (a.bits, b.bits) == (1, 1) && byte(a) == byte(b)
+    };
+    let mut cells = Vec::new();
+    for group in sorted.chunk_by(same) {
+        let [Field { first, bits, .. }, ..] = *group else {
+            continue;
+        };
+        let cell = |fields: &[Field], bit| Cell {
+            station: fields[0].station,
+            object: fields[0].object,
+            bytes: first / 8..first / 8 + bits.div_ceil(8),
+            bit,
+            fields: fields.to_vec(),
+        };
+        let covered = group
+            .iter()
+            .fold(0, |bits, field| bits | 1 << (field.first % 8));
+        if way == Way::Read || bits > 1 || covered == 0xFF_u32 {
+            cells.push(cell(group, None));
+        } else {
+            let one = |field: &Field| {
+                let bit = u8::try_from(field.first % 8).expect("below 8");
+                cell(std::slice::from_ref(field), Some(bit))
+            };
+            cells.extend(group.iter().map(one));
+        }
+    }
+    cells
+}
+
+/// Cells that follow one another, or have a gap of `gap` bytes at most, are one item.
+fn pieces(way: Way, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
+    let room = room(way, [JOB, ANSWER], limit);
+    let mut pieces: Vec<Piece> = Vec::new();
+    for cell in cells {
+        let open = pieces.last_mut().filter(|piece| {
+            let range = piece.item.range();
+            (piece.station, piece.item.object, piece.item.bit())
+                == (cell.station, cell.object, None)
+                && cell.bit.is_none()
+                && cell.bytes.start <= range.end + gap
+                && cell.bytes.end.max(range.end) - range.start <= room
+        });
+        let piece = if let Some(piece) = open {
+            let range = piece.item.range();
+            piece.item = Item::bytes(cell.object, range.start..range.end.max(cell.bytes.end));
+            piece
+        } else {
+            pieces.push(Piece {
+                station: cell.station,
+                item: match cell.bit {
+                    Some(bit) => Item::bit_of(cell.object, cell.bytes.start, bit),
+                    None => Item::bytes(cell.object, cell.bytes.clone()),
+                },
+                copies: Vec::new(),
+            });
+            pieces.last_mut().expect("it was pushed")
+        };
+        // The data of a bit are a byte with the bit as its lowest.
+        let begin = piece.item.byte * 8 + usize::from(piece.item.bit);
+        for field in &cell.fields {
+            let copy = Copy {
+                frame: field.frame,
+                data: field.first - begin,
+                bits: field.bits,
+            };
+            match piece.copies.last_mut() {
+                Some(last) if last.is_followed_by(copy) => last.bits += copy.bits,
+                _ => piece.copies.push(copy),
+            }
+        }
+    }
+    pieces
+}
+
+impl Copy {
+    /// Whether both are one run of whole bytes.
+    const fn is_followed_by(self, next: Self) -> bool {
+        self.bits > 1
+            && next.bits > 1
+            && self.frame + self.bits == next.frame
+            && self.data + self.bits == next.data
+    }
+}
+
+/// Puts each piece into the first job that has room for it.
+fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
+    // Each with its length and that of its answer.
+    let mut jobs: Vec<(Job, [usize; 2])> = Vec::new();
+    for piece in pieces {
+        let bytes = piece.item.range().len();
+        let mut open = jobs.iter_mut().filter(|(job, lengths)| {
+            job.pieces.len() < ITEMS && bytes <= room(way, *lengths, limit)
+        });
+        let index = open.next();
+        let (job, lengths) = match index {
+            Some(open) => open,
+            None => {
+                let pieces = Vec::new();
+                jobs.push((Job { way, pieces }, [JOB, ANSWER]));
+                jobs.last_mut().expect("it was pushed")
+            }
+        };
+        let data = item::DATA_HEADER + bytes.next_multiple_of(2);
+        let [job_length, answer] = lengths;
+        *job_length += item::ADDRESS;
+        match way {
+            Way::Write => (*job_length, *answer) = (*job_length + data, *answer + 1),
+            Way::Read => *answer += data,
+        }
+        job.pieces.push(piece);
+    }
+    jobs.into_iter().map(|(job, _)| job).collect()
 }
 
 /// How many bytes one more item of a job may have.
@@ -106,71 +245,4 @@ fn room(way: Way, [job, answer]: [usize; 2], limit: usize) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn image(station: usize, length: usize) -> Image {
-        Image {
-            station,
-            object: Object::Block(10),
-            byte: 100,
-            length,
-        }
-    }
-
-    fn lengths(job: &Job) -> [usize; 2] {
-        let items = job.pieces.len() * item::ADDRESS;
-        let data: usize = job
-            .pieces
-            .iter()
-            .map(|piece| item::DATA_HEADER + piece.frame.len().next_multiple_of(2))
-            .sum();
-        match job.way {
-            Way::Write => [JOB + items + data, ANSWER + job.pieces.len()],
-            Way::Read => [JOB + items, ANSWER + data],
-        }
-    }
-
-    #[test]
-    fn every_byte_is_carried_once_and_no_job_is_too_long() {
-        for way in [Way::Write, Way::Read] {
-            for limit in [64, 112, 240, 480, 960] {
-                for sizes in [&[1][..], &[360], &[134, 3, 5, 1], &[1; 50], &[4096, 1]] {
-                    let images = sizes.iter().enumerate();
-                    let images: Vec<Image> = images
-                        .map(|(station, size)| image(station, *size))
-                        .collect();
-                    let jobs = jobs(way, &images, limit);
-                    let mut carried = vec![0; sizes.len()];
-                    for job in &jobs {
-                        assert!(!job.pieces.is_empty() && job.pieces.len() <= ITEMS);
-                        let long = lengths(job).into_iter().any(|length| length > limit);
-                        assert!(!long, "{way:?} {limit} {job:?}");
-                        for piece in &job.pieces {
-                            let carried = &mut carried[piece.station];
-                            assert_eq!(piece.frame.start, *carried);
-                            assert_eq!(piece.item.range().start, 100 + *carried);
-                            assert_eq!(piece.item.range().len(), piece.frame.len());
-                            *carried = piece.frame.end;
-                        }
-                    }
-                    assert_eq!(carried, sizes);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn what_fits_into_one_job_is_one_job_and_long_images_are_cut_between_values() {
-        assert_eq!(jobs(Way::Write, &[image(0, 360)], 480).len(), 1);
-        assert_eq!(
-            jobs(Way::Read, &[image(0, 134), image(1, 130)], 480).len(),
-            1
-        );
-        assert_eq!(jobs(Way::Read, &[image(0, 462)], 480).len(), 1);
-        let cut = jobs(Way::Read, &[image(0, 463)], 480);
-        assert_eq!(cut[0].pieces[0].frame, 0..456);
-        assert_eq!(cut[1].pieces[0].frame, 456..463);
-        assert!(jobs(Way::Read, &[image(0, 0)], 480).is_empty());
-    }
-}
+mod tests;

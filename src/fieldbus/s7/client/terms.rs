@@ -3,9 +3,9 @@
 use std::fmt;
 
 use super::Refusal;
-use crate::fieldbus::BusError;
-use crate::fieldbus::s7::lists::Identity;
+use crate::fieldbus::s7::szl::Identity;
 use crate::fieldbus::s7::{Fault, Tsap};
+use crate::fieldbus::{BusError, PlcState};
 use crate::time::Nanos;
 
 /// What both ends of a connection, or this one, have agreed upon.
@@ -61,6 +61,8 @@ impl From<Fault> for End {
 pub enum News {
     /// The connection stands, with units of this length at most; the CPU says who it is, or nothing.
     Met(u16, Option<Identity>),
-    /// The images have been written, and read.
+    /// What is to be written has been, and what is to be read.
     Done,
+    /// The CPU says whether it runs; nothing where it does not say.
+    State(Option<PlcState>),
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::fieldbus::s7::hex;
-use crate::fieldbus::s7::lists::{self, Identity};
+use crate::fieldbus::s7::szl::{self, Identity};
 
 /// Inputs that count up, outputs and DB 1 over the same bytes, four flags; one job after the other.
 #[derive(Default)]
@@ -57,6 +57,7 @@ impl Line {
                 identity: Identity::of_driver("Test rig"),
                 pdu: 480,
                 clients: 32,
+                epoch: Facts::NEVER_SET,
             },
         }
     }
@@ -390,7 +391,7 @@ fn question(line: &mut Line, parameters: &str, data: &str) -> (Vec<u8>, Vec<u8>)
 fn a_list_that_is_too_long_is_fetched_piece_by_piece() {
     let mut whole = Vec::new();
     let mut line = Line::agreed(64);
-    lists::write(0x001C, 0, &line.facts, Nanos::ZERO, &mut whole).expect("it is there");
+    szl::write(0x001C, 0, &line.facts, Nanos::ZERO, &mut whole).expect("it is there");
     let (mut more, data) = question(&mut line, "000112041144 0100", "ff 09 0004 001c 0000");
     let mut fetched = data[4..].to_vec();
     let mut units = 1;
@@ -433,6 +434,16 @@ fn the_clock_and_the_blocks_are_told() {
     assert_eq!(data.len(), 4 + 78);
     assert_eq!(data[4 + 12..4 + 14], [1, 0x2C], "its number");
     assert_eq!(data[4 + 40..4 + 42], [0, 10], "its length");
+}
+
+#[test]
+fn the_first_question_of_plc4x_is_answered_though_it_states_more_bytes_than_it_has() {
+    let mut line = Line::agreed(480);
+    let right = question(&mut line, "000112041144 0100", "ff 09 0004 0011 0000");
+    let of_plc4x = question(&mut line, "000112041144 0100", "ff 09 000c 0011 0000");
+    assert_eq!(right, of_plc4x);
+    assert_eq!(right.0[3..], [0, 0], "no error");
+    assert_eq!(right.1[4..8], [0, 0x11, 0, 0]);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::signal::{SignalTable, fail_safe_frame};
 use crate::time::{Nanos, Stop};
 
 use super::item::{Code, Object};
-use super::lists::{Facts, Identity};
+use super::szl::{Facts, Identity};
 use super::{Conversation, Fault, Memory, transport};
 
 use map::{Map, Place};
@@ -43,6 +43,7 @@ impl S7Server {
             identity: Identity::of_driver(name),
             pdu: options.pdu,
             clients: u16::try_from(options.clients).unwrap_or(u16::MAX),
+            epoch: Facts::NEVER_SET,
         };
         Self {
             address: options.address.clone(),
@@ -65,6 +66,9 @@ impl S7Server {
 
 impl Free for S7Server {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        if let Some(epoch) = port.clock().epoch() {
+            self.service.facts.epoch = epoch;
+        }
         tcp::serve(&self.address, &mut self.service, port, stop)
     }
 }

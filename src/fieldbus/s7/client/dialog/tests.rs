@@ -1,4 +1,5 @@
 use super::*;
+use crate::fieldbus::PlcState;
 use crate::fieldbus::s7::item::Object;
 use crate::fieldbus::s7::{Tsap, hex};
 
@@ -6,11 +7,12 @@ const PATIENCE: Nanos = Nanos::from_millis(100);
 
 /// Station 0 writes 2 bytes at DB 1 byte 2 and reads 4 at DB 1 byte 0, as in the captured conversation.
 fn dialog(asks_who: bool) -> Dialog {
-    let image = |byte, length| Image {
+    let field = |byte: usize, length: usize| Field {
         station: 0,
+        frame: 0,
         object: Object::Block(1),
-        byte,
-        length,
+        first: byte * 8,
+        bits: length * 8,
     };
     let terms = Terms {
         calling: Tsap::new(&[1, 0]),
@@ -19,7 +21,12 @@ fn dialog(asks_who: bool) -> Dialog {
         patience: PATIENCE,
         asks_who,
     };
-    Dialog::new(terms, Nanos::ZERO, vec![image(2, 2)], vec![image(0, 4)])
+    let frames = Frames {
+        written: vec![field(2, 2)],
+        read: vec![field(0, 4)],
+        lengths: vec![[2, 4]],
+    };
+    frames.dialog(terms, Nanos::ZERO)
 }
 
 /// What the dialog has to say.
@@ -185,35 +192,76 @@ fn a_refusal_ends_the_connection_and_is_told() {
         ),
         Refusal::Job(error::NO_FUNCTION)
     );
-    let mut working = met();
-    working.begin(Nanos::ZERO);
-    let Refusal::Item {
+}
+
+#[test]
+fn an_item_that_is_refused_is_told_and_the_rest_of_the_cycle_is_done() {
+    let mut dialog = met();
+    dialog.begin(Nanos::ZERO);
+    hears(
+        &mut dialog,
+        "03 00 00 16 02 f0 80 32 03 0000 0002 0002 0001 00 00 05 01 0a",
+    )
+    .expect("right");
+    assert_eq!(hears(&mut dialog, READ), Ok(Some(News::Done)));
+    let Some(Refusal::Item {
         written,
         item,
         code,
-    } = refused(
-        &mut working,
-        "03 00 00 16 02 f0 80 32 03 0000 0002 0002 0001 00 00 05 01 0a",
-    )
+    }) = dialog.refusal(0)
     else {
         panic!("an item was refused");
     };
-    assert_eq!((written, item.range(), code), (true, 2..4, Code::MISSING));
-    let mut working = met();
-    working.begin(Nanos::ZERO);
-    hears(&mut working, WRITTEN).expect("right");
-    let refusal = refused(
-        &mut working,
-        "03 00 00 19 02 f0 80 32 03 0000 0003 0002 0004 00 00 04 01 05 00 0000",
-    );
+    assert_eq!((*written, item.range(), *code), (true, 2..4, Code::MISSING));
+    assert_eq!(dialog.frame_read(0), [1, 2, 3, 4]);
+
+    let mut dialog = met();
+    dialog.begin(Nanos::ZERO);
+    hears(&mut dialog, WRITTEN).expect("right");
+    let refused = "03 00 00 19 02 f0 80 32 03 0000 0003 0002 0004 00 00 04 01 05 00 0000";
+    assert_eq!(hears(&mut dialog, refused), Ok(Some(News::Done)));
     assert!(matches!(
-        refusal,
-        Refusal::Item {
+        dialog.refusal(0),
+        Some(Refusal::Item {
             written: false,
             code: Code::ADDRESS,
             ..
-        }
+        })
     ));
+    // Left out, there is nothing to do; and taken in again, it is as it was.
+    dialog.suspend(0, true);
+    assert_eq!(dialog.begin(Nanos::ZERO), Some(News::Done));
+    assert_eq!(dialog.refusal(0), None);
+    dialog.suspend(0, false);
+    assert_eq!(dialog.begin(Nanos::ZERO), None);
+}
+
+const RUNS: &str = "03 00 00 3d 02 f0 80 32 07 0000 0002 000c 0020 0001120812840100 00 00 0000 \
+    ff 09 001c 0424 0000 0014 0001 5144ff08 0000000000000000 9401010000000007";
+
+#[test]
+fn a_cpu_is_asked_whether_it_runs() {
+    let ask = |answer: &str| {
+        let mut dialog = met();
+        dialog.ask_state(Nanos::ZERO);
+        assert!(dialog.asks_state() && !dialog.asks_who() && !dialog.is_idle());
+        says(
+            &mut dialog,
+            "03 00 00 21 02 f0 80 32 07 0000 0002 0008 0008 0001120411440100 ff 09 0004 0424 0000",
+        );
+        let news = hears(&mut dialog, answer);
+        assert!(dialog.is_idle());
+        news
+    };
+    assert_eq!(ask(RUNS), Ok(Some(News::State(Some(PlcState::Run)))));
+    let stops = RUNS.replace("5144ff08", "4302ff84");
+    assert_eq!(ask(&stops), Ok(Some(News::State(Some(PlcState::Stop)))));
+    for refuses in [
+        "03 00 00 21 02 f0 80 32 07 0000 0002 000c 0004 0001120812840100 00 00 d401 0a 00 0000",
+        "03 00 00 13 02 f0 80 32 02 0000 0002 0000 0000 81 04",
+    ] {
+        assert_eq!(ask(refuses), Ok(Some(News::State(None))));
+    }
 }
 
 #[test]

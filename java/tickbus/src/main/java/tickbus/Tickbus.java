@@ -149,7 +149,7 @@ public final class Tickbus implements AutoCloseable {
         Objects.requireNonNull(tables, "tables");
         NativeLibrary.load();
         Layout layout = new Layout();
-        long handle = initializeNative(driverCfg.toString(), tables, layout);
+        long handle = initializeNative(nameOf(driverCfg), tables, layout);
         try {
             layout.check();
             return new Tickbus(handle, layout);
@@ -157,6 +157,12 @@ public final class Tickbus implements AutoCloseable {
             finalizeNative(handle);
             throw e;
         }
+    }
+
+    /** The file's name for native code: its URI, where the JVM's file encoding cannot hold the path as text. */
+    private static String nameOf(Path file) {
+        String name = file.toString();
+        return name.indexOf('\uFFFD') < 0 ? name : "file://" + file.toUri().getRawPath();
     }
 
     /**

@@ -1,6 +1,7 @@
 //! System status lists (SZL): what a client asks a CPU for before anything else, and who that CPU is.
 
 use super::pdu::error;
+use crate::fieldbus::PlcState;
 use crate::time::Nanos;
 
 /// Who a CPU is, as its system status lists tell it.
@@ -52,6 +53,18 @@ pub struct Facts {
     pub pdu: u16,
     /// How many clients it serves at once.
     pub clients: u16,
+    /// What its clock showed when the driver's showed zero, as the time since 1 January 1970.
+    pub epoch: Nanos,
+}
+
+impl Facts {
+    /// 1 January 1994: where the clock of a CPU begins that was never set.
+    pub const NEVER_SET: Nanos = Nanos::from_secs(8_766 * 86_400);
+
+    /// The CPU's clock at `now`, as `DATE_AND_TIME`.
+    pub fn clock(&self, now: Nanos) -> [u8; 8] {
+        date_and_time(self.epoch + now)
+    }
 }
 
 /// Lengths of texts in the lists.
@@ -67,9 +80,12 @@ const MODULE: usize = 2 + ORDER + 6;
 /// Bytes before the records of a list: its id, its index, length of a record, number of records.
 const HEADER: usize = 8;
 
+/// The list that tells whether a CPU runs.
+pub const STATE: u16 = 0x0424;
+
 /// Lists that a server of ours has.
-const LISTS: [u16; 9] = [
-    0x0000, 0x0011, 0x0111, 0x001C, 0x011C, 0x0131, 0x0132, 0x0232, 0x0424,
+const LISTS: [u16; 11] = [
+    0x0000, 0x0011, 0x0111, 0x0019, 0x001C, 0x011C, 0x0074, 0x0131, 0x0132, 0x0232, STATE,
 ];
 
 /// Appends the list `id`, or its part `index`, as a CPU gives it at `now`.
@@ -84,11 +100,14 @@ pub fn write(id: u16, index: u16, facts: &Facts, now: Nanos, out: &mut Vec<u8>) 
         0x0111 => one_of(modules(&facts.identity), index)?,
         0x001C => components(&facts.identity),
         0x011C => one_of(components(&facts.identity), index)?,
-        // Index 1 tells of communication in general, 4 of protection.
+        0x0019 | 0x0074 => leds(),
+        // Index 1 tells of communication in general, 3 of operating and monitoring, 4 of protection.
         0x0131 if index <= 1 => vec![communication(facts)],
+        0x0131 if index == 3 => vec![monitoring(facts)],
+        0x0132 if index == 1 => vec![connections(facts)],
         0x0132 if index == 4 => vec![protection()],
         0x0232 if index == 4 || index == 0 => vec![protection()],
-        0x0424 => vec![running(now)],
+        STATE => vec![running(facts.clock(now))],
         0x0131 | 0x0132 | 0x0232 => return Err(error::NO_INDEX),
         _ => return Err(error::NO_LIST),
     };
@@ -156,6 +175,33 @@ fn communication(facts: &Facts) -> Vec<u8> {
     record
 }
 
+/// What panels may ask for: to read once and to write once, and none of the cyclic services.
+fn monitoring(facts: &Facts) -> Vec<u8> {
+    let mut record = vec![0, 3, 0b11, 0, 0, 0];
+    // Bytes that are read as a whole: those of one unit, without what stands around them.
+    let whole = facts.pdu.saturating_sub(18);
+    record.extend_from_slice(&whole.to_be_bytes());
+    record.resize(40, 0);
+    record
+}
+
+/// One connection kept for a programming device and one for a panel, none of them in use, and how many are free.
+fn connections(facts: &Facts) -> Vec<u8> {
+    let mut record = Vec::new();
+    for word in [1, 1, 1, 0, 0, 0, 0, facts.clients] {
+        record.extend_from_slice(&word.to_be_bytes());
+    }
+    record.resize(40, 0);
+    record
+}
+
+/// The lamps SF, RUN and STOP: number, whether it is on, whether it flashes.
+fn leds() -> Vec<Vec<u8>> {
+    [[0, 1, 0, 0], [0, 4, 1, 0], [0, 5, 0, 0]]
+        .map(Vec::from)
+        .to_vec()
+}
+
 /// No password, key switch on RUN.
 fn protection() -> Vec<u8> {
     let mut record = Vec::new();
@@ -167,20 +213,18 @@ fn protection() -> Vec<u8> {
 }
 
 /// The CPU runs, since its beginning.
-fn running(now: Nanos) -> Vec<u8> {
+fn running(clock: [u8; 8]) -> Vec<u8> {
     let mut record = vec![0x51, 0x44, 0xFF, 0x08, 0, 0, 0, 0, 0, 0, 0, 0];
-    record.extend_from_slice(&clock(now));
+    record.extend_from_slice(&clock);
     record
 }
 
-/// The CPU's clock at `now`, as `DATE_AND_TIME`: a CPU whose clock was never set begins with 1994.
-///
-/// No clock of the system is looked at: equal runs give equal bytes.
-pub fn clock(now: Nanos) -> [u8; 8] {
-    let millis = (now.0 / 1_000_000).max(0);
+/// A time since 1 January 1970 as `DATE_AND_TIME`.
+fn date_and_time(since: Nanos) -> [u8; 8] {
+    let millis = (since.0 / 1_000_000).max(0);
     let (days, of_day) = (millis / 86_400_000, millis % 86_400_000);
     // By Howard Hinnant's algorithm for civil dates; day 0 is 1 March of the year 0.
-    let day = days + 728_234;
+    let day = days + 719_468;
     let era = day / 146_097;
     let of_era = day % 146_097;
     let year_of_era = (of_era - of_era / 1_460 + of_era / 36_524 - of_era / 146_096) / 365;
@@ -197,8 +241,8 @@ pub fn clock(now: Nanos) -> [u8; 8] {
         let number = u8::try_from(number % 100).expect("two digits");
         number / 10 * 16 + number % 10
     };
-    // 1 January 1994 was a Saturday, and 1 is Sunday.
-    let weekday = u8::try_from((days + 6) % 7 + 1).expect("a day of the week");
+    // 1 January 1970 was a Thursday, and 1 is Sunday.
+    let weekday = u8::try_from((days + 4) % 7 + 1).expect("a day of the week");
     let (seconds, millis) = (of_day / 1000, of_day % 1000);
     let ones = u8::try_from(millis % 10).expect("a digit");
     [
@@ -211,6 +255,27 @@ pub fn clock(now: Nanos) -> [u8; 8] {
         bcd(millis / 10),
         ones * 16 + weekday,
     ]
+}
+
+/// Whether a CPU runs, as its list 0x0424 says; `None` when it does not say.
+///
+/// The fourth byte of the record has the state that was entered in its lower half, and the one before in the upper.
+pub fn state(list: &[u8]) -> Option<PlcState> {
+    let (header, record) = list.split_first_chunk::<HEADER>()?;
+    let [_, _, _, entered, ..] = *record else {
+        return None;
+    };
+    if header[..2] != STATE.to_be_bytes() {
+        return None;
+    }
+    Some(match entered & 0x0F {
+        // It does not know.
+        0 => return None,
+        // RUN; of a redundant pair also RUN-R, LINK-UP and UPDATE, in which the program goes on.
+        0x8 | 0x9 | 0xB | 0xC => PlcState::Run,
+        // STOP in its kinds, STARTUP, HOLD, DEFECTIVE.
+        _ => PlcState::Stop,
+    })
 }
 
 /// Takes what lists 0x0011 and 0x001C say into an identity. `list` begins with its id.
@@ -294,6 +359,7 @@ mod tests {
             identity: Identity::of_driver("Test rig"),
             pdu: 960,
             clients: 32,
+            epoch: Facts::NEVER_SET,
         }
     }
 
@@ -321,6 +387,7 @@ mod tests {
             (0x0111, 9, error::NO_INDEX),
             (0x011C, 6, error::NO_INDEX),
             (0x0131, 2, error::NO_INDEX),
+            (0x0132, 2, error::NO_INDEX),
             (0x0132, 8, error::NO_INDEX),
         ] {
             let mut list = Vec::new();
@@ -378,18 +445,73 @@ mod tests {
     }
 
     #[test]
-    fn the_clock_begins_with_1994() {
+    fn a_panel_is_told_that_there_are_no_cyclic_services_and_which_lamps_are_on() {
+        let list = |id, index| {
+            let mut list = Vec::new();
+            write(id, index, &facts(), Nanos::ZERO, &mut list).expect("it is there");
+            list.split_off(HEADER)
+        };
+        assert_eq!(list(0x0131, 3)[..8], [0, 3, 0b11, 0, 0, 0, 0x03, 0xAE]);
+        assert_eq!(list(0x0132, 1)[..2], [0, 1]);
+        for id in [0x0019, 0x0074] {
+            assert_eq!(list(id, 0), [0, 1, 0, 0, 0, 4, 1, 0, 0, 5, 0, 0]);
+        }
+    }
+
+    #[test]
+    fn a_cpu_runs_if_its_list_says_so() {
+        let mut list = Vec::new();
+        write(STATE, 0, &facts(), Nanos::ZERO, &mut list).expect("it is there");
+        assert_eq!(state(&list), Some(PlcState::Run), "as our server says it");
+        for (entered, said) in [
+            (0x08, Some(PlcState::Run)),
+            (0x68, Some(PlcState::Run)),
+            (0x09, Some(PlcState::Run)),
+            (0x00, None),
+            (0x03, Some(PlcState::Stop)),
+            (0x04, Some(PlcState::Stop)),
+            (0x84, Some(PlcState::Stop)),
+            (0x06, Some(PlcState::Stop)),
+            (0x0A, Some(PlcState::Stop)),
+            (0x0D, Some(PlcState::Stop)),
+        ] {
+            list[HEADER + 3] = entered;
+            assert_eq!(state(&list), said, "{entered:02X}");
+        }
+        for cut in 0..HEADER + 4 {
+            assert_eq!(state(&list[..cut]), None, "{cut}");
+        }
+        list[1] = 0x25;
+        assert_eq!(state(&list), None, "another list");
+    }
+
+    #[test]
+    fn the_clock_of_a_cpu_that_was_never_set_begins_with_1994() {
+        let facts = facts();
         assert_eq!(
-            clock(Nanos::ZERO),
+            facts.clock(Nanos::ZERO),
             [0x94, 0x01, 0x01, 0, 0, 0, 0, 0x07],
             "a Saturday"
         );
         let leap = Nanos::from_secs(86_400 * (365 + 365 + 31 + 28) + 12 * 3600 + 34 * 60 + 56);
         let leap = leap + Nanos::from_millis(789);
         assert_eq!(
-            clock(leap),
+            facts.clock(leap),
             [0x96, 0x02, 0x29, 0x12, 0x34, 0x56, 0x78, 0x95],
             "Thursday, 29 February 1996"
+        );
+    }
+
+    #[test]
+    fn a_clock_that_was_set_goes_on_from_its_date() {
+        // 2026-11-22 01:30:13 UTC, a Sunday.
+        let facts = Facts {
+            epoch: Nanos::from_secs(1_795_311_013),
+            ..facts()
+        };
+        assert_eq!(
+            facts.clock(Nanos::from_millis(250)),
+            [0x26, 0x11, 0x22, 0x01, 0x30, 0x13, 0x25, 0x01]
         );
     }
 }

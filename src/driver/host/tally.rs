@@ -50,6 +50,10 @@ impl Tally {
 
     /// Counts the rising edges from `before` to `now`.
     pub(super) fn count(&self, area: Area, before: &[u8], now: &[u8]) {
+        // Most scans change nothing.
+        if before == now {
+            return;
+        }
         for bit in self.bits.iter().filter(|bit| bit.area == area) {
             if !before[bit.byte] & now[bit.byte] & bit.mask != 0 {
                 bit.rises.fetch_add(1, Ordering::Relaxed);

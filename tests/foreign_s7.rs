@@ -278,7 +278,9 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
     let longs = (8..592).step_by(8).map(|byte| format!("%IL{byte}"));
     let words = (592..598).step_by(2).map(|byte| format!("%IW{byte}"));
     for address in bits.chain(["%IB1".to_owned()]).chain(longs).chain(words) {
-        further += &format!("[[signal]]\nname = \"{address}\"\naddress = \"{address}\"\n");
+        further += "[[signal]]\nname = \"here\"\naddress = \"here\"\n"
+            .replace("here", &address)
+            .as_str();
     }
     let last = &*further;
     let mut end = End::open_with(&fieldbus(""), last);

@@ -11,7 +11,12 @@ mod conformance;
 mod descriptors;
 #[path = "peers/modbus.rs"]
 mod modbus;
+#[path = "peers/modbus_plc.rs"]
+mod modbus_plc;
 mod peers;
+#[cfg(unix)]
+#[path = "peers/pty.rs"]
+mod pty;
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -19,6 +24,7 @@ use std::time::Duration;
 
 use conformance::rig::{MAX_AGE, await_that, logged, pass};
 use modbus::{Tcp, request};
+use modbus_plc::{Habit, Plc};
 use peers::{Alone, client, is_closed, leave};
 use socket2::SockRef;
 use tickbus::driver::Code;
@@ -310,4 +316,286 @@ fn the_line_runs_while_a_client_talks_and_is_stale_when_none_does() {
     device.until("it waits for the next one", |end| {
         end.link().state == LinkState::Opening
     });
+}
+
+/// A machine that asks `plc`, and may write into it though it does not say who it is.
+fn asks(plc: &Plc, further: &str) -> Alone {
+    let address = plc.address;
+    Alone::open(&format!(
+        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-client\"\naddress = \"{address}\"\n\
+         cycle = \"1ms\"\nmax_age = \"300ms\"\nreconnect = [\"1ms\"]\n{further}"
+    ))
+}
+
+const AT: &str = r#"
+[fieldbus.at]
+"level"  = "holding-register:21"
+"long"   = "input-register offset:30:LREAL"
+"door"   = "discrete-input:3"
+"valve"  = "000008"
+"force"  = "%MW40"
+"ready"  = "400101.3"
+"pump"   = "coil:5"
+"fan"    = "coil:7"
+
+[[signal]]
+name    = "level"
+address = "%QW0"
+type    = "INT"
+
+[[signal]]
+name    = "long"
+address = "%QL8"
+type    = "LREAL"
+order   = "CDAB"
+
+[[signal]]
+name    = "door"
+address = "%QX2.0"
+
+[[signal]]
+name    = "valve"
+address = "%QX2.1"
+
+[[signal]]
+name    = "force"
+address = "%ID0"
+type    = "REAL"
+
+[[signal]]
+name    = "ready"
+address = "%IX4.0"
+latch   = "rising"
+
+[[signal]]
+name    = "pump"
+address = "%IX4.1"
+
+[[signal]]
+name    = "fan"
+address = "%IX4.2"
+"#;
+
+#[test]
+fn single_signals_lie_where_the_plc_has_them_and_nothing_else_in_it_is_written() {
+    let single: modbus_plc::Habits = |_, function| match function {
+        15 | 16 => Habit::Refuses(1),
+        _ => Habit::Answers,
+    };
+    for habits in [|_, _| Habit::Answers, single] {
+        let plc = Plc::start(habits);
+        let identity = format!("modbus device at {}, unit 1", plc.address);
+        let before = plc.with(|memory| {
+            memory.registers[1][20] = 4711;
+            // 1.5 with its words in the other order.
+            memory.registers[0][30..34].copy_from_slice(&[0, 0, 0, 0x3FF8]);
+            memory.bits[1][2] = true;
+            memory.bits[0][7] = true;
+            (memory.bits.clone(), memory.registers.clone())
+        });
+        let mut machine = asks(&plc, &format!("write_to = \"{identity}\"\n{AT}"));
+        machine.end.set("force", 2.5);
+        machine.end.set("fan", 1.0);
+        machine.until("both ends have all", |end| {
+            let arrived = end.get("level") == 4711.0 && end.get("long") == 1.5;
+            let written = plc.with(|memory| memory.registers[1][40..42] == [0x4020, 0]);
+            arrived && written && end.get("door") == 1.0 && end.get("valve") == 1.0
+        });
+        // A pulse of one tick in a bit of a register is written there.
+        machine.end.set("ready", 1.0);
+        machine.end.tick();
+        machine.end.set("ready", 0.0);
+        machine.until("the PLC had the pulse", |_| {
+            plc.with(|memory| memory.registers[1][100] == 0xA5AD)
+        });
+        machine.until("it is over", |_| {
+            plc.with(|memory| memory.registers[1][100] == 0xA5A5)
+        });
+        let (mut bits, mut registers) = before;
+        bits[0][4] = false;
+        bits[0][6] = true;
+        registers[1][40..42].copy_from_slice(&[0x4020, 0]);
+        machine.end.driver.close();
+        plc.with(|memory| {
+            assert_eq!(memory.bits, bits);
+            assert_eq!(memory.registers, registers);
+        });
+    }
+}
+
+const TWO_WORDS: &str = "[[signal]]\nname = \"from\"\naddress = \"%QW0\"\n\
+                         [[signal]]\nname = \"to\"\naddress = \"%IW0\"\n\
+                         [[signal]]\nname = \"further\"\naddress = \"%IW8\"\n";
+
+#[test]
+fn registers_between_two_signals_are_left_alone() {
+    let plc = Plc::start(|_, _| Habit::Answers);
+    let write_to = format!("write_to = \"modbus device at {}, unit 1\"", plc.address);
+    let mut machine = asks(
+        &plc,
+        &format!("inputs = \"offset:100\"\n{write_to}\n{TWO_WORDS}"),
+    );
+    machine.end.set("to", 1.0);
+    machine.end.set("further", 2.0);
+    machine.until("both are written", |_| {
+        plc.with(|memory| memory.registers[1][100] == 1 && memory.registers[1][104] == 2)
+    });
+    machine.end.driver.close();
+    plc.with(|memory| assert_eq!(memory.registers[1][101..104], [0xA5A5; 3]));
+}
+
+#[test]
+fn a_plc_that_ignores_or_hangs_up_on_the_question_who_it_is_is_read_and_written() {
+    for habits in [
+        (|_, function| {
+            if function == 43 {
+                Habit::Ignores
+            } else {
+                Habit::Answers
+            }
+        }) as modbus_plc::Habits,
+        |_, function| {
+            if function == 43 {
+                Habit::HangsUp
+            } else {
+                Habit::Answers
+            }
+        },
+    ] {
+        let plc = Plc::start(habits);
+        let write_to = format!("write_to = \"modbus device at {}, unit 1\"", plc.address);
+        let mut machine = asks(
+            &plc,
+            &format!("timeout = \"20ms\"\n{write_to}\n{TWO_WORDS}"),
+        );
+        machine.until("it is read", |end| end.get("from") == f64::from(0xA5A5_u16));
+        machine.end.set("to", 7.0);
+        machine.until("it is written", |_| {
+            plc.with(|memory| memory.registers[1][1024] == 7)
+        });
+        assert_eq!(machine.end.link().state, LinkState::Running);
+        machine.end.driver.close();
+        let asked = plc.with(|memory| memory.asked.iter().filter(|asked| asked.1 == 43).count());
+        assert_eq!(asked, 2);
+    }
+}
+
+/// Two stations that a machine has, each with a register to read that is safe at -1.
+const TWO_UNITS: &str = "[[station]]\nname = \"press\"\nunit = 3\n[[station]]\nname = \"oven\"\nunit = 7\n\
+     [[signal]]\nname = \"press\"\nstation = \"press\"\naddress = \"%QW0\"\ntype = \"INT\"\nfail_safe = -1\n\
+     [[signal]]\nname = \"oven\"\nstation = \"oven\"\naddress = \"%QW0\"\ntype = \"INT\"\nfail_safe = -1\n";
+
+#[test]
+fn a_unit_in_fault_is_fail_safe_alone_and_the_other_is_read_on() {
+    logged::expect("the other stations go on");
+    for habits in [
+        (|unit, _| {
+            if unit == 7 {
+                Habit::Refuses(4)
+            } else {
+                Habit::Answers
+            }
+        }) as modbus_plc::Habits,
+        |unit, _| {
+            if unit == 7 {
+                Habit::Ignores
+            } else {
+                Habit::Answers
+            }
+        },
+    ] {
+        let plc = Plc::start(habits);
+        let mut machine = asks(&plc, TWO_UNITS);
+        for value in [1_u8, 2, 3] {
+            plc.with(|memory| memory.registers[1][0] = u16::from(value));
+            machine.until("the press is read", |end| {
+                end.get("press") == f64::from(value)
+            });
+            assert_eq!(machine.end.get("oven"), -1.0);
+        }
+        machine.end.driver.close();
+    }
+}
+
+#[test]
+fn a_client_that_leaves_takes_the_values_of_its_unit_alone() {
+    let mut device = Alone::open(&format!(
+        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-server\"\n\
+         address = \"127.0.0.1:0\"\ncycle = \"1ms\"\nmax_age = \"300ms\"\n{TWO_UNITS}"
+    ));
+    let write = |stream: &mut TcpStream, unit, value| {
+        let pdu = [6, 0, 0, 0, value];
+        stream
+            .write_all(&request(1, unit, &pdu))
+            .expect("the server reads");
+        assert_eq!(answer(stream, 1), pdu);
+    };
+    let [mut press, mut oven] = [(); 2].map(|()| client(device.address()));
+    write(&mut press, 3, 5);
+    write(&mut oven, 7, 6);
+    device.until("both have theirs", |end| {
+        end.get("press") == 5.0 && end.get("oven") == 6.0
+    });
+    leave(press);
+    device.until("the press is fail-safe", |end| {
+        write(&mut oven, 7, 6);
+        end.tick();
+        end.get("press") == -1.0
+    });
+    assert_eq!(device.end.get("oven"), 6.0);
+}
+
+#[test]
+fn function_3_reads_the_inputs_behind_the_outputs() {
+    let (mut device, mut stream) = device("");
+    device.end.set("position", 5.0);
+    device.end.tick();
+    assert_eq!(ask(&mut stream, 1, &[3, 4, 1, 0, 1]), [3, 2, 0, 5]);
+    let both = [23, 4, 1, 0, 1, 0, 1, 0, 1, 2, 0, 9];
+    assert_eq!(ask(&mut stream, 2, &both), [23, 2, 0, 5]);
+    device.until_speed(9);
+    // Nobody writes them.
+    assert_eq!(ask(&mut stream, 3, &[6, 4, 1, 0, 1]), [0x86, 2]);
+}
+
+/// A line whose receiver stays on while it sends.
+#[cfg(unix)]
+#[test]
+fn a_server_on_a_line_that_echoes_answers_each_request_once() {
+    use tickbus::fieldbus::modbus::rtu;
+
+    let line = pty::Line::new();
+    // A slow line, as the clock of the test runs faster than the pseudo-terminal carries.
+    let slow = "unit = 1\necho = true\nbaud = 50\nsilence = \"1ms\"";
+    let config = conformance::rig::config(&AnyPort, "device", slow);
+    let serial = format!("device = \"{}\"", line.end(0).display());
+    let mut device = Alone::open(&config.replace("address = \"127.0.0.1:0\"", &serial));
+    device.until("it listens", |end| {
+        end.driver.statistics().contains("\ndevice=")
+    });
+    let mut master = std::fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .open(line.end(1))
+        .expect("the other end");
+    for speed in [5_u8, 6, 6, 7] {
+        let mut request = Vec::new();
+        rtu::append(1, &mut request, |pdu| pdu.extend([6, 0, 1, 0, speed]));
+        master.write_all(&request).expect("a line");
+        let mut answer = [0; 8];
+        std::thread::scope(|scope| {
+            let reading = scope.spawn(|| master.read_exact(&mut answer));
+            device.until("it answers", |_| reading.is_finished());
+        });
+        assert_eq!(answer[..], request);
+        // All that it says comes back.
+        master.write_all(&answer).expect("a line");
+        device.until_speed(i16::from(speed));
+    }
+    // An answer to an echo would be an exception, or a second write.
+    for _ in 0..200 {
+        pass(&device.clock, 1);
+    }
+    assert_eq!(device.end.statistic("bus_cycles"), "4");
+    assert!(!device.end.driver.statistics().contains("illegal"));
 }

@@ -1,53 +1,45 @@
-//! A Modbus client's half of the codec: whatever a server answers to whatever it was asked.
+//! A Modbus client's half of the codec: addresses as people write them, requests planned for signals anywhere, and
+//! whatever a server answers to them.
 //!
-//! The first bytes choose what is polled; what follows are answers, each behind its length.
+//! The first bytes are the device's abilities and the number of signals, of which each has five bytes; then come answers,
+//! each behind its length. The same input is also read as the text of an address.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use tickbus::fieldbus::modbus::{
-    Block, Fault, Identification, Map, PDU_LIMIT, Query, Side, Table, Tables, answer, queries,
+    Abilities, Fault, Identification, Map, PDU_LIMIT, Piece, Query, Side, Spot, Table, Tables,
+    answer, queries,
 };
 
 fuzz_target!(|data: &[u8]| {
-    let Some((header, mut answers)) = data.split_first_chunk::<6>() else {
+    if let Ok(text) = std::str::from_utf8(data) {
+        address(text);
+    }
+    let Some((&[flags, gap, reads, writes], rest)) = data.split_first_chunk::<4>() else {
         return;
     };
-    let [tables, first, reads, writes, wide, combine] = *header;
-    let table = |number: u8| Table::ALL[usize::from(number) % 4];
-    let bytes = |number: u8| usize::from(number) * if wide & 1 == 0 { 1 } else { 9 };
-    let first = usize::from(first) * 16;
-    let read = Block {
-        table: table(tables),
-        first,
-        byte: 0,
-        bytes: bytes(reads),
+    let able = Abilities {
+        many_coils: flags & 2 == 0,
+        many_registers: flags & 4 == 0,
+        ..Abilities::new(flags & 1 == 1, usize::from(gap) * 16)
     };
-    let written = if tables & 16 == 0 {
-        Table::Coils
-    } else {
-        Table::HoldingRegisters
-    };
-    let write = Block {
-        table: written,
-        first,
-        byte: 0,
-        bytes: bytes(writes),
-    };
-    let sends: Vec<u8> = (0..write.bytes).map(|byte| byte.to_le_bytes()[0]).collect();
-    let mut receives = vec![0; read.bytes];
-    for query in queries(&[read], &[write], combine & 1 == 1) {
+    let (reads, rest) = pieces(usize::from(reads % 64), rest, false);
+    let (writes, mut answers) = pieces(usize::from(writes % 64), rest, true);
+    let sends: Vec<u8> = (0..length(&writes)).map(|byte| byte.to_le_bytes()[0]).collect();
+    let mut receives = vec![0; length(&reads)];
+    for query in queries(&reads, &writes, &able) {
         let mut request = Vec::new();
         query.append(&sends, &mut request);
         assert!(request.len() <= PDU_LIMIT, "{query}");
-        serve(query, &request, &mut receives);
+        serve(&query, &request, &mut receives);
         let Some((length, rest)) = answers.split_first() else {
             continue;
         };
         let (pdu, after) = rest.split_at(usize::from(*length).min(rest.len()));
         answers = after;
         let before = receives.clone();
-        match query.take(pdu, &mut receives) {
+        match query.take(&request, pdu, &mut receives) {
             Ok(()) => assert_eq!(pdu[0], request[0]),
             Err(fault) => {
                 assert_eq!(receives, before, "what is refused brings nothing");
@@ -59,9 +51,79 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// A server of ours takes every request, unless it writes what nobody can.
-fn serve(query: Query, request: &[u8], receives: &mut [u8]) {
-    let mut holds = vec![0; 0x1_0000];
+/// What is an address is one in the spelling that messages have, too.
+fn address(text: &str) {
+    let Ok(spot) = text.parse::<Spot>() else {
+        return;
+    };
+    let place = spot.place;
+    assert!(place.offset < 0x1_0000);
+    assert!(spot.bit.is_none_or(|bit| bit < 16 && !place.table.is_bits()));
+    let element = place.table.element();
+    for same in [
+        format!("{element} offset:{}", place.offset),
+        format!("{element}:{}", place.offset + 1),
+        format!("{}{:05}", place.table.digit(), place.offset + 1),
+    ] {
+        assert_eq!(same.parse::<Spot>().map(|spot| spot.place), Ok(place));
+    }
+}
+
+/// Signals, one behind the other in the frame; none of those that are written is where another one is.
+fn pieces(count: usize, mut data: &[u8], writes: bool) -> (Vec<Piece>, &[u8]) {
+    let (mut pieces, mut frame) = (Vec::<Piece>::new(), 0_usize);
+    for _ in 0..count {
+        let Some((&[table, high, low, size, within], rest)) = data.split_first_chunk::<5>() else {
+            break;
+        };
+        data = rest;
+        let table = if writes {
+            [Table::Coils, Table::HoldingRegisters][usize::from(table % 2)]
+        } else {
+            Table::ALL[usize::from(table % 4)]
+        };
+        let first = usize::from(u16::from_be_bytes([high, low]) % 0x7FF0);
+        let bits = if table.is_bits() { 1 } else { [1, 8, 16, 32, 64][usize::from(size % 5)] };
+        let fills = size & 128 != 0;
+        let within = match (table.is_bits(), bits, fills) {
+            (true, ..) => 0,
+            (_, 1, _) => usize::from(within % 16),
+            (_, 8, _) | (_, _, true) => usize::from(within % 2) * 8,
+            _ => 0,
+        };
+        if bits > 1 {
+            frame = frame.next_multiple_of(8);
+        }
+        let piece = Piece {
+            table,
+            wire: first * table.width() + within,
+            bit: frame,
+            bits,
+            fills,
+        };
+        // Whole registers, so that no two share one.
+        let meets = |other: &Piece| {
+            let (one, two) = (piece.span(), other.span());
+            other.table == table && one.first < two.end() && two.first < one.end()
+        };
+        if writes && pieces.iter().any(meets) {
+            continue;
+        }
+        frame += bits;
+        pieces.push(piece);
+    }
+    (pieces, data)
+}
+
+/// Bytes of the frame that these signals need.
+fn length(pieces: &[Piece]) -> usize {
+    let ends = pieces.iter().map(|piece| (piece.bit + piece.bits).div_ceil(8));
+    ends.max().unwrap_or_default()
+}
+
+/// A server of ours takes every request, and nothing in it changes but what the query says.
+fn serve(query: &Query, request: &[u8], receives: &mut [u8]) {
+    let mut holds = vec![0x55; 0x1_0000];
     let mut tables = Tables {
         map: Map {
             input: Side::Sends,
@@ -74,5 +136,28 @@ fn serve(query: Query, request: &[u8], receives: &mut [u8]) {
     let mut reply = Vec::new();
     let done = answer(request, &mut tables, &Identification::default(), &mut reply);
     assert_eq!(done.refused, None, "{query}");
-    query.take(&reply, receives).expect("an honest answer");
+    query
+        .take(request, &reply, receives)
+        .expect("an honest answer");
+    let Some(write) = query.write() else {
+        assert!(holds.iter().all(|byte| *byte == 0x55), "{query}");
+        return;
+    };
+    let width = write.table.width();
+    let all = write.span.first * width..write.span.end() * width;
+    let is_masked = matches!(query, Query::Mask(_));
+    let is_own = |bit: usize| {
+        let mut own = write.pieces.iter();
+        if is_masked {
+            own.any(|piece| (piece.wire..piece.wire + piece.bits).contains(&bit))
+        } else {
+            all.contains(&bit)
+        }
+    };
+    for (at, byte) in holds.iter().enumerate() {
+        for bit in 0..8 {
+            let is_kept = byte >> bit & 1 == 0x55 >> bit & 1;
+            assert!(is_kept || is_own(at * 8 + bit), "{query} changes another bit");
+        }
+    }
 }

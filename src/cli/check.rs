@@ -13,7 +13,7 @@ use crate::driver::{Config, Timing};
 use crate::fieldbus::socket::{self, Sending, TcpRole};
 use crate::fieldbus::{Options, Role, loopback, plugin, s7};
 use crate::record;
-use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
+use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width};
 use crate::time::Nanos;
 
 /// Read a driver.cfg; print its signal table, or every mistake in it.
@@ -53,7 +53,7 @@ fn report(config: &Config) -> String {
     };
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
-    line("bus", &bus(&config.bus, config.role));
+    line("bus", &bus(&config.bus, config.role, &config.table));
     for request in config.bus.requests(&config.table) {
         line("request", &request);
     }
@@ -132,14 +132,14 @@ fn role(config: &Config) -> &'static str {
     }
 }
 
-fn bus(options: &Options, role: Role) -> String {
+fn bus(options: &Options, role: Role, table: &SignalTable) -> String {
     let mut parts = vec![options.kind().to_owned()];
     match options {
         Options::Loopback(options) => parts.extend(loopback(options)),
         Options::Socket(options) => parts.extend(socket(options)),
         Options::Plugin(options) => parts.extend(plugin(options)),
-        Options::ModbusServer(options) => parts.extend(options.shown()),
-        Options::ModbusClient(options) => parts.extend(options.shown(role)),
+        Options::ModbusServer(options) => parts.extend(options.shown(table)),
+        Options::ModbusClient(options) => parts.extend(options.shown(role, table)),
         Options::S7Server(options) => parts.extend(s7_server(options)),
         Options::S7Client(options) => parts.extend(s7_client(options)),
         Options::OpcuaClient(options) => parts.extend(options.summary()),

@@ -176,6 +176,7 @@ impl Options {
     /// What a bus that polls asks for in each cycle, a line for each request; empty for others.
     pub fn requests(&self, table: &SignalTable) -> Vec<String> {
         match self {
+            Self::ModbusClient(options) => options.shown_requests(table),
             Self::S7Client(options) => options.shown_requests(table),
             _ => Vec::new(),
         }
@@ -186,6 +187,8 @@ impl Options {
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let kind = self.kind();
         if let Self::S7Client(options) = self {
+            options.place_signals(lines, table);
+        } else if let Self::ModbusClient(options) = self {
             options.place_signals(lines, table);
         } else if let Some(first) = lines.first() {
             first.wrong(
@@ -199,6 +202,7 @@ impl Options {
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
             Self::Socket(options) => options.fit(table, axes, collector),
+            Self::ModbusServer(options) => options.fit(table, collector),
             Self::ModbusClient(options) => options.fit(table, collector),
             Self::S7Server(options) => options.fit(table, collector),
             Self::S7Client(options) => options.fit(table, collector),

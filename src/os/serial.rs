@@ -22,6 +22,8 @@ pub struct SerialSettings {
     pub parity: Parity,
     /// Two stop bits; else one.
     pub two_stop_bits: bool,
+    /// The port switches the transceiver of an RS-485 line to sending while it sends, with RTS.
+    pub rs485: bool,
 }
 
 impl fmt::Display for SerialSettings {
@@ -32,7 +34,8 @@ impl fmt::Display for SerialSettings {
             Parity::None => 'N',
         };
         let stop_bits = if self.two_stop_bits { 2 } else { 1 };
-        write!(f, "{} baud, 8{parity}{stop_bits}", self.baud)
+        write!(f, "{} baud, 8{parity}{stop_bits}", self.baud)?;
+        f.write_str(if self.rs485 { ", RS-485" } else { "" })
     }
 }
 
@@ -97,10 +100,49 @@ mod unix {
             attributes.special_codes[SpecialCodeIndex::VTIME] = 0;
             attributes.set_speed(settings.baud)?;
             tcsetattr(&port, OptionalActions::Now, &attributes)?;
+            if settings.rs485 {
+                switch_direction(&port)?;
+            }
             ioctl_tiocexcl(&port)?;
             tcflush(&port, QueueSelector::IOFlush)?;
             Ok(Self(File::from(port)))
         }
+    }
+
+    /// Lets the driver of the port switch between sending and receiving with RTS: on while it sends.
+    #[cfg(target_os = "linux")]
+    #[allow(unsafe_code, reason = "no crate of ours wraps this request")]
+    fn switch_direction(port: &impl AsFd) -> io::Result<()> {
+        use rustix::ioctl::{Setter, ioctl};
+
+        /// `struct serial_rs485` of linux/serial.h: flags, delays in milliseconds before and after sending, padding.
+        #[repr(C)]
+        struct Rs485 {
+            flags: u32,
+            delay_before: u32,
+            delay_after: u32,
+            padding: [u32; 5],
+        }
+
+        const TIOCSRS485: rustix::ioctl::Opcode = 0x542F;
+        const ENABLED: u32 = 1;
+        const RTS_ON_SEND: u32 = 1 << 1;
+
+        let settings = Rs485 {
+            flags: ENABLED | RTS_ON_SEND,
+            delay_before: 0,
+            delay_after: 0,
+            padding: [0; 5],
+        };
+        // SAFETY: the request reads one `serial_rs485`, whose layout `Rs485` has (32 bytes since Linux 2.6.34), and
+        // keeps no pointer to it.
+        unsafe { ioctl(port, Setter::<TIOCSRS485, Rs485>::new(settings)) }?;
+        Ok(())
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn switch_direction(_port: &impl AsFd) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
     }
 
     impl Read for SerialPort {

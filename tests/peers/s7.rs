@@ -3,8 +3,8 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -309,5 +309,83 @@ impl Client {
     pub fn write(&mut self, area: u8, byte: usize, bytes: &[u8]) {
         let answer = self.ask(&command(area, byte, bytes));
         assert_eq!(answer[7 + 12..], [5, 1, 0xFF]);
+    }
+}
+
+/// A CPU by hand: its blocks, its state, and what it was asked.
+pub struct Cpu {
+    /// Blocks that are there; each of their bytes is their number.
+    pub blocks: Vec<u8>,
+    /// What its list 0x0424 says; none where it refuses the list.
+    pub state: Option<u8>,
+    /// How often it was asked for that list.
+    pub asked: u32,
+}
+
+impl Cpu {
+    /// Serves one client after the other, for as long as there are any.
+    pub fn serve(listener: TcpListener, cpu: Arc<Mutex<Self>>) {
+        std::thread::spawn(move || {
+            while let Ok((stream, _)) = listener.accept() {
+                let mut client = Client(stream);
+                while let Some(packet) = client.receive() {
+                    let answer = cpu.lock().expect("no panic").answer(&packet);
+                    client.send(&answer);
+                }
+            }
+        });
+    }
+
+    fn answer(&mut self, request: &[u8]) -> Vec<u8> {
+        if request[5] == 0xE0 {
+            return CONFIRM.to_vec();
+        }
+        let reference = [request[11], request[12]];
+        let unit = |kind: u8, parameters: &[u8], data: &[u8]| {
+            let length = |bytes: &[u8]| u16::try_from(bytes.len()).expect("short").to_be_bytes();
+            let mut unit = vec![0x32, kind, 0, 0];
+            for word in [reference, length(parameters), length(data)] {
+                unit.extend_from_slice(&word);
+            }
+            if kind == 3 {
+                unit.extend_from_slice(&[0, 0]);
+            }
+            packet(&[&unit, parameters, data].concat())
+        };
+        let parameters = &request[17..];
+        match (request[8], parameters[0]) {
+            (1, 0xF0) => unit(3, &[0xF0, 0, 0, 1, 0, 1, 1, 0xE0], &[]),
+            (1, 4) => {
+                let count = parameters[1];
+                let mut data: Vec<u8> = Vec::new();
+                for item in parameters[2..].chunks(12) {
+                    if data.len() % 2 == 1 {
+                        data.push(0);
+                    }
+                    let (length, block) = (item[5], item[7]);
+                    if self.blocks.contains(&block) {
+                        data.extend([0xFF, 4, 0, length * 8]);
+                        data.extend(vec![block; length.into()]);
+                    } else {
+                        data.extend([0x0A, 0, 0, 0]);
+                    }
+                }
+                unit(3, &[4, count], &data)
+            }
+            (7, _) => {
+                let is_state = request[request.len() - 4..][..2] == [0x04, 0x24];
+                self.asked += u32::from(is_state);
+                let Some(state) = self.state.filter(|_| is_state) else {
+                    let refuses = [0, 1, 0x12, 8, 0x12, 0x84, 1, 0, 0, 0, 0xD4, 1];
+                    return unit(7, &refuses, &[0x0A, 0, 0, 0]);
+                };
+                let mut data = vec![
+                    0xFF, 9, 0, 28, 4, 0x24, 0, 0, 0, 20, 0, 1, 0x51, 0x44, 0xFF, state,
+                ];
+                data.resize(32, 0);
+                unit(7, &[0, 1, 0x12, 8, 0x12, 0x84, 1, 0, 0, 0, 0, 0], &data)
+            }
+            other => panic!("{other:?} was not expected"),
+        }
     }
 }

@@ -111,6 +111,14 @@ impl Exception {
     /// The unit behind a gateway does not answer.
     pub const GATEWAY_TARGET_FAILED: Self = Self(0x0B);
 
+    /// Whether the server has found fault with the request itself, so that it will refuse it for ever.
+    pub const fn is_about_the_request(self) -> bool {
+        matches!(
+            self,
+            Self::ILLEGAL_FUNCTION | Self::ILLEGAL_DATA_ADDRESS | Self::ILLEGAL_DATA_VALUE
+        )
+    }
+
     /// Its name in the standard; empty where that has none.
     pub const fn name(self) -> &'static str {
         match self {

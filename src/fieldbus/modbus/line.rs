@@ -33,14 +33,26 @@ pub struct Serial {
     pub settings: SerialSettings,
     /// The silence that ends a telegram.
     pub silence: Nanos,
+    /// Whether what is sent comes back, and is to be dropped.
+    pub echo: bool,
 }
 
 impl fmt::Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Tcp(address) => address.fmt(f),
-            Self::Serial(serial) => write!(f, "{} at {}", serial.device, serial.settings),
+            Self::Serial(serial) => {
+                write!(f, "{} at {}", serial.device, serial.settings)?;
+                f.write_str(if serial.echo { ", which echoes" } else { "" })
+            }
         }
+    }
+}
+
+impl Serial {
+    /// The echo that is to be dropped, if there is one.
+    pub(super) fn new_echo(&self) -> Option<rtu::Echo> {
+        self.echo.then(|| rtu::Echo::new(self.settings.baud))
     }
 }
 
@@ -58,7 +70,7 @@ impl Line {
         Ok(())
     }
 
-    /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits` and `silence`; without any of them it is
+    /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without any of them it is
     /// `address`. `check` has its say about what the driver.cfg states.
     pub(super) fn read(
         table: &mut Table<'_>,
@@ -67,7 +79,8 @@ impl Line {
     ) -> Option<Self> {
         let stated = table.take("address");
         let device = table.take("device");
-        let serial = ["baud", "parity", "stop_bits", "silence"].map(|key| (key, table.take(key)));
+        let serial = ["baud", "parity", "stop_bits", "silence", "echo", "rs485"]
+            .map(|key| (key, table.take(key)));
         let Some(device) = device else {
             for (key, value) in &serial {
                 if let Some(value) = value
@@ -106,8 +119,10 @@ impl Line {
             DEVICE_LIMIT,
             "name the serial port, such as \"/dev/ttyUSB0\"",
         );
-        let [baud, parity, stop_bits, silence] = serial.map(|(_, value)| value);
-        let settings = read_settings(baud.as_ref(), parity.as_ref(), stop_bits.as_ref());
+        let [baud, parity, stop_bits, silence, echo, rs485] = serial.map(|(_, value)| value);
+        let flag = |value: Option<Value<'_>>| value.map_or(Some(false), |value| value.boolean());
+        let (echo, rs485) = (flag(echo), flag(rs485));
+        let settings = read_settings(baud.as_ref(), parity.as_ref(), stop_bits.as_ref(), rs485);
         let silence = silence.as_ref().map(Value::duration);
         let (device, settings) = (device?.to_owned(), settings?);
         let silence = match silence {
@@ -118,6 +133,7 @@ impl Line {
             device,
             settings,
             silence,
+            echo: echo?,
         }))
     }
 }
@@ -126,6 +142,7 @@ fn read_settings(
     baud: Option<&Value<'_>>,
     parity: Option<&Value<'_>>,
     stop_bits: Option<&Value<'_>>,
+    rs485: Option<bool>,
 ) -> Option<SerialSettings> {
     let baud = match baud {
         None => Some(19_200),
@@ -148,5 +165,6 @@ fn read_settings(
         baud: baud?,
         parity: parity?,
         two_stop_bits: two_stop_bits?,
+        rs485: rs485?,
     })
 }

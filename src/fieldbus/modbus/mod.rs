@@ -15,24 +15,28 @@ pub mod rtu;
 mod serial;
 mod server;
 mod shown;
+mod spot;
 mod stations;
 mod table;
 mod tables;
 
 pub use answer::{Done, answer, refuse};
-pub use client::{Block, ClientOptions, Fault, ModbusClient, Query, queries};
+pub use client::{
+    Abilities, Block, ClientOptions, Fault, ModbusClient, Piece, Query, Region, queries,
+};
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;
 pub use line::{Line, Serial};
 pub use place::{Place, PlaceError};
 pub use server::{ModbusServer, ServerOptions};
+pub use spot::Spot;
 pub use stations::Stations;
 pub use table::{Span, Table, put_bits, take_bits};
 pub use tables::{Map, Side, Tables};
 
-/// The holding register at which the inputs of a PLC begin that is itself a server, unless a driver.cfg says
-/// otherwise: behind all its outputs, and where `OpenPLC` has its memory words.
-const CONTROLLER_INPUTS: usize = 1024;
+/// The holding register at which `%I` begins among those of a PLC or of a machine that is a server, unless a driver.cfg
+/// says otherwise: behind the outputs of all but the largest, and where `OpenPLC` has its memory words.
+const INPUTS: usize = 1024;
 
 /// This system's serial ports are not used yet.
 #[cfg(not(unix))]

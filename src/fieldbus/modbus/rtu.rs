@@ -134,6 +134,58 @@ impl Framer {
     }
 }
 
+/// What a line that echoes gives back of what was sent, such as a two-wire adapter whose receiver stays on.
+#[derive(Debug)]
+pub struct Echo {
+    /// How long one character takes.
+    character: Nanos,
+    expected: Vec<u8>,
+    /// When the rest of it will not come any more.
+    until: Nanos,
+}
+
+impl Echo {
+    /// How much later than the line needs an echo may come: adapters keep what they receive for up to 16 ms.
+    const SLACK: Nanos = Nanos::from_millis(50);
+
+    /// The echo of a line with this speed.
+    pub fn new(baud: u32) -> Self {
+        Self {
+            character: character(baud),
+            expected: Vec::new(),
+            until: Nanos::ZERO,
+        }
+    }
+
+    /// These bytes were sent at `now`.
+    pub fn sent(&mut self, now: Nanos, bytes: &[u8]) {
+        if now > self.until {
+            self.expected.clear();
+        }
+        self.expected.extend_from_slice(bytes);
+        let characters = i64::try_from(self.expected.len()).unwrap_or(i64::MAX);
+        self.until = now + self.character.times(characters) + Self::SLACK;
+    }
+
+    /// How many of the bytes that came at `now` are the echo of what was sent. What differs from that is none, and
+    /// what comes behind it neither.
+    pub fn strip(&mut self, now: Nanos, bytes: &[u8]) -> usize {
+        if now > self.until {
+            self.expected.clear();
+        }
+        let pairs = self.expected.iter().zip(bytes);
+        let count = pairs
+            .take_while(|(expected, came)| expected == came)
+            .count();
+        if count < bytes.len() {
+            self.expected.clear();
+        } else {
+            self.expected.drain(..count);
+        }
+        count
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,6 +235,22 @@ mod tests {
         let taken = framer.take(Nanos(199), |telegram| telegram.map(<[u8]>::to_vec));
         assert_eq!(taken, Some(Some(READ.to_vec())));
         assert_eq!(framer.take(Nanos(999), |_| ()), None, "it is taken once");
+    }
+
+    #[test]
+    fn the_echo_of_what_was_sent_is_dropped_and_what_follows_it_is_not() {
+        let mut echo = Echo::new(9_600);
+        echo.sent(Nanos(0), &READ);
+        assert_eq!(echo.strip(Nanos(10), &READ[..5]), 5);
+        let rest = [&READ[5..], &[1, 3]].concat();
+        assert_eq!(echo.strip(Nanos(20), &rest), 3);
+        assert_eq!(echo.strip(Nanos(30), &READ), 0, "it comes once");
+        echo.sent(Nanos(40), &READ);
+        assert_eq!(echo.strip(Nanos(50), &[2, 3]), 0, "that is another one's");
+        assert_eq!(echo.strip(Nanos(60), &READ), 0);
+        echo.sent(Nanos(70), &READ);
+        let late = Nanos::from_millis(100);
+        assert_eq!(echo.strip(late, &READ), 0, "no echo is so late");
     }
 
     #[test]

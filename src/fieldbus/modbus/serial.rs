@@ -24,6 +24,10 @@ pub(super) fn open(line: &Serial) -> Result<SerialPort, BusError> {
                 "get the right to use it; on Debian and Ubuntu that is the group dialout"
             }
             ErrorKind::ResourceBusy => "end the other program that has it",
+            _ if line.settings.rs485 => {
+                "if its driver cannot switch the direction of RS-485, remove rs485 = true and take an adapter that \
+                 does so by itself"
+            }
             _ => "check that it is a serial port that can be set so",
         };
         BusError::Link(format!(

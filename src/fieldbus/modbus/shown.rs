@@ -1,18 +1,36 @@
 //! Where signals lie, for people: both ways to count, side by side.
 
 use crate::fieldbus::Role;
-use crate::signal::{Area, DataType, Signal};
+use crate::signal::{Area, DataType, Signal, SignalTable};
 
-use super::{Block, ClientOptions, Place, ServerOptions, Table};
+use super::{Block, ClientOptions, Place, Query, ServerOptions, Side, Table};
 
 impl ServerOptions {
-    /// What the line is and does.
-    pub fn shown(&self) -> Vec<String> {
+    /// What the line is and does, with the signals of `signals`.
+    pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
         parts.extend(self.stations.shown(None));
-        if let Some(offset) = self.map.window {
-            let table = Table::HoldingRegisters;
+        let bytes = |area| {
+            signals
+                .stations
+                .iter()
+                .map(move |station| station.bytes(area))
+                .max()
+        };
+        let outputs = bytes(Area::Output).unwrap_or_default();
+        let table = Table::HoldingRegisters;
+        if bytes(Area::Input) > Some(0)
+            && let Some(offset) = self.map(outputs).window
+        {
             parts.push(format!("%I also from {} on", Place { table, offset }));
+        }
+        if outputs > 0 && self.input == Side::Sends {
+            // Whoever expects %I there sees plausible numbers: what he wrote himself.
+            parts.push(format!(
+                "{} and the {} behind it are %Q: read, they give back what was written last",
+                Place { table, offset: 0 },
+                table.elements(outputs) - 1
+            ));
         }
         if self.every_write {
             parts.push("every write".to_owned());
@@ -40,16 +58,32 @@ impl ServerOptions {
 }
 
 impl ClientOptions {
-    /// What the line is and does, for the end with `role`.
-    pub fn shown(&self, role: Role) -> Vec<String> {
+    /// What the line is and does, for the end with `role` and the signals of `table`.
+    pub fn shown(&self, role: Role, table: &SignalTable) -> Vec<String> {
         let (writes, reads) = role.areas();
         let mut parts = vec![format!("asks {}", self.line)];
         parts.extend(self.stations.shown(Some(self.unit(0))));
         parts.extend([(reads, "reads"), (writes, "writes")].map(|(area, does)| {
+            if !self.lies_as_a_whole(area, table) {
+                return format!("{does} {area} where [fieldbus.at] says");
+            }
             let places: Vec<String> = self.places(area).map(|place| place.to_string()).collect();
-            format!("{does} {area} from {} on", places.join(" and from "))
+            let places = places.join(" and from ");
+            let elsewhere =
+                |signal: &Signal| signal.area == area && self.at.contains_key(&signal.name);
+            if table.signals.iter().any(elsewhere) {
+                format!("{does} {area} where [fieldbus.at] says, the rest from {places} on")
+            } else {
+                format!("{does} {area} from {places} on")
+            }
         }));
-        parts.push(format!("answers within {}", self.timeout));
+        parts.push(match self.timeout {
+            Some(timeout) => format!("answers within {timeout}"),
+            None if table.stations.len() > 1 => {
+                "answers within half of max_age, at most 1s".to_owned()
+            }
+            None => "answers within 1s".to_owned(),
+        });
         if !self.combine {
             parts.push("never writes and reads in one request".to_owned());
         }
@@ -60,8 +94,43 @@ impl ClientOptions {
         parts
     }
 
+    /// The requests of a cycle, a line for each.
+    pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
+        let mut lines = Vec::new();
+        for station in 0..table.stations.len() {
+            let unit = match table.stations.len() {
+                1 => String::new(),
+                _ => format!("unit {}: ", self.unit(station)),
+            };
+            let blocked = match self.stations.write_to(station) {
+                Some(_) => "",
+                None => "; written once \"write_to\" names the device",
+            };
+            for query in self.requests(table, station) {
+                let Some(write) = query.write() else {
+                    lines.push(format!("{unit}{query}"));
+                    continue;
+                };
+                let zeros = match query {
+                    Query::Mask(_) => 0,
+                    _ => write.zeros(),
+                };
+                let rest = match zeros {
+                    0 => String::new(),
+                    1 => "; 1 of the bits written has no signal and becomes 0".to_owned(),
+                    bits => format!("; {bits} of the bits written have no signal and become 0"),
+                };
+                lines.push(format!("{unit}{query}{rest}{blocked}"));
+            }
+        }
+        lines
+    }
+
     /// Where a signal of a station with areas of so many bytes lies.
     pub fn place(&self, signal: &Signal, bytes: usize) -> String {
+        if let Some(spot) = self.at.get(&signal.name) {
+            return spot.to_string();
+        }
         let blocks = self.blocks(signal.area, bytes).unwrap_or_default();
         let holds = |block: &&Block| (block.byte..block.byte + block.bytes).contains(&signal.byte);
         let block = blocks.iter().find(holds);

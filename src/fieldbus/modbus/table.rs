@@ -138,14 +138,28 @@ pub fn take_bits(source: &[u8], from: usize, count: usize, target: &mut [u8]) {
 ///
 /// When either is too short for them.
 pub fn put_bits(source: &[u8], count: usize, target: &mut [u8], to: usize) {
+    copy_bits(source, 0, count, target, to);
+}
+
+/// Copies `count` bits that begin at bit `from` of `source` to those that begin at bit `to` of `target`; all others
+/// stay.
+///
+/// # Panics
+///
+/// When either is too short for them.
+pub(super) fn copy_bits(source: &[u8], from: usize, count: usize, target: &mut [u8], to: usize) {
+    if (from | to | count).is_multiple_of(8) {
+        target[to / 8..(to + count) / 8].copy_from_slice(&source[from / 8..(from + count) / 8]);
+        return;
+    }
     for index in 0..count {
-        let bit = source[index / 8] >> (index % 8) & 1;
-        let place = to + index;
-        let mask = 1 << (place % 8);
+        let (from, to) = (from + index, to + index);
+        let bit = source[from / 8] >> (from % 8) & 1;
+        let mask = 1 << (to % 8);
         if bit == 0 {
-            target[place / 8] &= !mask;
+            target[to / 8] &= !mask;
         } else {
-            target[place / 8] |= mask;
+            target[to / 8] |= mask;
         }
     }
 }

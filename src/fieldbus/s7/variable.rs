@@ -98,7 +98,7 @@ impl fmt::Display for Variable {
 
 /// Reads what STEP 7 and TIA Portal write (`%DB10.DBX0.3`, `%MW20`, `%I0.0`), with or without the percent sign;
 /// with a type behind it, as PLC4X writes (`%DB10.DBD4:REAL`, `%DB10:4:REAL`); with the type within it, as
-/// KEPServer and nodes7 write (`DB10,REAL4`, `DB10,X0.3`, `MR20`); and the variable memory of a LOGO! (`VW20`).
+/// `KEPServer` and nodes7 write (`DB10,REAL4`, `DB10,X0.3`, `MR20`); and the variable memory of a LOGO! (`VW20`).
 impl FromStr for Variable {
     type Err = String;
 

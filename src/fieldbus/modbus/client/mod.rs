@@ -1,6 +1,10 @@
 //! The bus `modbus-client`: this end reads and writes a server's tables.
 
+mod at;
+mod lie;
 mod options;
+mod piece;
+mod plan;
 mod poll;
 mod query;
 
@@ -17,9 +21,12 @@ use crate::signal::SignalTable;
 use crate::time::{Nanos, Stop};
 
 use super::Line;
+pub use lie::Block;
 pub use options::ClientOptions;
+pub use piece::Piece;
+pub use plan::{Abilities, queries};
 use poll::{Framing, Poll, Station};
-pub use query::{Block, Fault, Query, queries};
+pub use query::{Fault, Query, Region};
 
 /// So many times `max_age` a server may leave what it was sent unacknowledged.
 const PATIENCE: i64 = 4;
@@ -44,22 +51,12 @@ impl ModbusClient {
         let (writes, reads) = role.areas();
         let stations = table.stations.iter().enumerate();
         let stations = stations.map(|(index, station)| {
-            let blocks = |area| {
-                // What does not fit was reported when the driver.cfg was read.
-                options
-                    .blocks(area, station.bytes(area))
-                    .unwrap_or_default()
-            };
-            Station {
-                unit: options.unit(index),
-                reads: blocks(reads),
-                writes: blocks(writes),
-                combine: options.combine,
-                sends: Vec::new(),
-                receives: vec![0; station.bytes(reads)],
-                identified: false,
-                queries: Vec::new(),
-            }
+            Station::new(
+                options.unit(index),
+                options.pieces(table, index, reads),
+                options.pieces(table, index, writes),
+                station.bytes(reads),
+            )
         });
         let stations: Vec<Station> = stations.collect();
         let guards = (0..stations.len())
@@ -73,15 +70,14 @@ impl ModbusClient {
         }
     }
 
-    fn poll(&mut self, framing: Framing, peer: String, now: Nanos) -> Poll<'_> {
-        for station in &mut self.stations {
-            station.combine = self.options.combine;
-        }
+    fn poll(&mut self, framing: Framing, peer: String, port: &Port, now: Nanos) -> Poll<'_> {
+        let timeout = self.options.patience(self.stations.len(), port.max_age());
         Poll::new(
             &mut self.stations,
             &mut self.guards,
             framing,
-            (self.cycle, self.options.timeout),
+            self.options.abilities(),
+            (self.cycle, timeout),
             peer,
             now,
         )
@@ -109,11 +105,18 @@ impl Free for ModbusClient {
                     transaction: 0,
                     inbox: Vec::new(),
                 };
-                let poll = self.poll(framing, peer.to_string(), port.clock().now());
-                let left = || {
-                    BusError::Left(format!(
-                        "{peer} closed the connection; if it serves one client at a time, end the other one"
-                    ))
+                let poll = self.poll(framing, peer.to_string(), port, port.clock().now());
+                let left = |asked_identity| {
+                    BusError::Left(if asked_identity {
+                        format!(
+                            "{peer} closed the connection when it was asked who it is (function 43); if it does so \
+                             again, it is not asked any more"
+                        )
+                    } else {
+                        format!(
+                            "{peer} closed the connection; if it serves one client at a time, end the other one"
+                        )
+                    })
                 };
                 let mut stream = Leaving(stream);
                 serve(&mut stream, poll, &mut poller, port, stop, left, broken)
@@ -130,9 +133,10 @@ impl Free for ModbusClient {
                     character: super::rtu::character(line.settings.baud),
                     silence: line.silence,
                     quiet_until: now + line.silence,
+                    echo: line.new_echo(),
                 };
-                let poll = self.poll(framing, line.device.clone(), now);
-                let left = || gone(&line, "it was closed");
+                let poll = self.poll(framing, line.device.clone(), port, now);
+                let left = |_| gone(&line, "it was closed");
                 let broken = |error| gone(&line, error);
                 serve(&mut serial, poll, &mut poller, port, stop, left, broken)
             }
@@ -180,7 +184,7 @@ fn serve(
     poller: &mut Poller,
     port: &mut Port,
     stop: &Stop,
-    left: impl Fn() -> BusError,
+    left: impl Fn(bool) -> BusError,
     broken: impl Fn(io::Error) -> BusError,
 ) -> Result<(), BusError> {
     let mut bytes = [0; 4096];
@@ -189,17 +193,20 @@ fn serve(
         let now = port.clock().now();
         if readable {
             match line.read(&mut bytes) {
-                Ok(0) => return Err(left()),
+                Ok(0) => return Err(left(poll.hung_up())),
                 Ok(count) => poll.arrived(now, &bytes[..count], port)?,
                 Err(error) if is_for_later(&error) => {}
-                Err(error) => return Err(broken(error)),
+                Err(error) => {
+                    poll.hung_up();
+                    return Err(broken(error));
+                }
             }
         }
         poll.turn(now, port)?;
         let mut blocked = false;
         while !blocked && !poll.to_write(now).is_empty() {
             match line.write(poll.to_write(now)) {
-                Ok(count) => poll.wrote(count),
+                Ok(count) => poll.wrote(now, count),
                 Err(error) if is_for_later(&error) => blocked = true,
                 Err(error) => return Err(broken(error)),
             }

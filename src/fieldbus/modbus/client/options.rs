@@ -1,17 +1,20 @@
 //! What a driver.cfg says to the bus `modbus-client`.
 
-use crate::config::{Collector, Table, Value};
+use std::collections::BTreeMap;
+
+use crate::config::{Collector, Table};
 use crate::fieldbus::Role;
 use crate::fieldbus::modbus::line::Line;
-use crate::fieldbus::modbus::place::SHAPE;
 use crate::fieldbus::modbus::stations::{Stations, Units, read_write_to};
-use crate::fieldbus::modbus::table::{ADDRESSES, Table as OfTable};
-use crate::fieldbus::modbus::{CONTROLLER_INPUTS, Place};
+use crate::fieldbus::modbus::table::Table as OfTable;
+use crate::fieldbus::modbus::{INPUTS, Place, Spot};
 use crate::fieldbus::tcp::Address;
 use crate::signal::{Area, SignalTable};
 use crate::time::Nanos;
 
-use super::Block;
+use super::lie::Lie;
+use super::plan::{Abilities, queries};
+use super::{Block, Piece, Query};
 
 /// Where a client connects to unless a driver.cfg says otherwise: where a server of ours listens.
 const ADDRESS: Address = Address::local(1502);
@@ -22,8 +25,9 @@ const TIMEOUT: Nanos = Nanos::from_secs(1);
 /// The unit of a single station unless a driver.cfg says otherwise.
 const UNIT: u8 = 1;
 
-/// The most parts that an area may have.
-const PARTS: usize = 100;
+/// On a serial line a gap of so many bits is read rather than that two requests are made: eight registers last about as
+/// long as what a request has beside its values.
+const SERIAL_GAP: usize = 128;
 
 /// What a driver.cfg says to the bus `modbus-client`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,28 +40,15 @@ pub struct ClientOptions {
     pub inputs: Lie,
     /// Where `%Q` lies.
     pub outputs: Lie,
-    /// How long the server has for an answer.
-    pub timeout: Nanos,
+    /// The signals that lie elsewhere, by their names: `[fieldbus.at]`.
+    pub at: BTreeMap<String, Spot>,
+    /// How long the server has for an answer, if the driver.cfg says so.
+    pub timeout: Option<Nanos>,
     /// Whether one request may write and read.
     pub combine: bool,
     /// Whether every change that the server makes is reported as an event, beside the image.
     pub events: bool,
-}
-
-/// Where an area of the image lies in the tables of a unit.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Lie {
-    /// From the first byte on, one behind the other.
-    parts: Vec<Part>,
-    /// Where the driver.cfg says so.
-    at: usize,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
-    place: Place,
-    /// How many bytes; `None` for all that are left.
-    bytes: Option<usize>,
+    pub(super) role: Role,
 }
 
 impl ClientOptions {
@@ -90,7 +81,7 @@ impl ClientOptions {
         let writes = |area| role.areas().0 == area;
         let inputs = Lie::read(inputs.as_ref(), at, input, writes(Area::Input));
         let outputs = Lie::read(outputs.as_ref(), at, output, writes(Area::Output));
-        let timeout = timeout.map_or(Some(TIMEOUT), |value| value.duration());
+        let timeout = timeout.map_or(Some(None), |value| value.duration().map(Some));
         let combine = combine.map_or(Some(true), |value| value.boolean());
         let events = events.map_or(Some(false), |value| value.boolean());
         let mut stations = stations?;
@@ -102,15 +93,20 @@ impl ClientOptions {
             stations,
             inputs: inputs?,
             outputs: outputs?,
+            at: BTreeMap::new(),
             timeout: timeout?,
             combine: combine?,
             events: events?,
+            role,
         })
     }
 
     /// Reports what does not go together with the sizes of the stations.
     pub(in crate::fieldbus) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         for area in [Area::Input, Area::Output] {
+            if !self.lies_as_a_whole(area, table) {
+                continue;
+            }
             for station in &table.stations {
                 if let Err((what, right)) = self.blocks(area, station.bytes(area)) {
                     collector.report(self.lie(area).at, what, right);
@@ -127,9 +123,19 @@ impl ClientOptions {
         }
     }
 
+    /// Whether `inputs` or `outputs` matters: whether not every signal of the area has a place of its own.
+    pub(in crate::fieldbus::modbus) fn lies_as_a_whole(
+        &self,
+        area: Area,
+        table: &SignalTable,
+    ) -> bool {
+        let mut signals = table.signals.iter().filter(|signal| signal.area == area);
+        self.at.is_empty() || signals.any(|signal| !self.at.contains_key(&signal.name))
+    }
+
     /// Where the parts of an area begin.
     pub(in crate::fieldbus::modbus) fn places(&self, area: Area) -> impl Iterator<Item = Place> {
-        self.lie(area).parts.iter().map(|part| part.place)
+        self.lie(area).places()
     }
 
     /// The unit of a station.
@@ -137,52 +143,62 @@ impl ClientOptions {
         self.stations.unit(station).unwrap_or(UNIT)
     }
 
-    /// Where an area of so many bytes lies.
+    /// How long a server has for an answer where there are so many stations.
+    ///
+    /// Where the driver.cfg does not say, one of several that is silent must not make the data of the others older than
+    /// `max_age`.
+    pub fn patience(&self, stations: usize, max_age: Nanos) -> Nanos {
+        self.timeout.unwrap_or(if stations > 1 {
+            TIMEOUT.min(Nanos(max_age.0 / 2))
+        } else {
+            TIMEOUT
+        })
+    }
+
+    /// Where an area of so many bytes lies as a whole.
     ///
     /// # Errors
     ///
     /// It does not fit: what is wrong, and what would be right.
     pub fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, (String, String)> {
-        let parts = &self.lie(area).parts;
-        let mut blocks = Vec::new();
-        let mut byte = 0;
-        for (number, part) in parts.iter().enumerate() {
-            let left = bytes - byte;
-            let is_last = number + 1 == parts.len();
-            let size = part.bytes.unwrap_or(left);
-            if size > left || (is_last && size < left) {
-                let all: usize = parts.iter().filter_map(|part| part.bytes).sum();
-                return Err((
-                    format!("the parts of {area} have {all} bytes, but {area} has {bytes}"),
-                    "let \"bytes\" out of the last part, which then has all that are left, or change the \
-                     size of the image"
-                        .to_owned(),
-                ));
+        self.lie(area).blocks(area, bytes)
+    }
+
+    /// Where the signals of a station's area lie.
+    pub fn pieces(&self, table: &SignalTable, station: usize, area: Area) -> Vec<Piece> {
+        // What does not fit was reported when the driver.cfg was read.
+        let blocks = self.blocks(area, table.stations[station].bytes(area));
+        let blocks = blocks.unwrap_or_default();
+        let mut pieces = Vec::new();
+        for signal in &table.signals {
+            if signal.station != station || signal.area != area {
+                continue;
             }
-            let block = Block {
-                table: part.place.table,
-                first: part.place.offset,
-                byte,
-                bytes: size,
-            };
-            if block.span().end() > ADDRESSES {
-                return Err((
-                    format!(
-                        "{area} would lie at {} {} from {} on, and end at offset {}",
-                        block.span().count,
-                        block.table,
-                        part.place,
-                        block.span().end() - 1
-                    ),
-                    "begin further to the front; the last offset is 65535".to_owned(),
-                ));
-            }
-            byte += size;
-            if size > 0 {
-                blocks.push(block);
+            match self.at.get(&signal.name) {
+                Some(spot) => pieces.extend(Piece::of_spot(signal, *spot)),
+                None => {
+                    let parts = blocks.iter();
+                    pieces.extend(parts.filter_map(|block| Piece::of_block(signal, block)));
+                }
             }
         }
-        Ok(blocks)
+        pieces
+    }
+
+    /// What is taken for granted of a device that is met anew.
+    pub(super) fn abilities(&self) -> Abilities {
+        let gap = match self.line {
+            Line::Tcp(_) => usize::MAX,
+            Line::Serial(_) => SERIAL_GAP,
+        };
+        Abilities::new(self.combine, gap)
+    }
+
+    /// The requests that a station is sent in each cycle, unless its device refuses some of them.
+    pub fn requests(&self, table: &SignalTable, station: usize) -> Vec<Query> {
+        let (writes, reads) = self.role.areas();
+        let pieces = |area| self.pieces(table, station, area);
+        queries(&pieces(reads), &pieces(writes), &self.abilities())
     }
 }
 
@@ -191,79 +207,7 @@ fn default(role: Role, area: Area) -> Place {
     let (table, offset) = match (role, area) {
         (_, Area::Output) => (OfTable::HoldingRegisters, 0),
         (Role::Controller, Area::Input) => (OfTable::InputRegisters, 0),
-        (Role::Device, Area::Input) => (OfTable::HoldingRegisters, CONTROLLER_INPUTS),
+        (Role::Device, Area::Input) => (OfTable::HoldingRegisters, INPUTS),
     };
     Place { table, offset }
-}
-
-impl Lie {
-    fn read(value: Option<&Value<'_>>, at: usize, default: Place, writes: bool) -> Option<Self> {
-        let Some(value) = value else {
-            let parts = vec![Part {
-                place: default,
-                bytes: None,
-            }];
-            return Some(Self { parts, at });
-        };
-        let at = value.at();
-        if value.as_text().is_some() {
-            let place = read_place(value, default.table, writes)?;
-            let parts = vec![Part { place, bytes: None }];
-            return Some(Self { parts, at });
-        }
-        let right = format!(
-            "{SHAPE}; or a list such as [{{ at = \"coil:1\", bytes = 2 }}, {{ at = \"offset:0\" }}]"
-        );
-        let list = value.list(&right)?;
-        if list.is_empty() || list.len() > PARTS {
-            value.wrong(
-                format!("it has {} parts", list.len()),
-                format!("write 1 to {PARTS}"),
-            );
-            return None;
-        }
-        let count = list.len();
-        let parts: Vec<Option<Part>> = list
-            .iter()
-            .enumerate()
-            .map(|(number, element)| {
-                let mut table = element.table("a part of the image", &right)?;
-                let place = table.require("at", SHAPE);
-                let bytes = if number + 1 < count {
-                    table.require("bytes", "write how many bytes of the image lie there")
-                } else {
-                    table.take("bytes")
-                };
-                table.finish();
-                let place = place.and_then(|value| read_place(&value, default.table, writes));
-                let bytes = match bytes {
-                    None => None,
-                    Some(value) => {
-                        let bytes = value.whole(1..=0x1_0000)?;
-                        Some(usize::try_from(bytes).ok()?)
-                    }
-                };
-                Some(Part {
-                    place: place?,
-                    bytes,
-                })
-            })
-            .collect();
-        let parts = parts.into_iter().collect::<Option<Vec<Part>>>()?;
-        Some(Self { parts, at })
-    }
-}
-
-fn read_place(value: &Value<'_>, table: OfTable, writes: bool) -> Option<Place> {
-    let place = Place::parse(value.text(SHAPE)?, table)
-        .map_err(|error| value.wrong(error.what, error.right))
-        .ok()?;
-    if writes && !place.table.is_writable() {
-        value.wrong(
-            format!("nobody can write {}", place.table),
-            "this end writes them: choose holding registers or coils, or check \"role\"",
-        );
-        return None;
-    }
-    Some(place)
 }

@@ -2,29 +2,21 @@
 //! out.
 
 mod identify;
+mod station;
+mod trouble;
 
 use crate::fieldbus::identity::Guard;
-use crate::fieldbus::modbus::identification;
+use crate::fieldbus::modbus::function::EXCEPTION_BIT;
 use crate::fieldbus::modbus::mbap::{self, Telegram};
 use crate::fieldbus::modbus::rtu;
-use crate::fieldbus::modbus::{Exception, Identification};
+use crate::fieldbus::modbus::{Function, Identification};
 use crate::fieldbus::{BusError, Port};
 use crate::time::{Nanos, Pace};
 
-use super::query::{Block, Fault, Query, length, queries};
-
-/// A station, as it is polled.
-#[derive(Debug)]
-pub(super) struct Station {
-    pub(super) unit: u8,
-    pub(super) reads: Vec<Block>,
-    pub(super) writes: Vec<Block>,
-    pub(super) combine: bool,
-    pub(super) sends: Vec<u8>,
-    pub(super) receives: Vec<u8>,
-    pub(super) identified: bool,
-    pub(super) queries: Vec<Query>,
-}
+use super::plan::Abilities;
+use super::query::{Fault, length};
+use identify::Identity;
+pub(super) use station::Station;
 
 /// How telegrams are told apart.
 #[derive(Debug)]
@@ -45,6 +37,8 @@ pub(super) enum Framing {
         silence: Nanos,
         /// Until when nothing may be sent.
         quiet_until: Nanos,
+        /// The line's echo of what is sent, where it has one.
+        echo: Option<rtu::Echo>,
     },
 }
 
@@ -64,6 +58,8 @@ enum Asked {
 struct Asking {
     station: usize,
     what: Asked,
+    /// The function code.
+    code: u8,
     /// Until when it has to answer.
     limit: Nanos,
 }
@@ -82,11 +78,11 @@ pub(super) struct Poll<'a> {
     /// When it was last looked at what is due.
     looked: Nanos,
     asking: Option<Asking>,
+    /// The request as it goes over the line, where its PDU begins, and how much of it the system has taken.
     request: Vec<u8>,
+    pdu: usize,
     written: usize,
-    /// Stations in a row that gave no answer.
-    unanswered: usize,
-    /// Whether the line is said to be lost for that.
+    /// Whether the line is said to be lost, as no station is in order.
     lost: bool,
 }
 
@@ -95,13 +91,14 @@ impl<'a> Poll<'a> {
         stations: &'a mut [Station],
         guards: &'a mut [Guard],
         framing: Framing,
+        able: Abilities,
         (cycle, timeout): (Nanos, Nanos),
         peer: String,
         now: Nanos,
     ) -> Self {
         for (station, guard) in stations.iter_mut().zip(&mut *guards) {
-            station.identified = false;
             guard.part();
+            station.connect(able);
         }
         Self {
             stations,
@@ -114,8 +111,8 @@ impl<'a> Poll<'a> {
             looked: now,
             asking: None,
             request: Vec::new(),
+            pdu: 0,
             written: 0,
-            unanswered: 0,
             lost: false,
         }
     }
@@ -143,8 +140,14 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// The system took so many bytes of it.
-    pub(super) fn wrote(&mut self, count: usize) {
+    /// The system took so many bytes of it at `now`.
+    pub(super) fn wrote(&mut self, now: Nanos, count: usize) {
+        if let Framing::Rtu {
+            echo: Some(echo), ..
+        } = &mut self.framing
+        {
+            echo.sent(now, &self.request[self.written..][..count]);
+        }
         self.written += count;
     }
 
@@ -152,11 +155,7 @@ impl<'a> Poll<'a> {
     pub(super) fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         self.looked = now;
         match &self.asking {
-            Some(asking) if now >= asking.limit => {
-                let within = self.timeout;
-                let what = format!("did not answer within {within}");
-                self.give_up(&what, now, port)
-            }
+            Some(asking) if now >= asking.limit => self.give_up(now, port),
             None if self.pace.take(now) && port.sends(now) => self.begin(0, now, port),
             _ => Ok(()),
         }
@@ -184,26 +183,27 @@ impl<'a> Poll<'a> {
                 inbox,
                 silence,
                 quiet_until,
+                echo,
                 ..
             } => {
                 *quiet_until = now + *silence;
+                let bytes = match echo {
+                    Some(echo) => &bytes[echo.strip(now, bytes)..],
+                    None => bytes,
+                };
+                if bytes.is_empty() {
+                    return Ok(());
+                }
                 let room = rtu::ADU_LIMIT - inbox.len();
                 inbox.extend_from_slice(&bytes[..bytes.len().min(room)]);
-                let Some(asking) = &self.asking else {
+                if self.asking.is_none() {
                     port.count("modbus-client.unasked");
                     self.clear();
                     return Ok(());
-                };
-                // A client knows how long an answer is. So pauses within one, which some adapters make, do no
-                // harm, and none has to be waited for.
-                let expected = inbox.get(1..).and_then(|pdu| match asking.what {
-                    Asked::Query(index) => {
-                        let queries = &self.stations[asking.station].queries;
-                        length(queries.get(index).copied(), pdu)
-                    }
-                    Asked::Identity { .. } => identification::length(pdu),
-                });
-                match expected.map(|pdu| 1 + pdu + 2) {
+                }
+                // The beginning of an answer tells how long it is. So pauses within one, which some adapters make, do
+                // no harm, and none has to be waited for.
+                match inbox.get(1..).and_then(length).map(|pdu| 1 + pdu + 2) {
                     Some(expected) if inbox.len() >= expected => {
                         let telegram = inbox.clone();
                         self.hear(&telegram, now, port)
@@ -219,20 +219,24 @@ impl<'a> Poll<'a> {
         let Some(asking) = &self.asking else {
             return Ok(());
         };
-        let unit = self.stations[asking.station].unit;
+        let (station, code) = (asking.station, asking.code);
+        let unit = self.stations[station].unit;
+        self.clear();
         match rtu::parse(telegram) {
-            Some((from, pdu)) if from == unit => {
-                self.clear();
+            Some((from, pdu)) if from == unit && pdu[0] & !EXCEPTION_BIT == code => {
                 self.answered(pdu, now, port)
             }
-            Some(_) => {
+            // A late answer to what was asked before; the one that is waited for may yet come.
+            Some((from, pdu)) => {
                 port.count("modbus-client.unasked");
-                self.clear();
+                if from == unit && pdu[0] == Function::DeviceIdentification.code() {
+                    self.doubt(station);
+                }
                 Ok(())
             }
             None => {
                 port.count("modbus-client.damaged");
-                self.give_up("gave a damaged answer", now, port)
+                self.miss("gave a damaged answer", now, port)
             }
         }
     }
@@ -281,68 +285,24 @@ impl<'a> Poll<'a> {
                 self.identified(station, so_far, requests, pdu, now, port)
             }
             Asked::Query(index) => {
-                let Station {
-                    queries, receives, ..
-                } = &mut self.stations[station];
-                let query = queries[index];
-                match query.take(pdu, receives) {
+                let asked = &self.request[self.pdu..];
+                let polled = &mut self.stations[station];
+                let taken = polled.queries[index].take(asked, pdu, &mut polled.receives);
+                match taken {
                     Ok(()) => self.go_on(station, index + 1, now, port),
                     Err(Fault::Malformed(what)) => {
-                        let unit = self.named(station);
-                        Err(BusError::Protocol(format!(
-                            "{unit} was asked to {query}; {what}; check that it is a Modbus server"
-                        )))
+                        let query = &self.stations[station].queries[index];
+                        let error = BusError::Protocol(format!(
+                            "{} was asked to {query}; {what}; check that it is a Modbus server",
+                            self.named(station)
+                        ));
+                        self.declined(station, error, now, port)
                     }
                     Err(Fault::Refused(exception)) => {
-                        self.refused(station, query, exception, now, port)
+                        self.refused(station, index, exception, now, port)
                     }
                 }
             }
-        }
-    }
-
-    fn refused(
-        &mut self,
-        station: usize,
-        query: Query,
-        exception: Exception,
-        now: Nanos,
-        port: &mut Port,
-    ) -> Result<(), BusError> {
-        let unit = self.named(station);
-        if matches!(query, Query::Both { .. }) {
-            // Many a server does not know it, or knows it for some registers alone.
-            port.log(
-                log::Level::Info,
-                "refused",
-                format_args!("{unit} refused to {query}: {exception}; it is asked in two requests"),
-            );
-            self.stations[station].combine = false;
-            self.prepare(station);
-            return self.begin(station, now, port);
-        }
-        match exception {
-            Exception::ACKNOWLEDGE
-            | Exception::SERVER_DEVICE_BUSY
-            | Exception::GATEWAY_PATH_UNAVAILABLE
-            | Exception::GATEWAY_TARGET_FAILED => {
-                self.asking = Some(Asking {
-                    station,
-                    what: Asked::Query(0),
-                    limit: now,
-                });
-                self.give_up(&format!("gave {exception}"), now, port)
-            }
-            _ => Err(BusError::Refused(format!(
-                "{unit} refused to {query}: {exception}; {}",
-                match exception {
-                    Exception::ILLEGAL_FUNCTION =>
-                        "choose another table with \"inputs\" or \"outputs\"",
-                    Exception::ILLEGAL_DATA_ADDRESS =>
-                        "correct \"inputs\" or \"outputs\", or the sizes of the image; offsets count from 0",
-                    _ => "see what the device's manual says of it",
-                }
-            ))),
         }
     }
 
@@ -351,82 +311,17 @@ impl<'a> Poll<'a> {
         format!("unit {} of {}", self.stations[station].unit, self.peer)
     }
 
-    /// There is no answer to what is asked: goes on with the next station, unless nobody answers at all.
-    fn give_up(&mut self, what: &str, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let Some(Asking {
-            station,
-            what: asked,
-            ..
-        }) = self.asking.take()
-        else {
-            return Ok(());
-        };
-        port.count("modbus-client.unanswered");
-        // Whoever answers next may be another device.
-        self.stations[station].identified = false;
-        self.guards[station].part();
-        self.clear();
-        self.request.clear();
-        self.written = 0;
-        self.unanswered += 1;
-        if self.unanswered >= self.stations.len() {
-            let to = match asked {
-                Asked::Identity { .. } => "say who it is (function 43)".to_owned(),
-                Asked::Query(index) => match self.stations[station].queries.get(index) {
-                    Some(query) => query.to_string(),
-                    None => "answer".to_owned(),
-                },
-            };
-            let error = BusError::Link(format!(
-                "{}, asked to {to}, {what}; see whether the device runs, and whether \"unit\" is its number",
-                self.named(station)
-            ));
-            if matches!(self.framing, Framing::Tcp { .. }) {
-                return Err(error);
-            }
-            if !std::mem::replace(&mut self.lost, true) {
-                port.lost(&error, "it is asked again every cycle");
-            }
-        }
-        self.begin(station + 1, now, port)
-    }
-
-    /// Makes the requests of a station anew.
-    fn prepare(&mut self, station: usize) {
-        let may_write = self.guards[station].may_write();
-        let station = &mut self.stations[station];
-        let writes: &[Block] = if may_write { &station.writes } else { &[] };
-        station.queries = queries(&station.reads, writes, station.combine);
-        if station.queries.is_empty() {
-            // Whether it lives is to be known all the same.
-            let look = |block: &Block| Block {
-                byte: 0,
-                bytes: 0,
-                ..*block
-            };
-            let look = station.writes.first().map(look);
-            station.queries.extend(look.map(Query::Read));
-        }
-    }
-
-    /// Begins with a station in this cycle, or ends the cycle behind the last one.
+    /// Begins with the first station from this one on that does not rest in this cycle, or ends the cycle.
     fn begin(&mut self, station: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let Some(polled) = self.stations.get_mut(station) else {
+        let mut rest = station..self.stations.len();
+        let Some(next) = rest.find(|station| !self.stations[*station].rests(now)) else {
             return Ok(());
         };
-        if !polled.identified {
-            if !polled.writes.is_empty() {
-                let so_far = Identification::default();
-                self.ask_identity(station, so_far, 0, 0, now);
-                return Ok(());
-            }
-            polled.identified = true;
-            self.prepare(station);
-        }
-        let polled = &mut self.stations[station];
+        let polled = &mut self.stations[next];
+        polled.prepare(self.guards[next].may_write());
         polled.sends.clear();
-        polled.sends.extend_from_slice(port.outgoing(station, now));
-        self.go_on(station, 0, now, port)
+        polled.sends.extend_from_slice(port.outgoing(next, now));
+        self.go_on(next, 0, now, port)
     }
 
     /// Makes the request with this index, or ends the station's part of the cycle behind the last one.
@@ -438,11 +333,20 @@ impl<'a> Poll<'a> {
         port: &mut Port,
     ) -> Result<(), BusError> {
         let polled = &self.stations[station];
-        if let Some(query) = polled.queries.get(index).copied() {
-            let answer = query.read().map_or(8, |read| read.bytes + 6);
-            self.ask(station, Asked::Query(index), answer, now, |polled, pdu| {
-                query.append(&polled.sends, pdu);
-            });
+        if let Some(query) = polled.queries.get(index) {
+            if polled.is_to_be_prepared() {
+                // Who the device is has become doubtful since: the rest is not written.
+                return self.begin(station + 1, now, port);
+            }
+            let (code, answer) = (query.function().code(), query.answer_length());
+            self.ask(
+                station,
+                Asked::Query(index),
+                code,
+                answer,
+                now,
+                |polled, pdu| polled.queries[index].append(&polled.sends, pdu),
+            );
             return Ok(());
         }
         if polled.receives.is_empty() {
@@ -453,17 +357,22 @@ impl<'a> Poll<'a> {
         if self.guards[station].may_write() {
             port.sent(station);
         }
-        self.unanswered = 0;
-        self.lost = false;
+        self.recovered(station);
         port.running(&format!("polling {}", self.peer));
+        if self.stations[station].wants_identity(now) && self.may_ask(station, port) {
+            self.ask_identity(station, Identification::default(), 0, 0, now);
+            return Ok(());
+        }
         self.begin(station + 1, now, port)
     }
 
-    /// Makes a request, whose PDU `write` appends, and to which an answer of so many bytes is expected.
+    /// Makes a request with this function code, whose PDU `write` appends, and to which an answer of so many bytes is
+    /// expected.
     fn ask(
         &mut self,
         station: usize,
         what: Asked,
+        code: u8,
         answer: usize,
         now: Nanos,
         write: impl FnOnce(&Station, &mut Vec<u8>),
@@ -476,6 +385,7 @@ impl<'a> Poll<'a> {
         match &mut self.framing {
             Framing::Tcp { transaction, .. } => {
                 *transaction = transaction.wrapping_add(1);
+                self.pdu = mbap::HEADER;
                 mbap::append(*transaction, polled.unit, request, |pdu| write(polled, pdu));
             }
             Framing::Rtu {
@@ -485,15 +395,17 @@ impl<'a> Poll<'a> {
                 ..
             } => {
                 inbox.clear();
+                self.pdu = 1;
                 rtu::append(polled.unit, request, |pdu| write(polled, pdu));
-                // The line needs its time for both.
-                let characters = i64::try_from(request.len() + answer).unwrap_or(i64::MAX);
+                // The line needs its time for both, and for what is around the answer.
+                let characters = i64::try_from(request.len() + answer + 3).unwrap_or(i64::MAX);
                 limit = limit.max(*quiet_until + self.timeout) + character.times(characters);
             }
         }
         self.asking = Some(Asking {
             station,
             what,
+            code,
             limit,
         });
     }

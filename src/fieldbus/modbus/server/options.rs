@@ -1,12 +1,13 @@
 //! What a driver.cfg says to the bus `modbus-server`.
 
-use crate::config::{Table, Value};
+use crate::config::{Collector, Table, Value};
 use crate::fieldbus::Role;
 use crate::fieldbus::modbus::line::Line;
 use crate::fieldbus::modbus::stations::{Stations, Units};
-use crate::fieldbus::modbus::{CONTROLLER_INPUTS, Map, Place, Side, table};
+use crate::fieldbus::modbus::{INPUTS, Map, Place, Side, table};
 use crate::fieldbus::options::read_events;
 use crate::fieldbus::tcp::Address;
+use crate::signal::SignalTable;
 
 use super::super::place::SHAPE;
 
@@ -22,8 +23,10 @@ const CLIENTS: usize = 1024;
 pub struct ServerOptions {
     /// Where it serves.
     pub line: Line,
-    /// Where the frames lie in the tables.
-    pub map: Map,
+    /// The frame of `%I`.
+    pub input: Side,
+    /// The holding register at which `%I` begins once more, if the driver.cfg says so, and where it does.
+    pub window: Option<(usize, usize)>,
     /// Which unit each station is.
     pub stations: Stations,
     /// The most clients at once.
@@ -50,11 +53,8 @@ impl ServerOptions {
         };
         let stations = Stations::read(units, unit.as_ref());
         let window = match &inputs {
-            None => Some(match role {
-                Role::Device => None,
-                Role::Controller => Some(CONTROLLER_INPUTS),
-            }),
-            Some(value) => read_window(value).map(Some),
+            None => Some(None),
+            Some(value) => read_window(value).map(|window| Some((window, value.at()))),
         };
         let clients = clients.as_ref().map_or(Some(CLIENTS), |value| {
             value
@@ -68,15 +68,45 @@ impl ServerOptions {
         };
         Some(Self {
             line: line?,
-            map: Map {
-                input,
-                window: window?,
-            },
+            input,
+            window: window?,
             stations: stations?,
             clients: clients?,
             events: events?.0,
             every_write: events?.1,
         })
+    }
+}
+
+impl ServerOptions {
+    /// Where the frames of a station lie in the tables, whose `%Q` has so many bytes.
+    pub fn map(&self, output_bytes: usize) -> Map {
+        let outputs = table::Table::HoldingRegisters.elements(output_bytes);
+        // Where %Q reaches so far there is no room for it, and nobody asked for it.
+        let usual = (outputs <= INPUTS).then_some(INPUTS);
+        Map {
+            input: self.input,
+            window: self.window.map_or(usual, |(first, _)| Some(first)),
+        }
+    }
+
+    /// Reports `inputs` that would lie among the registers of `%Q`.
+    pub(in crate::fieldbus) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let Some((first, at)) = self.window else {
+            return;
+        };
+        let outputs = table.stations.iter().map(|station| station.output_bytes);
+        let outputs = table::Table::HoldingRegisters.elements(outputs.max().unwrap_or_default());
+        if first < outputs {
+            collector.report(
+                at,
+                format!(
+                    "holding registers up to offset {} are %Q, and %I would begin among them at {first}",
+                    outputs - 1
+                ),
+                format!("begin at offset {outputs} or further on"),
+            );
+        }
     }
 }
 

@@ -3,8 +3,9 @@
 use std::io::{Read as _, Write as _};
 
 use crate::fieldbus::modbus::Function;
+use crate::fieldbus::modbus::function::EXCEPTION_BIT;
 use crate::fieldbus::modbus::line::Serial;
-use crate::fieldbus::modbus::rtu::{self, Framer};
+use crate::fieldbus::modbus::rtu::{self, Echo, Framer};
 use crate::fieldbus::modbus::serial::{gone, open};
 use crate::fieldbus::tcp::{is_for_later, no_wait};
 use crate::fieldbus::{BusError, Port};
@@ -15,6 +16,10 @@ use super::units::{Carried, UnitSet};
 
 /// The unit that is everyone.
 const BROADCAST: u8 = 0;
+
+/// After so many requests in a row that equal the answer before, the log tells how a line that echoes is served. (A
+/// client that writes one value again and again looks the same: it is answered all the same.)
+const ECHOES: u32 = 20;
 
 /// Serves the units until `stop`.
 ///
@@ -38,6 +43,8 @@ pub(super) fn serve(
         writes: vec![true; units.len()].into(),
         units,
         framer: Framer::new(line.silence),
+        echo: line.new_echo(),
+        suspicion: Suspicion::default(),
         reply: Vec::new(),
         written: 0,
         carried: None,
@@ -55,6 +62,9 @@ struct Server<'a> {
     /// The stations that the client has written to.
     writes: Box<[bool]>,
     framer: Framer,
+    /// What the line gives back of what is sent, where it is known to do so.
+    echo: Option<Echo>,
+    suspicion: Suspicion,
     /// The answer that is under way, and how much of it the system has taken.
     reply: Vec<u8>,
     written: usize,
@@ -105,16 +115,20 @@ impl Server<'_> {
         };
         // Silence may have ended a telegram before these came.
         self.attend(now, port);
-        self.framer.arrived(now, &bytes[..count]);
+        let own = self.echo.as_mut();
+        let own = own.map_or(0, |echo| echo.strip(now, &bytes[..count]));
+        self.framer.arrived(now, &bytes[own..count]);
         Ok(())
     }
 
     /// Answers the telegram that silence has ended, if it has and is for a unit here.
     fn attend(&mut self, now: Nanos, port: &mut Port) {
         let Self {
+            line,
             units,
             writes,
             framer,
+            suspicion,
             reply,
             written,
             carried,
@@ -127,6 +141,22 @@ impl Server<'_> {
             };
             if port.is_down(now) {
                 return;
+            }
+            // No request has that bit: it is somebody's answer, or the echo of one.
+            if pdu[0] & EXCEPTION_BIT != 0 {
+                port.count("modbus-server.answers_heard");
+                return;
+            }
+            if suspicion.is_confirmed(telegram == Some(&reply[..])) {
+                port.log(
+                    log::Level::Warn,
+                    "echo",
+                    format_args!(
+                        "on {} each answer comes back as if it were a request; if the adapter echoes what it sends, \
+                         write echo = true into [fieldbus]",
+                        line.device
+                    ),
+                );
             }
             // Whoever asks anew no longer waits for the last answer.
             reply.clear();
@@ -158,8 +188,14 @@ impl Server<'_> {
         if self.written == self.reply.len() {
             return Ok(());
         }
-        match self.serial.write(&self.reply[self.written..]) {
-            Ok(count) => self.written += count,
+        let rest = &self.reply[self.written..];
+        match self.serial.write(rest) {
+            Ok(count) => {
+                if let Some(echo) = &mut self.echo {
+                    echo.sent(port.clock().now(), &rest[..count]);
+                }
+                self.written += count;
+            }
             Err(error) if is_for_later(&error) => return Ok(()),
             Err(error) => return Err(gone(self.line, &error)),
         }
@@ -169,5 +205,17 @@ impl Server<'_> {
             self.units.carried(carried, port);
         }
         Ok(())
+    }
+}
+
+/// Looks whether answers come back as requests: those to functions 5, 6 and 22 are such.
+#[derive(Debug, Default)]
+struct Suspicion(u32);
+
+impl Suspicion {
+    /// One more request came, which equals the last answer or not; whether that has happened often enough now.
+    fn is_confirmed(&mut self, is_last_answer: bool) -> bool {
+        self.0 = if is_last_answer { self.0 + 1 } else { 0 };
+        self.0 >= ECHOES && self.0.is_multiple_of(ECHOES)
     }
 }

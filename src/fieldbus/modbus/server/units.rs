@@ -12,7 +12,6 @@ use crate::fieldbus::modbus::{Done, Exception, Function, Identification, Map, Ta
 /// The units of a server, and what clients have written to them.
 #[derive(Debug)]
 pub(super) struct UnitSet {
-    map: Map,
     identification: Identification,
     /// Whether a write is an event even where it changes nothing.
     every_write: bool,
@@ -23,6 +22,7 @@ pub(super) struct UnitSet {
 struct Unit {
     /// Its number; `None` for any.
     number: Option<u8>,
+    map: Map,
     /// What clients have written, from the fail-safe values on; one byte more where that makes the last register
     /// whole.
     holds: Box<[u8]>,
@@ -56,6 +56,7 @@ impl UnitSet {
             holds.resize(holds_len.next_multiple_of(2), 0);
             Unit {
                 number: options.stations.unit(station),
+                map: options.map(table.stations[station].output_bytes),
                 holds: holds.into(),
                 holds_len,
                 shown: Vec::new(),
@@ -64,7 +65,6 @@ impl UnitSet {
             }
         };
         Self {
-            map: options.map,
             identification: Identification::of_driver(driver),
             every_write: options.every_write,
             units: (0..table.stations.len()).map(unit).collect(),
@@ -112,7 +112,7 @@ impl UnitSet {
             frame
         };
         let mut tables = Tables {
-            map: self.map,
+            map: unit.map,
             sends,
             holds: &mut unit.holds,
             holds_len: unit.holds_len,

@@ -1,7 +1,8 @@
 //! A client's side of one connection, without I/O: time and bytes are handed in, bytes and the next deadline come
 //! out.
 
-use super::plan::{self, Field, Job, Piece, Way};
+use super::plan::{Job, Way};
+use super::traffic::{Traffic, function_of, write_data};
 use super::{End, Frames, News, Refusal, Terms};
 use crate::fieldbus::s7::Fault;
 use crate::fieldbus::s7::item::{self, Code, Data};
@@ -65,66 +66,6 @@ enum Phase {
     Idle,
     /// The job with this index is under way.
     Working(usize),
-}
-
-/// The frames of all stations, and the jobs that carry them.
-#[derive(Debug)]
-struct Traffic {
-    fields: Frames,
-    jobs: Vec<Job>,
-    /// The frames of this cycle, by station: those to be written, and those read.
-    out: Vec<Box<[u8]>>,
-    into: Vec<Box<[u8]>>,
-    /// What the CPU refused in this cycle, by station.
-    refused: Vec<Option<Refusal>>,
-    /// Stations that the cycles leave out.
-    suspended: Vec<bool>,
-    may_write: bool,
-}
-
-impl Traffic {
-    fn new(fields: Frames) -> Self {
-        let frames = |side: usize| {
-            let lengths = fields.lengths.iter();
-            lengths.map(|length| vec![0; length[side]].into()).collect()
-        };
-        let stations = fields.lengths.len();
-        Self {
-            out: frames(0),
-            into: frames(1),
-            refused: vec![None; stations],
-            suspended: vec![false; stations],
-            jobs: Vec::new(),
-            may_write: false,
-            fields,
-        }
-    }
-
-    /// Divides what is to be carried into jobs with units of at most `limit` bytes.
-    fn plan(&mut self, limit: usize) {
-        let active = |fields: &[Field]| -> Vec<Field> {
-            let fields = fields.iter();
-            let fields = fields.filter(|field| !self.suspended[field.station]);
-            fields.copied().collect()
-        };
-        let mut jobs = Vec::new();
-        if self.may_write {
-            jobs = plan::jobs(Way::Write, &active(&self.fields.written), limit);
-        }
-        jobs.extend(plan::jobs(Way::Read, &active(&self.fields.read), limit));
-        self.jobs = jobs;
-    }
-
-    /// Takes down that the CPU refused a piece, unless it did not.
-    fn judge(&mut self, job: usize, piece: usize, code: Code) -> bool {
-        let Job { way, pieces } = &self.jobs[job];
-        let piece = &pieces[piece];
-        if code != Code::OK {
-            let refusal = Refusal::item(*way, piece.item, code);
-            self.refused[piece.station].get_or_insert(refusal);
-        }
-        code == Code::OK
-    }
 }
 
 impl Dialog {
@@ -496,29 +437,6 @@ impl Dialog {
             }
         }
         Ok(self.work(now, index + 1))
-    }
-}
-
-/// The function of a job, and the number of its items.
-fn function_of(way: Way, pieces: &[Piece]) -> [u8; 2] {
-    let code = match way {
-        Way::Write => function::WRITE,
-        Way::Read => function::READ,
-    };
-    [code, u8::try_from(pieces.len()).expect("20 at most")]
-}
-
-fn write_data(pieces: &[Piece], frames: &[Box<[u8]>], out: &mut Vec<u8>) {
-    let begin = out.len();
-    for piece in pieces {
-        if (out.len() - begin) % 2 == 1 {
-            out.push(0);
-        }
-        let length = piece.item.range().len();
-        item::write_header(Code(0), piece.item.element, length, out);
-        let data = out.len();
-        out.resize(data + length, 0);
-        piece.gather(&frames[piece.station], &mut out[data..]);
     }
 }
 

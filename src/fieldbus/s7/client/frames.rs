@@ -1,5 +1,7 @@
 //! What is written into a CPU and read from it, signal by signal.
 
+use std::fmt::Write as _;
+
 use super::plan::{self, Field, Job, Way};
 use super::{ClientOptions, Dialog, Terms};
 use crate::fieldbus::Role;
@@ -71,13 +73,11 @@ impl Frames {
                 count => format!("{count} jobs"),
             };
             let mut text = items(&few);
-            text.push_str(&format!("; {} a cycle", count(&few)));
+            // Writing to a string cannot fail.
+            let _ = write!(text, "; {} a cycle", count(&few));
             if few.len() != many.len() {
-                text.push_str(&format!(
-                    " with units of {longest} bytes, {} with {}",
-                    count(&many),
-                    pdu::LEAST
-                ));
+                let (many, least) = (count(&many), pdu::LEAST);
+                let _ = write!(text, " with units of {longest} bytes, {many} with {least}");
             }
             text
         };

@@ -7,6 +7,7 @@ mod options;
 mod plan;
 mod refusal;
 mod terms;
+mod traffic;
 
 use crate::fieldbus::rarely::Rarely;
 use crate::fieldbus::tcp::{self, no_wait};

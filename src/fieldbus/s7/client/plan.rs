@@ -49,12 +49,12 @@ pub(super) struct Job {
 pub(super) struct Piece {
     pub(super) station: usize,
     pub(super) item: Item,
-    copies: Vec<Copy>,
+    runs: Vec<Run>,
 }
 
 /// Bits that lie in the frame and in the data of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Copy {
+struct Run {
     frame: usize,
     data: usize,
     bits: usize,
@@ -63,15 +63,15 @@ struct Copy {
 impl Piece {
     /// Fills `data`, the item's, from a frame.
     pub(super) fn gather(&self, frame: &[u8], data: &mut [u8]) {
-        for copy in &self.copies {
-            carry(frame, copy.frame, data, copy.data, copy.bits);
+        for run in &self.runs {
+            carry(frame, run.frame, data, run.data, run.bits);
         }
     }
 
     /// Takes `data`, the item's, over into a frame.
     pub(super) fn scatter(&self, data: &[u8], frame: &mut [u8]) {
-        for copy in &self.copies {
-            carry(data, copy.data, frame, copy.frame, copy.bits);
+        for run in &self.runs {
+            carry(data, run.data, frame, run.frame, run.bits);
         }
     }
 }
@@ -172,28 +172,28 @@ fn pieces(way: Way, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
                     Some(bit) => Item::bit_of(cell.object, cell.bytes.start, bit),
                     None => Item::bytes(cell.object, cell.bytes.clone()),
                 },
-                copies: Vec::new(),
+                runs: Vec::new(),
             });
             pieces.last_mut().expect("it was pushed")
         };
         // The data of a bit are a byte with the bit as its lowest.
         let begin = piece.item.byte * 8 + usize::from(piece.item.bit);
         for field in &cell.fields {
-            let copy = Copy {
+            let run = Run {
                 frame: field.frame,
                 data: field.first - begin,
                 bits: field.bits,
             };
-            match piece.copies.last_mut() {
-                Some(last) if last.is_followed_by(copy) => last.bits += copy.bits,
-                _ => piece.copies.push(copy),
+            match piece.runs.last_mut() {
+                Some(last) if last.is_followed_by(run) => last.bits += run.bits,
+                _ => piece.runs.push(run),
             }
         }
     }
     pieces
 }
 
-impl Copy {
+impl Run {
     /// Whether both are one run of whole bytes.
     const fn is_followed_by(self, next: Self) -> bool {
         self.bits > 1
@@ -209,18 +209,16 @@ fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
     let mut jobs: Vec<(Job, [usize; 2])> = Vec::new();
     for piece in pieces {
         let bytes = piece.item.range().len();
-        let mut open = jobs.iter_mut().filter(|(job, lengths)| {
+        let has_room = |(job, lengths): &(Job, [usize; 2])| {
             job.pieces.len() < ITEMS && bytes <= room(way, *lengths, limit)
-        });
-        let index = open.next();
-        let (job, lengths) = match index {
-            Some(open) => open,
-            None => {
-                let pieces = Vec::new();
-                jobs.push((Job { way, pieces }, [JOB, ANSWER]));
-                jobs.last_mut().expect("it was pushed")
-            }
         };
+        let open = jobs.iter().position(has_room);
+        let index = open.unwrap_or(jobs.len());
+        if index == jobs.len() {
+            let pieces = Vec::new();
+            jobs.push((Job { way, pieces }, [JOB, ANSWER]));
+        }
+        let (job, lengths) = &mut jobs[index];
         let data = item::DATA_HEADER + bytes.next_multiple_of(2);
         let [job_length, answer] = lengths;
         *job_length += item::ADDRESS;

@@ -7,10 +7,41 @@ use crate::fieldbus::{BusError, Port};
 use crate::time::Nanos;
 
 use super::super::query::{Fault, expect};
-use super::{Asked, Asking, Poll};
+use super::{Asked, Poll};
 
 /// So many requests are made at most to learn who a device is.
 const IDENTIFYING: usize = 8;
+
+/// How long it is until a device is asked again that did not say who it is.
+const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// So many times in a row a device is silent, or hangs up, when it is asked who it is, until that counts as its answer.
+/// Each time it has answered something else before, so it is there.
+const SILENCES: u8 = 2;
+
+/// What is known of who a device is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Identity {
+    /// It is still to be asked, not before then.
+    Unknown { silences: u8, not_before: Nanos },
+    /// It said it, or said nothing.
+    Known,
+}
+
+impl Default for Identity {
+    fn default() -> Self {
+        Self::Unknown {
+            silences: 0,
+            not_before: Nanos::ZERO,
+        }
+    }
+}
+
+impl Identity {
+    pub(super) fn is_due(self, now: Nanos) -> bool {
+        matches!(self, Self::Unknown { not_before, .. } if now >= not_before)
+    }
+}
 
 impl Poll<'_> {
     /// Asks a station who it is, from this object on.
@@ -24,8 +55,8 @@ impl Poll<'_> {
     ) {
         const BASIC: u8 = 1;
         let what = Asked::Identity { so_far, requests };
-        self.ask(station, what, rtu::ADU_LIMIT, now, |_, pdu| {
-            let code = Function::DeviceIdentification.code();
+        let code = Function::DeviceIdentification.code();
+        self.ask(station, what, code, rtu::ADU_LIMIT, now, |_, pdu| {
             pdu.extend_from_slice(&[code, READ_DEVICE_IDENTIFICATION, BASIC, object]);
         });
     }
@@ -47,29 +78,87 @@ impl Poll<'_> {
                 return Ok(());
             }
             Ok(Some(_)) => {}
+            Err(Fault::Refused(exception)) if exception.is_about_the_request() => {
+                so_far = Identification::default();
+            }
             // A device that is busy or away says who it is another time.
             Err(Fault::Refused(
-                exception @ (Exception::SERVER_DEVICE_BUSY
+                Exception::ACKNOWLEDGE
+                | Exception::SERVER_DEVICE_BUSY
                 | Exception::GATEWAY_PATH_UNAVAILABLE
-                | Exception::GATEWAY_TARGET_FAILED),
+                | Exception::GATEWAY_TARGET_FAILED,
             )) => {
-                self.asking = Some(Asking {
-                    station,
-                    what: Asked::Identity { so_far, requests },
-                    limit: now,
-                });
-                return self.give_up(&format!("gave {exception}"), now, port);
+                if let Identity::Unknown { not_before, .. } = &mut self.stations[station].identity {
+                    *not_before = now + PAUSE;
+                }
+                return self.begin(station + 1, now, port);
             }
-            Ok(None) | Err(_) => so_far = Identification::default(),
+            Ok(None) | Err(_) => return self.says_nothing(station, now, port),
         }
-        let mut identity = so_far.line();
+        self.stations[station].hang_ups = 0;
+        self.meet(station, &so_far, port);
+        self.begin(station + 1, now, port)
+    }
+
+    /// The device gave no answer, or none that can be understood, when it was asked who it is.
+    pub(super) fn says_nothing(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        if let Identity::Unknown {
+            silences,
+            not_before,
+        } = &mut self.stations[station].identity
+        {
+            *silences += 1;
+            *not_before = now + PAUSE;
+            if *silences >= SILENCES {
+                self.meet(station, &Identification::default(), port);
+            }
+        }
+        self.begin(station + 1, now, port)
+    }
+
+    fn meet(&mut self, station: usize, said: &Identification, port: &mut Port) {
+        let mut identity = said.line();
         if identity.is_empty() {
             let unit = self.stations[station].unit;
             identity = format!("modbus device at {}, unit {unit}", self.peer);
         }
         self.guards[station].meet(port, &identity);
-        self.stations[station].identified = true;
-        self.prepare(station);
-        self.begin(station, now, port)
+        self.stations[station].identity = Identity::Known;
+    }
+
+    /// Who the device is may not be true any more: nothing is written until it has said it again.
+    pub(super) fn doubt(&mut self, station: usize) {
+        self.guards[station].part();
+        self.stations[station].identity = Identity::default();
+        self.stations[station].forget_queries();
+    }
+
+    /// Whether a station is to be asked who it is. After it hung up for that too often, that is its answer, for this
+    /// connection.
+    pub(super) fn may_ask(&mut self, station: usize, port: &mut Port) -> bool {
+        if self.stations[station].hang_ups < SILENCES {
+            return true;
+        }
+        self.stations[station].hang_ups = 0;
+        self.meet(station, &Identification::default(), port);
+        false
+    }
+
+    /// The connection has ended: tells whether that was when a device was asked who it is.
+    pub(in super::super) fn hung_up(&mut self) -> bool {
+        let Some(asking) = &self.asking else {
+            return false;
+        };
+        let asks = matches!(asking.what, Asked::Identity { .. });
+        let station = asking.station;
+        if asks {
+            self.stations[station].hang_ups += 1;
+        }
+        asks
     }
 }

@@ -1,5 +1,6 @@
 use super::*;
 use crate::fieldbus::PlcState;
+use crate::fieldbus::s7::client::plan::Field;
 use crate::fieldbus::s7::item::Object;
 use crate::fieldbus::s7::{Tsap, hex};
 

@@ -162,8 +162,9 @@ const BYTES: usize = 512;
 const OBJECTS: [Object; 3] = [Object::Inputs, Object::Flags, Object::Block(2)];
 
 fn memory(seed: u8) -> Vec<u8> {
-    let byte = |index: usize| (index as u8).wrapping_mul(167).wrapping_add(seed);
-    (0..BYTES * 3).map(byte).collect()
+    let bytes = (0..=u8::MAX).cycle();
+    let told = bytes.map(|index| index.wrapping_mul(167).wrapping_add(seed));
+    told.take(BYTES * 3).collect()
 }
 
 fn place(object: Object) -> usize {

@@ -70,6 +70,16 @@ tickbus_command() {
     esac
 }
 
+# Whether there is an iec2c: the one that IEC2C names, that is on the PATH, or that lies in shared/peers beside the
+# checkout. IEC2C names it from there on.
+iec2c() {
+    if [ -z "${IEC2C:-}" ] && ! have iec2c && [ -x "$ROOT/../shared/peers/iec2c/iec2c" ]; then
+        IEC2C=$ROOT/../shared/peers/iec2c/iec2c
+    fi
+    export IEC2C=${IEC2C:-iec2c}
+    have "$IEC2C"
+}
+
 # Maven, without its chatter and its colours, on the Java reactor.
 maven() {
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'

@@ -4,6 +4,7 @@
 //! is made states its directions and that it was never compiled by the editor that it is for, as long as that is so.
 
 mod names;
+mod plcopen;
 mod record;
 mod s7;
 mod siemens;
@@ -13,6 +14,7 @@ mod symbols;
 use crate::config::Mistakes;
 use crate::driver::Config;
 use crate::fieldbus::{Options, Role};
+use st::codesys::Editor;
 
 /// The editors that sources are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -21,15 +23,23 @@ pub enum Target {
     S71500,
     /// TIA Portal: SCL for an S7-1200, which has fewer types and shorter jobs.
     S71200,
-    /// CODESYS V3: Structured Text to paste.
+    /// CODESYS V3: `PLCopen` XML.
     Codesys,
+    /// TwinCAT 3: `PLCopen` XML.
+    TwinCat,
     /// `OpenPLC`: one program in Structured Text.
     OpenPlc,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::S71500, Self::S71200, Self::Codesys, Self::OpenPlc];
+    pub const ALL: [Self; 5] = [
+        Self::S71500,
+        Self::S71200,
+        Self::Codesys,
+        Self::TwinCat,
+        Self::OpenPlc,
+    ];
 
     /// As the command line names it.
     pub const fn name(self) -> &'static str {
@@ -37,6 +47,7 @@ impl Target {
             Self::S71500 => "s7-1500",
             Self::S71200 => "s7-1200",
             Self::Codesys => "codesys",
+            Self::TwinCat => "twincat",
             Self::OpenPlc => "openplc",
         }
     }
@@ -87,8 +98,9 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
     let mut export = match target {
         Target::S71500 => return Ok(s7::export(config, s7::Cpu::S71500)),
         Target::S71200 => return Ok(s7::export(config, s7::Cpu::S71200)),
-        Target::Codesys => st::codesys::export(config),
-        Target::OpenPlc => st::openplc::export(config),
+        Target::Codesys => st::codesys::export(config, Editor::Codesys),
+        Target::TwinCat => st::codesys::export(config, Editor::TwinCat),
+        Target::OpenPlc => st::openplc::export(config)?,
     };
     export.files.push(symbols::file(config));
     Ok(export)

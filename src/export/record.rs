@@ -87,9 +87,20 @@ pub(super) fn facts(signal: &Signal) -> Vec<String> {
 impl<'a> Record<'a> {
     /// The record of one direction; `names` gives the names.
     pub(super) fn of(table: &'a SignalTable, area: Area, names: &mut Names) -> Self {
+        Self::aligned(table, area, 1, names)
+    }
+
+    /// The same with each station from a multiple of `aligned` bytes on.
+    pub(super) fn aligned(
+        table: &'a SignalTable,
+        area: Area,
+        aligned: usize,
+        names: &mut Names,
+    ) -> Self {
         let mut starts = Vec::with_capacity(table.stations.len());
-        let mut bytes = 0;
+        let mut bytes: usize = 0;
         for station in &table.stations {
+            bytes = bytes.next_multiple_of(aligned);
             starts.push(bytes);
             bytes += station.bytes(area);
         }
@@ -121,18 +132,24 @@ impl<'a> Record<'a> {
 
     /// Where each station's image begins, for a comment; nothing where there is but one.
     pub(super) fn stations(table: &SignalTable) -> Vec<String> {
+        Self::stations_aligned(table, 1)
+    }
+
+    /// The same with each station from a multiple of `aligned` bytes on.
+    pub(super) fn stations_aligned(table: &SignalTable, aligned: usize) -> Vec<String> {
         if table.stations.len() < 2 {
             return Vec::new();
         }
-        let mut starts = (0, 0);
+        let mut starts = [0_usize; 2];
         let mut lines = Vec::new();
         for station in &table.stations {
+            starts = starts.map(|start| start.next_multiple_of(aligned));
             lines.push(format!(
                 "station \"{}\": its %IB0 is %IB{} here, its %QB0 is %QB{}",
-                station.name, starts.0, starts.1
+                station.name, starts[0], starts[1]
             ));
-            starts.0 += station.input_bytes;
-            starts.1 += station.output_bytes;
+            starts[0] += station.input_bytes;
+            starts[1] += station.output_bytes;
         }
         lines
     }

@@ -6,6 +6,7 @@ use tickbus::export::{Target, export};
 use tickbus::signal::{Area, DataType, Signal};
 
 use crate::machine::{Machine, Value, units};
+use crate::plcopen;
 use crate::tables;
 
 /// Each signal of an area with its first byte in the record of all stations.
@@ -161,24 +162,33 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
     #[test]
-    fn programs_for_codesys_copy_each_value_between_its_variable_and_its_registers(
+    fn programs_for_codesys_and_twincat_copy_each_value_between_its_variable_and_its_registers(
         config in tables::any_table(),
         record in prop::collection::vec(any::<u8>(), 1300),
     ) {
-        // An overlay of memory is nothing that the machine knows: the functions are those in arithmetic.
-        let declarations = file(&config, Target::Codesys, "_io.st");
-        let (begin, end) = (file(&config, Target::Codesys, "_begin.st"), file(&config, Target::Codesys, "_end.st"));
-        let portable = portable_functions();
-        let calm = calmed(&config, record);
-        assert_copied(
-            &config,
-            &calm,
-            &declarations,
-            [("Cell_1_begin", &begin), ("Cell_1_end", &end)],
-            &portable,
-            |name| if name.starts_with("bits_") { name.to_owned() } else { format!("Cell_1_io.{name}") },
-            |area, number| format!("Cell_1_io.{}[{number}]", if area == Area::Input { "In" } else { "Out" }),
-        );
+        // A pointer is nothing that the machine knows: the functions are those in arithmetic.
+        for target in [Target::Codesys, Target::TwinCat] {
+            let (declarations, units) = plcopen::structured_text(&file(&config, target, ".xml"));
+            // What is said to libraries of the editors stands before the inputs and after the outputs.
+            let text = |name: &str| {
+                let (_, text) = units.iter().find(|(unit, _)| unit == name).expect("the program");
+                let (head, _) = text.split_once('\n').expect("a head");
+                let (_, rest) = text.split_once("IF Cell_1_io.Simulated THEN\n").expect("its own part");
+                let (body, _) = rest.split_once("ELSE\n    ; (* Not simulated").expect("the end of its part");
+                let locals = "VAR\n    bits_32 : DWORD;\n    bits_64 : LWORD;\nEND_VAR";
+                format!("{head}\n{locals}\nIF Cell_1_io.Simulated THEN\n{body}END_IF;\nEND_PROGRAM\n")
+            };
+            let calm = calmed(&config, record.clone());
+            assert_copied(
+                &config,
+                &calm,
+                &declarations,
+                [("Cell_1_begin", &text("Cell_1_begin")), ("Cell_1_end", &text("Cell_1_end"))],
+                &portable_functions(),
+                |name| if name.starts_with("bits_") { name.to_owned() } else { format!("Cell_1_io.{name}") },
+                |area, number| format!("Cell_1_io.{}[{number}]", if area == Area::Input { "In" } else { "Out" }),
+            );
+        }
     }
 
     /// REAL and its bits, by the arithmetic for compilers that cannot overlay memory: equal for all numbers in full
@@ -254,7 +264,7 @@ fn the_program_for_openplc_copies_between_registers_and_variables() {
         &config,
         &record,
         &source,
-        [("Drive", &begin), ("Drive", &end)],
+        [("Drive_program", &begin), ("Drive_program", &end)],
         &functions,
         str::to_owned,
         |area, number| {

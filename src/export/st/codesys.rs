@@ -1,216 +1,244 @@
-//! Texts for CODESYS: a list of global variables, functions, and two programs.
+//! For CODESYS and TwinCAT: a list of global variables, two functions and two programs, as one file of `PLCopen` XML.
 
-use super::registers::kind;
-use super::{add, comment, copies, records, remark, source, temporaries};
+mod link;
+mod modbus;
+mod socket;
+mod tcpip;
+
+use super::life::{self, ALIVE, Life};
+use super::registers::{BITS_OF, REAL_OF, kind};
+use super::{comment, copies, records, remark, taken, temporaries};
 use crate::driver::Config;
+use crate::export::plcopen::{Kind, Project, Unit, Variable, variable};
 use crate::export::record::{Place, Record, block_prefix};
-use crate::export::{Export, File};
+use crate::export::{Export, File, head};
 use crate::fieldbus::Options;
 use crate::signal::DataType;
+use link::Link;
 
-const EDITOR: &str = "CODESYS V3 and editors made from it";
+/// The editor that a file is for: both read the same XML, but have libraries of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::export) enum Editor {
+    /// CODESYS V3, and editors made from it.
+    Codesys,
+    /// TwinCAT 3.
+    TwinCat,
+}
 
-const COMPILED: &str =
-    "Read by the parser of another project in our tests, never compiled in CODESYS.";
-
-/// A REAL and its bits share their memory.
-const FUNCTIONS: &str = "\
-TYPE tickbus_overlay :
-UNION
-    number : REAL;
-    bits : DWORD;
-END_UNION
-END_TYPE
-
-FUNCTION tickbus_real : REAL
-VAR_INPUT
-    bits : DWORD;
-END_VAR
-VAR
-    overlay : tickbus_overlay;
-END_VAR
-overlay.bits := bits;
-tickbus_real := overlay.number;
-END_FUNCTION
-
-FUNCTION tickbus_bits : DWORD
-VAR_INPUT
-    number : REAL;
-END_VAR
-VAR
-    overlay : tickbus_overlay;
-END_VAR
-overlay.number := number;
-tickbus_bits := overlay.bits;
-END_FUNCTION
-";
-
-/// The texts for `config`.
-pub(in crate::export) fn export(config: &Config) -> Export {
-    let prefix = block_prefix(&config.name);
-    let records = records(config, []);
-    let list = format!("{prefix}_io");
-    let file = |name: String, text: String| File {
-        name: format!("{name}.st"),
-        text,
-    };
-    let mut files = vec![file(list.clone(), globals(config, &list, &records))];
-    let is_real = |place: &Place<'_>| place.data_type() == DataType::Real;
-    if records
-        .iter()
-        .any(|record| record.places.iter().any(is_real))
-    {
-        let mut text = source(
-            config,
-            "A REAL out of its bits, and back.",
-            EDITOR,
-            COMPILED,
-        );
-        text.push_str(FUNCTIONS);
-        files.push(file(format!("{prefix}_functions"), text));
+impl Editor {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Codesys => "CODESYS V3 and editors made from it",
+            Self::TwinCat => "TwinCAT 3",
+        }
     }
+
+    const fn import(self) -> &'static str {
+        match self {
+            Self::Codesys => "Select the application, then Project > Import PLCopenXML",
+            Self::TwinCat => "Right-click the PLC project > Import PLCopenXML",
+        }
+    }
+}
+
+const COMPILED: &str = "Its XML was checked against PLCopen's schema, and its statements are read by the parser of another \
+                        project in our tests; it was never compiled in the editor.";
+
+/// The files for `config`.
+pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
+    let prefix = block_prefix(&config.name);
+    let list = format!("{prefix}_io");
+    let (begin, end) = (format!("{prefix}_begin"), format!("{prefix}_end"));
+    // Modbus carries each station from a register of its own on; a record over TCP has no gaps.
+    let aligned = match config.bus {
+        Options::ModbusServer(_) | Options::ModbusClient(_) => 2,
+        _ => 1,
+    };
+    let mut link = Link::of(config, editor, &list);
+    let declared = [&list, &begin, &end].map(String::clone);
+    let own = link.globals.iter().map(|own| own.name.clone());
+    let fixed = [REAL_OF, BITS_OF].map(str::to_owned);
+    let life_names = life::declared(config);
+    let mut names = taken(
+        declared
+            .into_iter()
+            .chain(own)
+            .chain(fixed)
+            .chain(life_names),
+    );
+    let records = records(config, aligned, &mut names);
     let [bring, take] = copies(
         &records,
         &|name| format!("{list}.{name}"),
         &|register| format!("{list}.In[{register}]"),
         &|register| format!("{list}.Out[{register}]"),
     );
-    let name = format!("{prefix}_begin");
-    let mut text = source(
+    let is_known = link.globals.iter().any(|own| own.name == ALIVE);
+    let life = Life::of(
         config,
-        "The first program of the task: the simulated inputs come into their variables.",
-        EDITOR,
-        COMPILED,
+        &records,
+        &|name| format!("{list}.{name}"),
+        [&format!("{list}.{ALIVE}"), &format!("{list}.Simulated")],
+        is_known,
     );
-    let other = "Not simulated: copy the real inputs into the same variables here.";
-    program(&mut text, &name, &list, &[], &bring, other);
-    files.push(file(name, text));
-
-    let name = format!("{prefix}_end");
-    let mut text = source(
-        config,
-        "The last program of the task: the outputs go to the simulation.",
-        EDITOR,
-        COMPILED,
-    );
-    let other = "Not simulated: copy the variables to the real outputs here. While simulated they stay as they are.";
-    program(
-        &mut text,
-        &name,
+    if life.is_beating() && !is_known {
+        link.globals.push(Variable {
+            comment: "the heartbeat of the simulation was seen lately".to_owned(),
+            ..variable(ALIVE, Kind::Basic("BOOL"))
+        });
+    }
+    let is_real = |place: &Place<'_>| place.data_type() == DataType::Real;
+    let mut units = Vec::new();
+    if records
+        .iter()
+        .any(|record| record.places.iter().any(is_real))
+    {
+        units.extend(functions());
+    }
+    let mut lines = link.before.lines.clone();
+    lines.extend(simulated(
         &list,
-        &temporaries(&records[1]),
-        &take,
-        other,
-    );
-    files.push(file(name, text));
-    Export {
-        files,
-        notes: Vec::new(),
-    }
-}
-
-fn globals(config: &Config, list: &str, records: &[Record<'_>; 2]) -> String {
-    let [inputs, outputs] = records;
-    let (incoming, outgoing) = (inputs.bytes.div_ceil(2), outputs.bytes.div_ceil(2));
-    let what = format!("Global variable list {list}: one variable for each signal.");
-    let mut text = source(config, &what, EDITOR, COMPILED);
-    for line in how(&config.bus, list, incoming, outgoing) {
-        add(&mut text, &comment(&line));
-    }
-    add(&mut text, "");
-    add(&mut text, "{attribute 'qualified_only'}");
-    add(&mut text, "VAR_GLOBAL");
-    add(
-        &mut text,
-        "    Simulated : BOOL; (* TRUE: the simulation stands in for the machine *)",
-    );
-    for (name, registers, what) in [("In", incoming, "from"), ("Out", outgoing, "to")] {
-        if registers > 0 {
-            let remark = format!(
-                "registers {what} the simulation: n holds bytes 2n and 2n + 1 of the record, the first one is the high byte"
-            );
-            let last = registers - 1;
-            add(
-                &mut text,
-                &format!(
-                    "    {name} : ARRAY[0..{last}] OF WORD; {}",
-                    comment(&remark)
-                ),
-            );
-        }
-    }
-    for (record, input) in [(inputs, true), (outputs, false)] {
-        for place in &record.places {
-            let remark = comment(&remark(place, input));
-            add(
-                &mut text,
-                &format!("    {} : {}; {remark}", place.name, kind(place)),
-            );
-        }
-    }
-    add(&mut text, "END_VAR");
-    text
-}
-
-/// One program: what it does while the simulation stands in, and where the user's own goes.
-fn program(
-    text: &mut String,
-    name: &str,
-    list: &str,
-    variables: &[&str],
-    lines: &[String],
-    other: &str,
-) {
-    add(text, &format!("PROGRAM {name}"));
-    if !variables.is_empty() {
-        add(text, "VAR");
-        for variable in variables {
-            add(text, &format!("    {variable}"));
-        }
-        add(text, "END_VAR");
-    }
-    add(text, &format!("IF {list}.Simulated THEN"));
-    for line in lines {
-        add(text, &format!("    {line}"));
-    }
-    if lines.is_empty() {
-        add(text, "    ;");
-    }
-    add(text, "ELSE");
-    add(text, &format!("    ; {}", comment(other)));
-    add(text, "END_IF;");
-    add(text, "END_PROGRAM");
-}
-
-/// How the registers come and go, bus by bus.
-fn how(bus: &Options, list: &str, incoming: usize, outgoing: usize) -> Vec<String> {
-    let mut lines = vec![
-        "Add each text by hand: a global variable list, a data type, functions and programs of these names, the texts pasted \
-         into them."
+        &bring,
+        "copy the real inputs into the same variables here",
+    ));
+    lines.extend(life.before.clone());
+    let mut locals = link.before.locals.clone();
+    locals.extend(life.locals.iter().map(|(name, kind)| {
+        let kind = if *kind == "TON" {
+            Kind::Block(kind)
+        } else {
+            Kind::Basic(kind)
+        };
+        variable(name, kind)
+    }));
+    units.push(Unit {
+        name: begin.clone(),
+        returns: None,
+        inputs: Vec::new(),
+        locals,
+        lines,
+        comment: "The first program of the task: the simulated inputs come into their variables."
             .to_owned(),
-    ];
-    match bus.kind() {
-        "modbus-server" => lines.extend([
-            "Device tree: Ethernet > Modbus TCP Client > Modbus TCP Server with address and port of the simulation, unit 1.".to_owned(),
-            format!("Channel 1: function code 4, offset 0, length {incoming}; map it to {list}.In."),
-            format!("Channel 2: function code 16, offset 0, length {outgoing}; map it to {list}.Out."),
-            "A channel has at most 125 registers to read and 123 to write: use several, and map their elements.".to_owned(),
-        ]),
-        "opcua-client" | "opcua-server" => lines.push(
-            "OPC UA carries the variables themselves: share this list in the symbol configuration; the registers In and \
-             Out, and the programs, are not needed."
-                .to_owned(),
+    });
+    let mut lines = life.after.clone();
+    lines.extend(simulated(
+        &list,
+        &take,
+        "copy the variables to the real outputs here; while simulated they stay as they are",
+    ));
+    lines.extend(link.after.lines.clone());
+    let mut locals: Vec<Variable> = temporaries(&records[1])
+        .into_iter()
+        .map(|(name, kind)| variable(name, Kind::Basic(kind)))
+        .collect();
+    locals.extend(link.after.locals.clone());
+    units.push(Unit {
+        name: end.clone(),
+        returns: None,
+        inputs: Vec::new(),
+        locals,
+        lines,
+        comment: "The last program of the task: the outputs go to the simulation.".to_owned(),
+    });
+    let mut about = head(
+        config,
+        "The PLC's half of a simulated machine.",
+        editor.name(),
+        COMPILED,
+    );
+    about.extend(Record::stations_aligned(&config.table, aligned));
+    let project = Project {
+        name: prefix.clone(),
+        comment: about.join("\n"),
+        units,
+        globals: (list.clone(), globals(&records, &link)),
+    };
+    let mut steps = vec![format!(
+        "{}: {prefix}.xml. It brings the list {list}, the programs {begin} and {end}, and what they call.",
+        editor.import()
+    )];
+    steps.extend(link.steps);
+    steps.extend([
+        format!("In the task of your program, call {begin} first and {end} last."),
+        format!(
+            "Your program reads and writes {list}.NAME. While {list}.Simulated is TRUE, they come from the simulation and go \
+             to it; while it is FALSE, its start value, neither is copied."
         ),
-        "socket" => lines.push(format!(
-            "Records over TCP need a library of the PLC's maker: receive {} bytes and put bytes 2n and 2n + 1 into {list}.In[n], \
-             high byte first; send {} bytes from {list}.Out likewise.",
-            2 * incoming,
-            2 * outgoing
-        )),
-        kind => lines.push(format!(
-            "The bus \"{kind}\" has no block of its own for CODESYS: what brings {list}.In and takes {list}.Out is to be \
-             written by hand."
-        )),
+    ]);
+    let mut readme = about;
+    readme.push(String::new());
+    let numbered = steps.iter().enumerate();
+    readme.extend(numbered.map(|(number, step)| format!("{}. {step}", number + 1)));
+    readme.push(String::new());
+    let file = |name: String, text: String| File { name, text };
+    Export {
+        files: vec![
+            file(format!("{prefix}.xml"), project.text()),
+            file(format!("{prefix}_README.txt"), readme.join("\r\n")),
+        ],
+        notes: link.notes,
     }
-    lines
+}
+
+/// A REAL out of its bits and back: the same memory, seen as both.
+fn functions() -> [Unit; 2] {
+    [
+        (REAL_OF, "REAL", "bits", "DWORD", "A REAL out of its bits."),
+        (BITS_OF, "DWORD", "number", "REAL", "The bits of a REAL."),
+    ]
+    .map(|(name, returns, input, kind, comment)| Unit {
+        name: name.to_owned(),
+        returns: Some(returns),
+        inputs: vec![variable(input, Kind::Basic(kind))],
+        locals: vec![variable("same", Kind::Pointer(returns))],
+        lines: vec![
+            format!("same := ADR({input});"),
+            format!("{name} := same^;"),
+        ],
+        comment: comment.to_owned(),
+    })
+}
+
+fn globals(records: &[Record<'_>; 2], link: &Link) -> Vec<Variable> {
+    let remarked = |name: &str, kind: Kind, comment: &str| Variable {
+        comment: comment.to_owned(),
+        ..variable(name, kind)
+    };
+    let mut all = vec![remarked(
+        "Simulated",
+        Kind::Basic("BOOL"),
+        "TRUE: the simulation stands in for the machine",
+    )];
+    all.extend(link.globals.clone());
+    for (record, name, way) in [(&records[0], "In", "from"), (&records[1], "Out", "to")] {
+        let count = record.bytes.div_ceil(2);
+        if count > 0 {
+            let comment = format!(
+                "registers {way} the simulation: n holds bytes 2n and 2n + 1 of the record, the first one is the high byte"
+            );
+            all.push(remarked(name, Kind::Array(count, "WORD"), &comment));
+        }
+    }
+    let places = records.iter().flat_map(|record| &record.places);
+    all.extend(places.map(|place| {
+        let kind = Kind::Basic(kind(place).name());
+        remarked(&place.name, kind, &remark(place))
+    }));
+    all
+}
+
+/// What is done while the simulation stands in, and where the user's own goes.
+fn simulated(list: &str, lines: &[String], other: &str) -> Vec<String> {
+    let mut all = vec![format!("IF {list}.Simulated THEN")];
+    all.extend(lines.iter().map(|line| format!("    {line}")));
+    if lines.is_empty() {
+        all.push("    ;".to_owned());
+    }
+    all.push("ELSE".to_owned());
+    all.push(format!(
+        "    ; {}",
+        comment(&format!("Not simulated: {other}."))
+    ));
+    all.push("END_IF;".to_owned());
+    all
 }

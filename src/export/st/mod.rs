@@ -1,11 +1,13 @@
-//! Structured Text: for CODESYS, and for `OpenPLC` and others that compile with `iec2c`.
+//! Structured Text: for CODESYS and TwinCAT, and for `OpenPLC` and others that compile with `iec2c`.
 //!
 //! Both get the records as 16-bit registers, as Modbus carries them, and copy between these and one variable for each
 //! signal.
 
 pub(super) mod codesys;
+mod life;
 pub(super) mod openplc;
 mod registers;
+mod telegrams;
 
 use std::fmt::Write as _;
 
@@ -18,16 +20,22 @@ use crate::signal::{Area, DataType, Width};
 /// Names that the sources use for themselves.
 const TAKEN: [&str; 6] = ["Simulated", "In", "Out", "bits_32", "bits_64", "Hardware"];
 
-/// Both records; no two signals have one name, whatever their direction, and none has one of `taken`.
-fn records(config: &Config, taken: impl IntoIterator<Item = String>) -> [Record<'_>; 2] {
+/// The names that a source declares beside its signals: those of all, and `more`.
+fn taken(more: impl IntoIterator<Item = String>) -> Names {
     let mut names = Names::default();
     for name in TAKEN {
         names.give(name);
     }
-    for name in taken {
+    for name in more {
         names.give(&name);
     }
-    [Area::Input, Area::Output].map(|area| Record::of(&config.table, area, &mut names))
+    names
+}
+
+/// Both records, each station from a multiple of `aligned` bytes on; no two signals have one name, whatever their
+/// direction.
+fn records<'a>(config: &'a Config, aligned: usize, names: &mut Names) -> [Record<'a>; 2] {
+    [Area::Input, Area::Output].map(|area| Record::aligned(&config.table, area, aligned, names))
 }
 
 /// Adds a line.
@@ -35,22 +43,18 @@ fn add(text: &mut String, content: &str) {
     writeln!(text, "{content}").expect("a String takes all");
 }
 
-/// The variables that the statements for a record of outputs need.
-fn temporaries(outputs: &Record<'_>) -> Vec<&'static str> {
+/// The variables that the statements for a record of outputs need: name and type.
+fn temporaries(outputs: &Record<'_>) -> Vec<(&'static str, &'static str)> {
     let has = |width| {
-        outputs
-            .places
-            .iter()
-            .any(|place| place.data_type().width() == width)
+        let mut places = outputs.places.iter();
+        places.any(|place| place.data_type().width() == width)
     };
     let all = [
-        (Width::Double, "bits_32 : DWORD;"),
-        (Width::Long, "bits_64 : LWORD;"),
+        (Width::Double, ("bits_32", "DWORD")),
+        (Width::Long, ("bits_64", "LWORD")),
     ];
-    all.into_iter()
-        .filter(|(width, _)| has(*width))
-        .map(|(_, line)| line)
-        .collect()
+    let needed = all.into_iter().filter(|(width, _)| has(*width));
+    needed.map(|(_, variable)| variable).collect()
 }
 
 /// A comment of IEC 61131-3.
@@ -60,10 +64,10 @@ fn comment(text: &str) -> String {
     format!("(* {text} *)")
 }
 
-/// The head of a source.
-fn source(config: &Config, what: &str, editor: &str, compiled: &str) -> String {
+/// The head of a source; each station begins at a multiple of `aligned` bytes.
+fn source(config: &Config, aligned: usize, what: &str, editor: &str, compiled: &str) -> String {
     let mut lines = head(config, what, editor, compiled);
-    lines.extend(Record::stations(&config.table));
+    lines.extend(Record::stations_aligned(&config.table, aligned));
     let mut text = String::new();
     for line in lines {
         text.push_str(&comment(&line));
@@ -74,22 +78,12 @@ fn source(config: &Config, what: &str, editor: &str, compiled: &str) -> String {
 }
 
 /// What is to be known about a signal's variable.
-fn remark(place: &Place<'_>, input: bool) -> String {
+fn remark(place: &Place<'_>) -> String {
     let mut text = place.remark();
     if place.data_type() == DataType::Lreal {
         text.push_str(", the bits of an LREAL");
     }
-    // Where a Modbus client that reads single signals finds it: offsets on the wire.
-    let table = match (place.data_type(), input) {
-        (DataType::Bool, true) => format!(
-            "discrete input {}",
-            place.byte * 8 + usize::from(place.bit())
-        ),
-        (DataType::Bool, false) => format!("coil {}", place.byte * 8 + usize::from(place.bit())),
-        (_, true) => format!("input register {}", place.byte / 2),
-        (_, false) => format!("holding register {}", place.byte / 2),
-    };
-    format!("{text}; Modbus: {table}")
+    text
 }
 
 /// The statements that bring the inputs, and those that take the outputs, with these ways to write registers.

@@ -1,0 +1,100 @@
+//! A program that tickbus itself hosts: located variables are the image.
+
+use super::{COMPILED, EDITOR, configuration, declared, program, remarks};
+use crate::driver::Config;
+use crate::export::record::Place;
+use crate::export::st::life::{self, ALIVE, Life};
+use crate::export::st::{add, comment, records, source, taken};
+use crate::signal::DataType;
+
+pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
+    let mut names = taken(declared(config).chain(life::declared(config)));
+    let records = records(config, 1, &mut names);
+    let mut text = source(
+        config,
+        1,
+        "The PLC's half for a program that tickbus hosts: docs/own-plc-program.md tells how.",
+        EDITOR,
+        COMPILED,
+    );
+    remarks(
+        &mut text,
+        &["Addresses count elements, as OpenPLC does: %QW1 is the second word.".to_owned()],
+    );
+    let [name, _] = program(config);
+    add(&mut text, &format!("PROGRAM {name}"));
+    let mut odd = 0;
+    for (record, what) in records.iter().zip([
+        "inputs: the simulation writes them",
+        "outputs: the simulation reads them",
+    ]) {
+        if record.places.is_empty() {
+            continue;
+        }
+        add(&mut text, &format!("  VAR {}", comment(what)));
+        for place in &record.places {
+            let remark = comment(&place.remark());
+            if let Some(address) = element(place) {
+                let (name, data_type) = (&place.name, place.data_type());
+                add(
+                    &mut text,
+                    &format!("    {name} AT {address} : {data_type}; {remark}"),
+                );
+                continue;
+            }
+            odd += 1;
+            for number in 0..place.size() {
+                let remark = if number == 0 { remark.as_str() } else { "" };
+                let name = names.give(&format!("{}_at{number}", place.name));
+                let byte = place.byte + number;
+                let line = format!(
+                    "    {name} AT {}B{byte} : BYTE; {remark}",
+                    place.signal.area
+                );
+                add(&mut text, line.trim_end());
+            }
+        }
+        add(&mut text, "  END_VAR");
+    }
+    if odd > 0 {
+        notes.push(format!(
+            "{odd} signals do not begin at a multiple of their size, where no element does: they are there as bytes"
+        ));
+    }
+    let life = Life::of(config, &records, &str::to_owned, [ALIVE, "TRUE"], false);
+    if life.is_beating() {
+        add(&mut text, "  VAR");
+        add(
+            &mut text,
+            &format!("    {ALIVE} : BOOL; (* the heartbeat of the simulation was seen lately *)"),
+        );
+        for (name, kind) in &life.locals {
+            add(&mut text, &format!("    {name} : {kind};"));
+        }
+        add(&mut text, "  END_VAR");
+    }
+    add(&mut text, "");
+    for line in life.before.iter().chain(&life.after) {
+        add(&mut text, &format!("  {line}"));
+    }
+    // A program without a statement is none for iec2c, nor is a lone semicolon a statement.
+    add(
+        &mut text,
+        "  (* Your program goes here, before this line. *)",
+    );
+    add(&mut text, "  RETURN;");
+    add(&mut text, "END_PROGRAM");
+    configuration(&mut text, config);
+    text
+}
+
+/// The address of a signal, counted in elements of its size; `None` where it begins between two of them.
+fn element(place: &Place<'_>) -> Option<String> {
+    let (area, byte) = (place.signal.area, place.byte);
+    if place.data_type() == DataType::Bool {
+        return Some(format!("{area}X{byte}.{}", place.bit()));
+    }
+    let letter = place.data_type().width().letter();
+    let is_whole = byte.is_multiple_of(place.size());
+    is_whole.then(|| format!("{area}{letter}{}", byte / place.size()))
+}

@@ -64,6 +64,7 @@ impl Device {
             hold: Nanos::default(),
             fail_safe: Slot::default(),
             dead_band: 0.0,
+            range: None,
         };
         let signals: Vec<Signal> = match files {
             Files::AreaByArea => [Area::Input, Area::Output]

@@ -51,6 +51,7 @@ fn signal(data_type: DataType, area: Area, byte: usize, bit: u8) -> Signal {
         hold: Nanos::default(),
         fail_safe: Slot::default(),
         dead_band: 0.0,
+        range: None,
     }
 }
 

@@ -14,6 +14,8 @@ mod foreign;
 mod opcua;
 #[path = "peers/pcap.rs"]
 mod pcap;
+#[path = "peers/opcua_served.rs"]
+mod served;
 
 use std::path::{Path, PathBuf};
 
@@ -59,6 +61,24 @@ fn main() -> std::process::ExitCode {
         (
             "a_server_that_asks_for_a_user_lets_nobody_else_in",
             no_anonymous,
+        ),
+        ("a_plc_in_stop_is_stale_until_it_runs_again", in_stop),
+        ("the_nodes_of_fieldbus_at_are_read_and_written", placed),
+        (
+            "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
+            served::ages_apart,
+        ),
+        (
+            "a_client_that_reads_stays_connected_whoever_leaves",
+            served::undisturbed,
+        ),
+        (
+            "the_status_of_the_server_goes_on_and_its_host_is_announced",
+            served::tells_of_itself,
+        ),
+        (
+            "a_client_with_the_certificate_of_another_application_gets_no_values",
+            served::impostor,
         ),
     ])
 }
@@ -119,6 +139,57 @@ fn comes_back() -> Result<(), Absent> {
     Ok(())
 }
 
+fn in_stop() -> Result<(), Absent> {
+    const SUSPENDED: i32 = 3;
+    let address = free_address();
+    let mut plc = plc(address, &json!({}))?;
+    let mut device = Device::plain(address);
+    device.until("values", |end| end.get("speed") == 7.0);
+    device.until("it is told", |end| {
+        end.driver.statistics().contains("cpu=run\n")
+    });
+    plc.ask(&json!({"state": SUSPENDED}));
+    device.until("fail-safe values", |end| {
+        end.tick().code == Code::Stale && end.get("speed") == -1.0
+    });
+    assert_eq!(device.end.link().cause.name(), "stopped");
+    assert_eq!(device.end.statistic("cpu"), "stop");
+    // Nothing has changed meanwhile, so the server reports no value again.
+    plc.ask(&json!({"state": 0}));
+    device.until("values again", |end| end.get("speed") == 7.0);
+    assert_eq!(device.end.link().state, LinkState::Running);
+    Ok(())
+}
+
+fn placed() -> Result<(), Absent> {
+    let address = free_address();
+    let mut nodes = nodes();
+    let list = nodes.as_object_mut().expect("a table");
+    for (name, other) in [("speed", "\"DB\".\"Speed\""), ("position", "DB.Position")] {
+        let value = list.remove(name).expect("it is there");
+        list.insert(other.to_owned(), value);
+    }
+    list.insert("DB.Spare".to_owned(), json!(["Int16", 55]));
+    let mut plc = plc(address, &json!({"nodes": nodes}))?;
+    let mut device = Device::client(
+        address,
+        &format!(
+            "security = \"None\"\nwrite_to = \"{IDENTITY}\"\n[fieldbus.at]\n\
+             \"speed\" = \"nsu=urn:test:signals;s=\\\"DB\\\".\\\"Speed\\\"\"\n\
+             \"position\" = \"ns=2;s=DB.Position\""
+        ),
+    );
+    device.until("values", |end| {
+        end.get("speed") == 7.0 && end.get("torque") == 1.5
+    });
+    device.end.set("position", 138.24);
+    device.until("the PLC has it", |_| {
+        plc.ask(&json!({"get": "DB.Position"}))["value"] == json!(13824)
+    });
+    assert_eq!(plc.ask(&json!({"get": "DB.Spare"}))["value"], json!(55));
+    Ok(())
+}
+
 fn bad_quality() -> Result<(), Absent> {
     let address = free_address();
     let mut plc = plc(address, &json!({}))?;
@@ -165,6 +236,7 @@ fn wrong_types() -> Result<(), Absent> {
 }
 
 fn guarded() -> Result<(), Absent> {
+    conformance::rig::logged::expect("nothing is written into the PLC \"urn:test:plc ACME PLC\"");
     let address = free_address();
     let mut plc = plc(address, &json!({}))?;
     let mut device = Device::client(address, "security = \"None\"");
@@ -308,7 +380,7 @@ fn serves() -> Result<(), Absent> {
     let properties = client.ask(&json!({"properties": "position.scaled"}));
     let range = properties["EURange"].as_str().expect("a range");
     assert!(
-        range.contains("-327.68") && range.contains("327.67"),
+        range.contains("Low=0.0") && range.contains("High=276.48"),
         "{range}"
     );
     assert!(properties["EngineeringUnits"].to_string().contains("mm"));
@@ -461,6 +533,7 @@ fn nothing_malformed() -> Result<(), Absent> {
 }
 
 fn secured() -> Result<(), Absent> {
+    conformance::rig::logged::expect("a client with an unknown certificate was turned away");
     let folder = tempfile::tempdir().expect("a folder");
     let uri = "urn:test:client";
     let made = json!({"certificate": folder.path(), "uri": uri});

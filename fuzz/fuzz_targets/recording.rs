@@ -51,6 +51,7 @@ fn table() -> SignalTable {
         unit: None,
         latch: None,
         dead_band: 0.0,
+        range: None,
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
     };

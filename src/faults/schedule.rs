@@ -150,6 +150,7 @@ mod tests {
                 hold: Nanos::ZERO,
                 fail_safe: Slot::default(),
                 dead_band: 0.0,
+                range: None,
             }],
         }
     }

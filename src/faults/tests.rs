@@ -25,6 +25,7 @@ pub(super) fn table() -> SignalTable {
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
         dead_band: 0.0,
+        range: None,
     };
     SignalTable {
         stations: vec![Station {

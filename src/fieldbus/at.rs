@@ -45,6 +45,11 @@ impl<'a> At<'a> {
         entries
     }
 
+    /// Where the address stands in the text, for [`Collector::report`](crate::config::Collector::report).
+    pub fn at(&self) -> usize {
+        self.value.at()
+    }
+
     /// Takes down a mistake in this address.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.value.wrong(what, right);

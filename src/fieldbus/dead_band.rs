@@ -138,6 +138,7 @@ mod tests {
             hold: Nanos::ZERO,
             fail_safe: Slot::default(),
             dead_band,
+            range: None,
         }
     }
 

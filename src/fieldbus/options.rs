@@ -165,6 +165,7 @@ impl Options {
         match self {
             Self::ModbusServer(options) => options.place(signal),
             Self::ModbusClient(options) => options.place(signal, station.bytes(signal.area)),
+            Self::OpcuaClient(options) => options.place(signal, station),
             Self::S7Client(options) => options
                 .variable(signal)
                 .map(|variable| variable.to_string())
@@ -189,6 +190,8 @@ impl Options {
         if let Self::S7Client(options) = self {
             options.place_signals(lines, table);
         } else if let Self::ModbusClient(options) = self {
+            options.place_signals(lines, table);
+        } else if let Self::OpcuaClient(options) = self {
             options.place_signals(lines, table);
         } else if let Some(first) = lines.first() {
             first.wrong(

@@ -327,6 +327,11 @@ impl Port {
             .unwrap_or_default()
     }
 
+    /// How long ago the peer of a station was heard of; [`Nanos::MAX`] for never.
+    pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
+        self.image.stations[station].peer_age(now)
+    }
+
     /// When the next station becomes stale if nothing comes from it; [`Nanos::MAX`] if all are.
     pub fn stale_at(&self, now: Nanos) -> Nanos {
         let limit = self.max_age();

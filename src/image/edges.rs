@@ -459,6 +459,7 @@ mod tests {
                 data_type: DataType::Bool,
                 order: ByteOrder::Abcd,
                 scale: None,
+                range: None,
                 unit: None,
                 latch: latched.then_some(Latch::Rising),
                 hold: Nanos::ZERO,

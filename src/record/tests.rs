@@ -31,6 +31,7 @@ fn table(stations: &[&str]) -> SignalTable {
                     unit: scaled.then(|| "m/s \"$".to_owned()),
                     latch: None,
                     dead_band: 0.0,
+                    range: None,
                     hold: Nanos::ZERO,
                     fail_safe: Slot::default(),
                 });

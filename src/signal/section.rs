@@ -138,6 +138,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         dead_band: dead_band
             .and_then(|value| fitting_dead_band(&value, band.flatten()?, data_type))
             .unwrap_or_default(),
+        range: None,
     };
     let hold =
         hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched.is_some()));
@@ -145,9 +146,11 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         hold: hold.unwrap_or_default(),
         ..signal
     };
-    let scaled = scale.as_ref().map(|value| scale_of(value, data_type));
+    let scaled = scale.as_ref().map(|value| drawn(value, data_type));
+    let (scale, range) = scaled.flatten().unzip();
     let signal = Signal {
-        scale: scaled.flatten(),
+        scale,
+        range,
         ..signal
     };
     let fail_safe = match (fail_safe, scaled) {
@@ -357,6 +360,11 @@ const PAIR: &str = "write two numbers, such as [0, 27648]";
 
 /// A linear scale for raw values of `data_type`.
 pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
+    drawn(value, data_type).map(|(scale, _)| scale)
+}
+
+/// A linear scale for raw values of `data_type`, and the two values that it was drawn through, the lower one first.
+fn drawn(value: &Value<'_>, data_type: DataType) -> Option<(Scale, [f64; 2])> {
     const SHAPE: &str = "write scale = { raw = [0, 27648], value = [0.0, 250.0] }";
     if data_type == DataType::Bool {
         value.wrong("a BOOL cannot be scaled", "remove \"scale\"");
@@ -402,7 +410,8 @@ pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
             "write two different ones, such as value = [0.0, 250.0]",
         );
     } else if let Some(scale) = Scale::through(raw_numbers, numbers) {
-        return Some(scale);
+        let [one, other] = numbers;
+        return Some((scale, [one.min(other), one.max(other)]));
     } else {
         value.wrong(
             "the slope of this scale is beyond what a number can hold",

@@ -46,6 +46,9 @@ pub struct Signal {
     /// By how much the value may move, in engineering units, without being news to a bus that sends
     /// on change; zero where every change is. Never negative, and zero on a BOOL.
     pub dead_band: f64,
+    /// The lowest and the highest value of normal operation, in engineering units: the two values that its scale
+    /// names. What a display goes by; no value is kept within it.
+    pub range: Option<[f64; 2]>,
 }
 
 impl Signal {

@@ -9,9 +9,11 @@ mod nanos;
 mod pace;
 mod spans;
 mod stop;
+mod wall;
 
 pub use clock::{Clock, Manual, Monotonic};
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
 pub use spans::Spans;
 pub use stop::{Stop, Waker};
+pub use wall::{WallClock, system_time};

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tickbus::time::Monotonic;
 
-use crate::conformance::rig::{End, await_that};
+use crate::conformance::rig::{End, await_that, logged};
 use crate::foreign::{self, Absent};
 
 pub const SIGNALS: &str = r#"
@@ -149,11 +149,17 @@ impl Device {
     }
 
     pub fn open_in(folder: tempfile::TempDir, kind: &str, keys: &str) -> Self {
+        Self::open_with(folder, kind, keys, SIGNALS)
+    }
+
+    pub fn open_with(folder: tempfile::TempDir, kind: &str, keys: &str, signals: &str) -> Self {
         let clock: Arc<Monotonic> = Monotonic::shared();
+        // A new folder has no certificate yet.
+        logged::expect("made a certificate for \"tickbus Test rig\"");
         let pki = folder.path().join("pki");
         let text = format!(
             "[driver]\nid = 7\nname = \"Test rig\"\n[fieldbus]\nkind = \"{kind}\"\nmax_age = \"2s\"\n\
-             reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{SIGNALS}",
+             reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{signals}",
             pki.display().to_string()
         );
         let end = End::open(&text, &clock);

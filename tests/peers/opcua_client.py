@@ -9,6 +9,8 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"subscribe": [nodes, interval, queue]}  {}
     {"changes": node}                {"values": […]} since the last time
     {"properties": node}             {name: value as text}
+    {"status": true}                 {"start", "time"}, of the structure ServerStatus, in seconds
+    {"endpoints": true}              {"urls": […]}, as the server announces them
     {"stop": true}                   and at the end of stdin
 """
 
@@ -97,6 +99,11 @@ async def serve(client):
         if "properties" in line:
             for one in await node(line["properties"]).get_properties():
                 answer[(await one.read_browse_name()).Name] = str(await one.read_value())
+        if "status" in line:
+            status = await client.get_node(ua.NodeId(ua.ObjectIds.Server_ServerStatus)).read_value()
+            answer = {"start": status.StartTime.timestamp(), "time": status.CurrentTime.timestamp()}
+        if "endpoints" in line:
+            answer["urls"] = [one.EndpointUrl for one in await client.get_endpoints()]
         if "stop" in line:
             return
         print(json.dumps(answer), flush=True)

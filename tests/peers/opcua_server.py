@@ -5,6 +5,7 @@ It says "ready" on stdout, then obeys a line of JSON from stdin at a time, and a
     {"set": {name: value}}           writes good values
     {"status": {name: "Bad…"}}       writes the last value again, with that status
     {"get": name}                    {"value": …}
+    {"state": number}                the state that the server says it is in
     {"stop": true}                   and at the end of stdin
 """
 
@@ -93,6 +94,9 @@ async def main():
                     StatusCode=ua.StatusCode(getattr(ua.StatusCodes, status)),
                 )
                 await server.write_attribute_value(nodes[name].nodeid, value)
+            if "state" in line:
+                state = server.get_node(ua.NodeId(ua.ObjectIds.Server_ServerStatus_State))
+                await state.write_value(ua.Variant(line["state"], ua.VariantType.Int32))
             if "get" in line:
                 answer["value"] = await nodes[line["get"]].read_value()
             if "stop" in line:

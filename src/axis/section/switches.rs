@@ -109,6 +109,7 @@ fn read_switch(
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
         dead_band: 0.0,
+        range: None,
     };
     let section = Section {
         signal,

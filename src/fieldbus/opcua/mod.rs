@@ -9,6 +9,8 @@ mod security;
 mod url;
 
 #[cfg(feature = "opcua")]
+mod application;
+#[cfg(feature = "opcua")]
 mod client;
 #[cfg(feature = "opcua")]
 mod line;
@@ -16,6 +18,8 @@ mod line;
 mod pki;
 #[cfg(feature = "opcua")]
 mod reactor;
+#[cfg(feature = "opcua")]
+mod rejects;
 #[cfg(feature = "opcua")]
 mod server;
 #[cfg(feature = "opcua")]

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, HashMap};
 
 use crate::config::{Collector, Table, Value, did_you_mean, shown};
+use crate::fieldbus::At;
 use crate::fieldbus::options::read_events;
-use crate::fieldbus::tcp::{Address, AddressError};
-use crate::signal::{Signal, SignalTable};
+use crate::fieldbus::tcp::{Address, AddressError, Host};
+use crate::signal::{Signal, SignalTable, Station};
 use crate::time::Nanos;
 
 use super::security::{Credentials, Keys, Mode, Policy};
@@ -59,6 +60,8 @@ pub struct Node {
 pub struct ServerOptions {
     /// Where it listens; port 0 lets the system choose one.
     pub address: Address,
+    /// The host that it announces to clients; `None` for the one that it listens at, or the computer's name.
+    pub host: Option<String>,
     /// How messages may be protected; never empty.
     pub security: Vec<Policy>,
     /// Certificates, and the user that may log in.
@@ -178,21 +181,46 @@ impl ClientOptions {
         parts
     }
 
-    /// The node of a signal of `table`.
+    /// The node of a signal of `station`.
     ///
     /// # Errors
     ///
     /// What is made of its name is no node id.
     pub(super) fn node(
         &self,
-        table: &SignalTable,
         signal: &Signal,
+        station: &Station,
     ) -> Result<NodeName, NodeNameError> {
         if let Some(node) = self.nodes.get(&signal.name) {
             return Ok(node.name.clone());
         }
-        let station = &table.stations[signal.station].name;
-        self.node_pattern.node(&signal.name, station)
+        self.node_pattern.node(&signal.name, &station.name)
+    }
+
+    /// The node of a signal of `station`, in words for people.
+    pub(in crate::fieldbus) fn place(&self, signal: &Signal, station: &Station) -> String {
+        // A node id that is none was reported.
+        let node = self.node(signal, station);
+        node.map_or_else(|_| String::new(), |node| shown(&node.to_string()))
+    }
+
+    /// Takes the lines of `[fieldbus.at]`, node ids, and reports those that are none.
+    pub(in crate::fieldbus) fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        for line in lines {
+            let name = &table.signals[line.signal].name;
+            let parsed: Result<NodeName, NodeNameError> = line.text.parse();
+            match parsed {
+                Err(error) => line.wrong(error.what, error.right),
+                Ok(_) if self.nodes.contains_key(name) => line.wrong(
+                    format!("the signal \"{}\" stands in \"nodes\", too", shown(name)),
+                    "keep the line in [fieldbus.at], and remove the one in nodes",
+                ),
+                Ok(node) => {
+                    let at = line.at();
+                    self.nodes.insert(name.clone(), Node { name: node, at });
+                }
+            }
+        }
     }
 
     /// Reports nodes of signals that are not there, and nodes that several signals have.
@@ -210,7 +238,7 @@ impl ClientOptions {
         let mut taken: HashMap<NodeName, &str> = HashMap::new();
         for signal in &table.signals {
             let at = self.nodes.get(&signal.name).map_or(self.at, |node| node.at);
-            match self.node(table, signal) {
+            match self.node(signal, &table.stations[signal.station]) {
                 Err(error) => {
                     let what = format!("signal \"{}\": {}", shown(&signal.name), error.what);
                     collector.report(at, what, error.right);
@@ -225,7 +253,7 @@ impl ClientOptions {
                                 shown(&signal.name),
                                 shown(&node.to_string())
                             ),
-                            "give each signal a node of its own, in nodes or by {name} in node_pattern",
+                            "give each signal a node of its own, in [fieldbus.at] or by {name} in node_pattern",
                         );
                     }
                 }
@@ -250,6 +278,9 @@ impl ServerOptions {
     /// What it says, in words for people.
     pub fn summary(&self) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.address)];
+        if let Some(host) = &self.host {
+            parts.push(format!("announces \"{}\"", shown(host)));
+        }
         parts.push(protection(&self.security, self.credentials.mode));
         let user = self.credentials.login.as_ref();
         parts.push(match (user, self.anonymous) {
@@ -263,6 +294,7 @@ impl ServerOptions {
     /// Reads the keys of a server.
     pub(in crate::fieldbus) fn read(mut table: Table<'_>) -> Option<Self> {
         let address = table.take("address");
+        let host = table.take("host");
         let keys = Keys::take(&mut table);
         let anonymous = table.take("anonymous");
         let events = table.take("events");
@@ -277,6 +309,7 @@ impl ServerOptions {
         table.finish();
 
         let read = address.as_ref().map_or(Some(ADDRESS), Address::read);
+        let host = host.map_or(Some(None), |value| read_host(&value).map(Some));
         let security = keys
             .security
             .as_ref()
@@ -295,12 +328,33 @@ impl ServerOptions {
         let events = events.as_ref().map_or(Some((false, false)), read_events);
         Some(Self {
             address: read?,
+            host: host?,
             security: security?,
             credentials: credentials?,
             anonymous: allowed?,
             events: events?.0,
             every_write: events?.1,
         })
+    }
+}
+
+/// A host as clients write it into a URL: brackets around an IPv6 address.
+fn read_host(value: &Value<'_>) -> Option<String> {
+    let right = "write this computer's address, such as \"192.168.0.5\", or a name that every client can look up";
+    let text = value.text(right)?;
+    // Any port makes an address of it.
+    match format!("{text}:{}", super::url::PORT).parse::<Address>() {
+        Ok(Address {
+            host: Host::Ip(ip), ..
+        }) if ip.is_unspecified() => {
+            value.wrong(format!("nobody can go to the host \"{ip}\""), right);
+            None
+        }
+        Ok(_) => Some(text.to_owned()),
+        Err(_) => {
+            value.wrong(format!("\"{}\" is no host", shown(text)), right);
+            None
+        }
     }
 }
 

@@ -9,17 +9,18 @@
 //! pki/rejected/                 those that are not; move one to trusted to trust it
 //! ```
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use opcua::crypto::{CertificateStore, SecurityPolicy, X509, X509Data};
-use opcua::types::{ByteString, DateTime, StatusCode};
+use opcua::types::{ByteString, DateTime, DateTimeUtc, StatusCode};
 
 use crate::fieldbus::BusError;
+use crate::time::{WallClock, system_time};
 
-use super::{Credentials, Line, Login, Policy, Secret, Trust};
+use super::{Credentials, Line, Login, Policy, Secret, Trust, application};
 
 /// What all programs of this project say they are.
 pub(super) const PRODUCT: &str = "tickbus";
@@ -45,6 +46,10 @@ pub(super) struct Pki {
     /// What it is called for programs.
     pub(super) uri: String,
     pub(super) trust: Trust,
+    /// A host that the own certificate names, too.
+    pub(super) host: Option<String>,
+    /// By which certificates are judged.
+    pub(super) wall: WallClock,
     directory: PathBuf,
     login: Option<Login>,
 }
@@ -60,6 +65,8 @@ impl Pki {
             application: format!("{PRODUCT} {}", line.name),
             uri: application_uri(line.name),
             trust: credentials.trust,
+            host: None,
+            wall: system_time,
             directory: line.directory.to_owned(),
             login: credentials.login.clone(),
         }
@@ -94,7 +101,13 @@ impl Pki {
             organizational_unit: PRODUCT.to_owned(),
             country: "EU".to_owned(),
             state: "-".to_owned(),
-            alt_host_names: X509Data::alt_host_names(uri, None, true, true, false),
+            alt_host_names: X509Data::alt_host_names(
+                uri,
+                self.host.clone().map(|host| vec![host]),
+                true,
+                true,
+                false,
+            ),
             certificate_duration_days: DAYS,
         };
         let store = CertificateStore::new(&self.folder);
@@ -116,15 +129,10 @@ impl Pki {
         let certificate = CertificateStore::read_cert(file);
         let why = match certificate {
             Err(error) => error,
-            Ok(certificate) => {
-                let good = certificate
-                    .is_application_uri_valid(&self.uri)
-                    .and_then(|()| certificate.is_time_valid(&DateTime::now().as_chrono()));
-                match good {
-                    Ok(()) => return Ok(()),
-                    Err(error) => error.to_string(),
-                }
-            }
+            Ok(certificate) => match self.examine(&certificate, &self.uri) {
+                Ok(()) => return Ok(()),
+                Err(why) => why,
+            },
         };
         Err(BusError::Refused(format!(
             "the own certificate \"{}\" cannot be used ({why}); delete it, and it is made anew for {}",
@@ -175,25 +183,21 @@ impl Pki {
         if self.trust == Trust::Any {
             return Ok(());
         }
-        let good = certificate
-            .is_time_valid(&DateTime::now().as_chrono())
-            .and_then(|()| certificate.is_application_uri_valid(uri));
-        match good {
+        match self.examine(&certificate, uri) {
             Ok(()) => Ok(()),
-            Err(error) => refused(format!(
-                "the certificate of the server is not good ({error}); give the server a new one, or write \
+            Err(why) => refused(format!(
+                "the certificate of the server is not good ({why}); give the server a new one, or write \
                  trust = \"any\" to take it all the same"
             )),
         }
     }
 
-    /// The names of the files of certificates that were turned away.
-    pub(super) fn rejected(&self) -> BTreeSet<String> {
-        let files = fs::read_dir(self.folder.join("rejected"));
-        let files = files.into_iter().flatten().flatten();
-        files
-            .filter_map(|file| file.file_name().into_string().ok())
-            .collect()
+    /// Whether a certificate is good today, and that of the application called `uri`.
+    fn examine(&self, certificate: &X509, uri: &str) -> Result<(), String> {
+        certificate
+            .is_time_valid(&date((self.wall)()).as_chrono())
+            .map_err(|error| error.to_string())?;
+        application::check(certificate, uri)
     }
 
     /// The user and the password.
@@ -255,6 +259,13 @@ fn application_uri(name: &str) -> String {
         }
     }
     uri
+}
+
+/// The time of day, as OPC UA counts it.
+pub(super) fn date(since_1970: Duration) -> DateTime {
+    let seconds = i64::try_from(since_1970.as_secs()).ok();
+    let time = seconds.and_then(|s| DateTimeUtc::from_timestamp(s, since_1970.subsec_nanos()));
+    time.map_or_else(DateTime::endtimes, DateTime::from)
 }
 
 /// What is said of a service that ended with `status`.

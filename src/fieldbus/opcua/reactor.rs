@@ -80,6 +80,11 @@ impl Reactor {
         make()
     }
 
+    /// How many tasks have not ended yet.
+    pub(super) fn tasks(&self) -> usize {
+        self.runtime().metrics().num_alive_tasks()
+    }
+
     /// Lets a task run during waits.
     pub(super) fn spawn(&self, task: impl Future<Output = ()> + Send + 'static) {
         // Nobody waits for its end: it ends with the runtime at the latest.
@@ -185,6 +190,11 @@ impl<T> Inbox<T> {
     pub(super) fn push(&self, news: T) {
         self.lock().push(news);
         self.wake.notify_one();
+    }
+
+    /// Adds all of `news`, and ends the wait.
+    pub(super) fn extend(&self, news: impl IntoIterator<Item = T>) {
+        news.into_iter().for_each(|news| self.push(news));
     }
 
     /// Takes all news, oldest first, by changing places with the empty `taken`.

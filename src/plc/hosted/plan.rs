@@ -428,6 +428,7 @@ mod tests {
             latch: None,
             hold: Nanos::ZERO,
             dead_band: 0.0,
+            range: None,
             fail_safe: Slot::default(),
         });
         SignalTable {

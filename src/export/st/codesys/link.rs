@@ -73,7 +73,7 @@ impl Link {
                 }
             }
             Options::ModbusServer(options) => modbus::link(config, options, editor, list),
-            Options::ModbusClient(_) if editor == Editor::Codesys => Self::of_steps([
+            Options::ModbusClient(options) if editor == Editor::Codesys && options.at.is_empty() => Self::of_steps([
                 format!(
                     "Device tree: Ethernet > ModbusTCP Server Device. Its holding registers are what the simulation writes: map \
                      them to {list}.In. Its input registers are what the simulation reads: map them to {list}.Out."

@@ -22,6 +22,12 @@ pub(super) fn text(config: &Config, options: &ClientOptions) -> Result<String, M
             "export from a driver.cfg for each OpenPLC, with the signals of its station",
         ));
     }
+    if !options.at.is_empty() {
+        return Err(wrong(
+            "signals of [fieldbus.at] lie where a program for OpenPLC has them already".to_owned(),
+            "remove [fieldbus.at] to export a program to which the simulation's images are laid",
+        ));
+    }
     let registers = |area: Area| -> Result<Vec<String>, Mistakes> {
         let bytes = config.table.stations[0].bytes(area);
         let blocks = options.blocks(area, bytes);
@@ -35,8 +41,7 @@ pub(super) fn text(config: &Config, options: &ClientOptions) -> Result<String, M
                      of OpenPLC",
                 ));
             }
-            let span = block.span();
-            for register in span.first..span.end() {
+            for register in block.first..block.first + block.bytes.div_ceil(2) {
                 addresses.push(match register {
                     0..WORDS => format!("%QW{register}"),
                     _ if register < 2 * WORDS => format!("%MW{}", register - WORDS),

@@ -39,7 +39,8 @@ pub struct Block {
 }
 
 impl Block {
-    fn span(self) -> Span {
+    /// The elements of the table.
+    pub fn span(self) -> Span {
         Span {
             first: self.first,
             count: self.table.elements(self.bytes),

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use opcua::client::{MonitoredItemMap, OnSubscriptionNotificationCore, Session};
 use opcua::types::{
     DataChangeNotification, DataValue, Error, MonitoredItemCreateRequest, MonitoringMode,
-    MonitoringParameters, NodeId, NotificationMessage, StatusChangeNotification, StatusCode,
-    TimestampsToReturn,
+    MonitoringParameters, NodeId, NotificationMessage, ServerState, StatusChangeNotification,
+    StatusCode, TimestampsToReturn, VariableId, Variant,
 };
 
-use crate::fieldbus::BusError;
 use crate::fieldbus::opcua::pki::meaning;
 use crate::fieldbus::opcua::reactor::Inbox;
+use crate::fieldbus::{BusError, PlcState};
 use crate::time::Nanos;
 
 use super::Field;
@@ -32,6 +32,8 @@ pub(super) enum News {
     Values(Vec<(usize, DataValue)>),
     /// A publish without values: all are as they were.
     Alive,
+    /// What the PLC says of itself.
+    Plc(PlcState),
     /// The answer to a Write, one status per value; or why there is none.
     Written(Result<Vec<StatusCode>, BusError>),
     /// The session is over.
@@ -63,8 +65,13 @@ impl OnSubscriptionNotificationCore for Feed {
                 let error = BusError::Left(format!("the server ended the subscription ({why})"));
                 self.0.push(News::Ended(error));
             } else if let Some(data) = data.into_inner_as::<DataChangeNotification>() {
-                let items = data.monitored_items.into_iter().flatten();
-                values.extend(items.map(|item| (signal(item.client_handle), item.value)));
+                for item in data.monitored_items.into_iter().flatten() {
+                    if item.client_handle == STATE {
+                        self.0.extend(state(&item.value).map(News::Plc));
+                    } else {
+                        values.push((signal(item.client_handle), item.value));
+                    }
+                }
             }
         }
         self.0.push(if values.is_empty() {
@@ -72,6 +79,23 @@ impl OnSubscriptionNotificationCore for Feed {
         } else {
             News::Values(values)
         });
+    }
+}
+
+/// The name of the item that is no signal: the state of the server.
+const STATE: u32 = u32::MAX;
+
+/// What `Server_ServerStatus_State` says of the PLC; `None` for nothing. Outputs of a server in test mode lead
+/// nowhere, as those of one that was suspended (OPC 10000-5, 12.6).
+fn state(value: &DataValue) -> Option<PlcState> {
+    const RUNNING: i32 = ServerState::Running as i32;
+    const UNKNOWN: i32 = ServerState::Unknown as i32;
+    match value.value {
+        _ if value.status().is_bad() => None,
+        Some(Variant::Int32(RUNNING)) => Some(PlcState::Run),
+        Some(Variant::Int32(UNKNOWN)) => None,
+        Some(Variant::Int32(_)) => Some(PlcState::Stop),
+        _ => None,
     }
 }
 
@@ -109,6 +133,8 @@ pub(super) async fn subscribe(
             rhythm.max_age
         );
     }
+    // Before the values, which count for nothing while it is not running.
+    watch_state(session, id, interval).await?;
     let read: Vec<usize> = (0..fields.len())
         .filter(|index| fields[*index].is_read)
         .collect();
@@ -148,6 +174,33 @@ pub(super) async fn subscribe(
         }
     }
     Ok(revised)
+}
+
+/// Subscribes to the state of the server. One that does not report it is believed to run.
+async fn watch_state(session: &Session, id: u32, interval: Nanos) -> Result<(), BusError> {
+    let request = MonitoredItemCreateRequest::new(
+        NodeId::from(VariableId::Server_ServerStatus_State).into(),
+        MonitoringMode::Reporting,
+        MonitoringParameters {
+            client_handle: STATE,
+            sampling_interval: interval.as_micros() / 1e3,
+            queue_size: 1,
+            discard_oldest: true,
+            ..MonitoringParameters::default()
+        },
+    );
+    let made = session
+        .create_monitored_items(id, TimestampsToReturn::Both, vec![request])
+        .await
+        .map_err(|error| no_subscription(&error))?;
+    let refused = made.iter().map(|made| made.result.status_code);
+    if let Some(status) = refused.into_iter().find(|status| status.is_bad()) {
+        log::info!(
+            "the server does not report its state ({}), so a PLC in STOP is not noticed by it",
+            meaning(status)
+        );
+    }
+    Ok(())
 }
 
 /// Publishing interval and the longest silence, counted in it, as the server has made them of what was asked.

@@ -219,7 +219,7 @@ impl Free for Client {
 fn fields(options: &ClientOptions, line: Line<'_>) -> Result<Vec<Field>, String> {
     let read: Area = line.role.areas().1;
     let field = |signal: &Signal| {
-        let node = options.node(line.table, signal);
+        let node = options.node(signal, &line.table.stations[signal.station]);
         Ok(Field {
             name: signal.name.clone(),
             data_type: signal.data_type,

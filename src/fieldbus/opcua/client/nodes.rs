@@ -155,7 +155,7 @@ pub(super) async fn check(
         let _ = write!(text, "; and {} more", mistakes.len() - TOLD);
     }
     Err(BusError::Refused(format!(
-        "{text}; correct the signals, or \"nodes\" and \"node_pattern\", or the server"
+        "{text}; correct the signals, or [fieldbus.at] and \"node_pattern\", or the server"
     )))
 }
 

@@ -158,7 +158,8 @@ impl Readings {
         signals.all(|&signal| matches!(self.quality[signal], Quality::Good | Quality::Uncertain))
     }
 
-    fn commit(&mut self, port: &mut Port, now: Nanos, fields: &[Field]) {
+    /// Hands in what is known, as far as it is whole.
+    pub(super) fn commit(&mut self, port: &mut Port, now: Nanos, fields: &[Field]) {
         debug_assert_eq!(fields.len(), self.quality.len(), "one per signal");
         for station in 0..self.frames.len() {
             if self.is_sound(station) && !self.frames[station].is_empty() {

@@ -7,7 +7,7 @@ use opcua::types::NodeId;
 
 use crate::fieldbus::opcua::pki::meaning;
 use crate::fieldbus::opcua::reactor::{Inbox, Reactor};
-use crate::fieldbus::{BusError, Port};
+use crate::fieldbus::{BusError, PlcState, Port};
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Pace, Stop};
 
@@ -77,6 +77,15 @@ impl Talk<'_> {
         match news {
             News::Values(values) => self.readings.take(port, now, self.fields, &values)?,
             News::Alive => self.readings.touch(port, now),
+            News::Plc(state) => {
+                for station in 0..port.stations() {
+                    port.plc_state(station, now, state);
+                }
+                // Values that have not changed while it stood are not reported again: they count from now on.
+                if state == PlcState::Run {
+                    self.readings.commit(port, now, self.fields);
+                }
+            }
             News::Written(answer) => {
                 if let Some(writings) = &mut self.writings {
                     writings.answered(port, self.table, &answer?);

@@ -3,16 +3,19 @@
 use std::sync::Arc;
 
 use opcua::server::SubscriptionCache;
-use opcua::types::{DataValue, DateTime, NodeId, NumericRange, StatusCode, Variant};
+use opcua::server::address_space::NodeType;
+use opcua::types::{DataValue, NodeId, StatusCode, Variant};
 
+use crate::fieldbus::opcua::pki::date;
 use crate::fieldbus::opcua::values::{self, Values};
 use crate::fieldbus::{Port, Role};
 use crate::image::Event;
 use crate::signal::{Plan, Scale, Signal, SignalTable, Slot};
-use crate::time::Nanos;
+use crate::time::{Nanos, WallClock};
 
-use super::manager::{Nodes, Watched};
+use super::manager::Nodes;
 use super::space;
+use super::watched::{Variable, Watched};
 
 /// All signals, as the image has them and as their nodes show them.
 pub(super) struct Image {
@@ -28,10 +31,43 @@ pub(super) struct Image {
 }
 
 /// Where values are shown: the nodes of the crate's server, and who is told of them.
+#[derive(Clone)]
 pub(super) struct Show {
     pub(super) nodes: Arc<Nodes>,
     pub(super) subscriptions: Arc<SubscriptionCache>,
     pub(super) watched: Watched,
+    pub(super) wall: WallClock,
+}
+
+impl Show {
+    /// A value of this status, made now.
+    fn value(&self, status: StatusCode, value: Variant) -> DataValue {
+        let time = date((self.wall)());
+        DataValue {
+            // None but the empty one where it is bad, so that the first good one is a change also for
+            // subscribers that are not told of a status alone.
+            value: Some(if status.is_bad() {
+                Variant::Empty
+            } else {
+                value
+            }),
+            status: Some(status),
+            source_timestamp: Some(time),
+            server_timestamp: Some(time),
+            ..DataValue::default()
+        }
+    }
+
+    /// Gives a node a value, and tells those who subscribe to it.
+    fn put(&self, node: &NodeId, variable: Variable, value: DataValue) {
+        if let Some(NodeType::Variable(shown)) = self.nodes.address_space().write().find_mut(node) {
+            shown.set_data_value(value.clone());
+        } else {
+            debug_assert!(false, "every signal has its nodes: {node}");
+        }
+        self.watched
+            .tell(&self.subscriptions, node, variable, &value);
+    }
 }
 
 /// A signal's nodes, and what they show.
@@ -117,8 +153,9 @@ impl Image {
             self.receives.set(signal, bits);
             let place = &mut self.places[signal];
             place.written = true;
-            // The write itself has shown it.
+            // The write itself has shown it, but not in engineering units.
             place.shown = Some((bits, StatusCode::Good));
+            self.put_scaled(signal);
             touched[self.table.signals[signal].station] = true;
         }
         for (station, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
@@ -142,9 +179,10 @@ impl Image {
                 }
             }
         }
-        let stale = port.silence(now) > port.max_age();
         for index in 0..self.places.len() {
-            if self.table.signals[index].area == self.role.areas().1 {
+            let signal = &self.table.signals[index];
+            if signal.area == self.role.areas().1 {
+                let stale = port.peer_age(signal.station, now) > port.max_age();
                 let status = match (self.places[index].written, stale) {
                     (false, _) => StatusCode::BadWaitingForInitialData,
                     (true, true) => StatusCode::UncertainLastUsableValue,
@@ -190,30 +228,30 @@ impl Image {
             place.since = now;
         }
         place.shown = Some((bits, status));
-        let place = &self.places[index];
-        let data_type = self.table.signals[index].data_type;
-        let raw = values::variant(data_type, bits);
-        let time = DateTime::now();
-        let value = |value: Variant| DataValue {
-            // None but the empty one where it is bad, so that the first good one is a change also for
-            // subscribers that are not told of a status alone.
-            value: Some(if status.is_bad() {
-                Variant::Empty
-            } else {
-                value
-            }),
-            status: Some(status),
-            source_timestamp: Some(time),
-            server_timestamp: Some(time),
-            ..DataValue::default()
+        self.put_scaled(index);
+        let raw = values::variant(self.table.signals[index].data_type, bits);
+        let variable = Variable {
+            signal: index,
+            is_scaled: false,
         };
-        let scaled = place.scaled.as_ref().map(|(node, scale)| {
-            let real = scale.value(real(&raw));
-            (node, None::<&NumericRange>, value(Variant::Double(real)))
-        });
-        let all = std::iter::once((&place.node, None, value(raw.clone()))).chain(scaled);
-        let put = self.show.nodes.set_values(&self.show.subscriptions, all);
-        debug_assert!(put.is_ok(), "every signal has its nodes: {put:?}");
+        let value = self.show.value(status, raw);
+        self.show.put(&self.places[index].node, variable, value);
+    }
+
+    /// Brings the node that has a signal in engineering units up to what the signal's own node shows.
+    fn put_scaled(&self, index: usize) {
+        let place = &self.places[index];
+        let (Some((node, scale)), Some((bits, status))) = (&place.scaled, place.shown) else {
+            return;
+        };
+        let raw = values::variant(self.table.signals[index].data_type, bits);
+        let scaled = Variant::Double(scale.value(real(&raw)));
+        let variable = Variable {
+            signal: index,
+            is_scaled: true,
+        };
+        self.show
+            .put(node, variable, self.show.value(status, scaled));
     }
 }
 

@@ -1,8 +1,9 @@
 //! What clients do to the nodes: they read, subscribe and write.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use async_trait::async_trait;
@@ -14,17 +15,18 @@ use opcua::server::node_manager::{
     MonitoredItemRef, ParsedReadValueId, ParsedWriteValue, RequestContext, ServerContext, WriteNode,
 };
 use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
-use opcua::types::{
-    AttributeId, DataValue, DateTime, NodeId, NumericRange, StatusCode, TimestampsToReturn,
-};
+use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
 use tokio::sync::oneshot;
 
+use crate::fieldbus::opcua::pki::date;
 use crate::fieldbus::opcua::reactor::Inbox;
-use crate::fieldbus::opcua::values;
+use crate::fieldbus::opcua::{application, values};
 use crate::signal::{Area, SignalTable, Slot};
-use crate::time::Nanos;
+use crate::time::{Nanos, WallClock};
 
+use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
+use super::watched::{Variable, Watched};
 
 /// A sampling interval that keeps no change back, in milliseconds; the crate takes no zero here.
 const UNFILTERED: f64 = 0.001;
@@ -71,6 +73,10 @@ pub(super) enum News {
     Written(Visitor, Vec<Vec<(usize, Slot)>>),
     /// These signals are about to be read: their nodes have to be brought up to date first.
     Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
+    /// A client was refused, as the text says: its certificate is that of another application.
+    Impostor(String),
+    /// Certificates were turned away: the new files, and how many there were in all.
+    Rejected(Vec<String>, usize),
     /// The server has ended.
     Ended(String),
 }
@@ -81,11 +87,23 @@ pub(super) type Nodes = InMemoryNodeManager<Signals>;
 /// The signals, as the crate's server asks for them.
 pub(super) struct Signals {
     table: Arc<SignalTable>,
-    by_node: HashMap<NodeId, usize>,
+    by_node: HashMap<NodeId, Variable>,
+    own: Own,
+    /// What was found of the applications of sessions, the latest last.
+    judged: Mutex<VecDeque<(u32, bool)>>,
+}
+
+/// What the nodes belong to.
+pub(super) struct Own {
     /// The area that clients write.
-    reads: Area,
-    watched: Watched,
-    inbox: Inbox<News>,
+    pub(super) reads: Area,
+    pub(super) watched: Watched,
+    pub(super) inbox: Inbox<News>,
+    pub(super) wall: WallClock,
+    /// Whether a client's certificate has to be that of its application.
+    pub(super) checks_applications: bool,
+    /// How many tasks the server has while nobody is connected; known from when it begins to listen.
+    pub(super) tasks_alone: Arc<AtomicUsize>,
 }
 
 impl fmt::Debug for Signals {
@@ -95,27 +113,59 @@ impl fmt::Debug for Signals {
 }
 
 impl Signals {
-    /// The signals of `table`, of which clients write those of the area `reads`.
-    pub(super) fn new(
-        table: Arc<SignalTable>,
-        reads: Area,
-        watched: Watched,
-        inbox: Inbox<News>,
-    ) -> Self {
-        let mut by_node: HashMap<NodeId, usize> = HashMap::new();
+    /// The signals of `table`.
+    pub(super) fn new(table: Arc<SignalTable>, own: Own) -> Self {
+        let mut by_node = HashMap::new();
         for (index, signal) in table.signals.iter().enumerate() {
+            let variable = |is_scaled| Variable {
+                signal: index,
+                is_scaled,
+            };
             if let Some((scaled, _)) = space::scaled(&table, signal) {
-                by_node.insert(scaled, index);
+                by_node.insert(scaled, variable(true));
             }
-            by_node.insert(space::node(&signal.name), index);
+            by_node.insert(space::node(&signal.name), variable(false));
         }
         Self {
             table,
             by_node,
-            reads,
-            watched,
-            inbox,
+            own,
+            judged: Mutex::default(),
         }
+    }
+
+    /// Whether the certificate of a client is that of the application that it says it is. The crate looks after the
+    /// rest of it before there is a session.
+    fn admits(&self, context: &RequestContext) -> Result<(), StatusCode> {
+        if !self.own.checks_applications {
+            return Ok(());
+        }
+        let verdict = |is_good| match is_good {
+            true => Ok(()),
+            false => Err(StatusCode::BadCertificateUriInvalid),
+        };
+        // A list is whole between any two of its changes.
+        let mut judged = self.judged.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = judged.iter().find(|(id, _)| *id == context.session_id);
+        if let Some((_, is_good)) = known {
+            return verdict(*is_good);
+        }
+        let session = context.session.read();
+        let uri = session.application_description().application_uri.as_ref();
+        let checked = match session.client_certificate() {
+            Some(certificate) => application::check(certificate, uri),
+            // An unprotected session.
+            None => Ok(()),
+        };
+        if judged.len() >= SESSIONS {
+            judged.pop_front();
+        }
+        judged.push_back((context.session_id, checked.is_ok()));
+        let is_good = checked.is_ok();
+        if let Err(why) = checked {
+            self.own.inbox.push(News::Impostor(why));
+        }
+        verdict(is_good)
     }
 
     /// The signal and its bits that a client wants to write.
@@ -124,19 +174,18 @@ impl Signals {
         space: &AddressSpace,
         write: &ParsedWriteValue,
     ) -> Result<(usize, Slot), StatusCode> {
-        let Some(&index) = self.by_node.get(&write.node_id) else {
+        let Some(&variable) = self.by_node.get(&write.node_id) else {
             return Err(if space.node_exists(&write.node_id) {
                 StatusCode::BadNotWritable
             } else {
                 StatusCode::BadNodeIdUnknown
             });
         };
-        let signal = &self.table.signals[index];
-        let its_own = write.node_id == space::node(&signal.name);
-        if write.attribute_id != AttributeId::Value || !its_own {
+        let signal = &self.table.signals[variable.signal];
+        if write.attribute_id != AttributeId::Value || variable.is_scaled {
             return Err(StatusCode::BadNotWritable);
         }
-        if signal.area != self.reads {
+        if signal.area != self.own.reads {
             return Err(StatusCode::BadUserAccessDenied);
         }
         if write.index_range != NumericRange::None {
@@ -148,14 +197,20 @@ impl Signals {
         }
         let value = write.value.value.as_ref();
         let bits = value.and_then(|value| values::bits(signal.data_type, value));
-        Ok((index, bits.ok_or(StatusCode::BadTypeMismatch)?))
+        Ok((variable.signal, bits.ok_or(StatusCode::BadTypeMismatch)?))
     }
 }
 
 #[async_trait]
 #[expect(clippy::mut_mut, reason = "the crate's own signature")]
 impl InMemoryNodeManagerImpl for Signals {
-    async fn init(&self, _: &mut AddressSpace, _: ServerContext) {}
+    async fn init(&self, _: &mut AddressSpace, _: ServerContext) {
+        // The last manager to be asked, just before the server listens.
+        let tasks = tokio::runtime::Handle::current()
+            .metrics()
+            .num_alive_tasks();
+        self.own.tasks_alone.store(tasks, Ordering::Relaxed);
+    }
 
     fn name(&self) -> &'static str {
         "signals"
@@ -173,12 +228,20 @@ impl InMemoryNodeManagerImpl for Signals {
         max_age: f64,
         timestamps: TimestampsToReturn,
     ) -> Vec<DataValue> {
-        let signals = nodes
+        if let Err(status) = self.admits(context) {
+            let refused = DataValue {
+                status: Some(status),
+                ..DataValue::default()
+            };
+            return vec![refused; nodes.len()];
+        }
+        let variables = nodes
             .iter()
             .filter_map(|node| self.by_node.get(&node.node_id));
-        let signals = signals.copied().collect();
+        let signals = variables.map(|variable| variable.signal).collect();
         let (done, ready) = oneshot::channel();
-        self.inbox
+        self.own
+            .inbox
             .push(News::Reads(Visitor::of(context), signals, done));
         // It fails when the bus has stopped; then the nodes are as they were.
         let _ = ready.await;
@@ -195,6 +258,10 @@ impl InMemoryNodeManagerImpl for Signals {
         address_space: &RwLock<AddressSpace>,
         items: &mut [&mut &mut CreateMonitoredItem],
     ) {
+        if let Err(status) = self.admits(context) {
+            items.iter_mut().for_each(|item| item.set_status(status));
+            return;
+        }
         let wanted: Vec<_> = items.iter().map(|item| item.item_to_monitor()).collect();
         let both = TimestampsToReturn::Both;
         let values = self
@@ -205,7 +272,7 @@ impl InMemoryNodeManagerImpl for Signals {
                 item.set_initial_value(value);
             }
             item.set_status(StatusCode::Good);
-            if let Some(&signal) = self.by_node.get(&item.item_to_monitor().node_id) {
+            if let Some(&variable) = self.by_node.get(&item.item_to_monitor().node_id) {
                 let sampling = millis(item.sampling_interval());
                 let publishing = publishing(context, item.handle());
                 // A queue keeps what is sampled. Without one, what is there when it publishes is seen: the
@@ -218,15 +285,15 @@ impl InMemoryNodeManagerImpl for Signals {
                     }
                     sampling.max(publishing)
                 };
-                self.watched.add(signal, item.handle(), span);
+                self.own.watched.add(variable, item.handle(), span);
             }
         }
     }
 
     async fn delete_monitored_items(&self, _: &RequestContext, items: &[&MonitoredItemRef]) {
         for item in items {
-            if let Some(&signal) = self.by_node.get(item.node_id()) {
-                self.watched.remove(signal, item.handle());
+            if let Some(&variable) = self.by_node.get(item.node_id()) {
+                self.own.watched.remove(variable, item.handle());
             }
         }
     }
@@ -237,9 +304,11 @@ impl InMemoryNodeManagerImpl for Signals {
         address_space: &RwLock<AddressSpace>,
         nodes_to_write: &mut [&mut WriteNode],
     ) -> Result<(), StatusCode> {
+        // Every node of a service that fails has its status.
+        self.admits(context)?;
         let mut lists: Vec<Vec<(usize, Slot)>> = vec![Vec::new()];
         let mut space = address_space.write();
-        let now = DateTime::now();
+        let now = date((self.own.wall)());
         for node in nodes_to_write {
             let (index, bits) = match self.judge(&space, node.value()) {
                 Ok(judged) => judged,
@@ -261,8 +330,9 @@ impl InMemoryNodeManagerImpl for Signals {
             if let Some(NodeType::Variable(variable)) = space.find_mut(id) {
                 variable.set_data_value(value.clone());
             }
-            let change = std::iter::once((value, id, AttributeId::Value));
-            context.subscriptions.notify_data_change(change);
+            let variable = self.by_node[id];
+            let watched = &self.own.watched;
+            watched.tell(&context.subscriptions, id, variable, &value);
             let last = lists.last_mut().expect("there is always one");
             if last.iter().any(|(other, _)| *other == index) {
                 lists.push(vec![(index, bits)]);
@@ -271,7 +341,8 @@ impl InMemoryNodeManagerImpl for Signals {
             }
         }
         if !lists[0].is_empty() {
-            self.inbox.push(News::Written(Visitor::of(context), lists));
+            let inbox = &self.own.inbox;
+            inbox.push(News::Written(Visitor::of(context), lists));
         }
         Ok(())
     }
@@ -309,52 +380,4 @@ fn publishing(context: &RequestContext, item: MonitoredItemHandle) -> Nanos {
 )]
 fn millis(millis: f64) -> Nanos {
     Nanos((millis.max(0.0) * 1e6) as i64)
-}
-
-/// The signals that clients subscribe to, and for how long each has to be shown to be seen by all of them.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Watched(Arc<Mutex<Items>>);
-
-#[derive(Debug, Default)]
-struct Items {
-    of: HashMap<usize, HashMap<MonitoredItemHandle, Nanos>>,
-    /// How many there ever were.
-    made: usize,
-}
-
-impl Watched {
-    fn lock(&self) -> MutexGuard<'_, Items> {
-        // A table is whole between any two of its changes.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn add(&self, signal: usize, item: MonitoredItemHandle, span: Nanos) {
-        let mut items = self.lock();
-        items.of.entry(signal).or_default().insert(item, span);
-        items.made += 1;
-    }
-
-    fn remove(&self, signal: usize, item: MonitoredItemHandle) {
-        let of = &mut self.lock().of;
-        if let Some(items) = of.get_mut(&signal) {
-            items.remove(&item);
-            if items.is_empty() {
-                of.remove(&signal);
-            }
-        }
-    }
-
-    /// How long the signal has to be shown; `None` when nobody subscribes to it.
-    pub(super) fn span(&self, signal: usize) -> Option<Nanos> {
-        let items = &self.lock().of;
-        items
-            .get(&signal)
-            .and_then(|items| items.values().max().copied())
-    }
-
-    /// How many items were left behind, if nobody subscribes to anything any more.
-    pub(super) fn left_behind(&self) -> usize {
-        let items = self.lock();
-        if items.of.is_empty() { items.made } else { 0 }
-    }
 }

@@ -5,36 +5,45 @@ mod manager;
 mod peers;
 mod setup;
 mod space;
+mod status;
 mod units;
+mod watched;
 
-use std::collections::BTreeSet;
 use std::net::TcpListener;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use opcua::server::ServerHandle;
+use opcua::types::{VariableId, Variant};
 use socket2::SockRef;
 use tokio::sync::Notify;
 
+use crate::fieldbus::rarely::Rarely;
 use crate::fieldbus::{BusError, Free, Port, Role, tcp};
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Pace, Stop};
 
 use super::pki::Pki;
 use super::reactor::{Inbox, Reactor};
-use super::{Line, Policy, ServerOptions};
+use super::rejects::Rejects;
+use super::{Line, Policy, ServerOptions, Trust};
 use image::{Image, Show};
-use manager::{News, Visitor, Watched};
+use manager::{News, Own, Visitor};
 use peers::{Peers, Seen};
+use watched::Watched;
 
 /// How long clients are given to hear of the end, in real time.
 const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
 
-/// How often the folder of rejected certificates is looked at.
-const LOOK: Nanos = Nanos::from_secs(1);
+/// How often the folder of rejected certificates is looked at, in real time.
+const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// The crate's server does not forget subscriptions to nodes when the subscription as a whole is deleted. When so
-/// many are left behind and nobody is there, it is made anew; the listener stays.
-const WORN: usize = 30;
+/// The most sessions at once.
+const SESSIONS: usize = 100;
+
+/// async-opcua 0.19 does not forget the monitored items of a subscription that ends as a whole, up to 200 bytes each.
+/// When at least this many have ended and nobody at all is connected, its server is made anew; the listener stays.
+const WORN: usize = 10;
 
 /// The bus of kind `opcua-server`.
 #[derive(Debug)]
@@ -50,9 +59,11 @@ pub struct Server {
 impl Server {
     /// The bus that `options` describe, for `line`.
     pub fn new(options: &ServerOptions, line: Line<'_>) -> Self {
+        let mut pki = Pki::new(&options.credentials, line);
+        pki.host.clone_from(&options.host);
         Self {
             options: options.clone(),
-            pki: Pki::new(&options.credentials, line),
+            pki,
             name: line.name.to_owned(),
             table: Arc::new(line.table.clone()),
             role: line.role,
@@ -75,18 +86,23 @@ impl Server {
         reactor: &Reactor,
         max_age: Nanos,
         listener: TcpListener,
+        rejects: &Arc<Mutex<Rejects>>,
     ) -> Result<Started, BusError> {
         let bound = listener
             .local_addr()
             .map_err(|error| tcp::no_wait(&error))?;
         let inbox: Inbox<News> = reactor.inbox();
-        let watched = Watched::default();
-        let signals = manager::Signals::new(
-            Arc::clone(&self.table),
-            self.role.areas().1,
-            watched.clone(),
-            inbox.clone(),
-        );
+        let (watched, tasks_alone) = (Watched::default(), Arc::default());
+        let wall = self.pki.wall;
+        let own = Own {
+            reads: self.role.areas().1,
+            watched: watched.clone(),
+            inbox: inbox.clone(),
+            wall,
+            checks_applications: self.pki.trust == Trust::Listed,
+            tasks_alone: Arc::clone(&tasks_alone),
+        };
+        let signals = manager::Signals::new(Arc::clone(&self.table), own);
         let login = self.pki.login()?;
         let (server, handle) =
             reactor.within(|| setup::build(self, max_age, login, bound, signals))?;
@@ -95,7 +111,11 @@ impl Server {
             nodes: nodes.expect("it was handed to the server"),
             subscriptions: Arc::clone(handle.subscriptions()),
             watched,
+            wall,
         };
+        if self.is_secure() {
+            reactor.spawn(look_after(Arc::clone(rejects), inbox.clone()));
+        }
         let ended = Arc::new(Notify::new());
         reactor.spawn({
             let (inbox, ended) = (inbox.clone(), Arc::clone(&ended));
@@ -113,7 +133,29 @@ impl Server {
             handle,
             ended,
             show,
+            tasks_alone,
         })
+    }
+}
+
+/// Looks after the folder of rejected certificates, beside the bus thread: files take the time that they take.
+async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
+    loop {
+        tokio::time::sleep(LOOK).await;
+        let rejects = Arc::clone(&rejects);
+        let look = move || {
+            // A list is whole between any two of its changes.
+            let mut rejects = rejects.lock().unwrap_or_else(PoisonError::into_inner);
+            rejects.look()
+        };
+        match tokio::task::spawn_blocking(look).await {
+            Ok(found) if found.count > 0 => {
+                inbox.push(News::Rejected(found.files, found.count));
+            }
+            Ok(_) => {}
+            // The bus is ending.
+            Err(_) => return,
+        }
     }
 }
 
@@ -124,6 +166,21 @@ struct Started {
     /// Told when it has ended.
     ended: Arc<Notify>,
     show: Show,
+    /// How many tasks it has while nobody is connected.
+    tasks_alone: Arc<AtomicUsize>,
+}
+
+impl Started {
+    /// Whether nobody is connected, not even on the way to a session, and no session waits for its client to come
+    /// back.
+    fn is_alone(&self, reactor: &Reactor) -> bool {
+        let sessions =
+            VariableId::Server_ServerDiagnostics_ServerDiagnosticsSummary_CurrentSessionCount;
+        let sessions = self.handle.info().diagnostics.get(sessions);
+        let none = Some(Variant::UInt32(0));
+        reactor.tasks() <= self.tasks_alone.load(Ordering::Relaxed)
+            && sessions.is_some_and(|sessions| sessions.value == none)
+    }
 }
 
 impl Free for Server {
@@ -141,19 +198,14 @@ impl Free for Server {
             .map_err(refused)?;
         let waiting = format!("listening on {bound}, and nobody has written yet");
         port.opening(&waiting);
+        let rejects = Rejects::new(self.pki.folder.join("rejected"));
+        let rejects = Arc::new(Mutex::new(rejects));
         let mut service: Option<Service<'_>> = None;
         loop {
             let reactor = Reactor::new(stop)?;
-            let Started {
-                inbox,
-                handle,
-                ended,
-                show,
-            } = self.start(
-                &reactor,
-                port.max_age(),
-                listener.try_clone().map_err(refused)?,
-            )?;
+            let listener = listener.try_clone().map_err(refused)?;
+            let mut started = self.start(&reactor, port.max_age(), listener, &rejects)?;
+            let show = started.show.clone();
             let service = match &mut service {
                 Some(service) => {
                     service.image.move_to(show);
@@ -162,20 +214,20 @@ impl Free for Server {
                 None => service.insert(Service {
                     image: Image::new(&self.table, self.role, port, show, self.options.every_write),
                     peers: Peers::default(),
+                    table: &self.table,
                     waiting: waiting.clone(),
-                    rejected: self.pki.rejected(),
-                    pki: self.is_secure().then_some(&self.pki),
-                    look: port.clock().now() + LOOK,
-                    // Where nothing is written, readers are the peers.
-                    receives: (0..port.stations()).any(|station| port.sizes(station).1 > 0),
+                    pki: &self.pki,
+                    turned_away: Rarely::default(),
                 }),
             };
-            let served = service.serve(&reactor, &inbox, self.cycle, port, stop);
-            handle.cancel();
-            reactor.farewell(FAREWELL, ended.notified());
-            match served? {
-                Served::Stopped => return Ok(()),
-                Served::Worn => log::debug!("the server begins anew, as nobody is there"),
+            match service.serve(&reactor, &mut started, self.cycle, port, stop) {
+                // Nobody is there to take leave of; who comes now waits at the listener.
+                Ok(Served::Worn) => port.count("opcua.begun_anew"),
+                ended => {
+                    started.handle.cancel();
+                    reactor.farewell(FAREWELL, started.ended.notified());
+                    return ended.map(|_| ());
+                }
             }
         }
     }
@@ -192,21 +244,18 @@ enum Served {
 struct Service<'a> {
     image: Image,
     peers: Peers,
+    table: &'a SignalTable,
     waiting: String,
-    /// The certificates that were turned away, as the log knows them.
-    rejected: BTreeSet<String>,
-    pki: Option<&'a Pki>,
-    /// When they are looked at again.
-    look: Nanos,
-    /// Whether clients write anything.
-    receives: bool,
+    pki: &'a Pki,
+    /// Clients that were turned away, for certificates that are unknown or not their own.
+    turned_away: Rarely,
 }
 
 impl Service<'_> {
     fn serve(
         &mut self,
         reactor: &Reactor,
-        inbox: &Inbox<News>,
+        started: &mut Started,
         cycle: Nanos,
         port: &mut Port,
         stop: &Stop,
@@ -216,13 +265,13 @@ impl Service<'_> {
         let mut news = Vec::new();
         while !stop.is_stopped() {
             let now = clock.now();
-            inbox.take(&mut news);
+            started.inbox.take(&mut news);
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }
             if pace.take(now) {
                 self.look(port, now);
-                if self.peers.count() == 0 && self.image.left_behind() >= WORN {
+                if self.image.left_behind() >= WORN && started.is_alone(reactor) {
                     return Ok(Served::Worn);
                 }
                 self.image.show(port, now);
@@ -236,18 +285,49 @@ impl Service<'_> {
     fn hear(&mut self, port: &mut Port, now: Nanos, news: News) -> Result<(), BusError> {
         match news {
             News::Written(visitor, lists) => {
-                for list in lists {
-                    self.image.received(port, now, &list);
+                for list in &lists {
+                    self.image.received(port, now, list);
                 }
-                self.meet(port, visitor);
+                let table = self.table;
+                let written = lists.iter().flatten();
+                let stations = written.map(|(signal, _)| table.signals[*signal].station);
+                self.meet(port, visitor, stations);
             }
             News::Reads(visitor, signals, done) => {
                 self.image.show_to_reader(port, now, &signals);
-                if !self.receives {
-                    self.meet(port, visitor);
+                // Where nothing is written, readers are the peers.
+                let stations = signals.iter().map(|at| self.table.signals[*at].station);
+                let fed: Vec<usize> = stations
+                    .filter(|station| port.sizes(*station).1 == 0)
+                    .collect();
+                if !fed.is_empty() {
+                    self.meet(port, visitor, fed);
                 }
                 // The reader may be gone.
                 let _ = done.send(());
+            }
+            News::Impostor(why) => {
+                port.count("opcua.refused_applications");
+                if let Some(times) = self.turned_away.count(("opcua", "application")) {
+                    log::warn!(
+                        "a client gets no values, as its certificate is not its own ({why}); give it a \
+                         certificate for its ApplicationUri, or write trust = \"any\"{times}"
+                    );
+                }
+            }
+            News::Rejected(files, count) => {
+                let folder = self.pki.folder.display();
+                for file in files {
+                    if let Some(times) = self.turned_away.count(("opcua", "certificate")) {
+                        log::warn!(
+                            "a client with an unknown certificate was turned away; to trust it, move \
+                             \"{folder}/rejected/{file}\" to \"{folder}/trusted\"{times}"
+                        );
+                    }
+                }
+                for _ in 0..count {
+                    port.count("opcua.rejected_certificates");
+                }
             }
             News::Ended(why) => {
                 return Err(BusError::Link(format!(
@@ -258,39 +338,27 @@ impl Service<'_> {
         Ok(())
     }
 
-    /// A client is a peer from now on.
-    fn meet(&mut self, port: &mut Port, visitor: Visitor) {
-        if let Some(name) = self.peers.add(visitor) {
+    /// A client is a peer of these stations from now on.
+    fn meet(
+        &mut self,
+        port: &mut Port,
+        visitor: Visitor,
+        stations: impl IntoIterator<Item = usize>,
+    ) {
+        if let Some(name) = self.peers.add(visitor, stations) {
             port.running(&format!("serving \"{name}\""));
             port.tell("clients", &self.peers.count().to_string());
         }
     }
 
     fn look(&mut self, port: &mut Port, now: Nanos) {
-        match self.peers.look() {
-            Seen::Alive => (0..port.stations()).for_each(|station| port.touch(station, now)),
-            Seen::Silent => {}
-            Seen::Gone => {
-                port.tell("clients", "0");
-                let error = BusError::Left("the last client closed its session".to_owned());
-                port.lost(&error, &self.waiting);
-            }
+        let seen = self.peers.look(|station| port.touch(station, now));
+        if seen != Seen::Same {
+            port.tell("clients", &self.peers.count().to_string());
         }
-        if let Some(pki) = self.pki
-            && now >= self.look
-        {
-            self.look = now + LOOK;
-            for file in pki.rejected() {
-                if !self.rejected.contains(&file) {
-                    let folder = pki.folder.display();
-                    log::warn!(
-                        "a client with an unknown certificate was turned away; to trust it, move \
-                         \"{folder}/rejected/{file}\" to \"{folder}/trusted\""
-                    );
-                    port.count("opcua.rejected_certificates");
-                    self.rejected.insert(file);
-                }
-            }
+        if seen == Seen::Gone {
+            let error = BusError::Left("the last client closed its session".to_owned());
+            port.lost(&error, &self.waiting);
         }
     }
 }

@@ -4,50 +4,73 @@ use std::time::Instant;
 
 use super::manager::Visitor;
 
-/// Sessions of clients that have written, or, where nothing is written, read.
+/// Sessions of clients that have written, or, at stations that have nothing to write, read. Each counts for the
+/// stations that it has dealt with, and for no other.
 ///
-/// Every request of a session counts as a sign of life, a Publish too: a client that writes on change only has
-/// a subscription or a heartbeat besides.
+/// Every request of a session is a sign of life, a Publish too: a client that writes on change only has a
+/// subscription or a heartbeat besides.
 #[derive(Default)]
-pub(super) struct Peers(Vec<(Visitor, Option<Instant>)>);
+pub(super) struct Peers(Vec<Peer>);
 
-/// What was seen of the peers.
+struct Peer {
+    visitor: Visitor,
+    /// When its session was to expire, as seen at the last look.
+    deadline: Option<Instant>,
+    /// The stations that it feeds.
+    stations: Vec<usize>,
+}
+
+/// What was seen of the peers since the last look.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Seen {
-    /// One has sent a request since the last look.
-    Alive,
-    /// Nothing.
-    Silent,
-    /// The last one has closed its session, or let it expire.
+    /// Nobody has left.
+    Same,
+    /// Some have closed their sessions, or let them expire; others are there.
+    Fewer,
+    /// The last one has left.
     Gone,
 }
 
 impl Peers {
-    /// A client has done something that feeds the image; gives its name if it is new.
-    pub(super) fn add(&mut self, visitor: Visitor) -> Option<&str> {
-        if self.0.iter().any(|(peer, _)| peer.id == visitor.id) {
-            return None;
+    /// A client has fed these stations; gives its name if it is new.
+    pub(super) fn add(
+        &mut self,
+        visitor: Visitor,
+        stations: impl IntoIterator<Item = usize>,
+    ) -> Option<&str> {
+        let known = self.0.iter().position(|peer| peer.visitor.id == visitor.id);
+        let at = known.unwrap_or_else(|| {
+            let deadline = (visitor.deadline)();
+            self.0.push(Peer {
+                visitor,
+                deadline,
+                stations: Vec::new(),
+            });
+            self.0.len() - 1
+        });
+        let peer = &mut self.0[at];
+        for station in stations {
+            if !peer.stations.contains(&station) {
+                peer.stations.push(station);
+            }
         }
-        let deadline = (visitor.deadline)();
-        self.0.push((visitor, deadline));
-        self.0.last().map(|(peer, _)| &*peer.name)
+        known.is_none().then_some(&*peer.visitor.name)
     }
 
-    /// Looks at all of them.
-    pub(super) fn look(&mut self) -> Seen {
-        if self.0.is_empty() {
-            return Seen::Silent;
-        }
-        let mut alive = false;
-        self.0.retain_mut(|(peer, before)| {
-            let deadline = (peer.deadline)();
-            alive |= deadline != std::mem::replace(before, deadline);
+    /// Looks at all of them; `alive` is told each station of a peer that has sent a request since the last look.
+    pub(super) fn look(&mut self, mut alive: impl FnMut(usize)) -> Seen {
+        let before = self.0.len();
+        self.0.retain_mut(|peer| {
+            let deadline = (peer.visitor.deadline)();
+            if deadline.is_some() && deadline != std::mem::replace(&mut peer.deadline, deadline) {
+                peer.stations.iter().for_each(|station| alive(*station));
+            }
             deadline.is_some()
         });
-        match (self.0.is_empty(), alive) {
-            (true, _) => Seen::Gone,
-            (false, true) => Seen::Alive,
-            (false, false) => Seen::Silent,
+        match self.0.len() {
+            now if now == before => Seen::Same,
+            0 => Seen::Gone,
+            _ => Seen::Fewer,
         }
     }
 

@@ -3,8 +3,9 @@
 use std::net::{IpAddr, SocketAddr};
 
 use opcua::crypto::X509Data;
+use opcua::server::diagnostics::DiagnosticsNodeManagerBuilder;
 use opcua::server::node_manager::ServerContext;
-use opcua::server::node_manager::memory::InMemoryNodeManagerBuilder;
+use opcua::server::node_manager::memory::{CoreNodeManagerBuilder, InMemoryNodeManagerBuilder};
 use opcua::server::{
     ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
 };
@@ -16,10 +17,8 @@ use crate::fieldbus::opcua::{Mode, Policy, Trust};
 use crate::time::Nanos;
 
 use super::manager::{self, Signals};
-use super::space;
-
-/// The most sessions at once.
-const SESSIONS: usize = 100;
+use super::status::Status;
+use super::{SESSIONS, space};
 
 /// The name of the one user among the crate's.
 const USER: &str = "user";
@@ -55,6 +54,10 @@ pub(super) fn build(
         std::env::current_exe().unwrap_or_default().join("none")
     };
     let rhythm = rhythm(of.cycle);
+    let host = match &options.host {
+        Some(host) => host.clone(),
+        None => announced(bound.ip()),
+    };
     let mut builder = ServerBuilder::new()
         .application_name(&pki.application)
         .application_uri(&pki.uri)
@@ -63,13 +66,11 @@ pub(super) fn build(
         .certificate_path(&pki.certificate)
         .private_key_path(&pki.key)
         .trust_client_certs(pki.trust == Trust::Any)
-        .host(host(bound.ip()))
+        .discovery_urls(vec![format!("opc.tcp://{host}:{}/", bound.port())])
+        .host(host)
         .port(bound.port())
-        .discovery_urls(vec![format!(
-            "opc.tcp://{}:{}/",
-            host(bound.ip()),
-            bound.port()
-        )])
+        // They count the sessions.
+        .diagnostics_enabled(true)
         .subscription_poll_interval_ms(rhythm)
         .max_sessions(SESSIONS)
         .build_info(BuildInfo {
@@ -127,14 +128,20 @@ pub(super) fn build(
         space::build(address_space, &name, &table, reads);
         signals
     };
+    let wall = pki.wall;
     let built = builder
+        // The first that owns a node has it, and the signals' own has to be the last.
+        .without_node_managers()
+        .with_node_manager(move |context| Status::new(context, wall))
+        .with_node_manager(InMemoryNodeManagerBuilder::new(CoreNodeManagerBuilder))
+        .with_node_manager(DiagnosticsNodeManagerBuilder)
         .with_node_manager(InMemoryNodeManagerBuilder::new(nodes))
         .build();
     built.map_err(|error| BusError::Refused(format!("there can be no server ({error})")))
 }
 
 /// The host that clients are told: where it listens, or the name of the machine if that is everywhere.
-fn host(ip: IpAddr) -> String {
+fn announced(ip: IpAddr) -> String {
     let name = || X509Data::computer_hostnames().into_iter().next();
     match ip {
         _ if ip.is_unspecified() => name().unwrap_or_else(|| ip.to_string()),

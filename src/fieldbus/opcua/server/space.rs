@@ -113,7 +113,7 @@ fn variable(
     if let Some(name) = own_unit {
         units(space, first, name, &id);
     }
-    let Some((value, scale)) = scaled else {
+    let Some((value, _)) = scaled else {
         return;
     };
     VariableBuilder::new(&value, browse("Scaled"), "Scaled")
@@ -122,7 +122,10 @@ fn variable(
         .value_rank(-1)
         .value(0.0)
         .minimum_sampling_interval(0.0)
-        .has_type_definition(VariableTypeId::AnalogItemType)
+        .has_type_definition(match signal.range {
+            Some(_) => VariableTypeId::AnalogItemType,
+            None => VariableTypeId::AnalogUnitType,
+        })
         .component_of(id)
         .insert(space);
     units(
@@ -131,7 +134,9 @@ fn variable(
         signal.unit.as_deref().unwrap_or_default(),
         &value,
     );
-    if let Some(range) = range(signal, scale) {
+    if let Some([low, high]) = signal.range {
+        // The range of normal operation, not that of the type (OPC 10000-8, 5.3.2).
+        let range = ExtensionObject::from_message(Range { low, high });
         property(
             space,
             first + 2,
@@ -164,20 +169,6 @@ fn property(
         .has_type_definition(VariableTypeId::PropertyType)
         .property_of(of.clone())
         .insert(space);
-}
-
-/// The range of the value in engineering units, where the raw one has an end.
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "the ends of a range, for people"
-)]
-fn range(signal: &Signal, scale: Scale) -> Option<ExtensionObject> {
-    let raw = signal.data_type.range()?;
-    let ends = [raw.start(), raw.end()].map(|end| scale.value(*end as f64));
-    Some(ExtensionObject::from_message(Range {
-        low: ends[0].min(ends[1]),
-        high: ends[0].max(ends[1]),
-    }))
 }
 
 /// What a person reads of a signal: its address and type in the PLC.

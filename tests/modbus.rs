@@ -323,7 +323,7 @@ fn asks(plc: &Plc, further: &str) -> Alone {
     let address = plc.address;
     Alone::open(&format!(
         "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-client\"\naddress = \"{address}\"\n\
-         cycle = \"1ms\"\nmax_age = \"300ms\"\nreconnect = [\"1ms\"]\n{further}"
+         cycle = \"1ms\"\nmax_age = \"300ms\"\nreconnect = [\"10ms\"]\n{further}"
     ))
 }
 

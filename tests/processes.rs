@@ -336,3 +336,40 @@ fn what_is_wrong_is_told_before_anything_starts() {
     assert!(text.contains("no PLC program is called \"rigg\""), "{text}");
     assert_eq!(code, Some(2));
 }
+
+/// One server with two stations, as two remote I/O units behind one address.
+#[test]
+fn a_mirror_serves_several_stations() {
+    let stations = "[[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n".to_owned()
+        + &["A", "B"]
+            .map(|station| {
+                format!(
+                    "[[signal]]\nname = \"{station} to\"\naddress = \"%QB1\"\nstation = \"{station}\"\n\
+                     [[signal]]\nname = \"{station} from\"\naddress = \"%IB1\"\nstation = \"{station}\"\n"
+                )
+            })
+            .concat();
+    let text = |fieldbus: &str| {
+        let head =
+            "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"socket\"\ncycle = \"1ms\"\n";
+        format!("{head}{fieldbus}\n{stations}")
+    };
+    let file = save(&text("address = \"127.0.0.1:0\""));
+    let path = file.path().to_str().expect("a plain name");
+    let mut mirror = Process::start(&["mirror", path, "--tick", "1ms"]);
+    let listening = mirror.until("listening on");
+    let address = listening
+        .split_whitespace()
+        .find(|word| word.starts_with("127.0.0.1:"));
+    let address = address.expect("an address").trim_end_matches([';', ',']);
+    let plc = format!("role = \"controller\"\naddress = \"{address}\"");
+    let config = Config::parse("driver.cfg", &text(&plc)).unwrap_or_else(|why| panic!("{why}"));
+    let clock = Monotonic::shared();
+    let mut driver = Driver::open(config, clock).expect("opens");
+    let mut slots = driver.initial_slots();
+    (slots[0], slots[2]) = (Slot::from_real(5.0), Slot::from_real(7.0));
+    await_that("both stations come back", || {
+        driver.exchange(Nanos::ZERO, &mut slots);
+        (slots[1].real(), slots[3].real()) == (5.0, 7.0)
+    });
+}

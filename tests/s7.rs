@@ -545,7 +545,7 @@ fn machine_of_two(cpu: Cpu) -> (Alone, Arc<Mutex<Cpu>>) {
     Cpu::serve(listener, Arc::clone(&cpu));
     let machine = Alone::open(&format!(
         "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\ncycle = \"1ms\"\n\
-         max_age = \"300ms\"\nreconnect = [\"1ms\"]\n\
+         max_age = \"300ms\"\nreconnect = [\"10ms\"]\n\
          [[station]]\nname = \"left\"\noutput = \"DB5\"\n[[station]]\nname = \"right\"\noutput = \"DB7\"\n\
          [[signal]]\nname = \"l\"\nstation = \"left\"\naddress = \"%QB0\"\nfail_safe = 99\n\
          [[signal]]\nname = \"r\"\nstation = \"right\"\naddress = \"%QB0\"\nfail_safe = 99\n"

@@ -136,7 +136,8 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let (scans, stale) = host.scans();
     let fault = host.fault();
     // A scan that never ends is noticed here, if the command was too short to notice it before.
-    let fault = host.close().or(fault);
+    let unended = host.close();
+    let fault = fault.or(unended);
     let failure = fault.or_else(|| report.as_ref().and_then(|report| report.failure()));
     if told.is_ok() {
         let mut out = io::stdout().lock();

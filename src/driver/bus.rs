@@ -177,8 +177,11 @@ fn open_loopback(
         let (host, tally) = SteppedHost::new(program, config, scan);
         return Ok((Bus::Stepped(Box::new(host)), Some(Program::Stepped(tally))));
     }
-    let sizes = [Area::Input, Area::Output].map(|area| area_bytes(&config.table, 0, area));
-    let (device, controller) = private_link(&[sizes.into()]);
+    let sizes =
+        |station| [Area::Input, Area::Output].map(|area| area_bytes(&config.table, station, area));
+    let stations = 0..config.table.stations.len();
+    let sizes: Vec<(usize, usize)> = stations.map(|station| sizes(station).into()).collect();
+    let (device, controller) = private_link(&sizes);
     let bus = |end| Box::new(FreeLoopback::over(end, cycle));
     let title = format!("plc {}", program.name());
     let hosted = Hosted {
@@ -215,24 +218,24 @@ pub(super) fn check_fit(
 ) -> Result<(), DriverError> {
     let name = program.name().to_owned();
     let refused = |what: String| DriverError::Config(format!("{}: {what}", config.path.display()));
-    let [station] = &config.table.stations[..] else {
+    let stations = &config.table.stations;
+    if stations.len() > 1 && program.for_another_station().is_none() {
         return Err(refused(format!(
             "the PLC program \"{name}\" serves one station, but this driver has {}; use one \
              driver.cfg per station",
-            config.table.stations.len()
+            stations.len()
         )));
-    };
+    }
     program
         .fit(&config.table, config.addressing)
         .map_err(|source| program_error(config, source))?;
-    let (reads, writes) = match role {
-        Role::Controller => (("%I", station.input_bytes), ("%Q", station.output_bytes)),
-        Role::Device => (("%Q", station.output_bytes), ("%I", station.input_bytes)),
-    };
-    for ((area, has), needs) in [
+    let (writes, reads) = role.areas();
+    let needs = [
         (reads, program.input_bytes()),
         (writes, program.output_bytes()),
-    ] {
+    ];
+    for (station, (area, needs)) in stations.iter().flat_map(|s| needs.map(|need| (s, need))) {
+        let has = station.bytes(area);
         if has < needs {
             return Err(refused(format!(
                 "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \

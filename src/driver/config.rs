@@ -3,44 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use super::layout;
+use super::timing::{Spans, Timing};
 use crate::axis::{self, Axis};
 use crate::config::{Collector, Mistakes, Table, Value, load_text, read_text};
 use crate::faults::{self, Fault};
 use crate::fieldbus::{At, LifeSigns, Options, Role, Written};
 use crate::record;
 use crate::signal::{Addressing, SignalTable, Station};
-use crate::time::Nanos;
-
-/// Waits between attempts to reach the peer again, where a driver.cfg states none.
-const RECONNECT: [Nanos; 6] = [
-    Nanos::from_secs(1),
-    Nanos::from_secs(2),
-    Nanos::from_secs(4),
-    Nanos::from_secs(8),
-    Nanos::from_secs(15),
-    Nanos::from_secs(30),
-];
-
-/// The least age at which data become stale, where a driver.cfg states none.
-const LEAST_MAX_AGE: Nanos = Nanos::from_millis(250);
-
-/// The shortest bus cycle that an operating system keeps to.
-const LEAST_CYCLE: Nanos = Nanos::from_micros(50);
-
-/// The shortest `watchdog`: the pauses of a busy machine are no stop of the simulation.
-const LEAST_WATCHDOG: Nanos = Nanos::from_millis(10);
-
-/// The shortest pause of `reconnect`: each attempt is a line in the log.
-const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 
 /// The longest name of a driver, in characters.
 const NAME_LIMIT: usize = 120;
 
 /// The longest path of a file, in characters.
 const PATH_LIMIT: usize = 1000;
-
-/// The most waits in `reconnect`.
-const RECONNECT_LIMIT: usize = 100;
 
 /// All that a driver.cfg says, checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,20 +56,6 @@ pub struct Asked {
     /// Whether another address will take the place of the file's; see
     /// [`Options::set_address`].
     pub moved: bool,
-}
-
-/// Cycle times and time-outs of a driver.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Timing {
-    /// The bus cycle; `None` leaves it to the bus. Positive.
-    pub cycle: Option<Nanos>,
-    /// Data from the peer that are older than this are stale. Positive.
-    pub max_age: Nanos,
-    /// A simulation that has not ticked for longer than this has stopped; `None` never says so.
-    pub watchdog: Option<Nanos>,
-    /// Waits between attempts to reach the peer again; the last one repeats. Never empty, all
-    /// positive.
-    pub reconnect: Vec<Nanos>,
 }
 
 impl Config {
@@ -236,13 +197,10 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
     {
         bus.place_signals(&At::read(at, table), table);
     }
-    let mut life_signs = LifeSigns::default();
-    if let (Some(fieldbus), Some(table)) = (&fieldbus, &table) {
-        let of_bus = fieldbus.bus.as_ref().and_then(Options::cycle);
-        let cycle = fieldbus.timing.as_ref().and_then(|timing| timing.cycle);
-        let (role, signs) = (fieldbus.own_role, &fieldbus.life_signs);
-        signs.read(table, role, cycle.or(of_bus), &mut life_signs);
-    }
+    let life_signs = match (&fieldbus, &table) {
+        (Some(fieldbus), Some(table)) => fieldbus.read_life_signs(table),
+        _ => LifeSigns::default(),
+    };
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
         bus.fit(table, &axes, root.collector());
@@ -344,6 +302,17 @@ struct FieldbusTable<'a> {
     bus: Option<Options>,
 }
 
+impl FieldbusTable<'_> {
+    fn read_life_signs(&self, table: &SignalTable) -> LifeSigns {
+        let of_bus = self.bus.as_ref().and_then(Options::cycle);
+        let cycle = self.timing.as_ref().and_then(|timing| timing.cycle);
+        let mut signs = LifeSigns::default();
+        self.life_signs
+            .read(table, self.own_role, cycle.or(of_bus), &mut signs);
+        signs
+    }
+}
+
 fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_> {
     let kind = table.require("kind", "write the kind of bus, such as kind = \"loopback\"");
     let role = table.take("role");
@@ -396,92 +365,14 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_
     }
 }
 
-/// Cycle times and time-outs as they stand in the file.
-struct Spans<'a> {
-    cycle: Option<Value<'a>>,
-    max_age: Option<Value<'a>>,
-    watchdog: Option<Value<'a>>,
-    reconnect: Option<Value<'a>>,
-}
-
-impl<'a> Spans<'a> {
-    fn take(table: &mut Table<'a>) -> Self {
-        let [cycle, max_age, watchdog] =
-            ["cycle", "max_age", "watchdog"].map(|key| table.take(key));
-        Self {
-            cycle,
-            max_age,
-            watchdog,
-            reconnect: table.take("reconnect"),
-        }
-    }
-
-    /// Reads them, for a bus whose cycle is `of_bus` where none is stated.
-    fn read(&self, of_bus: Option<Nanos>) -> Option<Timing> {
-        let span = |value: &Option<Value<'_>>, least, why| match value {
-            None => Some(None),
-            Some(value) => value.duration_from(least, why).map(Some),
-        };
-        let no_rhythm = "no operating system keeps to a shorter bus cycle than 50us";
-        let no_stop = "a pause of a few milliseconds is no stop of the simulation";
-        let spans = (
-            span(&self.cycle, LEAST_CYCLE, no_rhythm),
-            span(&self.max_age, Nanos(1), ""),
-            span(&self.watchdog, LEAST_WATCHDOG, no_stop),
-        );
-        let reconnect = match &self.reconnect {
-            None => Some(RECONNECT.to_vec()),
-            Some(value) => read_reconnect(value),
-        };
-        let (stated_cycle, stated, watchdog) = (spans.0?, spans.1?, spans.2?);
-        if let (Some(cycle), Some(stated), Some(value)) =
-            (stated_cycle.or(of_bus), stated, &self.max_age)
-            && stated < cycle
-        {
-            let whose = if stated_cycle.is_some() {
-                ""
-            } else {
-                ", which is that of the bus where no \"cycle\" is stated"
-            };
-            value.wrong(
-                format!("\"max_age\" is {stated}, shorter than one bus cycle of {cycle}{whose}"),
-                "write some cycles, or all data are stale",
-            );
-        }
-        let ten_cycles = stated_cycle.unwrap_or_default().times(10);
-        let max_age = stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE));
-        Some(Timing {
-            cycle: stated_cycle,
-            max_age,
-            watchdog,
-            reconnect: reconnect?,
-        })
-    }
-}
-
-fn read_reconnect(value: &Value<'_>) -> Option<Vec<Nanos>> {
-    const SHAPE: &str = "write a list of durations, such as [\"1s\", \"2s\", \"5s\"]";
-    let list = value.list(SHAPE)?;
-    if list.is_empty() || list.len() > RECONNECT_LIMIT {
-        value.wrong(
-            format!("\"reconnect\" has {} elements", list.len()),
-            format!("write 1 to {RECONNECT_LIMIT} durations, such as [\"1s\", \"2s\", \"5s\"]"),
-        );
-        return None;
-    }
-    let pause = |value: &Value<'_>| {
-        value.duration_from(LEAST_PAUSE, "attempts that often only burden both ends")
-    };
-    let spans: Vec<Option<Nanos>> = list.iter().map(pause).collect();
-    spans.into_iter().collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driver::timing::{LEAST_MAX_AGE, RECONNECT};
     use crate::fieldbus::loopback::{self, Peer};
     use crate::fieldbus::socket::TcpRole;
     use crate::signal::{Area, ByteOrder, DataType, Latch, Signal, Slot};
+    use crate::time::Nanos;
 
     const HEAD: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\n\
                         link = \"cell\"\n";

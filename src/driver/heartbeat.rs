@@ -85,11 +85,12 @@ struct FrameBeat {
 }
 
 impl FrameBeats {
-    /// Those of the end with `role`, whose one station it is.
-    pub(super) fn new(config: &Config, role: Role) -> Self {
+    /// Those of the end with `role` in one of its stations.
+    pub(super) fn new(config: &Config, role: Role, station: usize) -> Self {
         let (writes, _) = role.areas();
         let beats = config.life_signs.beats(&config.table, role);
-        let beats = beats.map(|Heartbeat { signal, every }| {
+        let here = beats.filter(|beat| config.table.signals[beat.signal].station == station);
+        let beats = here.map(|Heartbeat { signal, every }| {
             let signal = config.table.signals[signal].clone();
             let alone = SignalTable {
                 stations: config.table.stations.clone(),
@@ -188,7 +189,7 @@ mod tests {
         let signals = "[[signal]]\nname = \"life\"\naddress = \"%QX1.2\"\n[[signal]]\nname = \"n\"\naddress = \"%QW2\"\norder = \"DCBA\"\n";
         let both = "[{ signal = \"life\", every = \"1ms\" }, { signal = \"n\", every = \"1ms\" }]\nrole = \"controller\"";
         let config = beats(signals, both);
-        let mut beats = FrameBeats::new(&config, Role::Controller);
+        let mut beats = FrameBeats::new(&config, Role::Controller, 0);
         let mut frame = [0xff, 0xf0, 0, 0];
         beats.beat(Nanos(0), &mut frame);
         assert_eq!(frame, [0xff, 0xf4, 1, 0]);

@@ -17,8 +17,9 @@ mod statistics;
 mod status;
 mod supervise;
 mod tape;
+mod timing;
 
-pub use config::{Asked, Config, Timing};
+pub use config::{Asked, Config};
 pub use exchange::Exchange;
 pub use host::Host;
 pub use open::{Driver, DriverError};
@@ -26,3 +27,4 @@ pub use slots::SlotMap;
 pub use statistics::{Counters, Snapshot};
 pub use status::Code;
 pub(crate) use supervise::panic_text;
+pub use timing::Timing;

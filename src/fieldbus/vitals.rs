@@ -140,11 +140,10 @@ impl Vitals {
 
     /// Looks at the clock; gives a station, if there is one, of which a signal has just been found to stand still.
     pub(super) fn look(&mut self, now: Nanos) -> Option<usize> {
-        let found = self.watched.iter_mut().find_map(|watched| {
+        self.watched.iter_mut().find_map(|watched| {
             let station = watched.watch.station;
             watched.look(now).then_some(station)
-        });
-        found
+        })
     }
 
     /// When to look next; [`Nanos::MAX`] for never.

@@ -42,6 +42,10 @@ impl Program for Mirror {
         0
     }
 
+    fn for_another_station(&self) -> Option<Box<dyn Program>> {
+        Some(Box::new(*self))
+    }
+
     fn scan(&mut self, scan: &mut Scan<'_>) {
         let bytes = scan.inputs.len().min(scan.outputs.len());
         scan.outputs[..bytes].copy_from_slice(&scan.inputs[..bytes]);

@@ -72,6 +72,11 @@ pub trait Program: Send {
     /// How many bytes of `%Q` the program writes; 0 if it takes what there is.
     fn output_bytes(&self) -> usize;
 
+    /// Another one of the same kind, for a further station of the driver; `None` for a program that serves one.
+    fn for_another_station(&self) -> Option<Box<dyn Program>> {
+        None
+    }
+
     /// Runs the program once: inputs to outputs. It allocates nothing and never waits.
     ///
     /// Images may be longer than the program asks for, and the rest is left alone. Of shorter

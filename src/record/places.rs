@@ -43,7 +43,7 @@ impl Place {
                 Err("this file is being replayed, and recording would destroy it")
             }
             None => {
-                in_use.insert(id.clone(), Use::Recorded);
+                in_use.insert(id.to_owned(), Use::Recorded);
                 Ok(Self(id))
             }
         })
@@ -63,7 +63,7 @@ impl Place {
             )
         })?;
         let mut in_use = lock();
-        match in_use.entry(id.clone()).or_insert(Use::Replayed(0)) {
+        match in_use.entry(id.to_owned()).or_insert(Use::Replayed(0)) {
             Use::Replayed(count) => *count += 1,
             Use::Recorded => {
                 return Err(format!(

@@ -9,7 +9,7 @@ use crate::driver::frames::{area_bytes, directions};
 use crate::driver::heartbeat::FrameBeats;
 use crate::driver::tape::Tape;
 use crate::fieldbus::Role;
-use crate::image::{BusEnd, Receiver, TickEnd, image};
+use crate::image::{BusEnd, Receiver, TickEnd, TickStation, image};
 use crate::plc::{Program, Scan};
 use crate::signal::Area;
 use crate::time::Nanos;
@@ -31,12 +31,87 @@ pub(super) struct Cpu {
     pub(super) faults: Option<FrameFaults>,
     pub(super) tape: Option<Tape>,
     beats: FrameBeats,
+    /// The other stations, each with a program of its own of the same kind.
+    others: Vec<Other>,
+}
+
+/// A further station of a driver: the program and its process image.
+struct Other {
+    program: Box<dyn Program>,
+    station: usize,
+    inputs: Inputs,
+    outputs: Box<[u8]>,
+    outputs_before: Box<[u8]>,
+    beats: FrameBeats,
+}
+
+impl Other {
+    fn new(program: Box<dyn Program>, config: &Config, role: Role, station: usize) -> Self {
+        let (writes, reads) = role.areas();
+        let outputs = frame(config, station, writes);
+        Self {
+            program,
+            station,
+            inputs: Inputs::new(frame(config, station, reads)),
+            outputs_before: outputs.clone(),
+            outputs,
+            beats: FrameBeats::new(config, role, station),
+        }
+    }
+
+    /// One scan; gives the age of its data, and whether they count.
+    fn scan(
+        &mut self,
+        (now, max_age): (Nanos, Nanos),
+        image: &mut TickStation,
+        tally: &Tally,
+        (writes, reads): (Area, Area),
+    ) -> (Nanos, bool) {
+        let Self {
+            program,
+            station,
+            inputs,
+            outputs,
+            outputs_before,
+            beats,
+        } = self;
+        inputs.before.copy_from_slice(&inputs.bytes);
+        let valid = image.is_valid();
+        let arrival = image.read(now, &mut Taking { inputs, tape: None });
+        tally.count((*station, reads), &inputs.before, &inputs.bytes);
+        let alive = valid && arrival.age <= max_age;
+        outputs_before.copy_from_slice(outputs);
+        program.scan(&mut Scan {
+            now,
+            alive,
+            cycle: arrival.sequence,
+            inputs: &inputs.bytes,
+            outputs,
+        });
+        beats.beat(now, outputs);
+        tally.count((*station, writes), outputs_before, outputs);
+        image.write(now, |frame| frame.copy_from_slice(outputs));
+        (arrival.age, alive)
+    }
+}
+
+fn frame(config: &Config, station: usize, area: Area) -> Box<[u8]> {
+    vec![0; area_bytes(&config.table, station, area)].into()
 }
 
 /// The inputs as the program sees them, and as it saw them a scan before.
 pub(super) struct Inputs {
     pub(super) bytes: Box<[u8]>,
     before: Box<[u8]>,
+}
+
+impl Inputs {
+    fn new(bytes: Box<[u8]>) -> Self {
+        Self {
+            before: bytes.clone(),
+            bytes,
+        }
+    }
 }
 
 /// Takes the inputs over, and their edges where they are recorded.
@@ -73,8 +148,9 @@ impl Cpu {
             faults,
             tape,
             beats,
+            others,
         } = self;
-        let station = &mut tick.stations[0];
+        let (station, further) = tick.stations.split_first_mut().expect("at least one");
         inputs.before.copy_from_slice(&inputs.bytes);
         if let Some(faults) = faults {
             faults.begin_scan(now, &mut inputs.bytes, outputs);
@@ -90,7 +166,7 @@ impl Cpu {
         if let Some(faults) = faults {
             faults.received(&mut inputs.bytes);
         }
-        tally.count(*reads, &inputs.before, &inputs.bytes);
+        tally.count((0, *reads), &inputs.before, &inputs.bytes);
         let alive = in_time && valid && arrival.age <= *max_age;
         outputs_before.copy_from_slice(outputs);
         program.scan(&mut Scan {
@@ -101,14 +177,20 @@ impl Cpu {
             outputs,
         });
         beats.beat(now, outputs);
-        tally.count(*writes, outputs_before, outputs);
+        tally.count((0, *writes), outputs_before, outputs);
         station.write(now, |frame| {
             frame.copy_from_slice(outputs);
             if let Some(faults) = faults {
                 faults.sending(frame);
             }
         });
-        tally.scanned(arrival.age, alive);
+        let (mut age, mut all_alive) = (arrival.age, alive);
+        for (other, image) in others.iter_mut().zip(further) {
+            let found = other.scan((now, *max_age), image, tally, (*writes, *reads));
+            age = age.max(found.0);
+            all_alive &= found.1;
+        }
+        tally.scanned(age, all_alive);
         if let Some(tape) = tape {
             let code = match arrival.fresh {
                 _ if !alive => Code::Stale,
@@ -120,21 +202,28 @@ impl Cpu {
     }
 }
 
-/// Makes the half of a line that has the program: its processor, the bus's end of its image, its tally.
+/// Makes the half of a line that has the program: its processor, the bus's end of its image, its tally. A program
+/// that can serve several stations serves all of them.
 pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
     let table = &config.table;
     let tally = Arc::new(Tally::new(table));
     let (tick, bus) = image(directions(table, role));
     let (writes, reads) = role.areas();
-    let frame = |area| vec![0; area_bytes(table, 0, area)].into_boxed_slice();
-    let (inputs, outputs) = (frame(reads), frame(writes));
+    let (inputs, outputs) = (frame(config, 0, reads), frame(config, 0, writes));
+    let others = (1..table.stations.len())
+        .filter_map(|station| {
+            Some(Other::new(
+                program.for_another_station()?,
+                config,
+                role,
+                station,
+            ))
+        })
+        .collect();
     let cpu = Cpu {
         program,
         tick,
-        inputs: Inputs {
-            before: inputs.clone(),
-            bytes: inputs,
-        },
+        inputs: Inputs::new(inputs),
         outputs_before: outputs.clone(),
         outputs,
         max_age: config.timing.max_age,
@@ -142,7 +231,8 @@ pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (C
         tally,
         faults: None,
         tape: None,
-        beats: FrameBeats::new(config, role),
+        beats: FrameBeats::new(config, role, 0),
+        others,
     };
     (cpu, bus)
 }
@@ -189,5 +279,37 @@ mod tests {
             cpu.scan(now, in_time);
         }
         assert_eq!(*told.lock().expect("no panic"), [true, false, true]);
+    }
+
+    #[test]
+    fn a_mirror_serves_each_station_by_itself() {
+        use crate::driver::Driver;
+        use crate::time::Manual;
+
+        let signal = |name: &str, address: &str, station: &str| {
+            format!(
+                "[[signal]]\nname = \"{name}\"\naddress = \"{address}\"\nstation = \"{station}\"\n"
+            )
+        };
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
+                    program = \"mirror\"\nscan = \"1ms\"\n[[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n"
+            .to_owned()
+            + &signal("A to", "%IB0", "A")
+            + &signal("B to", "%IB2", "B")
+            + &signal("A from", "%QB0", "A")
+            + &signal("B from", "%QB2", "B");
+        let config = crate::driver::Config::parse("driver.cfg", &text);
+        let config = config.unwrap_or_else(|wrong| panic!("{wrong}"));
+        let mut driver = Driver::open(config, Manual::new()).expect("opens");
+        let mut slots = driver.initial_slots();
+        for (slot, value) in [(0, 5.0), (1, 7.0)] {
+            slots[slot] = crate::signal::Slot::from_real(value);
+        }
+        let mut seen = Vec::new();
+        for tick in 1..=3 {
+            driver.exchange(Nanos::from_millis(tick), &mut slots);
+            seen = slots[2..4].iter().map(|slot| slot.real()).collect();
+        }
+        assert_eq!(seen, [5.0, 7.0]);
     }
 }

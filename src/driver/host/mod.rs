@@ -42,6 +42,14 @@ impl Host {
         clock: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
         bus::check_fit(config, &mut *program, config.role)?;
+        if config.table.stations.len() > 1 && !(config.faults.is_empty() && config.record.is_none())
+        {
+            return Err(DriverError::Config(format!(
+                "{}: a program behind several stations can neither be recorded nor have faults injected; use one \
+                 driver.cfg per station for that",
+                config.path.display()
+            )));
+        }
         let (Bus::Free(bus), None) = bus::open(config, &clock)? else {
             return Err(DriverError::Config(format!(
                 "{}: this bus runs on the ticks of a simulation, so that no PLC program can run on it \

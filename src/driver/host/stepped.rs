@@ -42,8 +42,9 @@ impl SteppedHost {
             .life_signs
             .watches(&config.table, Role::Controller, max_age);
         port.watch_life(watches);
-        let (tx, rx) = port.sizes(0);
-        let wire = vec![0; tx.max(rx)].into();
+        let sizes = (0..port.stations()).map(|station| port.sizes(station));
+        let longest = sizes.map(|(tx, rx)| tx.max(rx)).max();
+        let wire = vec![0; longest.unwrap_or_default()].into();
         (
             Self {
                 cpu,
@@ -58,16 +59,18 @@ impl SteppedHost {
     }
 }
 
-/// Carries the frame that `from` sends over to `to`; false if an injected fault swallows it.
+/// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
 fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) -> bool {
     if !from.sends(now) {
         return false;
     }
-    let frame = from.outgoing(0, now);
-    let wire = &mut wire[..frame.len()];
-    wire.copy_from_slice(frame);
-    to.received(0, now, wire);
-    from.sent(0);
+    for station in 0..from.stations() {
+        let frame = from.outgoing(station, now);
+        let wire = &mut wire[..frame.len()];
+        wire.copy_from_slice(frame);
+        to.received(station, now, wire);
+        from.sent(station);
+    }
     true
 }
 
@@ -99,7 +102,7 @@ impl Stepped for SteppedHost {
             if self.carried {
                 // Between two ticks simulation time passes and nothing else: the machine is there all along,
                 // however large the steps are.
-                self.port.touch(0, due);
+                (0..self.port.stations()).for_each(|station| self.port.touch(station, due));
             }
             self.cpu.scan(due, true);
             due += self.interval;

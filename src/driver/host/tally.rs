@@ -21,6 +21,7 @@ pub(in crate::driver) struct Tally {
 #[derive(Debug)]
 struct Bit {
     name: String,
+    station: usize,
     area: Area,
     byte: usize,
     mask: u8,
@@ -35,6 +36,7 @@ impl Tally {
             .filter(|signal| signal.data_type == DataType::Bool);
         let bits = signals.map(|signal| Bit {
             name: signal.name.clone(),
+            station: signal.station,
             area: signal.area,
             byte: signal.byte,
             mask: 1 << signal.bit,
@@ -48,6 +50,7 @@ impl Tally {
         }
     }
 
+<<<<<<< HEAD
     /// Counts the rising edges from `before` to `now`.
     pub(super) fn count(&self, area: Area, before: &[u8], now: &[u8]) {
         // Most scans change nothing.
@@ -55,6 +58,12 @@ impl Tally {
             return;
         }
         for bit in self.bits.iter().filter(|bit| bit.area == area) {
+=======
+    /// Counts the rising edges from `before` to `now` in an area of a station.
+    pub(super) fn count(&self, (station, area): (usize, Area), before: &[u8], now: &[u8]) {
+        let here = |bit: &&Bit| (bit.station, bit.area) == (station, area);
+        for bit in self.bits.iter().filter(here) {
+>>>>>>> main
             if !before[bit.byte] & now[bit.byte] & bit.mask != 0 {
                 bit.rises.fetch_add(1, Ordering::Relaxed);
             }

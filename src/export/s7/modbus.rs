@@ -146,6 +146,12 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
     if plan.config.table.stations.len() > 1 {
         return by_hand("modbus-client with several units", notes);
     }
+    if !options.at.is_empty() {
+        return by_hand(
+            "modbus-client with [fieldbus.at], whose signals lie where the program has them",
+            notes,
+        );
+    }
     let place = |area| {
         let bytes = plan.config.table.stations[0].bytes(area);
         let blocks = options.blocks(area, bytes).ok()?;

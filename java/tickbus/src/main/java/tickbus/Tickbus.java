@@ -137,7 +137,9 @@ public final class Tickbus implements AutoCloseable {
      * have the plant's own signal table, and a PLC program in this process at the other end.
      *
      * <p>A {@code [fieldbus]} with a {@code kind} stands instead of the file's; one without sets the {@code mode} of
-     * the file's own loopback. Times and sizes of the file stay.
+     * the file's own loopback. Times, sizes and signs of life of the file stay. {@code [[station]]} tables say by name
+     * what another bus has to know of the file's stations. A bus that replays a recording takes the file's own
+     * {@code [record]} away.
      *
      * @param driverCfg the driver.cfg, which must be right as it stands
      * @param tables TOML as in a driver.cfg; empty changes nothing

@@ -8,6 +8,9 @@ import static org.junit.jupiter.api.Assertions.assertSame;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import java.io.IOException;
+import java.net.URI;
+import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
@@ -15,6 +18,8 @@ import java.util.function.BooleanSupplier;
 import java.util.stream.IntStream;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.condition.EnabledOnOs;
+import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.function.Executable;
 import org.junit.jupiter.api.io.TempDir;
 
@@ -44,6 +49,16 @@ class TickbusTest {
                 bus.exchange();
             }
             Thread.onSpinWait();
+        }
+    }
+
+    /** A name in Latin-1, on a system that names its files in UTF-8. */
+    @Test
+    @EnabledOnOs(OS.LINUX)
+    void aFolderWhoseNameIsNoTextIsOpened() throws IOException {
+        Path folder = Files.createDirectory(Path.of(URI.create(directory.toUri() + "pr%FCfung")));
+        try (Tickbus bus = DriverCfg.mirror(1).signal("a", "%QX0.0").open(folder)) {
+            assertTrue(bus.exchange(TICK) >= 0);
         }
     }
 

@@ -50,20 +50,14 @@ impl Tally {
         }
     }
 
-<<<<<<< HEAD
-    /// Counts the rising edges from `before` to `now`.
-    pub(super) fn count(&self, area: Area, before: &[u8], now: &[u8]) {
+    /// Counts the rising edges from `before` to `now` in an area of a station.
+    pub(super) fn count(&self, (station, area): (usize, Area), before: &[u8], now: &[u8]) {
         // Most scans change nothing.
         if before == now {
             return;
         }
-        for bit in self.bits.iter().filter(|bit| bit.area == area) {
-=======
-    /// Counts the rising edges from `before` to `now` in an area of a station.
-    pub(super) fn count(&self, (station, area): (usize, Area), before: &[u8], now: &[u8]) {
         let here = |bit: &&Bit| (bit.station, bit.area) == (station, area);
         for bit in self.bits.iter().filter(here) {
->>>>>>> main
             if !before[bit.byte] & now[bit.byte] & bit.mask != 0 {
                 bit.rises.fetch_add(1, Ordering::Relaxed);
             }

@@ -50,12 +50,12 @@ mod storm {
         let (_reader, full) = full_pipe();
         let mut phases = [
             Phase::new("quiet", false),
-            Phase::new("storm", true),
-            Phase::new("storm.blocked", true),
+            Phase::new("open", true),
+            Phase::new("blocked", true),
         ];
         for _ in 0..rounds {
             for phase in &mut phases {
-                if phase.name == "storm.blocked" {
+                if phase.name == "blocked" {
                     rustix::stdio::dup2_stderr(&full).expect("both are open");
                 }
                 phase.run(&mut driver, address, span);
@@ -68,11 +68,14 @@ mod storm {
         let quiet = median(&mut phases[0].tails);
         for phase in &mut phases {
             let (name, tail) = (phase.name, median(&mut phase.tails));
-            println!("rust {name}.tick_p999_us {tail:.1}");
-            println!("rust {name}.tick_max_us {:.1}", median(&mut phase.most));
+            println!("rust storm.{name}.tick_p999_us {tail:.1}");
+            println!(
+                "rust storm.{name}.tick_max_us {:.1}",
+                median(&mut phase.most)
+            );
             if phase.storms {
-                println!("rust {name}.ratio {:.2}", tail / quiet);
-                println!("rust {name}.connections {}", phase.connections);
+                println!("rust storm.{name}.ratio {:.2}", tail / quiet);
+                println!("rust storm.{name}.connections {}", phase.connections);
             }
         }
         println!(

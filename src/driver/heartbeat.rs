@@ -196,4 +196,32 @@ mod tests {
         beats.beat(Nanos::from_millis(1), &mut frame);
         assert_eq!(frame, [0xff, 0xf0, 2, 0]);
     }
+
+    #[test]
+    fn one_file_serves_both_ends_and_the_other_end_watches_the_heartbeat() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\nmax_age = \"300ms\"\n\
+                    alive = { signal = \"plc\", within = \"500ms\" }\n\
+                    heartbeat = [{ signal = \"fast\", every = \"10ms\" }, { signal = \"slow\", every = \"1s\" }]\n\
+                    [[signal]]\nname = \"plc\"\naddress = \"%QX0.3\"\n\
+                    [[signal]]\nname = \"fast\"\naddress = \"%IW2\"\n\
+                    [[signal]]\nname = \"slow\"\naddress = \"%IB0\"\n";
+        let config = Config::parse("driver.cfg", text).unwrap_or_else(|wrong| panic!("{wrong}"));
+        let (signs, table) = (&config.life_signs, &config.table);
+        let watched = |role| -> Vec<(String, std::ops::Range<usize>, u8, Nanos)> {
+            let watches = signs
+                .watches(table, role, config.timing.max_age)
+                .into_iter();
+            watches
+                .map(|w| (w.name, w.bytes, w.mask, w.within))
+                .collect()
+        };
+        let millis = Nanos::from_millis;
+        let plc = ("plc".to_owned(), 0..1, 8, millis(500));
+        assert_eq!(watched(Role::Device), [plc]);
+        let fast = ("fast".to_owned(), 2..4, 0xff, millis(300));
+        let slow = ("slow".to_owned(), 0..1, 0xff, millis(5000));
+        assert_eq!(watched(Role::Controller), [fast, slow]);
+        assert_eq!(signs.beats(table, Role::Device).count(), 2);
+        assert_eq!(signs.beats(table, Role::Controller).count(), 0);
+    }
 }

@@ -78,7 +78,7 @@ mod tests {
     use crate::time::{Manual, Nanos};
 
     fn port() -> (Port, LinkStatus, logged::Watch) {
-        let logged = logged::Watch::new();
+        let logged = logged::Watch::over("tickbus::fieldbus");
         let status = LinkStatus::new("test", Nanos::from_millis(100));
         let clock: Arc<Manual> = Manual::new();
         let (_, end) = image(Vec::new());

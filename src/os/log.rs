@@ -2,6 +2,7 @@
 
 /// What tests expect of the log; integration tests have the same.
 #[cfg(test)]
+#[allow(dead_code, unreachable_pub, reason = "integration tests use all of it")]
 #[path = "../../tests/conformance/logged.rs"]
 pub(crate) mod logged;
 mod queue;

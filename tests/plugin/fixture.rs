@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use tickbus::driver::Code;
 use tickbus::time::{Manual, Nanos};
 
-use crate::conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
+use crate::conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that, logged};
 
 /// The command that helper processes run.
 pub(crate) const HELPER: &str = env!("CARGO_BIN_EXE_tickbus");
@@ -166,6 +166,10 @@ pub(crate) struct Misbehaving {
 
 impl Misbehaving {
     pub(crate) fn new(isolated: bool, options: &str) -> Self {
+        if isolated {
+            // A library that misbehaves, and a machine that is busy.
+            logged::expect("the helper process has not ended by itself");
+        }
         Self {
             folder: tempfile::tempdir().expect("a folder"),
             library: misbehaving().to_owned(),

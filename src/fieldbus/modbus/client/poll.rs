@@ -29,6 +29,10 @@ pub(super) enum Framing {
         inbox: Vec<u8>,
     },
     /// By their length, and silence between them.
+    #[cfg_attr(
+        not(unix),
+        expect(dead_code, reason = "no serial ports are used there")
+    )]
     Rtu {
         /// What has come of an answer.
         inbox: Vec<u8>,

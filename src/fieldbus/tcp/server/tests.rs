@@ -93,7 +93,7 @@ impl Waiting {
 
 impl Running {
     fn new() -> Self {
-        let logged = logged::Watch::new();
+        let logged = logged::Watch::over("tickbus::fieldbus");
         let clock = Manual::new();
         let stop = Stop::new();
         let status = LinkStatus::new("test", MAX_AGE);

@@ -256,7 +256,7 @@ impl Driver {
             config: Arc::clone(&self.config),
             counters: self.counters,
             stations: stations
-                .map(|station| (station.peer_age(now), station.cycles()))
+                .map(|station| (station.peer_age(now), station.is_valid(), station.cycles()))
                 .collect(),
             events_lost: self.events.lost(),
             now,

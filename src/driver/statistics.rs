@@ -108,8 +108,8 @@ impl Samples {
 pub struct Snapshot {
     pub(super) config: Arc<Config>,
     pub(super) counters: Counters,
-    /// Per station, how long ago its peer was heard of, and its bus cycles.
-    pub(super) stations: Vec<(Nanos, u64)>,
+    /// Per station, how long ago its peer was heard of, whether its data count, and its bus cycles.
+    pub(super) stations: Vec<(Nanos, bool, u64)>,
     pub(super) events_lost: u64,
     pub(super) now: Nanos,
     pub(super) samples: Samples,
@@ -126,13 +126,13 @@ impl Snapshot {
             return;
         }
         let sections = &self.config.table.stations;
-        for ((age, cycles), section) in self.stations.iter().zip(sections) {
+        for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
             let name = &section.name;
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
                 "station.{name}.stale={}",
-                *age > self.config.timing.max_age
+                *age > self.config.timing.max_age || !is_valid
             );
             if *age != Nanos::MAX {
                 let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
@@ -145,11 +145,11 @@ impl Snapshot {
 /// One `key=value` per line.
 impl fmt::Display for Snapshot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ages = self.stations.iter().map(|(age, _)| *age);
+        let ages = self.stations.iter().map(|(age, _, _)| *age);
         self.status.observe(self.now, ages);
         self.status.observe_call(self.now);
         let mut text = self.counters.to_string();
-        let cycles: u64 = self.stations.iter().map(|(_, cycles)| cycles).sum();
+        let cycles: u64 = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
         writeln!(
             text,
             "bus_cycles={cycles}\nevents_lost={}",

@@ -6,7 +6,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use tickbus::driver::Config;
-use tickbus::import::{Reading, import};
+use tickbus::import::{Client, Reading, import};
 use tickbus::signal::Addressing;
 
 fuzz_target!(|data: &[u8]| {
@@ -20,6 +20,11 @@ fuzz_target!(|data: &[u8]| {
             Addressing::Elements
         },
         lenient: choice & 2 != 0,
+        client: match choice >> 2 & 3 {
+            1 => Some(Client::Modbus),
+            2 => Some(Client::S7),
+            _ => None,
+        },
     };
     match import("tags.csv", bytes, reading) {
         Ok(imported) => {

@@ -3,18 +3,22 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+
 use super::Outcome;
-use crate::config::Mistakes;
-use crate::import::{Imported, Reading, import};
+use crate::config::{Mistake, Mistakes};
+use crate::import::{Client, Imported, Reading, import};
 use crate::signal::Addressing;
 
 /// Make a driver.cfg from a list of PLC tags: name, address, type, comment.
 ///
-/// Takes CSV with semicolons, commas or tabs, with or without headings, as tickbus, spreadsheets and the SDF export of
-/// TIA Portal write it. Tags outside of %I and %Q are told and skipped.
+/// Takes workbooks (XLSX) and CSV with semicolons, commas or tabs, with or without headings, as spreadsheets and TIA Portal
+/// (XLSX, SDF) write them; PLCopen XML and L5X; and the lists of PLC4X and KEPServer, whose addresses of registers and
+/// data blocks become [fieldbus.at] of a client bus. What cannot be used is told with its place.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// The table.
+    /// The list.
     table: PathBuf,
 
     /// Where the driver.cfg goes [default: standard output].
@@ -32,6 +36,20 @@ pub(super) struct Arguments {
     /// The numbers of the addresses count elements, as CODESYS has it, not bytes.
     #[arg(long)]
     iec: bool,
+
+    /// The client bus whose addresses the list has, where the list alone does not tell: %MW20 can be of either.
+    #[arg(long, value_name = "KIND")]
+    bus: Option<Client>,
+}
+
+impl ValueEnum for Client {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Modbus, Self::S7]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.kind()))
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
@@ -41,11 +59,8 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             let file = arguments.table.display();
             for mistake in &imported.skipped {
                 let (line, column) = mistake.place.unwrap_or((1, 1));
-                let _ = writeln!(
-                    stderr,
-                    "{file}:{line}:{column}: {}; {}",
-                    mistake.what, mistake.right
-                );
+                let Mistake { what, right, .. } = mistake;
+                let _ = writeln!(stderr, "{file}:{line}:{column}: {what}; {right}");
             }
             let told = format!(
                 "import: ok signals={} skipped={}",
@@ -90,6 +105,7 @@ fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
         Reading {
             addressing,
             lenient: arguments.lenient,
+            client: arguments.bus,
         },
     )
 }

@@ -39,6 +39,15 @@ impl Mistakes {
         }
     }
 
+    /// These mistakes of `file`, in the order in which they are; there has to be one.
+    pub fn of_list(file: &str, list: Vec<Mistake>) -> Self {
+        debug_assert!(!list.is_empty(), "no mistakes are none");
+        Self {
+            file: file.to_owned(),
+            list,
+        }
+    }
+
     /// Each of them, in line order.
     pub fn iter(&self) -> std::slice::Iter<'_, Mistake> {
         self.list.iter()

@@ -40,8 +40,21 @@ pub(super) fn records(text: &str, wrong: &Collector<'_>) -> Vec<Record> {
     records
 }
 
-/// The separator that the lines have most of outside of quotes; comments may have commas.
+/// The separator that the lines have most of outside of quotes; comments may have commas. In a list of properties
+/// (`Level = holding-register:21:UINT`) an equals sign comes before any of them.
 fn usual(text: &str) -> char {
+    let mut lines = text
+        .lines()
+        .take(1000)
+        .filter(|line| !line.trim().is_empty() && !line.starts_with('#'))
+        .peekable();
+    let is_property = |line: &str| {
+        let first = line.find(|c| c == '=' || c == '"' || SEPARATORS.contains(&c));
+        first.is_some_and(|at| line[at..].starts_with('='))
+    };
+    if lines.peek().is_some() && lines.all(is_property) {
+        return '=';
+    }
     let mut counts = [0_usize; SEPARATORS.len()];
     let mut quoted = false;
     for character in text.chars().take(10_000) {

@@ -2,6 +2,7 @@
 
 use super::address::{Place, place};
 use super::cells::Record;
+use super::device;
 use crate::signal::Addressing;
 
 /// The columns of a table, and its first record below the headings.
@@ -13,7 +14,28 @@ pub(super) struct Columns {
     pub(super) comment: Option<usize>,
     pub(super) unit: Option<usize>,
     pub(super) order: Option<usize>,
+    /// Who writes it: a direction, or KEPServer's client access.
+    pub(super) direction: Option<usize>,
+    /// KEPServer's columns of a scale: its kind, two raw values, two scaled ones.
+    pub(super) scale: Option<[usize; 5]>,
     pub(super) first: usize,
+}
+
+impl Columns {
+    /// Name, address, type, comment, and no headings.
+    pub(super) fn fixed() -> Self {
+        Self {
+            name: 0,
+            address: 1,
+            kind: Some(2),
+            comment: Some(3),
+            unit: None,
+            order: None,
+            direction: None,
+            scale: None,
+            first: 0,
+        }
+    }
 }
 
 /// What headings are called in English and German editors, in small letters.
@@ -44,7 +66,15 @@ const COMMENTS: &[&str] = &[
     "beschreibung",
     "bemerkung",
 ];
-const UNITS: &[&str] = &["unit", "einheit"];
+const UNITS: &[&str] = &["unit", "einheit", "eng units", "eng. units"];
+const DIRECTIONS: &[&str] = &["direction", "richtung", "client access"];
+const SCALES: [&str; 5] = [
+    "scaling",
+    "raw low",
+    "raw high",
+    "scaled low",
+    "scaled high",
+];
 const ORDERS: &[&str] = &["order", "byte order"];
 
 /// How many records are looked at where there are no headings.
@@ -65,6 +95,12 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
             comment: called(COMMENTS),
             unit: called(UNITS),
             order: called(ORDERS),
+            direction: called(DIRECTIONS),
+            scale: {
+                let columns = SCALES.map(|heading| called(&[heading]));
+                let all: Option<Vec<usize>> = columns.into_iter().collect();
+                all.and_then(|all| all.try_into().ok())
+            },
             first: 1,
         });
     }
@@ -74,7 +110,10 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
     let width = looked.iter().map(Vec::len).max().unwrap_or(0);
     let is_address = |record: &Record, column: usize| {
         let cell = record.get(column);
-        cell.is_some_and(|cell| !matches!(place(&cell.text, Addressing::Bytes), Place::Nothing))
+        cell.is_some_and(|cell| {
+            !matches!(place(&cell.text, Addressing::Bytes), Place::Nothing)
+                || device::is_address(&cell.text)
+        })
     };
     let hits = |column: usize| {
         looked
@@ -86,7 +125,6 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
         .rev()
         .max_by_key(|column| hits(*column))
         .filter(|column| hits(*column) > 0)?;
-    let kind = (address + 1 < width).then_some(address + 1);
     let is_flag = |text: &str| matches!(text.to_lowercase().as_str(), "" | "true" | "false");
     let comment = (address + 2..width).find(|column| {
         looked
@@ -96,10 +134,8 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
     Some(Columns {
         name: usize::from(address == 0),
         address,
-        kind,
+        kind: (address + 1 < width).then_some(address + 1),
         comment,
-        unit: None,
-        order: None,
-        first: 0,
+        ..Columns::fixed()
     })
 }

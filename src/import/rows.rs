@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::address::{Place, place};
 use super::cells::{Cell, Record};
 use super::columns::Columns;
+use super::device::{self, Client, kepserver_type};
 use crate::config::{Collector, did_you_mean, shown};
 use crate::signal::section::NAME_LIMIT;
 use crate::signal::{AREA_LIMIT, Address, Addressing, Area, ByteOrder, DataType, Width};
@@ -15,148 +16,407 @@ const MOST: usize = 100_000;
 /// The longest unit, in characters.
 const LONGEST_UNIT: usize = 40;
 
+/// The longest address in a device, in characters.
+const LONGEST_ADDRESS: usize = 200;
+
+/// What the addresses of a list are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum World {
+    /// Those of the process image.
+    Image(Addressing),
+    /// Those of a device, for a client.
+    Device(Client),
+    /// Inputs and outputs of modules, by their names.
+    Modules,
+}
+
 /// One tag that becomes a signal.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tag {
     pub(super) name: String,
-    pub(super) address: Address,
+    pub(super) area: Area,
+    /// Its address in the process image, once it has one.
+    pub(super) address: Option<Address>,
+    /// Where it lies in the device; empty where that is its address.
+    pub(super) at: String,
     pub(super) data_type: DataType,
     pub(super) order: ByteOrder,
     pub(super) unit: Option<String>,
+    /// Two raw values and what they mean.
+    pub(super) scale: Option<[f64; 4]>,
     pub(super) comment: String,
 }
 
 /// What the tags before have taken.
-struct Taken {
+#[derive(Default)]
+pub(super) struct Taken {
     /// Line of each name.
     names: HashMap<String, usize>,
     /// For each bit of %I and %Q, the line of the tag that has it; 0 for none.
     bits: [Vec<u32>; 2],
 }
 
+/// The client whose addresses these are, if they are no list of a process image. An address that both a process image
+/// and a client can have decides nothing; where some are of the image for sure, all are.
+pub(super) fn client<'a>(addresses: impl Iterator<Item = &'a str>) -> Option<Client> {
+    let (mut counts, mut of_image, mut typed) = ([0_usize; 2], false, false);
+    for address in addresses {
+        match device::only(address) {
+            Some(client) => {
+                counts[usize::from(client == Client::S7)] += 1;
+                typed |= client == Client::Modbus || address.contains([':', ',']);
+            }
+            None => of_image |= matches!(place(address, Addressing::Bytes), Place::Image(_)),
+        }
+    }
+    let [modbus, s7] = counts;
+    if modbus + s7 == 0 || (of_image && !typed) {
+        return None;
+    }
+    Some(if modbus >= s7 {
+        Client::Modbus
+    } else {
+        Client::S7
+    })
+}
+
 /// Reads the records below the headings.
 pub(super) fn read(
     records: &[Record],
     columns: &Columns,
-    addressing: Addressing,
+    world: World,
+    taken: &mut Taken,
+    tags: &mut Vec<Tag>,
     wrong: &Collector<'_>,
     skipped: &Collector<'_>,
-) -> Vec<Tag> {
-    let mut taken = Taken {
-        names: HashMap::new(),
-        bits: [Vec::new(), Vec::new()],
-    };
-    let mut tags = Vec::new();
+) {
     for record in &records[columns.first..] {
         if tags.len() == MOST {
             wrong.report(
                 record[0].at,
-                format!("there are more than {MOST} tags in %I and %Q"),
+                format!("there are more than {MOST} tags"),
                 "split the table over several drivers",
             );
             break;
         }
-        tags.extend(tag(record, columns, addressing, &mut taken, wrong, skipped));
+        let row = Row {
+            record,
+            columns,
+            wrong,
+            skipped,
+        };
+        tags.extend(row.tag(world, taken));
     }
-    tags
 }
 
-fn tag(
-    record: &Record,
-    columns: &Columns,
-    addressing: Addressing,
-    taken: &mut Taken,
-    wrong: &Collector<'_>,
-    skipped: &Collector<'_>,
-) -> Option<Tag> {
-    let cell = |column: Option<usize>| column.and_then(|column| record.get(column));
-    let text = |column| cell(column).map_or("", |cell| cell.text.as_str());
-    let Some(at_address) = cell(Some(columns.address)).filter(|cell| !cell.text.is_empty()) else {
-        wrong.report(
-            record[0].at,
-            format!(
-                "this line has no address: {}",
-                quoted(text(Some(columns.name)))
-            ),
-            "write one such as %I0.0 or %QW4",
-        );
-        return None;
-    };
-    let address = match place(&at_address.text, addressing) {
-        Place::Image(address) => address,
-        Place::Elsewhere(what) => {
-            skipped.report(
-                at_address.at,
-                format!(
-                    "{} is {what}, no part of the process image: skipped",
-                    quoted(&at_address.text)
-                ),
-                "let the PLC program copy it from %I or to %Q if the simulation needs it",
-            );
-            return None;
-        }
-        Place::Wrong(error) => {
-            // A bit in a wide type is how TIA Portal writes addresses of 64 bits: judged below by the type.
-            wrong.report(at_address.at, error.what, error.right);
-            return None;
-        }
-        Place::Nothing => {
+/// One line of a table.
+struct Row<'r> {
+    record: &'r Record,
+    columns: &'r Columns,
+    wrong: &'r Collector<'r>,
+    skipped: &'r Collector<'r>,
+}
+
+/// A tag's place, and what follows from it.
+struct Found {
+    area: Area,
+    address: Option<Address>,
+    at: String,
+    data_type: DataType,
+}
+
+impl Row<'_> {
+    fn cell(&self, column: Option<usize>) -> Option<&Cell> {
+        column.and_then(|column| self.record.get(column))
+    }
+
+    fn text(&self, column: Option<usize>) -> &str {
+        self.cell(column).map_or("", |cell| cell.text.as_str())
+    }
+
+    fn tag(&self, world: World, taken: &mut Taken) -> Option<Tag> {
+        let (columns, wrong) = (self.columns, self.wrong);
+        let cell = self.cell(Some(columns.address));
+        let Some(at_address) = cell.filter(|cell| !cell.text.is_empty()) else {
             wrong.report(
-                at_address.at,
-                format!("{} is no address", quoted(&at_address.text)),
-                "addresses look like %I0.0, %IB4, %QW2, %ID8",
+                self.record[0].at,
+                format!(
+                    "this line has no address: {}",
+                    quoted(self.text(Some(columns.name)))
+                ),
+                "write one such as %I0.0 or %QW4",
+            );
+            return None;
+        };
+        let found = match world {
+            World::Image(addressing) => self.in_image(at_address, addressing)?,
+            World::Device(client) => self.in_device(at_address, client)?,
+            World::Modules => self.in_module(at_address)?,
+        };
+        let at_name = self.cell(Some(columns.name));
+        let name = name(at_name, at_address, wrong)?;
+        let order = order(self.cell(columns.order), found.data_type, wrong)?;
+        let scale = self.scale(found.data_type)?;
+        let line = wrong.line(self.record[0].at);
+        if let Some(first) = taken.names.get(name) {
+            wrong.report(
+                at_name.unwrap_or(at_address).at,
+                format!(
+                    "the name {} is that of the tag on line {first}",
+                    quoted(name)
+                ),
+                "give each tag a name of its own",
             );
             return None;
         }
-    };
-    let (data_type, address) = kind(cell(columns.kind), address, wrong)?;
-    let name = name(cell(Some(columns.name)), at_address, wrong)?;
-    let order = order(cell(columns.order), data_type, wrong)?;
-    let line = wrong.line(record[0].at);
-    if let Some(first) = taken.names.get(name) {
-        wrong.report(
-            cell(Some(columns.name)).unwrap_or(at_address).at,
-            format!(
-                "the name {} is that of the tag on line {first}",
-                quoted(name)
+        if let Some(address) = found.address {
+            taken.take(name, address, line, at_address, wrong)?;
+        }
+        taken.names.insert(name.to_owned(), line);
+        let unit: String = self
+            .text(columns.unit)
+            .chars()
+            .filter(|c| !c.is_control())
+            .take(LONGEST_UNIT)
+            .collect();
+        let unit = unit.trim();
+        Some(Tag {
+            name: name.to_owned(),
+            area: found.area,
+            address: found.address,
+            at: found.at,
+            data_type: found.data_type,
+            order,
+            unit: (!unit.is_empty()).then(|| unit.to_owned()),
+            scale,
+            comment: self.text(columns.comment).to_owned(),
+        })
+    }
+
+    fn in_image(&self, cell: &Cell, addressing: Addressing) -> Option<Found> {
+        let (what, right) = match place(&cell.text, addressing) {
+            Place::Image(address) => {
+                let (data_type, address) = kind(self.cell(self.columns.kind), address, self.wrong)?;
+                return Some(Found {
+                    area: address.area,
+                    address: Some(address),
+                    at: String::new(),
+                    data_type,
+                });
+            }
+            Place::Elsewhere(what) => {
+                self.skipped.report(
+                    cell.at,
+                    format!(
+                        "{} is {what}, no part of the process image: skipped",
+                        quoted(&cell.text)
+                    ),
+                    "let the PLC program copy it from %I or to %Q if the simulation needs it",
+                );
+                return None;
+            }
+            Place::Nothing if cell.text.ends_with('*') => {
+                self.skipped.report(
+                    cell.at,
+                    format!("{} has no place yet: skipped", quoted(&cell.text)),
+                    "give it an address in the PLC's editor",
+                );
+                return None;
+            }
+            Place::Wrong(error) => (error.what, error.right),
+            Place::Nothing => (
+                format!("{} is no address", quoted(&cell.text)),
+                "addresses look like %I0.0, %IB4, %QW2, %ID8".to_owned(),
             ),
-            "give each tag a name of its own",
-        );
-        return None;
+        };
+        self.wrong.report(cell.at, what, right);
+        None
     }
-    let bits = &mut taken.bits[usize::from(address.area == Area::Output)];
-    let range = address.bits();
-    if bits.len() < range.end {
-        bits.resize(range.end, 0);
+
+    fn in_device(&self, cell: &Cell, client: Client) -> Option<Found> {
+        if cell.text.chars().nth(LONGEST_ADDRESS).is_some() {
+            let what = format!(
+                "the address {} is longer than {LONGEST_ADDRESS} characters",
+                quoted(&cell.text)
+            );
+            self.wrong.report(cell.at, what, "shorten it");
+            return None;
+        }
+        let spots = match device::spots(&cell.text, client) {
+            Ok(spots) => spots,
+            Err((what, right)) => {
+                self.wrong.report(cell.at, what, right);
+                return None;
+            }
+        };
+        let data_type = match spots.data_type {
+            Some(data_type) => data_type,
+            None => self.client_type()?.unwrap_or(spots.width.data_type()),
+        };
+        // Several registers make a wider value; nothing else is put together.
+        let is_of_registers = client == Client::Modbus && spots.width == Width::Word;
+        let fits = data_type.width() == spots.width
+            || (is_of_registers && data_type.width() != Width::Bit);
+        if !fits {
+            self.wrong.report(
+                self.cell(self.columns.kind).unwrap_or(cell).at,
+                format!(
+                    "{data_type} does not fit {}: the one has {} bits, the other {}",
+                    quoted(&cell.text),
+                    data_type.width().bits(),
+                    spots.width.bits()
+                ),
+                if is_of_registers {
+                    "name a bit of the register, such as 400021.0, or another type"
+                } else {
+                    "correct the one or the other"
+                },
+            );
+            return None;
+        }
+        let area = self.direction()?.or(spots.area).unwrap_or(Area::Output);
+        Some(Found {
+            area,
+            address: None,
+            at: cell.text.clone(),
+            data_type,
+        })
     }
-    if let Some(first) = bits[range.clone()].iter().find(|line| **line > 0) {
-        wrong.report(
-            at_address.at,
-            format!(
-                "{} ({address}) overlaps the tag on line {first}",
-                quoted(name)
-            ),
-            "each bit belongs to one signal: keep one of the two",
-        );
-        return None;
+
+    /// An input or output of a module: `Local:1:I.Data.0`.
+    fn in_module(&self, cell: &Cell) -> Option<Found> {
+        let data_type = self.client_type()?.unwrap_or(DataType::Bool);
+        let area = if cell.text.contains(":I") {
+            Area::Input
+        } else {
+            Area::Output
+        };
+        Some(Found {
+            area,
+            address: None,
+            at: cell.text.clone(),
+            data_type,
+        })
     }
-    taken.names.insert(name.to_owned(), line);
-    bits[range].fill(u32::try_from(line).unwrap_or(u32::MAX));
-    let unit = text(columns.unit);
-    let unit: String = unit
-        .chars()
-        .filter(|c| !c.is_control())
-        .take(LONGEST_UNIT)
-        .collect();
-    let unit = unit.trim();
-    Some(Tag {
-        name: name.to_owned(),
-        address,
-        data_type,
-        order,
-        unit: (!unit.is_empty()).then(|| unit.to_owned()),
-        comment: text(columns.comment).to_owned(),
-    })
+
+    /// The type that its column states, in the words of IEC 61131-3 or of KEPServer.
+    #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
+    fn client_type(&self) -> Option<Option<DataType>> {
+        let Some(cell) = self
+            .cell(self.columns.kind)
+            .filter(|cell| !cell.text.is_empty())
+        else {
+            return Some(None);
+        };
+        // Both have a BYTE and a WORD; with KEPServer's headings they are KEPServer's.
+        let (iec, kepserver) = (cell.text.parse().ok(), kepserver_type(&cell.text));
+        let known = if self.columns.scale.is_some() {
+            kepserver.or(iec)
+        } else {
+            iec.or(kepserver)
+        };
+        if known.is_none() {
+            unknown_type(cell, self.wrong);
+        }
+        known.map(Some)
+    }
+
+    /// Who writes the tag, if a column says so: the simulation an input of the PLC, the PLC its output.
+    #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
+    fn direction(&self) -> Option<Option<Area>> {
+        let Some(cell) = self.cell(self.columns.direction) else {
+            return Some(None);
+        };
+        match cell.text.to_lowercase().as_str() {
+            "" | "r/w" | "rw" | "read/write" => Some(None),
+            "ro" | "read only" | "out" | "output" | "%q" | "q" => Some(Some(Area::Output)),
+            "wo" | "write only" | "in" | "input" | "%i" | "i" => Some(Some(Area::Input)),
+            _ => {
+                self.wrong.report(
+                    cell.at,
+                    format!("{} is no direction", quoted(&cell.text)),
+                    "write \"input\" for what the simulation writes into the PLC, \"output\" for what it reads, or RO, WO, R/W",
+                );
+                None
+            }
+        }
+    }
+
+    /// KEPServer's linear scale.
+    #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
+    fn scale(&self, data_type: DataType) -> Option<Option<[f64; 4]>> {
+        let Some([kind, values @ ..]) = self.columns.scale else {
+            return Some(None);
+        };
+        let Some(cell) = self.cell(Some(kind)) else {
+            return Some(None);
+        };
+        let right =
+            "a linear scale has two raw values that differ, and two scaled ones that differ";
+        match cell.text.to_lowercase().as_str() {
+            "" | "none" => return Some(None),
+            "linear" if data_type != DataType::Bool => {}
+            _ => {
+                let what = format!(
+                    "{} is no scale that a {data_type} can have: left out",
+                    quoted(&cell.text)
+                );
+                self.skipped.report(cell.at, what, right);
+                return Some(None);
+            }
+        }
+        let numbers = values.map(|column| {
+            self.text(Some(column))
+                .parse::<f64>()
+                .ok()
+                .filter(|n| n.is_finite())
+        });
+        if let [Some(one), Some(two), Some(three), Some(four)] = numbers
+            && one < two
+            && three < four
+        {
+            return Some(Some([one, two, three, four]));
+        }
+        self.wrong
+            .report(cell.at, "the linear scale has wrong values", right);
+        None
+    }
+}
+
+impl Taken {
+    /// Takes the bits of `address`, or reports who has them.
+    fn take(
+        &mut self,
+        name: &str,
+        address: Address,
+        line: usize,
+        cell: &Cell,
+        wrong: &Collector<'_>,
+    ) -> Option<()> {
+        let bits = &mut self.bits[usize::from(address.area == Area::Output)];
+        let range = address.bits();
+        if bits.len() < range.end {
+            bits.resize(range.end, 0);
+        }
+        if let Some(first) = bits[range.clone()].iter().find(|line| **line > 0) {
+            wrong.report(
+                cell.at,
+                format!(
+                    "{} ({address}) overlaps the tag on line {first}",
+                    quoted(name)
+                ),
+                if address.width.bytes() > 1 {
+                    "each bit belongs to one signal: keep one of the two; if the numbers count elements, as in CODESYS, \
+                     add --iec"
+                } else {
+                    "each bit belongs to one signal: keep one of the two"
+                },
+            );
+            return None;
+        }
+        bits[range].fill(u32::try_from(line).unwrap_or(u32::MAX));
+        Some(())
+    }
 }
 
 fn quoted(text: &str) -> String {
@@ -173,18 +433,7 @@ fn kind(
         return Some((address.width.data_type(), address));
     };
     let Ok(data_type) = cell.text.trim_matches('"').parse::<DataType>() else {
-        let right = match cell.text.to_ascii_uppercase().as_str() {
-            "TIME" => "a TIME is a DINT of milliseconds: write DINT".to_owned(),
-            "CHAR" => "write BYTE or USINT".to_owned(),
-            "TIME_OF_DAY" | "TOD" => "write UDINT".to_owned(),
-            "DATE" => "write UINT".to_owned(),
-            _ => did_you_mean(&cell.text, "types", &DataType::ALL.map(DataType::name)),
-        };
-        wrong.report(
-            cell.at,
-            format!("{} is no type that a signal can have", quoted(&cell.text)),
-            right,
-        );
+        unknown_type(cell, wrong);
         return None;
     };
     if data_type.width() == address.width {
@@ -275,4 +524,19 @@ fn order(cell: Option<&Cell>, data_type: DataType, wrong: &Collector<'_>) -> Opt
             None
         }
     }
+}
+
+fn unknown_type(cell: &Cell, wrong: &Collector<'_>) {
+    let right = match cell.text.to_ascii_uppercase().as_str() {
+        "TIME" => "a TIME is a DINT of milliseconds: write DINT".to_owned(),
+        "CHAR" => "write BYTE or USINT".to_owned(),
+        "TIME_OF_DAY" | "TOD" => "write UDINT".to_owned(),
+        "DATE" => "write UINT".to_owned(),
+        _ => did_you_mean(&cell.text, "types", &DataType::ALL.map(DataType::name)),
+    };
+    wrong.report(
+        cell.at,
+        format!("{} is no type that a signal can have", quoted(&cell.text)),
+        right,
+    );
 }

@@ -151,6 +151,12 @@ fn a_wall_clock_away_from_home_is_found() {
                 fn g() { std::thread::sleep(Duration::ZERO); }";
     let found = [(1, "SystemTime"), (2, "Instant::now"), (3, "thread::sleep")];
     finds("src/driver/open.rs", text, &found);
+    let text = "use opcua_types::DateTime;\n\
+                fn f() { DateTime::now(); }\n\
+                fn g() { chrono::Utc::now(); Self::now(); clock.now(); yield_now() }\n\
+                fn h() { time::OffsetDateTime::now_utc(); thread::yield_now(); }";
+    let found = [(2, "DateTime::now"), (3, "Utc::now"), (4, "now_utc")];
+    finds("src/fieldbus/opcua/pki.rs", text, &found);
     finds("src/time/clock.rs", text, &[]);
     finds("src/cli/mirror.rs", text, &[]);
 }

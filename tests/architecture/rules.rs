@@ -121,24 +121,39 @@ fn clocks(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     if at_home(file, CLOCK_HOMES) {
         return Vec::new();
     }
-    let names: &[(&str, &[&str])] = &[
-        ("Instant::now", &["Instant", ":", ":", "now"]),
-        ("SystemTime", &["SystemTime"]),
-        ("thread::sleep", &["thread", ":", ":", "sleep"]),
+    let names: &[&[&str]] = &[
+        &["SystemTime"],
+        &["clock_gettime"],
+        &["thread", ":", ":", "sleep"],
     ];
     let mut found = Vec::new();
     for (at, token) in tokens.iter().enumerate() {
-        for (name, wanted) in names {
-            if texts(&tokens[at..], wanted) {
-                found.push(format!(
-                    "{}:{}: {name} is the system's time; take `now` as an argument, or a \
-                     `&dyn tickbus::time::Clock` to wait on",
-                    file.path, token.line
-                ));
-            }
+        let rest = &tokens[at..];
+        let is_named = names.iter().any(|wanted| texts(rest, wanted));
+        // Every type that knows what time it is by itself: Instant, DateTime, Utc, ...
+        let is_type = token.text.starts_with(char::is_uppercase) && token.text != "Self";
+        let tells = is_type && texts(&rest[1..], &[":", ":"]) && rest.get(3).is_some_and(asks_time);
+        if is_named || tells {
+            let name = if tells {
+                format!("{}::{}", token.text, rest[3].text)
+            } else if token.text == "thread" {
+                "thread::sleep".to_owned()
+            } else {
+                token.text.to_owned()
+            };
+            found.push(format!(
+                "{}:{}: {name} is the system's time; take `now` as an argument, a \
+                 `&dyn tickbus::time::Clock` to wait on, or a `tickbus::time::WallClock` for the date",
+                file.path, token.line
+            ));
         }
     }
     found
+}
+
+/// Whether a function of this name tells the time: `now`, `now_utc`, `now_with_offset`.
+fn asks_time(token: &Token<'_>) -> bool {
+    token.text == "now" || token.text.starts_with("now_")
 }
 
 fn length(file: File<'_>) -> Option<String> {

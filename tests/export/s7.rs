@@ -478,3 +478,81 @@ fn no_member_of_the_control_block_is_one_that_nothing_sets() {
         }
     }
 }
+
+/// A heartbeat of the driver is watched by the PLC on every bus, and a signal that `alive` names is counted up.
+#[test]
+fn signs_of_life_are_watched_and_given_on_every_bus() {
+    for kind in ["socket", "s7-client"] {
+        let address = if kind == "s7-client" {
+            "address = \"192.168.0.1\"\ninput = \"DB1\"\noutput = \"DB2\"\n"
+        } else {
+            ""
+        };
+        let text = format!(
+            "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"{kind}\"\n{address}\
+             alive = {{ signal = \"PLC life\", within = \"500ms\" }}\n\
+             heartbeat = {{ signal = \"Beat\", every = \"100ms\" }}\n\
+             [[signal]]\nname = \"PLC life\"\naddress = \"%QB1\"\n\
+             [[signal]]\nname = \"Beat\"\naddress = \"%IW2\"\ntype = \"UINT\"\n"
+        );
+        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|m| panic!("{m}\n{text}"));
+        let link = source(&config, "link");
+        let beat = "\"Cell_1_in\".Image.\"Beat\"";
+        for line in [
+            format!("IF {beat} <> #Last_beat_1 THEN"),
+            "PT := T#500ms);".to_owned(),
+            format!("#Last_beat_1 := {beat};"),
+            "\"Cell_1\".Alive := #Is_heard_1;".to_owned(),
+        ] {
+            assert!(link.contains(&line), "{line}\n{link}");
+        }
+        let (data, copy) = (source(&config, "data"), source(&config, "copy"));
+        assert!(
+            data.contains("Alive : Bool;   // the simulation ticks"),
+            "{data}"
+        );
+        let life = "\"Cell_1_out\".Image.\"PLC_life\"";
+        assert!(
+            copy.contains(&format!(
+                "{life} := USINT_TO_BYTE((BYTE_TO_USINT({life}) + 1) MOD 100);"
+            )),
+            "{copy}"
+        );
+        assert!(
+            !copy.contains("%QB1"),
+            "the count is not overwritten\n{copy}"
+        );
+    }
+}
+
+/// With its own memory as the place of the images the CPU has in %I what the simulation has written there: zeros from a data
+/// block must not go over it.
+#[test]
+fn what_the_simulation_reads_and_writes_in_the_cpu_itself_is_not_copied() {
+    let config = Config::parse(
+        "driver.cfg",
+        "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"192.168.0.1\"\noutput = \"DB2\"\n\
+         alive = { signal = \"Life\", within = \"500ms\" }\nheartbeat = { signal = \"Beat\", every = \"100ms\" }\n\
+         [fieldbus.at]\n\"Life\" = \"DB20.DBW8\"\n\
+         [[signal]]\nname = \"Beat\"\naddress = \"%IW4\"\ntype = \"UINT\"\n[[signal]]\nname = \"Life\"\naddress = \"%QW0\"\n\
+         [[signal]]\nname = \"Run\"\naddress = \"%QX2.0\"\n",
+    )
+    .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let (link, copy) = (source(&config, "link"), source(&config, "copy"));
+    assert!(
+        !copy.contains(":= \"Cell_1_in\"") && !copy.contains("%IW4"),
+        "{copy}"
+    );
+    assert!(
+        copy.contains("\"Cell_1_out\".Image.\"Run\" := %Q2.0;"),
+        "{copy}"
+    );
+    assert!(
+        copy.contains("%DB20.DBB9 := USINT_TO_BYTE((BYTE_TO_USINT(%DB20.DBB9) + 1) MOD 100);"),
+        "{copy}"
+    );
+    assert!(
+        link.contains("IF %IB5 <> #Last_beat_1 THEN") && link.contains("Last_beat_1 : Byte;"),
+        "{link}"
+    );
+}

@@ -1,6 +1,10 @@
 //! `tickbus import`: tables that editors write, what is told of wrong ones, and the way back from an export.
 #![allow(missing_docs, reason = "tests")]
 
+mod clients;
+mod projects;
+mod workbooks;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -198,14 +202,6 @@ fn the_driver_cfg_goes_to_a_file_that_is_not_there_and_check_finds_it_right() {
         run(&[&arguments[..], &["--force"]].concat()).status.code(),
         Some(0)
     );
-}
-
-#[test]
-fn a_workbook_is_told_how_to_become_a_table() {
-    let told = import("tags.xlsx", b"PK\x03\x04rest", Reading::default())
-        .expect_err("no text")
-        .to_string();
-    assert!(told.contains("save the sheet as CSV"), "{told}");
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! The blocks for the beginning and the end of OB1.
 
+use super::link::counting;
 use super::members::Path;
+use super::s7comm::direct;
 use super::{Image, Plan, line, source};
 use crate::export::record::Place;
 use crate::export::siemens::address;
@@ -24,7 +26,9 @@ pub(super) fn text(plan: &Plan<'_>) -> String {
         line(text, &format!("   \"{prefix}_link_DB\"();"));
         only_if_simulated(text);
         for place in &plan.inputs.record.places {
-            put(text, place, plan);
+            if direct(plan, place).is_none() {
+                put(text, place, plan);
+            }
         }
     });
     line(&mut text, "");
@@ -32,7 +36,11 @@ pub(super) fn text(plan: &Plan<'_>) -> String {
     function(&mut text, plan, &end, &plan.outputs, |text| {
         only_if_simulated(text);
         for place in &plan.outputs.record.places {
-            take(text, place, plan);
+            if is_watched(place, plan) {
+                count(text, place, plan);
+            } else if direct(plan, place).is_none() {
+                take(text, place, plan);
+            }
         }
     });
     text
@@ -135,4 +143,34 @@ fn take(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
             line(text, &format!("   {target} := {value};{remark}"));
         }
     }
+}
+
+/// Whether the driver's `alive` wants this signal to change while the PLC's program runs.
+fn is_watched(place: &Place<'_>, plan: &Plan<'_>) -> bool {
+    let signals = &plan.config.table.signals;
+    let mut alive = plan.config.life_signs.alive.iter();
+    alive.any(|alive| std::ptr::eq(&raw const signals[alive.signal], place.signal))
+}
+
+/// Changes the value of a signal in every scan: a BOOL toggles, others count and begin again at 100.
+fn count(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
+    let (value, kind) = counting(plan, &plan.outputs, place);
+    let remark = format!("   // \"{}\": alive in driver.cfg", place.signal.name);
+    let next = match kind {
+        "Bool" => format!("NOT {value}"),
+        "Byte" => format!("USINT_TO_BYTE((BYTE_TO_USINT({value}) + 1) MOD 100)"),
+        "Word" => format!("UINT_TO_WORD((WORD_TO_UINT({value}) + 1) MOD 100)"),
+        "DWord" => format!("UDINT_TO_DWORD((DWORD_TO_UDINT({value}) + 1) MOD 100)"),
+        "LWord" => format!("ULINT_TO_LWORD((LWORD_TO_ULINT({value}) + 1) MOD 100)"),
+        "Real" | "LReal" => {
+            line(text, &format!("   IF {value} < 100.0 THEN{remark}"));
+            line(text, &format!("      {value} := {value} + 1.0;"));
+            line(text, "   ELSE");
+            line(text, &format!("      {value} := 0.0;"));
+            line(text, "   END_IF;");
+            return;
+        }
+        _ => format!("({value} + 1) MOD 100"),
+    };
+    line(text, &format!("   {value} := {next};{remark}"));
 }

@@ -1,8 +1,14 @@
 //! The block that talks to the simulation: one body for each bus.
 
-use super::{Plan, line, modbus, s7comm, socket, source};
-use crate::fieldbus::Options;
+use super::members::Path;
+use super::{Image, Plan, line, modbus, s7comm, socket, source};
+use crate::driver::Config;
+use crate::export::record::Place;
+use crate::export::siemens::spelling;
+use crate::fieldbus::s7::Variable;
 use crate::fieldbus::socket::Message;
+use crate::fieldbus::{Options, Role};
+use crate::signal::{DataType, Width};
 
 /// A body: what it declares and what it does.
 #[derive(Default)]
@@ -20,6 +26,8 @@ pub(super) struct Body {
     pub(super) sends: bool,
     /// What is TRUE in each call in which the simulation was heard of; empty where nothing here can know.
     pub(super) heard: String,
+    /// The driver counts signals up by which the PLC sees that the simulation ticks.
+    pub(super) has_heartbeat: bool,
 }
 
 impl Body {
@@ -27,7 +35,11 @@ impl Body {
     pub(super) fn status(&self) -> Vec<&'static str> {
         let members = [
             (
-                !self.heard.is_empty(),
+                self.has_heartbeat,
+                "Alive : Bool;   // the simulation ticks: its heartbeat changes",
+            ),
+            (
+                !self.has_heartbeat && !self.heard.is_empty(),
                 "Alive : Bool;   // the simulation was heard of not longer ago than the driver's max_age",
             ),
             (
@@ -67,28 +79,98 @@ pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
         Options::OpcuaServer(options) => opcua_client(plan, &options.address.to_string()),
         bus @ (Options::Loopback(_) | Options::Plugin(_)) => by_hand(bus.kind(), notes),
     };
-    if !body.heard.is_empty() {
+    watch(plan, &mut body);
+    body
+}
+
+/// Declares and sets `Alive`: by the heartbeats of the driver.cfg if it has some, else by what the bus has heard.
+fn watch(plan: &Plan<'_>, body: &mut Body) {
+    let Config {
+        life_signs,
+        table,
+        timing,
+        ..
+    } = plan.config;
+    let prefix = &plan.prefix;
+    let mut watched = Vec::new();
+    for beat in life_signs.beats(table, Role::Device) {
+        let places = &plan.inputs.record.places;
+        let signal = &table.signals[beat.signal];
+        let Some(place) = places
+            .iter()
+            .find(|place| std::ptr::eq(place.signal, signal))
+        else {
+            continue;
+        };
+        let number = watched.len() + 1;
+        let (value, kind) = counting(plan, &plan.inputs, place);
+        body.variables.push(format!("Last_beat_{number} : {kind};"));
+        // A beat may come late, and a few be missed.
+        let within = timing.max_age.max(beat.every.times(5));
+        let last = format!("#Last_beat_{number}");
+        watched.push((
+            format!("{value} <> {last}"),
+            within,
+            Some(format!("{last} := {value};")),
+        ));
+    }
+    body.has_heartbeat = !watched.is_empty();
+    if watched.is_empty() && !body.heard.is_empty() {
+        watched.push((body.heard.clone(), timing.max_age, None));
+    }
+    let mut all = Vec::new();
+    for (number, (heard, within, then)) in watched.iter().enumerate() {
+        let number = number + 1;
         body.variables.extend([
-            "Silence : TON_TIME;".to_owned(),
-            "Is_heard : Bool;".to_owned(),
+            format!("Silence_{number} : TON_TIME;"),
+            format!("Is_heard_{number} : Bool;"),
         ]);
-        let (prefix, heard) = (&plan.prefix, &body.heard);
         body.code.extend([
             String::new(),
             format!("IF {heard} THEN"),
-            "   #Is_heard := TRUE;".to_owned(),
+            format!("   #Is_heard_{number} := TRUE;"),
             "END_IF;".to_owned(),
             format!(
-                "#Silence(IN := \"{prefix}\".Simulated AND NOT ({heard}), PT := {});",
-                time(plan.config.timing.max_age)
+                "#Silence_{number}(IN := \"{prefix}\".Simulated AND NOT ({heard}), PT := {});",
+                time(*within)
             ),
-            format!("IF #Silence.Q OR NOT \"{prefix}\".Simulated THEN"),
-            "   #Is_heard := FALSE;".to_owned(),
+            format!("IF #Silence_{number}.Q OR NOT \"{prefix}\".Simulated THEN"),
+            format!("   #Is_heard_{number} := FALSE;"),
             "END_IF;".to_owned(),
-            format!("\"{prefix}\".Alive := #Is_heard;"),
         ]);
+        body.code.extend(then.clone());
+        all.push(format!("#Is_heard_{number}"));
     }
-    body
+    if !all.is_empty() {
+        body.code
+            .push(format!("\"{prefix}\".Alive := {};", all.join(" AND ")));
+    }
+}
+
+/// What changes of a signal with every count, and its type: the signal itself or its least significant byte, where the
+/// simulation reads or writes it.
+pub(super) fn counting(
+    plan: &Plan<'_>,
+    image: &Image<'_>,
+    place: &Place<'_>,
+) -> (String, &'static str) {
+    let least = place.signal.order.byte_position(place.size(), 0);
+    if let Some(variable) = s7comm::direct(plan, place) {
+        if place.data_type() == DataType::Bool {
+            return (variable.to_string(), spelling(DataType::Bool));
+        }
+        let byte = Variable {
+            byte: variable.byte + least,
+            width: Width::Byte,
+            data_type: None,
+            ..variable
+        };
+        return (byte.to_string(), spelling(DataType::Byte));
+    }
+    match Path::of(place, plan.cpu) {
+        Path::Value(name) => (image.member(&name), spelling(place.data_type())),
+        Path::Bytes(names) => (image.member(&names[least]), spelling(DataType::Byte)),
+    }
 }
 
 /// The second source.

@@ -50,6 +50,7 @@ pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<S
         receives: inputs > 0,
         sends: outputs > 0,
         heard: "#Client.DONE".to_owned(),
+        ..Body::default()
     }
 }
 
@@ -226,6 +227,7 @@ pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<S
         receives: inputs > 0,
         sends: outputs > 0,
         heard: "#Server.NDR OR #Server.DR".to_owned(),
+        ..Body::default()
     }
 }
 

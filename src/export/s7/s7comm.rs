@@ -4,8 +4,10 @@ use std::ops::Range;
 
 use super::link::{Body, by_hand};
 use super::{Image, Plan};
+use crate::export::record::Place;
+use crate::fieldbus::Options;
 use crate::fieldbus::s7::item::Object;
-use crate::fieldbus::s7::{ClientOptions, ServerOptions, Start};
+use crate::fieldbus::s7::{ClientOptions, ServerOptions, Start, Variable};
 use crate::signal::Area;
 
 /// The simulation serves as a CPU: its I and Q are the images.
@@ -200,6 +202,17 @@ impl<'a> Jobs<'a> {
     }
 }
 
+/// The variable of the CPU that the simulation reads or writes itself for a signal: one that `[fieldbus.at]` names, or one
+/// of the process image. Copying would undo that.
+pub(super) fn direct(plan: &Plan<'_>, place: &Place<'_>) -> Option<Variable> {
+    let Options::S7Client(options) = &plan.config.bus else {
+        return None;
+    };
+    let variable = options.variable(place.signal)?;
+    let has_line = options.variables.contains_key(&place.signal.name);
+    (has_line || !matches!(variable.object, Object::Block(_))).then_some(variable)
+}
+
 /// Each image with the place where driver.cfg has it.
 fn places<'p>(
     plan: &'p Plan<'_>,
@@ -207,10 +220,10 @@ fn places<'p>(
 ) -> impl Iterator<Item = (Area, &'p Image<'p>, Start)> {
     let images = [(Area::Output, &plan.outputs), (Area::Input, &plan.inputs)];
     let places = images.map(|(area, image)| Some((area, image, options.place(0, area)?)));
-    places
-        .into_iter()
-        .flatten()
-        .filter(|(_, image, _)| image.record.bytes > 0)
+    places.into_iter().flatten().filter(|(_, image, _)| {
+        let mut signals = image.record.places.iter().map(|place| place.signal);
+        signals.any(|signal| !options.variables.contains_key(&signal.name))
+    })
 }
 
 /// The simulation dials and reads and writes the data blocks by itself.
@@ -228,6 +241,16 @@ pub(super) fn nothing(plan: &Plan<'_>, options: &ClientOptions) -> Body {
                 image.block
             ),
         });
+    }
+    for image in [&plan.outputs, &plan.inputs] {
+        for place in &image.record.places {
+            if let Some(variable) = options.variable(place.signal)
+                && options.variables.contains_key(&place.signal.name)
+            {
+                let name = &place.signal.name;
+                code.push(format!("    // \"{name}\" at {variable}, where the program has it: nothing is to be copied"));
+            }
+        }
     }
     Body {
         what: "The simulation reads and writes the data blocks by S7 communication; no call is needed here.".to_owned(),
@@ -250,7 +273,7 @@ pub(super) fn steps_for_nothing(plan: &Plan<'_>, options: &ClientOptions) -> Vec
     let mut steps = vec![
         "CPU properties > Protection & Security > Connection mechanisms: permit access with PUT/GET communication."
             .to_owned(),
-        "With local user management (TIA Portal V19 and later, S7-1500 from firmware 3.1, S7-1200 from 4.7) that is not \
+        "With local user management (TIA Portal V19 and later, S7-1500 from firmware 3.1, S7-1200 of generation 2) that is not \
          enough: Security settings > Users and roles, give the user \"Anonymous\" a role with the CPU's right to full \
          access; or choose the legacy access control by access levels, and there full access."
             .to_owned(),

@@ -122,6 +122,7 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         } else {
             String::new()
         },
+        ..Body::default()
     }
 }
 

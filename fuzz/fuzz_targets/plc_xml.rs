@@ -1,0 +1,39 @@
+//! Any text as PLCopen XML or L5X: the first byte chooses how it is read.
+//!
+//! Nothing may panic, and a project that is read becomes a driver.cfg in which nothing is wrong.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tickbus::driver::Config;
+use tickbus::import::{Reading, import};
+use tickbus::signal::Addressing;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((choice, bytes)) = data.split_first() else {
+        return;
+    };
+    // What does not begin as XML does is the business of tag_table.
+    if bytes.first() != Some(&b'<') {
+        return;
+    }
+    let reading = Reading {
+        addressing: if choice & 1 == 0 {
+            Addressing::Bytes
+        } else {
+            Addressing::Elements
+        },
+        lenient: choice & 2 != 0,
+        client: None,
+    };
+    match import("project.xml", bytes, reading) {
+        Ok(imported) => {
+            let config = Config::parse("driver.cfg", &imported.text)
+                .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", imported.text));
+            assert_eq!(config.table.signals.len(), imported.signals);
+        }
+        Err(mistakes) => {
+            assert!(mistakes.iter().all(|mistake| !mistake.what.is_empty()));
+        }
+    }
+});

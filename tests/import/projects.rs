@@ -1,0 +1,152 @@
+//! PLCopen XML and L5X.
+
+use tickbus::import::{Imported, Reading, import};
+
+use crate::signals;
+
+fn read(file: &str, text: &str) -> Imported {
+    import(file, text.as_bytes(), Reading::default())
+        .unwrap_or_else(|mistakes| panic!("{mistakes}"))
+}
+
+fn told(text: &str) -> String {
+    let wrong = import("plant.xml", text.as_bytes(), Reading::default()).expect_err("mistakes");
+    wrong.to_string()
+}
+
+const PLCOPEN: &str = r#"<?xml version="1.0" encoding="utf-8"?>
+<project xmlns="http://www.plcopen.org/xml/tc6_0200">
+  <types><pous><pou name="Main" pouType="program"><interface><localVars>
+    <variable name="Step"><type><INT/></type></variable>
+  </localVars></interface></pou></pous></types>
+  <instances><configurations><configuration name="c"><resource name="r">
+    <globalVars name="IO">
+      <variable name="Start" address="%IX0.0"><type><BOOL/></type>
+        <documentation><xhtml xmlns="http://www.w3.org/1999/xhtml">the green &amp; big
+           button</xhtml></documentation></variable>
+      <variable name="Level" address="%IW2"><type><INT/></type></variable>
+      <variable name="Speed" address="%QD4"><type><REAL/></type></variable>
+      <variable name="Flag" address="%MX0.0"><type><BOOL/></type></variable>
+      <variable name="Later" address="%I*"><type><BOOL/></type></variable>
+    </globalVars>
+  </resource></configuration></configurations></instances>
+</project>
+"#;
+
+#[test]
+fn variables_of_plcopen_xml_with_an_address_become_signals_and_the_others_are_told() {
+    let imported = read("plant.xml", PLCOPEN);
+    let names: Vec<_> = signals(&imported)
+        .into_iter()
+        .map(|(name, address, kind)| format!("{name} {address} {kind}"))
+        .collect();
+    assert_eq!(
+        names,
+        ["Start %IX0.0 BOOL", "Level %IW2 INT", "Speed %QD4 REAL"]
+    );
+    assert!(
+        imported
+            .text
+            .contains("\"%IX0.0\"   # the green & big button"),
+        "{}",
+        imported.text
+    );
+    let skipped: Vec<String> = imported
+        .skipped
+        .iter()
+        .map(|m| format!("{:?} {}", m.place.unwrap(), m.what))
+        .collect();
+    assert_eq!(
+        skipped,
+        [
+            "(4, 5) 1 variables without an address, \"Step\" the first, are no inputs or outputs: skipped",
+            "(13, 38) \"%MX0.0\" is a marker, no part of the process image: skipped",
+            "(14, 39) \"%I*\" has no place yet: skipped",
+        ]
+    );
+}
+
+#[test]
+fn addresses_that_count_elements_are_asked_for_when_they_overlap_as_bytes() {
+    let text = PLCOPEN
+        .replace("%IW2", "%IW1")
+        .replace("%IX0.0", "%IW0")
+        .replace(
+            "<BOOL/></type>\n        <doc",
+            "<INT/></type>\n        <doc",
+        );
+    let told = told(&text);
+    assert!(told.starts_with("plant.xml:11:"), "{told}");
+    assert!(told.contains("add --iec"), "{told}");
+}
+
+const L5X: &str = r#"<?xml version="1.0" encoding="UTF-8" standalone="yes"?>
+<RSLogix5000Content SchemaRevision="1.0" TargetName="Cell" TargetType="Controller">
+<Controller Use="Target" Name="Cell">
+<Modules>
+<Module Name="AI" ParentModule="Local"><Ports><Port Id="1" Address="3" Type="ICP" Upstream="true"/></Ports>
+<Communications><Connections><Connection><InputTag><Data Format="Decorated"><Structure DataType="AB:1756_IF8:I:0">
+<DataValueMember Name="Ch0Data" DataType="REAL"/></Structure></Data></InputTag></Connection></Connections></Communications>
+</Module>
+</Modules>
+<Tags>
+<Tag Name="Start_PB" TagType="Alias" Radix="Decimal" AliasFor="Local:1:I.Data.0"><Description><![CDATA[the green
+button]]></Description></Tag>
+<Tag Name="Motor" TagType="Alias" DataType="BOOL" AliasFor="Local:2:O.Data.3"/>
+<Tag Name="Level" TagType="Alias" AliasFor="Local:3:I.Ch0Data"/>
+<Tag Name="Unknown" TagType="Alias" AliasFor="Local:4:I.Ch0Data"/>
+<Tag Name="Counter" TagType="Base" DataType="DINT"/>
+</Tags>
+</Controller></RSLogix5000Content>
+"#;
+
+#[test]
+fn aliases_of_module_points_in_l5x_become_signals_laid_out_without_gaps() {
+    let imported = read("cell.L5X", L5X);
+    let names: Vec<_> = signals(&imported)
+        .into_iter()
+        .map(|(name, address, kind)| format!("{name} {address} {kind}"))
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "Start_PB %IX4.0 BOOL",
+            "Motor %QX0.0 BOOL",
+            "Level %ID0 REAL"
+        ]
+    );
+    assert!(
+        imported
+            .text
+            .contains("   # Local:1:I.Data.0 the green button"),
+        "{}",
+        imported.text
+    );
+    let skipped: Vec<&str> = imported.skipped.iter().map(|m| m.what.as_str()).collect();
+    assert_eq!(
+        skipped,
+        [
+            "the type of \"Local:4:I.Ch0Data\" stands nowhere in the file: skipped",
+            "1 tags that are no aliases of a module's inputs or outputs, \"Counter\" the first: skipped",
+        ]
+    );
+}
+
+#[test]
+fn broken_foreign_and_malicious_xml_is_refused_with_its_place() {
+    let broken = told("<project>\n  <variable name=\"a\"\n</project>");
+    assert!(
+        broken.starts_with("plant.xml:") && broken.contains("cannot be read"),
+        "{broken}"
+    );
+    assert!(told("<Document/>").contains("the root element \"Document\""));
+    let laughs = "<?xml version=\"1.0\"?><!DOCTYPE p [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><project>&b;</project>";
+    assert!(told(laughs).contains("cannot be read"), "{}", told(laughs));
+    // Deeper than any stack.
+    let deep = format!(
+        "<project>{}{}</project>",
+        "<a>".repeat(200_000),
+        "</a>".repeat(200_000)
+    );
+    assert!(!told(&deep).is_empty());
+}

@@ -86,7 +86,7 @@ fn device() -> (Driver, String) {
         }
     }
     let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     loop {
         let statistics = driver.statistics();

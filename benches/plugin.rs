@@ -78,7 +78,7 @@ mod plugin {
             library.display()
         );
         let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
         loop {
             clock.wait_until(clock.now() + Nanos::from_millis(10), &Stop::new());

@@ -1,9 +1,9 @@
 //! The reaction of a machine, per bus: from an edge at the PLC to the answer back at the PLC.
 //!
 //! The PLC is the program `reaction`. The machine ticks every millisecond and brings its %Q bit back on its %I
-//! bit: within the tick, as `tickbus mirror` does, or as a simulator that exchanges once a tick, whose answer to
-//! what one exchange brought goes out with the next. Beside them the bare TCP ping-pong of 360 and 134
-//! bytes. One `rust NAME VALUE` a line.
+//! bit: within the tick, as `tickbus mirror` does, or as a simulator that receives, answers and sends; or with the next one, as a
+//! simulator that exchanges once a tick. Beside them the bare TCP ping-pong of 360 and 134 bytes, and the limit for an
+//! answer within the tick: 1.5 times that, and half a tick for which an edge waits on average. One `rust NAME VALUE` a line.
 //!
 //! To be pinned to one core from outside.
 #![allow(missing_docs, reason = "a bench")]
@@ -46,16 +46,22 @@ fn main() {
     println!("rust reaction.bare_us {bare:.2}");
     let limit = 1.5 * bare + TICK.as_micros();
     println!("rust reaction.limit_us {limit:.1}");
+    let within = 1.5 * bare + TICK.as_micros() / 2.0;
+    println!("rust reaction.answer.limit_us {within:.1}");
 
     let loopback = config("kind = \"loopback\"\nlink = \"reaction\"");
     let simulator = reaction(&loopback, None, Machine::Simulator, edges);
     println!("rust reaction.loopback_us {simulator:.1}");
+    let answer = reaction(&loopback, None, Machine::Answers, edges);
+    println!("rust reaction.loopback.answer_us {answer:.1}");
     let device = config("kind = \"socket\"\naddress = \"127.0.0.1:0\"\nsend = \"reply\"");
     let controller = config("kind = \"socket\"");
     let mirror = reaction(&device, Some(&controller), Machine::Mirror, edges);
     println!("rust reaction.socket_us {mirror:.1}");
     let simulator = reaction(&device, Some(&controller), Machine::Simulator, edges);
     println!("rust reaction.socket.simulator_us {simulator:.1}");
+    let answer = reaction(&device, Some(&controller), Machine::Answers, edges);
+    println!("rust reaction.socket.answer_us {answer:.1}");
     for kind in ["modbus", "s7"] {
         let device = config(&format!(
             "kind = \"{kind}-server\"\naddress = \"127.0.0.1:0\""
@@ -66,6 +72,8 @@ fn main() {
         println!("rust reaction.{kind}_us {mirror:.1}");
         let simulator = reaction(&device, Some(&controller), Machine::Simulator, edges);
         println!("rust reaction.{kind}.simulator_us {simulator:.1}");
+        let answer = reaction(&device, Some(&controller), Machine::Answers, edges);
+        println!("rust reaction.{kind}.answer_us {answer:.1}");
     }
     #[cfg(feature = "opcua")]
     opcua(edges.min(500));
@@ -83,6 +91,8 @@ fn opcua(edges: usize) {
     );
     let mirror = reaction(&device, Some(&controller), Machine::Mirror, edges);
     println!("rust reaction.opcua_us {mirror:.1}");
+    let answer = reaction(&device, Some(&controller), Machine::Answers, edges);
+    println!("rust reaction.opcua.answer_us {answer:.1}");
 }
 
 /// The median of a bare exchange, in microseconds.
@@ -128,6 +138,8 @@ enum Machine {
     Mirror,
     /// With the exchange of its next tick.
     Simulator,
+    /// Between the two halves of its tick.
+    Answers,
 }
 
 /// A running machine, which ends when it is dropped.
@@ -148,9 +160,10 @@ impl Running {
 /// The median reaction in microseconds, of a machine and a PLC with these driver.cfg; without one of its own
 /// the PLC has the machine's.
 fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usize) -> f64 {
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let config = Config::parse("device.cfg", device).unwrap_or_else(|why| panic!("{why}"));
     let shared = Arc::clone(&clock) as Arc<dyn Clock>;
+    let answers = matches!(machine, Machine::Answers);
     let mut machine = match machine {
         Machine::Mirror => {
             let mirror = Box::new(Mirror);
@@ -158,7 +171,7 @@ fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usi
                 Host::open(&config, mirror, TICK, shared).expect("opens"),
             ))
         }
-        Machine::Simulator => {
+        Machine::Simulator | Machine::Answers => {
             Running::Simulator(Box::new(Driver::open(config, shared).expect("opens")))
         }
     };
@@ -178,7 +191,7 @@ fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usi
     let over = AtomicBool::new(false);
     std::thread::scope(|scope| {
         if let Running::Simulator(driver) = &mut machine {
-            scope.spawn(|| simulate(driver, &clock, &over));
+            scope.spawn(|| simulate(driver, answers, &clock, &over));
         }
         while !report.is_done() {
             let soon = clock.now() + Nanos::from_millis(5);
@@ -193,14 +206,20 @@ fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usi
     median.parse().expect("a number")
 }
 
-fn simulate(driver: &mut Driver, clock: &Monotonic, over: &AtomicBool) {
+fn simulate(driver: &mut Driver, answers: bool, clock: &Monotonic, over: &AtomicBool) {
     let mut slots = driver.initial_slots();
     let mut pace = Pace::new(clock.now(), TICK);
     let stop = Stop::new();
     while !over.load(Ordering::Relaxed) {
         if pace.take(clock.now()) {
-            driver.exchange(Nanos::ZERO, &mut slots);
-            slots[1] = slots[0];
+            if answers {
+                driver.receive(None, &mut slots);
+                slots[1] = slots[0];
+                driver.send(&mut slots);
+            } else {
+                driver.exchange(None, &mut slots);
+                slots[1] = slots[0];
+            }
         }
         clock.wait_until(pace.due(), &stop);
     }

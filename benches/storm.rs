@@ -134,7 +134,7 @@ mod storm {
                     [[signal]]\nname = \"in\"\naddress = \"%IW0\"\n\
                     [[signal]]\nname = \"out\"\naddress = \"%QW0\"\n";
         let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
         loop {
             let statistics = driver.statistics();
@@ -161,7 +161,7 @@ mod storm {
 
     /// Ticks on its beat for `span`; how long each exchange took.
     fn tick(driver: &mut Driver, span: Duration) -> Spans {
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let mut slots = driver.initial_slots();
         let (begin, stop) = (Instant::now(), Stop::new());
         let mut pace = Pace::new(clock.now(), TICK);

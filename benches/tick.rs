@@ -54,6 +54,20 @@ fn bits(latch: &str) -> String {
     text
 }
 
+/// Bits in bytes of their own, as the `Execute` of so many axes are.
+fn lone_bits(count: usize, latch: &str) -> String {
+    let mut text = String::new();
+    for area in ['Q', 'I'] {
+        for byte in 0..count {
+            let _ = write!(
+                text,
+                "[[signal]]\nname = \"{area} {byte}\"\naddress = \"%{area}X{byte}.0\"\n{latch}\n"
+            );
+        }
+    }
+    text
+}
+
 fn reals(count: usize) -> String {
     let mut text = String::new();
     for area in ['Q', 'I'] {
@@ -68,8 +82,32 @@ fn reals(count: usize) -> String {
     text
 }
 
+/// What 2,000 latched signals cost when all of them change in each tick.
+fn latches(criterion: &mut Criterion) {
+    const COUNT: usize = 2_000;
+    let mut group = criterion.benchmark_group("latches");
+    for (name, latch) in [("without", ""), ("with", "latch = \"rising\"")] {
+        for mode in ["free", "stepped"] {
+            let config = config(mode, &lone_bits(COUNT, latch));
+            let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
+            let mut slots = driver.initial_slots();
+            let mut time = Nanos::ZERO;
+            group.bench_function(BenchmarkId::new(name, mode), |bencher| {
+                bencher.iter(|| {
+                    time += Nanos::from_millis(1);
+                    for slot in &mut slots[COUNT..2 * COUNT] {
+                        *slot = Slot::from_real(1.0 - slot.real());
+                    }
+                    black_box(driver.exchange(time, &mut slots))
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
 fn exchange(criterion: &mut Criterion) {
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let mut group = criterion.benchmark_group("exchange");
     let latched = bits("latch = \"rising\"");
     // Faults that wait, and faults that are active.
@@ -137,5 +175,5 @@ fn hand_over(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, exchange, hand_over);
+criterion_group!(benches, exchange, latches, hand_over);
 criterion_main!(benches);

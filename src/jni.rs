@@ -131,8 +131,8 @@ extern "system" fn Java_tickbus_Tickbus_statisticsNative<'local>(
     handle: jlong,
 ) -> JString<'local> {
     env.with_env(|env| {
-        let text = with(handle, |device| device.statistics())?;
-        Ok(env.new_string(text)?)
+        let snapshot = with(handle, |device| device.snapshot())?;
+        Ok(env.new_string(snapshot.to_string())?)
     })
     .resolve::<ThrowFieldbusException>()
 }
@@ -184,8 +184,8 @@ extern "system" fn Java_tickbus_Tickbus_faultsNative<'local>(
     handle: jlong,
 ) -> JString<'local> {
     env.with_env(|env| {
-        let text = with(handle, |device| device.faults())?;
-        Ok(env.new_string(text)?)
+        let board = with(handle, |device| device.board())?;
+        Ok(env.new_string(device::faults(&board))?)
     })
     .resolve::<ThrowFieldbusException>()
 }
@@ -245,12 +245,18 @@ fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jin
 
 fn inject(env: &mut Env<'_>, handle: jlong, fault: &JString<'_>) -> Result<jint, Failure> {
     let text = fault.try_to_string(env)?;
-    let id = with(handle, |device| device.inject(&text))?.map_err(|mistakes| {
-        Failure::coded(
-            Code::BadArgument,
-            format!("the fault cannot be injected:\n{mistakes}"),
-        )
-    })?;
+    let config = with(handle, |device| device.config())?;
+    let id = crate::faults::read_one(&text, &config.table)
+        .and_then(|fault| match with(handle, |device| device.inject(&fault)) {
+            Ok(injected) => injected.map(Ok),
+            Err(failure) => Ok(Err(failure)),
+        })
+        .map_err(|mistakes| {
+            Failure::coded(
+                Code::BadArgument,
+                format!("the fault cannot be injected:\n{mistakes}"),
+            )
+        })??;
     Ok(jint::try_from(id).unwrap_or(jint::MAX))
 }
 

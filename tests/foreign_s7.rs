@@ -100,7 +100,7 @@ impl End {
             "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\n{fieldbus}\n{SIGNALS}{further}"
         );
         let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
         let slots = driver.initial_slots();
         Self { driver, slots }

@@ -9,11 +9,11 @@
 mod conformance;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use conformance::rig::{Bus, End, Liar, Rig, await_that, config};
 use tickbus::driver::Code;
-use tickbus::time::{Manual, Nanos};
+use tickbus::time::{Clock as _, Manual, Monotonic, Nanos};
 
 /// A link name of its own for every test.
 struct Link(String);
@@ -335,4 +335,39 @@ fn a_tick_is_a_receive_and_the_first_send_after_it() {
     end.tick();
     assert_eq!(end.statistic("ticks"), "4");
     assert_eq!(end.statistic("fresh"), "4");
+}
+
+/// The clock is read on the tick itself. A time that a thread keeps in memory falls behind by as much as that thread
+/// is kept waiting.
+#[test]
+fn age_is_never_understated_however_busy_the_machine_is() {
+    let (link, clock) = (Link::new(), Monotonic::shared());
+    let mut device = End::open(&config(&link, "device", ""), &clock);
+    let mut controller = End::open(&config(&link, "controller", ""), &clock);
+    await_that("the peer was there", || {
+        controller.tick();
+        device.tick().code == Code::Fresh
+    });
+    controller.driver.close();
+    let link_is_lost = || device.statistic("cause") == "left";
+    await_that("it is gone", link_is_lost);
+    // When it was heard of last, at the latest.
+    let first = device.tick();
+    let heard = clock.now() - first.age;
+    let over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                while !over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
+        }
+        for _ in 0..2_000 {
+            let before = clock.now();
+            let age = device.tick().age;
+            assert!(before - heard <= age, "{before} {heard} {age}");
+        }
+        over.store(true, Ordering::Relaxed);
+    });
 }

@@ -123,7 +123,7 @@ fn await_that(what: &str, mut done: impl FnMut() -> bool) {
 fn device() -> (Driver, Vec<Slot>, String) {
     let text = config("address = \"127.0.0.1:0\"\nmax_age = \"100ms\"");
     let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut address = None;
     await_that("the device listens", || {
@@ -364,7 +364,7 @@ fn a_mirror_serves_several_stations() {
     let address = address.expect("an address").trim_end_matches([';', ',']);
     let plc = format!("role = \"controller\"\naddress = \"{address}\"");
     let config = Config::parse("driver.cfg", &text(&plc)).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let mut driver = Driver::open(config, clock).expect("opens");
     let mut slots = driver.initial_slots();
     (slots[0], slots[2]) = (Slot::from_real(5.0), Slot::from_real(7.0));

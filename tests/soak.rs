@@ -142,7 +142,7 @@ fn a_device_outlives_all_peers() {
         text.parse().expect("TICKBUS_SOAK_SECONDS is a number")
     });
     let end = Instant::now() + Duration::from_secs(seconds);
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let config = Config::parse("soak.cfg", CONFIG).unwrap_or_else(|why| panic!("{why}"));
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut slots = driver.initial_slots();

@@ -117,13 +117,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         return Outcome::BusFailed;
     }
     let report = job.program.report();
-    let clock = match Monotonic::shared() {
-        Ok(clock) => clock,
-        Err(error) => {
-            eprintln!("{title}: the system refused a thread for the clock: {error}");
-            return Outcome::BusFailed;
-        }
-    };
+    let clock = Monotonic::shared();
     let host = match Host::open(&config, job.program, job.interval, Arc::clone(&clock) as _) {
         Ok(host) => host,
         Err(error) => {

@@ -13,7 +13,7 @@ use crate::signal::Area;
 use crate::time::Clock;
 
 use super::frames::area_bytes;
-use super::host::{HostThread, Hosted, SteppedHost, Tally};
+use super::host::{HostTally, HostThread, Hosted, SteppedHost, Tally};
 use super::replay::{Replay, ReplayTally};
 use super::{Config, DriverError};
 
@@ -25,7 +25,25 @@ pub(super) enum Program {
     Replay(Arc<ReplayTally>),
 }
 
+/// What it has counted, to be read by any thread.
+#[derive(Clone, Debug)]
+pub(super) enum ProgramTally {
+    Thread(HostTally),
+    Stepped(Arc<Tally>),
+    Replay(Arc<ReplayTally>),
+}
+
 impl Program {
+    pub(super) fn tally(&self) -> ProgramTally {
+        match self {
+            Self::Thread(host) => ProgramTally::Thread(host.told.clone()),
+            Self::Stepped(tally) => ProgramTally::Stepped(Arc::clone(tally)),
+            Self::Replay(tally) => ProgramTally::Replay(Arc::clone(tally)),
+        }
+    }
+}
+
+impl ProgramTally {
     /// Appends what the program has counted, one `key=value` a line.
     pub(super) fn write(&self, text: &mut String) {
         match self {

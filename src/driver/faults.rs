@@ -40,7 +40,16 @@ impl Driver {
     /// With every mistake in the text; or too many faults wait or are active.
     pub fn inject_text(&mut self, text: &str) -> Result<u32, Mistakes> {
         let fault = faults::read_one(text, &self.config.table)?;
-        self.inject(&fault).map_err(|error| {
+        self.inject_read(&fault)
+    }
+
+    /// The same for a fault that was read already.
+    ///
+    /// # Errors
+    ///
+    /// Too many faults wait or are active.
+    pub fn inject_read(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
+        self.inject(fault).map_err(|error| {
             let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
             Mistakes::of_file("fault", what, right)
         })
@@ -49,6 +58,11 @@ impl Driver {
     /// Ends a fault at the next exchange; false if there is none with this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
         self.faults.as_mut().is_some_and(|faults| faults.end(id))
+    }
+
+    /// Where the faults are told of, to be read by any thread.
+    pub fn board(&self) -> &Arc<Board> {
+        &self.board
     }
 
     /// The injected faults, in the order of injection; those that are long over may be missing.

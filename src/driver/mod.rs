@@ -24,7 +24,7 @@ pub use exchange::Exchange;
 pub use host::Host;
 pub use open::{Driver, DriverError};
 pub use slots::SlotMap;
-pub use statistics::Counters;
+pub use statistics::{Counters, Snapshot};
 pub use status::Code;
 pub(crate) use supervise::panic_text;
 pub use timing::Timing;

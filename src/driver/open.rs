@@ -6,7 +6,6 @@ use crate::axis::Reflexes;
 use crate::faults::{Board, Faults};
 use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
-use crate::os::dropped_log_lines;
 use crate::plc;
 use crate::record::{Columns, Recorder, RecorderError, When};
 use crate::signal::Slot;
@@ -17,14 +16,14 @@ use super::exchange::{Exchange, Tick};
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::station::Station;
-use super::statistics::Samples;
+use super::statistics::{Samples, Snapshot};
 use super::supervise::BusThread;
 use super::{Code, Config, Counters, SlotMap};
 
 /// An open driver: one device, or one controller, on its bus.
 #[derive(Debug)]
 pub struct Driver {
-    pub(super) config: Config,
+    pub(super) config: Arc<Config>,
     pub(super) slots: SlotMap,
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
@@ -211,7 +210,7 @@ impl Driver {
             beats: Beat::all(&config, config.role),
             events: tick.events,
             program,
-            config,
+            config: Arc::new(config),
         };
         for fault in &list {
             driver.inject(fault).map_err(DriverError::Config)?;
@@ -220,7 +219,7 @@ impl Driver {
     }
 
     /// What the driver was opened with.
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &Arc<Config> {
         &self.config
     }
 
@@ -246,32 +245,30 @@ impl Driver {
 
     /// What was counted, and how the line is doing, as one `key=value` per line.
     pub fn statistics(&self) -> String {
-        use std::fmt::Write as _;
+        self.snapshot().to_string()
+    }
 
-        let cycles: u64 = self.stations.iter().map(Station::cycles).sum();
-        let mut text = self.counters.to_string();
-        let lost = self.events.lost();
-        // Writing to a string cannot fail.
-        let _ = write!(text, "bus_cycles={cycles}\nevents_lost={lost}\n");
-        self.observe();
+    /// What the statistics are made of, copied: to be made text of when nothing waits for the driver.
+    pub fn snapshot(&self) -> Snapshot {
         let now = self.clock.now();
-        self.status.write(now, &mut text);
-        if self.stations.len() > 1 {
-            for (station, section) in self.stations.iter().zip(&self.config.table.stations) {
-                station.write(&section.name, now, self.max_age, &mut text);
-            }
+        let stations = self.stations.iter();
+        Snapshot {
+            config: Arc::clone(&self.config),
+            counters: self.counters,
+            stations: stations
+                .map(|station| (station.peer_age(now), station.is_valid(), station.cycles()))
+                .collect(),
+            events_lost: self.events.lost(),
+            now,
+            samples: self.samples.clone(),
+            status: self.status.clone(),
+            board: Arc::clone(&self.board),
+            program: self.program.as_ref().map(Program::tally),
+            record: self
+                .recorder
+                .as_ref()
+                .map(|recorder| Arc::clone(recorder.tally())),
         }
-        self.samples.write(&mut text);
-        self.board.tell(self.status.driver());
-        self.board.write(&mut text);
-        if let Some(program) = &self.program {
-            program.write(&mut text);
-        }
-        if let Some(recorder) = &self.recorder {
-            recorder.tally().write(&mut text);
-        }
-        let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
-        text
     }
 
     /// Looks at the line from outside, where the bus may be unable to.

@@ -1,7 +1,5 @@
 //! One station of an open driver, as the tick sees it.
 
-use std::fmt::Write as _;
-
 use super::{Code, Counters, SlotMap};
 use crate::image::{Arrival, TickStation};
 use crate::signal::{Area, Conversions, Plan, SignalTable, Slot};
@@ -44,16 +42,9 @@ impl Station {
         self.tick.peer_age(now)
     }
 
-    /// Appends how old its data are and how many bus cycles it has sent, one `key=value` a line.
-    pub(super) fn write(&self, name: &str, now: Nanos, max_age: Nanos, text: &mut String) {
-        let age = self.peer_age(now);
-        let stale = age > max_age || !self.tick.is_valid();
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "station.{name}.stale={stale}");
-        if age != Nanos::MAX {
-            let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
-        }
-        let _ = writeln!(text, "station.{name}.bus_cycles={}", self.cycles());
+    /// Whether the data count: the PLC runs, and what has to change does.
+    pub(super) fn is_valid(&self) -> bool {
+        self.tick.is_valid()
     }
 
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {

@@ -1,8 +1,14 @@
 //! What a driver counts.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
 
-use super::Code;
+use super::bus::ProgramTally;
+use super::{Code, Config};
+use crate::faults::Board;
+use crate::fieldbus::LinkStatus;
+use crate::os::dropped_log_lines;
+use crate::record::Tally;
 use crate::time::{Nanos, Spans};
 
 /// Counters of the tick.
@@ -91,5 +97,76 @@ impl Samples {
     pub(super) fn write(&self, text: &mut String) {
         self.exchange.write("exchange", text);
         self.age.write("age", text);
+    }
+}
+
+/// What the statistics of a driver are made of, at one moment.
+///
+/// To copy it takes a microsecond or two, to write it as text may take a hundred times as long: whoever has the driver to
+/// himself for the one gives it back before the other.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    pub(super) config: Arc<Config>,
+    pub(super) counters: Counters,
+    /// Per station, how long ago its peer was heard of, whether its data count, and its bus cycles.
+    pub(super) stations: Vec<(Nanos, bool, u64)>,
+    pub(super) events_lost: u64,
+    pub(super) now: Nanos,
+    pub(super) samples: Samples,
+    pub(super) status: LinkStatus,
+    pub(super) board: Arc<Board>,
+    pub(super) program: Option<ProgramTally>,
+    pub(super) record: Option<Arc<Tally>>,
+}
+
+impl Snapshot {
+    /// Appends how old each station's data are and how many bus cycles it has sent; nothing where there is one.
+    fn write_stations(&self, text: &mut String) {
+        if self.stations.len() < 2 {
+            return;
+        }
+        let sections = &self.config.table.stations;
+        for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
+            let name = &section.name;
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "station.{name}.stale={}",
+                *age > self.config.timing.max_age || !is_valid
+            );
+            if *age != Nanos::MAX {
+                let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
+            }
+            let _ = writeln!(text, "station.{name}.bus_cycles={cycles}");
+        }
+    }
+}
+
+/// One `key=value` per line.
+impl fmt::Display for Snapshot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ages = self.stations.iter().map(|(age, _, _)| *age);
+        self.status.observe(self.now, ages);
+        self.status.observe_call(self.now);
+        let mut text = self.counters.to_string();
+        let cycles: u64 = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
+        writeln!(
+            text,
+            "bus_cycles={cycles}\nevents_lost={}",
+            self.events_lost
+        )?;
+        self.status.write(self.now, &mut text);
+        self.write_stations(&mut text);
+        self.samples.write(&mut text);
+        self.board.tell(self.status.driver());
+        self.board.write(&mut text);
+        if let Some(program) = &self.program {
+            program.write(&mut text);
+        }
+        if let Some(record) = &self.record {
+            record.write(&mut text);
+        }
+        writeln!(text, "log.dropped={}", dropped_log_lines())?;
+        f.write_str(&text)
     }
 }

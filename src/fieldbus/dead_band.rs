@@ -190,6 +190,21 @@ mod tests {
     }
 
     #[test]
+    fn at_the_edge_of_its_dead_band_a_value_has_not_changed() {
+        let mut bands = dead_bands(vec![
+            signal(0, DataType::Real, 0.5),
+            signal(4, DataType::Real, 0.0),
+        ]);
+        let at = |value: f32| frame(0, &value.to_be_bytes());
+        assert!(!bands.differ(&at(1.0), &at(1.5)));
+        assert!(!bands.differ(&at(1.0), &at(0.5)));
+        assert!(bands.differ(&at(1.0), &at(1.5 + f32::EPSILON)));
+        // A dead band of nothing is none: the bits count, and minus zero has others.
+        let bare = |value: f32| frame(4, &value.to_be_bytes());
+        assert!(bands.differ(&bare(0.0), &bare(-0.0)));
+    }
+
+    #[test]
     fn what_is_no_number_differs_from_every_number_and_not_from_itself() {
         let mut bands = dead_bands(vec![signal(4, DataType::Real, 1e9)]);
         let at = |value: f32| frame(4, &value.to_be_bytes());

@@ -24,10 +24,10 @@ pub struct LatchedBit {
     pub hold: Nanos,
 }
 
-/// The latched bits of one frame, in the order of the signal table.
+/// The latched bits of one frame, byte by byte.
 pub fn latched_bits(table: &SignalTable, station: usize, area: Area) -> Box<[LatchedBit]> {
     let signals = table.signals.iter().enumerate();
-    signals
+    let mut bits: Box<[LatchedBit]> = signals
         .filter(|(_, signal)| signal.station == station && signal.area == area)
         .filter_map(|(index, signal)| {
             signal.latch.map(|latch| LatchedBit {
@@ -38,27 +38,43 @@ pub fn latched_bits(table: &SignalTable, station: usize, area: Area) -> Box<[Lat
                 hold: signal.hold,
             })
         })
-        .collect()
+        .collect();
+    bits.sort_by_key(|bit| bit.byte);
+    bits
 }
 
-/// Which bytes of a frame hold latched bits, and which bits of them.
-fn latched_masks(bits: &[LatchedBit]) -> Box<[(usize, u8)]> {
-    let mut masks: Vec<(usize, u8)> = Vec::new();
-    for bit in bits {
-        match masks.iter_mut().find(|(byte, _)| *byte == bit.byte) {
-            Some((_, mask)) => *mask |= bit.mask,
-            None => masks.push((bit.byte, bit.mask)),
-        }
-    }
-    masks.into()
+/// The latched bits that lie side by side in one byte.
+#[derive(Debug)]
+struct Group {
+    byte: usize,
+    mask: u8,
+    /// Which of the latched bits they are.
+    bits: Range<usize>,
+}
+
+/// Groups bits, which stand byte by byte: so that what a byte costs does not depend on how many others there are.
+fn groups(bits: &[LatchedBit]) -> Box<[Group]> {
+    let mut begin = 0;
+    let of_a_byte = bits.chunk_by(|one, next| one.byte == next.byte);
+    of_a_byte
+        .map(|side_by_side| {
+            let bits = begin..begin + side_by_side.len();
+            begin = bits.end;
+            Group {
+                byte: side_by_side[0].byte,
+                mask: side_by_side.iter().fold(0, |mask, bit| mask | bit.mask),
+                bits,
+            }
+        })
+        .collect()
 }
 
 /// Counts edges on the writing side of a hand-over.
 #[derive(Debug)]
 pub struct EdgeCounter {
     bits: Box<[LatchedBit]>,
-    masks: Box<[(usize, u8)]>,
-    /// The bytes of `masks` as they were last.
+    groups: Box<[Group]>,
+    /// The bytes of the groups as they were last.
     last: Box<[u8]>,
     counts: Box<[u32]>,
 }
@@ -66,11 +82,11 @@ pub struct EdgeCounter {
 impl EdgeCounter {
     /// A counter that takes `initial` for the levels before the first frame.
     pub fn new(bits: Box<[LatchedBit]>, initial: &[u8]) -> Self {
-        let masks = latched_masks(&bits);
+        let groups = groups(&bits);
         Self {
-            last: masks.iter().map(|(byte, _)| initial[*byte]).collect(),
+            last: groups.iter().map(|group| initial[group.byte]).collect(),
             counts: vec![0; bits.len()].into(),
-            masks,
+            groups,
             bits,
         }
     }
@@ -88,11 +104,18 @@ impl EdgeCounter {
 
     /// Counts the edges from the levels seen last to those in `bytes`.
     fn observe(&mut self, bytes: &[u8]) {
-        for (&(byte, mask), last) in self.masks.iter().zip(&mut self.last) {
-            let changed = (bytes[byte] ^ *last) & mask;
+        for (group, last) in self.groups.iter().zip(&mut self.last) {
+            let now = bytes[group.byte];
+            let changed = (now ^ *last) & group.mask;
             if changed != 0 {
-                count_byte(&self.bits, &mut self.counts, byte, changed, bytes[byte]);
-                *last = bytes[byte];
+                let (bits, counts) = (&self.bits, &mut self.counts);
+                count_byte(
+                    &bits[group.bits.clone()],
+                    &mut counts[group.bits.clone()],
+                    changed,
+                    now,
+                );
+                *last = now;
             }
         }
     }
@@ -104,10 +127,10 @@ impl EdgeCounter {
     }
 }
 
-/// Counts the edges of one byte.
-fn count_byte(bits: &[LatchedBit], counts: &mut [u32], byte: usize, changed: u8, now: u8) {
+/// Counts the edges of one byte, whose latched bits are `bits`.
+fn count_byte(bits: &[LatchedBit], counts: &mut [u32], changed: u8, now: u8) {
     for (bit, count) in bits.iter().zip(counts) {
-        if bit.byte == byte && bit.mask & changed != 0 {
+        if bit.mask & changed != 0 {
             let counts_here = match bit.latch {
                 Latch::Rising => now & bit.mask != 0,
                 Latch::Falling => now & bit.mask == 0,
@@ -141,8 +164,8 @@ const NOTHING_SHOWN: Shown = Shown {
 #[derive(Debug)]
 pub struct PulseShaper {
     bits: Box<[LatchedBit]>,
-    masks: Box<[(usize, u8)]>,
-    /// The bytes of `masks` as the receiver has seen them last, and as it is about to see them.
+    groups: Box<[Group]>,
+    /// The bytes of the groups as the receiver has seen them last, and as it is about to see them.
     levels: Box<[u8]>,
     next_levels: Box<[u8]>,
     shown: Box<[Shown]>,
@@ -156,8 +179,8 @@ pub struct PulseShaper {
 impl PulseShaper {
     /// A shaper whose receiver is taken to have seen `initial`.
     pub fn new(bits: Box<[LatchedBit]>, initial: &[u8]) -> Self {
-        let masks = latched_masks(&bits);
-        let levels: Box<[u8]> = masks.iter().map(|(byte, _)| initial[*byte]).collect();
+        let groups = groups(&bits);
+        let levels: Box<[u8]> = groups.iter().map(|group| initial[group.byte]).collect();
         Self {
             next_levels: levels.clone(),
             levels,
@@ -165,7 +188,7 @@ impl PulseShaper {
             next_shown: vec![NOTHING_SHOWN; bits.len()].into(),
             counts: vec![0; bits.len()].into(),
             busy: false,
-            masks,
+            groups,
             bits,
         }
     }
@@ -200,8 +223,8 @@ impl PulseShaper {
     /// Takes note that the receiver is about to see `bytes` unshaped.
     #[inline]
     pub fn pass(&mut self, bytes: &[u8]) {
-        for (&(byte, _), level) in self.masks.iter().zip(&mut self.next_levels) {
-            *level = bytes[byte];
+        for (group, level) in self.groups.iter().zip(&mut self.next_levels) {
+            *level = bytes[group.byte];
         }
     }
 
@@ -216,21 +239,23 @@ impl PulseShaper {
     pub fn shape(&mut self, edges: &[u32], now: Nanos, bytes: &mut [u8]) {
         self.counts.copy_from_slice(edges);
         self.busy = false;
-        for (index, bit) in self.bits.iter().enumerate() {
-            let group = self.masks.iter().position(|(byte, _)| *byte == bit.byte);
-            let seen = self.levels[group.expect("masks cover all bits")] & bit.mask != 0;
-            let level = bytes[bit.byte] & bit.mask != 0;
-            let shown = self.shown[index];
-            let (next_level, next) = shape_bit(bit, shown, seen, level, edges[index], now);
-            self.next_shown[index] = next;
-            self.busy |= next_level != level
-                || next.count != edges[index]
-                || next.count != shown.count
-                || now < next.hold_until;
-            if next_level {
-                bytes[bit.byte] |= bit.mask;
-            } else {
-                bytes[bit.byte] &= !bit.mask;
+        for (group, levels) in self.groups.iter().zip(&self.levels) {
+            let byte = &mut bytes[group.byte];
+            for index in group.bits.clone() {
+                let bit = &self.bits[index];
+                let (seen, level) = (levels & bit.mask != 0, *byte & bit.mask != 0);
+                let shown = self.shown[index];
+                let (next_level, next) = shape_bit(bit, shown, seen, level, edges[index], now);
+                self.next_shown[index] = next;
+                self.busy |= next_level != level
+                    || next.count != edges[index]
+                    || next.count != shown.count
+                    || now < next.hold_until;
+                if next_level {
+                    *byte |= bit.mask;
+                } else {
+                    *byte &= !bit.mask;
+                }
             }
         }
         self.pass(bytes);
@@ -248,10 +273,10 @@ impl PulseShaper {
     /// As [`confirm`](Self::confirm), for a receiver that has seen these bits of the frame alone (bit n of byte k is
     /// 8k + n).
     pub fn confirm_bits(&mut self, bits: &Range<usize>) {
-        for (group, &(byte, _)) in self.masks.iter().enumerate() {
-            let seen = mask_of(bits, byte);
-            let level = &mut self.levels[group];
-            *level = *level & !seen | self.next_levels[group] & seen;
+        let levels = self.levels.iter_mut().zip(&self.next_levels);
+        for (group, (level, next)) in self.groups.iter().zip(levels) {
+            let seen = mask_of(bits, group.byte);
+            *level = *level & !seen | next & seen;
         }
         if self.busy {
             for (index, bit) in self.bits.iter().enumerate() {
@@ -412,6 +437,89 @@ mod tests {
         shaper.counts[0] = u32::MAX;
         counter.observe(&[1]);
         assert_eq!(shaper.new_edges(counter.counts()).collect::<Vec<_>>(), [1]);
+    }
+
+    /// Signals of a table: station, area, byte, bit, and whether it is latched.
+    fn table(signals: &[(usize, Area, usize, u8, bool)]) -> SignalTable {
+        use crate::signal::{ByteOrder, DataType, Signal, Slot, Station};
+
+        let station = || Station {
+            name: String::new(),
+            input_bytes: 8,
+            output_bytes: 8,
+        };
+        let signals = signals
+            .iter()
+            .map(|&(station, area, byte, bit, latched)| Signal {
+                name: String::new(),
+                station,
+                area,
+                byte,
+                bit,
+                data_type: DataType::Bool,
+                order: ByteOrder::Abcd,
+                scale: None,
+                range: None,
+                unit: None,
+                latch: latched.then_some(Latch::Rising),
+                hold: Nanos::ZERO,
+                fail_safe: Slot::default(),
+                dead_band: 0.0,
+            });
+        SignalTable {
+            stations: vec![station(), station()],
+            signals: signals.collect(),
+        }
+    }
+
+    #[test]
+    fn latched_are_the_bits_of_this_station_and_area_that_say_so() {
+        let (this, other) = (Area::Output, Area::Input);
+        let table = table(&[
+            (0, this, 5, 7, true),
+            (0, this, 2, 0, true),
+            (0, this, 5, 1, false),
+            (0, other, 5, 2, true),
+            (1, this, 5, 3, true),
+            (0, this, 5, 4, true),
+            (0, this, 2, 6, true),
+        ]);
+        let bits = latched_bits(&table, 0, this);
+        let found: Vec<_> = bits
+            .iter()
+            .map(|bit| (bit.signal, bit.byte, bit.mask))
+            .collect();
+        assert_eq!(found, [(1, 2, 1), (6, 2, 64), (0, 5, 128), (5, 5, 16)]);
+        let groups = groups(&bits);
+        let groups: Vec<_> = groups
+            .iter()
+            .map(|group| (group.byte, group.mask, group.bits.clone()))
+            .collect();
+        assert_eq!(groups, [(2, 65, 0..2), (5, 144, 2..4)]);
+    }
+
+    #[test]
+    fn several_bits_of_one_byte_are_counted_and_shown_each_by_itself() {
+        let signals: Vec<_> = [(3, 0), (1, 7), (3, 5), (1, 2)]
+            .map(|(byte, bit)| (0, Area::Output, byte, bit, true))
+            .into();
+        let bits = latched_bits(&table(&signals), 0, Area::Output);
+        let mut counter = EdgeCounter::new(bits.clone(), &[0; 8]);
+        let mut shaper = PulseShaper::new(bits, &[0; 8]);
+        // A pulse of %QX3.5, and two of %QX1.2.
+        for (byte, level) in [(3, 0x20), (3, 0), (1, 4), (1, 0), (1, 4), (1, 0)] {
+            let mut bytes = [0; 8];
+            bytes[byte] = level;
+            counter.observe(&bytes);
+        }
+        assert_eq!(counter.counts(), [0, 2, 0, 1]);
+        let mut bytes = [0; 8];
+        shaper.shape(counter.counts(), Nanos::ZERO, &mut bytes);
+        assert_eq!(bytes, [0, 4, 0, 0x20, 0, 0, 0, 0]);
+        shaper.confirm_bits(&(24..32));
+        let mut bytes = [0; 8];
+        shaper.shape(counter.counts(), Nanos::ZERO, &mut bytes);
+        assert_eq!(bytes, [0, 4, 0, 0, 0, 0, 0, 0], "only byte 3 was seen");
     }
 
     #[test]

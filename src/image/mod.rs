@@ -30,7 +30,7 @@ pub use triple::{Reader, Writer, triple_buffer};
 pub struct Frame {
     /// The station's `%I` or `%Q`.
     pub bytes: Box<[u8]>,
-    /// Cumulative, wrapping edge counters of the latched signals, in signal order.
+    /// Cumulative, wrapping edge counters of the latched signals, in the order of [`latched_bits`].
     pub edges: Box<[u32]>,
     /// Counts the frames of this stream, from 1; 0 is the frame before the first.
     pub sequence: u64,

@@ -2,10 +2,11 @@
 //! JVM in sight.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
 use crate::config::Mistakes;
-use crate::driver::{Driver, Exchange};
-use crate::faults::Injected;
+use crate::driver::{Config, Driver, Exchange, Snapshot};
+use crate::faults::{Board, Fault, Injected};
 use crate::image::Event;
 use crate::time::Nanos;
 
@@ -16,6 +17,30 @@ pub(super) const EVENTS: usize = 64;
 
 /// Words per event: signal, value, time.
 pub(super) const EVENT_WORDS: usize = 3;
+
+/// The injected faults, a line each: number, state, how often begun, kind, name, what it does; with tabs
+/// between them.
+pub(super) fn faults(board: &Board) -> String {
+    let mut text = String::new();
+    for fault in board.list() {
+        let Injected {
+            id,
+            phase,
+            begun,
+            kind,
+            name,
+            what,
+            ..
+        } = fault;
+        // Writing to a string cannot fail; names have no control characters.
+        let _ = writeln!(
+            text,
+            "{id}\t{}\t{begun}\t{kind}\t{name}\t{what}",
+            phase.name()
+        );
+    }
+    text
+}
 
 /// An open driver and its shared buffer; `K` keeps the buffer's memory alive.
 pub(super) struct Device<K> {
@@ -78,13 +103,19 @@ impl<K> Device<K> {
         done.code.code()
     }
 
-    pub(super) fn statistics(&self) -> String {
-        self.driver.statistics()
+    /// What the statistics are made of; the text is made when the driver is given back.
+    pub(super) fn snapshot(&self) -> Snapshot {
+        self.driver.snapshot()
     }
 
-    /// Injects a fault and gives its number, or every mistake in its text.
-    pub(super) fn inject(&mut self, text: &str) -> Result<u32, Mistakes> {
-        self.driver.inject_text(text)
+    /// What the driver was opened with.
+    pub(super) fn config(&self) -> Arc<Config> {
+        Arc::clone(self.driver.config())
+    }
+
+    /// Injects a fault and gives its number; or says that there are too many.
+    pub(super) fn inject(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
+        self.driver.inject_read(fault)
     }
 
     /// Ends a fault; false if there is none with this number.
@@ -92,28 +123,9 @@ impl<K> Device<K> {
         self.driver.end_fault(id)
     }
 
-    /// The injected faults, a line each: number, state, how often begun, kind, name, what it does; with tabs
-    /// between them.
-    pub(super) fn faults(&self) -> String {
-        let mut text = String::new();
-        for fault in self.driver.injected_faults() {
-            let Injected {
-                id,
-                phase,
-                begun,
-                kind,
-                name,
-                what,
-                ..
-            } = fault;
-            // Writing to a string cannot fail; names have no control characters.
-            let _ = writeln!(
-                text,
-                "{id}\t{}\t{begun}\t{kind}\t{name}\t{what}",
-                phase.name()
-            );
-        }
-        text
+    /// Where the injected faults are told of.
+    pub(super) fn board(&self) -> Arc<Board> {
+        Arc::clone(self.driver.board())
     }
 
     /// Moves waiting events into `into`, three words each, and says how many.

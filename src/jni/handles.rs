@@ -111,8 +111,8 @@ impl<T, const N: usize> Handles<T, N> {
         }
     }
 
-    /// Ends a tenancy: `close` gets the tenant, failed or not, and the place is free when it returns
-    /// or panics.
+    /// Ends a tenancy: `close` gets the tenant, failed or not. The place is free from then on, and the handle
+    /// closed, however long `close` takes.
     pub(super) fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
         let mut claim = match self.claim(handle, OPEN) {
             Err(Code::Internal) => self.claim(handle, FAILED)?,
@@ -120,12 +120,9 @@ impl<T, const N: usize> Handles<T, N> {
         };
         claim.end = FREE;
         claim.content().panic = String::new();
-        claim
-            .content()
-            .tenant
-            .take()
-            .map(close)
-            .ok_or(Code::Internal)
+        let tenant = claim.content().tenant.take();
+        drop(claim);
+        tenant.map(close).ok_or(Code::Internal)
     }
 
     /// The text of the panic that this handle's tenant failed with.
@@ -318,6 +315,20 @@ mod tests {
         assert_eq!(handles.close(handle, |tenant| tenant), Ok(1));
         assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
         assert_eq!(handles.panic_of(handle), None);
+    }
+
+    #[test]
+    fn a_tenant_that_takes_its_time_to_close_keeps_nobody_waiting() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let met = handles.close(handle, |_| {
+            let next = open(&handles, 2);
+            (
+                handles.with(handle, |_| ()),
+                handles.with(next, |tenant| *tenant),
+            )
+        });
+        assert_eq!(met, Ok((Err(Code::Closed), Ok(2))));
     }
 
     #[test]

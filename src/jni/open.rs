@@ -72,10 +72,7 @@ pub(super) fn open(
             format!("driver.cfg cannot be used:\n{mistakes}"),
         )
     })?;
-    let clock = Monotonic::shared().map_err(|error| {
-        Failure::coded(Code::Internal, format!("no thread for the clock: {error}"))
-    })?;
-    let driver = Driver::open(config, clock)?;
+    let driver = Driver::open(config, Monotonic::shared())?;
     let shared = describe(env, &driver, layout)?;
     Ok(Device::new(driver, shared))
 }

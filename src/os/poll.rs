@@ -282,7 +282,7 @@ mod tests {
 
     #[test]
     fn stop_and_wake_end_a_wait_even_when_they_come_first() {
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let stop = Stop::new();
         stop.wake();
         let mut poller = Poller::new(&stop).expect("a pair of sockets");
@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn a_deadline_ends_a_wait() {
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let mut poller = Poller::new(&Stop::new()).expect("a pair of sockets");
         let deadline = clock.now() + Nanos::from_millis(2);
         while clock.now() < deadline {

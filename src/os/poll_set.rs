@@ -375,7 +375,7 @@ mod tests {
 
     #[test]
     fn a_stop_and_a_deadline_end_a_wait() {
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let stop = Stop::new();
         let mut set = PollSet::new(&stop).expect("sockets");
         let deadline = clock.now() + Nanos::from_millis(2);

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::stop::Shared;
@@ -13,11 +12,6 @@ use super::{Nanos, Stop};
 pub trait Clock: Send + Sync + fmt::Debug {
     /// The time now.
     fn now(&self) -> Nanos;
-
-    /// The time as it was a few milliseconds ago at most, to be read without a call into the system.
-    ///
-    /// This is what the tick path reads.
-    fn coarse(&self) -> CoarseTime;
 
     /// Waits until `deadline`, or until `stop` is stopped or woken, whichever is first.
     fn wait_until(&self, deadline: Nanos, stop: &Stop);
@@ -35,30 +29,15 @@ pub trait Clock: Send + Sync + fmt::Debug {
     }
 }
 
-/// The time of a clock, kept in memory by the clock.
-#[derive(Clone, Debug)]
-pub struct CoarseTime(Arc<AtomicI64>);
-
-impl CoarseTime {
-    /// The time now, or a few milliseconds ago.
-    #[inline]
-    pub fn now(&self) -> Nanos {
-        Nanos(self.0.load(Ordering::Relaxed))
-    }
-}
-
-/// How far [`Monotonic::coarse`] may lag.
-const COARSE_STEP: Nanos = Nanos::from_millis(2);
-
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// One thread per process keeps the coarse time, for as long as any clone lives.
+/// The tick reads it, too: on the systems that tickbus runs on that is no system call (on Linux some 25 ns in the
+/// vDSO). A time that a thread keeps in memory would cost less and lag by as much as that thread is kept waiting, tens
+/// of milliseconds on a busy machine.
+///
+/// It stands still while the computer sleeps.
 #[derive(Debug)]
-pub struct Monotonic {
-    coarse: Arc<AtomicI64>,
-    stop: Stop,
-    keeper: Option<JoinHandle<()>>,
-}
+pub struct Monotonic(());
 
 static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
 
@@ -67,47 +46,10 @@ fn monotonic_now() -> Nanos {
 }
 
 impl Monotonic {
-    /// The process's clock, started on first use and shared by all who hold it.
-    ///
-    /// # Errors
-    ///
-    /// The system refused the thread that keeps the coarse time.
-    pub fn shared() -> std::io::Result<Arc<Self>> {
-        static SHARED: Mutex<Weak<Monotonic>> = Mutex::new(Weak::new());
-        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(clock) = shared.upgrade() {
-            return Ok(clock);
-        }
-        let coarse = Arc::new(AtomicI64::new(monotonic_now().0));
-        let stop = Stop::new();
-        let keeper = std::thread::Builder::new()
-            .name("tickbus-clock".into())
-            .spawn({
-                let (coarse, stop) = (Arc::clone(&coarse), stop.clone());
-                move || {
-                    while !stop.is_stopped() {
-                        coarse.store(monotonic_now().0, Ordering::Relaxed);
-                        wait_monotonic(monotonic_now() + COARSE_STEP, &stop);
-                    }
-                }
-            })?;
-        let clock = Arc::new(Self {
-            coarse,
-            stop,
-            keeper: Some(keeper),
-        });
-        *shared = Arc::downgrade(&clock);
-        Ok(clock)
-    }
-}
-
-impl Drop for Monotonic {
-    fn drop(&mut self) {
-        self.stop.stop();
-        if let Some(keeper) = self.keeper.take() {
-            // The keeper cannot panic; were it to, there is nobody left to tell.
-            let _ = keeper.join();
-        }
+    /// The process's clock, shared by all who hold it.
+    pub fn shared() -> Arc<Self> {
+        static SHARED: LazyLock<Arc<Monotonic>> = LazyLock::new(|| Arc::new(Monotonic(())));
+        Arc::clone(&SHARED)
     }
 }
 
@@ -121,10 +63,6 @@ fn wait_monotonic(deadline: Nanos, stop: &Stop) {
 impl Clock for Monotonic {
     fn now(&self) -> Nanos {
         monotonic_now()
-    }
-
-    fn coarse(&self) -> CoarseTime {
-        CoarseTime(Arc::clone(&self.coarse))
     }
 
     fn wait_until(&self, deadline: Nanos, stop: &Stop) {
@@ -145,7 +83,7 @@ impl Clock for Monotonic {
 /// A clock that stands still until it is told to advance: for tests, and for simulation time.
 #[derive(Debug, Default)]
 pub struct Manual {
-    now: Arc<AtomicI64>,
+    now: AtomicI64,
     waiters: Mutex<Vec<Waiter>>,
 }
 
@@ -200,10 +138,6 @@ impl Manual {
 impl Clock for Manual {
     fn now(&self) -> Nanos {
         Nanos(self.now.load(Ordering::SeqCst))
-    }
-
-    fn coarse(&self) -> CoarseTime {
-        CoarseTime(Arc::clone(&self.now))
     }
 
     fn wait_until(&self, deadline: Nanos, stop: &Stop) {
@@ -283,8 +217,8 @@ mod tests {
 
     #[test]
     fn the_shared_clock_is_one() {
-        let one = Monotonic::shared().expect("a thread");
-        let two = Monotonic::shared().expect("a thread");
+        let one = Monotonic::shared();
+        let two = Monotonic::shared();
         assert!(Arc::ptr_eq(&one, &two));
         let before = one.now();
         one.wait_until(before + Nanos::from_millis(1), &Stop::new());

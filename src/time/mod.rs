@@ -11,7 +11,7 @@ mod spans;
 mod stop;
 mod wall;
 
-pub use clock::{Clock, CoarseTime, Manual, Monotonic};
+pub use clock::{Clock, Manual, Monotonic};
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
 pub use spans::Spans;

@@ -27,8 +27,7 @@ pub(crate) struct Machine {
 
 impl Machine {
     pub(crate) fn new(text: &str) -> Self {
-        let driver =
-            Driver::open(parse(text), Monotonic::shared().expect("a clock")).expect("opens");
+        let driver = Driver::open(parse(text), Monotonic::shared()).expect("opens");
         Self {
             slots: driver.initial_slots(),
             driver,

@@ -19,7 +19,7 @@ use super::{Config, DriverError, bus};
 
 pub(super) use stepped::SteppedHost;
 pub(super) use tally::Tally;
-pub(super) use thread::{HostThread, Hosted};
+pub(super) use thread::{HostTally, HostThread, Hosted};
 
 /// A PLC program at one end of a bus, scanned on its interval: a PLC without its box.
 ///
@@ -71,19 +71,19 @@ impl Host {
 
     /// How the line is doing.
     pub fn link(&self) -> Link {
-        self.0.status.observe_call(self.0.clock.now());
+        self.0.status.observe_call(self.0.told.clock.now());
         self.0.status.link()
     }
 
     /// What was counted, and how the line is doing, one `key=value` a line.
     pub fn statistics(&self) -> String {
-        let now = self.0.clock.now();
+        let now = self.0.told.clock.now();
         let mut text = String::new();
         self.0.status.observe_call(now);
         self.0.status.write(now, &mut text);
         self.0.board.tell(self.0.status.driver());
         self.0.board.write(&mut text);
-        self.0.write(&mut text);
+        self.0.told.write(&mut text);
         // Writing to a string cannot fail.
         let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
         text
@@ -96,12 +96,12 @@ impl Host {
 
     /// Scans so far, and how many of them found the data stale.
     pub fn scans(&self) -> (u64, u64) {
-        self.0.tally.scans()
+        self.0.told.tally.scans()
     }
 
     /// Why the program does not scan any more, if it does not: it panicked, or a scan does not end.
     pub fn fault(&self) -> Option<String> {
-        self.0.fault()
+        self.0.told.fault()
     }
 
     /// Stops scanning and closes the bus. Why the program did not end, if it did not.

@@ -52,6 +52,10 @@ impl Tally {
 
     /// Counts the rising edges from `before` to `now` in an area of a station.
     pub(super) fn count(&self, (station, area): (usize, Area), before: &[u8], now: &[u8]) {
+        // Most scans change nothing.
+        if before == now {
+            return;
+        }
         let here = |bit: &&Bit| (bit.station, bit.area) == (station, area);
         for bit in self.bits.iter().filter(here) {
             if !before[bit.byte] & now[bit.byte] & bit.mask != 0 {

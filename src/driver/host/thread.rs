@@ -52,17 +52,23 @@ pub(in crate::driver) struct Hosted {
     pub(in crate::driver) tape: Option<Tape>,
 }
 
-/// A program on a thread of its own, with the bus thread of its end of the line; dropping it stops both.
-#[derive(Debug)]
-pub(in crate::driver) struct HostThread {
+/// What a program on a thread of its own tells of itself, to any thread.
+#[derive(Clone, Debug)]
+pub(in crate::driver) struct HostTally {
     pub(super) tally: Arc<Tally>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
-    /// Disconnected when the thread ends.
-    ended: Receiver<()>,
     report: Option<Arc<dyn Report>>,
     record: Option<Arc<record::Tally>>,
     pub(super) clock: Arc<dyn Clock>,
+}
+
+/// A program on a thread of its own, with the bus thread of its end of the line; dropping it stops both.
+#[derive(Debug)]
+pub(in crate::driver) struct HostThread {
+    pub(in crate::driver) told: HostTally,
+    /// Disconnected when the thread ends.
+    ended: Receiver<()>,
     pub(super) status: LinkStatus,
     pub(super) board: Arc<Board>,
     stop: Stop,
@@ -126,13 +132,15 @@ impl HostThread {
             }
         })?;
         Ok(Self {
-            tally,
-            fault,
-            scanning,
+            told: HostTally {
+                tally,
+                fault,
+                scanning,
+                report,
+                record,
+                clock,
+            },
             ended,
-            report,
-            record,
-            clock,
             status,
             board,
             stop,
@@ -140,7 +148,9 @@ impl HostThread {
             bus,
         })
     }
+}
 
+impl HostTally {
     /// Appends what the program has counted, and its fault.
     pub(in crate::driver) fn write(&self, text: &mut String) {
         self.tally.write(text);

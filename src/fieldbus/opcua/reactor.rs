@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn tasks_run_while_the_thread_waits_and_their_news_end_the_wait() {
-        let (clock, stop) = (Monotonic::shared().expect("a thread"), Stop::new());
+        let (clock, stop) = (Monotonic::shared(), Stop::new());
         let reactor = Reactor::new(&stop).expect("a runtime");
         let inbox = reactor.inbox();
         let sender = inbox.clone();

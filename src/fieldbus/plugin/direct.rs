@@ -58,7 +58,7 @@ impl Free for Direct {
             |error: std::io::Error| BusError::Link(format!("the system refused a thread: {error}"));
         // A call that does not return cannot say so itself. Its watch lives in the system's own time, whatever
         // clock the driver has, and is left behind with the bus thread if that is.
-        let real = Monotonic::shared().map_err(cannot)?;
+        let real = Monotonic::shared();
         let (watch, over) = (port.call_watch(), Stop::new());
         std::thread::scope(|scope| {
             std::thread::Builder::new()

@@ -161,7 +161,7 @@ impl Helper {
         let (line, theirs) = UnixStream::pair().map_err(cannot)?;
         line.set_nonblocking(true).map_err(cannot)?;
         let poller = Poller::new(stop).map_err(cannot)?;
-        let clock = Monotonic::shared().map_err(cannot)?;
+        let clock = Monotonic::shared();
         let child = spawn(&bus.program, theirs.into(), file).map_err(cannot)?;
         Ok(Self {
             child,

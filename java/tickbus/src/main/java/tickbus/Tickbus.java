@@ -61,6 +61,8 @@ public final class Tickbus implements AutoCloseable {
     private static final VarHandle TICKER;
     /** Events that one native call can bring. */
     private static final int EVENTS = 64;
+    /** Events that one call hands over at most: as many as the driver's ring holds. */
+    private static final int MOST_EVENTS = 4096;
     /** How often a call that meets a running exchange is tried. */
     private static final int PATIENCE = 100;
     /** Longs per event: signal, slot, time. */
@@ -92,7 +94,10 @@ public final class Tickbus implements AutoCloseable {
     private final Map<String, Signal> byName = new HashMap<>();
     private final SignalGroup written;
     private final SignalGroup read;
+    /** Events that were fetched; those from {@code nextEvent} to {@code endOfEvents} are yet to be handed over. */
     private long[] events;
+    private int nextEvent;
+    private int endOfEvents;
     /**
      * The thread that the slots belong to; null when there is none. A thread that reads its own name here put it
      * there itself, so that a plain comparison is enough on every tick but a thread's first.
@@ -236,8 +241,9 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Goes on where {@link #statistics} or {@link #close} of another thread was in the way: the one ends within
-     * microseconds, the other in {@link Status#CLOSED}.
+     * Goes on where {@link #statistics}, {@link #inject} or {@link #close} of another thread was in the way. They have the
+     * driver for as long as it takes to copy what they need, or to take it over; after {@code close} it is
+     * {@link Status#CLOSED}.
      */
     private int after(int refusal, LongToIntFunction call) {
         int code = refusal;
@@ -426,31 +432,37 @@ public final class Tickbus implements AutoCloseable {
     /**
      * Hands over the waiting events, oldest first: the writes of the PLC one by one, on buses that have them.
      *
+     * <p>One call hands over 4096 at most, as many as the driver keeps, so that a PLC which writes faster than the handler
+     * works does not hold the tick up for ever. Should the handler throw, the event that it threw at counts as handed over,
+     * and the next call goes on behind it.
+     *
      * @param handler called on this thread, for each event
      * @return how many events there were
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public int pollEvents(EventHandler handler) {
         Objects.requireNonNull(handler, "handler");
+        mustBeTicker();
+        mustBeOpen();
         int total = 0;
-        int count;
-        do {
-            count = takeEvents();
-            for (int at = 0; at < count * EVENT_WORDS; at += EVENT_WORDS) {
-                Signal signal = signals.get((int) events[at]);
-                handler.event(signal, signal.value(events[at + 1]), events[at + 2]);
-            }
-            total += count;
-        } while (count == EVENTS);
+        while (total < MOST_EVENTS && (nextEvent < endOfEvents || takeEvents())) {
+            int at = nextEvent;
+            nextEvent += EVENT_WORDS;
+            total++;
+            Signal signal = signals.get((int) events[at]);
+            handler.event(signal, signal.value(events[at + 1]), events[at + 2]);
+        }
         return total;
     }
 
-    private int takeEvents() {
-        mustBeTicker();
+    /** Fetches events; false if there are none. */
+    private boolean takeEvents() {
         if (events == null) {
             events = new long[EVENTS * EVENT_WORDS];
         }
-        return eventsNative(handle, events);
+        endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
+        nextEvent = 0;
+        return endOfEvents > 0;
     }
 
     /**

@@ -15,6 +15,7 @@ import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.function.BooleanSupplier;
+import java.util.stream.IntStream;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.condition.EnabledOnOs;
@@ -337,6 +338,54 @@ class TickbusTest {
             assertEquals(1, values.get(0));
             assertEquals(100, values.get(99));
             assertEquals(0, bus.pollEvents((signal, value, time) -> values.clear()));
+        }
+    }
+
+    /** A bus with events that counts up and down again, a write of the PLC in each tick. */
+    private Tickbus withEvents() {
+        return DriverCfg.mirror(1).fieldbus("events = true").signal("in", "%IW0", "type = \"INT\"")
+            .signal("out", "%QW0", "type = \"INT\"").open(directory);
+    }
+
+    private void writes(Tickbus bus, int from, int to) {
+        for (int value = from; value <= to; value++) {
+            bus.signal("in").set(value);
+            now += TICK;
+            bus.exchange(now);
+        }
+    }
+
+    @Test
+    void aHandlerThatThrowsLosesNoEventButItsOwn() {
+        try (Tickbus bus = withEvents()) {
+            writes(bus, 1, 100);
+            List<Double> seen = new ArrayList<>();
+            EventHandler throwing = (signal, value, time) -> {
+                seen.add(value);
+                if (value == 5 || value == 70) {
+                    throw new IllegalStateException("at " + value);
+                }
+            };
+            for (int i = 0; i < 2; i++) {
+                assertThrows(IllegalStateException.class, () -> bus.pollEvents(throwing));
+            }
+            assertEquals(30, bus.pollEvents(throwing));
+            assertEquals(IntStream.rangeClosed(1, 100).mapToObj(value -> (double) value).toList(), seen);
+        }
+    }
+
+    @Test
+    void eventsThatComeFasterThanTheyAreHandledHoldNobodyUp() {
+        try (Tickbus bus = withEvents()) {
+            writes(bus, 1, 1);
+            int[] value = {1};
+            // Each event brings the next one.
+            int count = bus.pollEvents((signal, seen, time) -> {
+                value[0]++;
+                writes(bus, value[0] % 1000, value[0] % 1000);
+            });
+            assertEquals(4096, count);
+            assertEquals(1, bus.pollEvents((signal, seen, time) -> { }));
         }
     }
 

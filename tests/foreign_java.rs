@@ -78,7 +78,7 @@ impl Machine {
             "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\n{fieldbus}\nmax_age = \"3s\"\nreconnect = [\"50ms\"]\n{SIGNALS}"
         );
         let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared().expect("a thread");
+        let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
         let slots = driver.initial_slots();
         Self { driver, slots }

@@ -50,7 +50,7 @@ fn open(fieldbus: &str) -> (Driver, Vec<Slot>) {
         "[driver]\nid = 1\nname = \"soak\"\n[fieldbus]\n{fieldbus}\nmax_age = \"500ms\"\n{SIGNALS}"
     );
     let config = Config::parse("soak.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared().expect("a thread");
+    let clock = Monotonic::shared();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let slots = driver.initial_slots();
     (driver, slots)

@@ -30,6 +30,15 @@ fn homing_lowers_the_lifts_then_turns_the_wheels_then_is_ready() {
     cell.alive = true;
     cell.scans(2);
     assert_eq!(cell.seen.word, 0x041C | SUCTION, "LA1 − big, LA2 down");
+    cell.until("the switches", |cell| {
+        cell.plant.la1.at_bottom() && cell.plant.la2.at_bottom()
+    });
+    cell.scans(20);
+    assert_eq!(
+        cell.seen.word,
+        0x041C | SUCTION,
+        "past the switches, to the stops"
+    );
     cell.until("the jog", |cell| cell.seen.word == 0x0102);
     assert!(
         cell.plant.la1.position == 0 && cell.plant.la2.position == 0,

@@ -49,6 +49,11 @@ impl Lift {
     fn step(&mut self, by: Option<i32>, down: i32) -> bool {
         if self.at_bottom() && self.target.is_none() {
             self.referenced = true;
+            // It sinks onto its stop, as in the reference simulator when the run command falls
+            // (`LiftDrive.stop`). Nobody could send it there: referenced, it refuses to go down.
+            if !self.jammed {
+                self.position = 0;
+            }
         }
         let mut refused = false;
         if by != self.before {

@@ -20,6 +20,26 @@ enum Trouble {
     Noise([u8; 3]),
 }
 
+impl Trouble {
+    fn befalls(self, cell: &mut Cell) {
+        match self {
+            Self::Press(button) => cell.press(button),
+            Self::Link(alive) => cell.alive = alive,
+            Self::Jam(la1, la2) => {
+                cell.plant.la1.jammed = la1;
+                cell.plant.la2.jammed = la2;
+            }
+            Self::NotOk => cell.plant.not_ok = true,
+            Self::Mute(mute) => cell.plant.mute = mute,
+            Self::Blind(blind) => cell.plant.im1.blind = blind,
+            Self::Noise(flips) => {
+                let image = cell.plant.image();
+                cell.scan_inputs(std::array::from_fn(|byte| image[byte] ^ flips[byte]));
+            }
+        }
+    }
+}
+
 fn trouble() -> impl Strategy<Value = Trouble> {
     prop_oneof![
         4 => prop_oneof![Just(START), Just(STOP), Just(RESET)].prop_map(Trouble::Press),
@@ -30,6 +50,76 @@ fn trouble() -> impl Strategy<Value = Trouble> {
         1 => any::<bool>().prop_map(Trouble::Blind),
         2 => any::<[u8; 3]>().prop_map(Trouble::Noise),
     ]
+}
+
+/// Ends every trouble; then the operator presses Stop, and Reset after a fault, until the rig is parked.
+fn park(cell: &mut Cell) {
+    cell.alive = true;
+    cell.plant.la1.jammed = false;
+    cell.plant.la2.jammed = false;
+    cell.plant.mute = false;
+    cell.plant.im1.blind = false;
+    cell.scans(2);
+    for _ in 0..4 {
+        if cell.seen.phase != PARKED {
+            cell.press(STOP);
+        }
+        cell.until("a rest", |cell| [ABORT, PARKED].contains(&cell.seen.phase));
+        if cell.seen.phase == PARKED {
+            break;
+        }
+        cell.press(RESET);
+    }
+}
+
+/// The reference run of lift 1 reaches the bottom switch half a millimetre above the stop, and just then
+/// something makes the program drop the run command.
+#[test]
+fn a_reference_run_that_ends_on_the_switch_parks_lift_1_on_its_stop() {
+    let not_ok = Trouble::Noise([128, 0, 0]);
+    for broken_off_by in [not_ok, Trouble::NotOk, Trouble::Link(false)] {
+        for acknowledged in [true, false] {
+            let mut cell = Cell::new(La1Code::MsbFirst);
+            cell.plant.not_ok = acknowledged;
+            cell.until("the switch", |cell| cell.plant.la1.at_bottom());
+            assert_eq!(
+                (cell.plant.la1.position, cell.seen.word & 0x001C),
+                (500, 0x001C)
+            );
+            broken_off_by.befalls(&mut cell);
+            cell.scans(1);
+            assert_eq!(cell.seen.word & 0x001C, 0, "{broken_off_by:?}");
+            park(&mut cell);
+            assert_eq!(
+                (cell.seen.phase, cell.plant.la1.position),
+                (PARKED, 0),
+                "{broken_off_by:?}, acknowledged before: {acknowledged}"
+            );
+        }
+    }
+}
+
+/// A case that the test below once found.
+#[test]
+fn noise_in_the_scan_in_which_lift_1_meets_its_switch_parks_it_on_its_stop() {
+    let not_ok = Trouble::Noise([128, 0, 0]);
+    let mut cell = Cell::ready();
+    for (trouble, scans) in [
+        (Trouble::Mute(false), 105),
+        (Trouble::Jam(false, false), 75),
+        (Trouble::Press(START), 104),
+        (not_ok, 0),
+        (Trouble::Press(RESET), 72),
+        (Trouble::Press(START), 132),
+        (Trouble::Press(START), 117),
+        (not_ok, 0),
+    ] {
+        trouble.befalls(&mut cell);
+        cell.scans(scans);
+    }
+    assert_eq!((cell.seen.phase, cell.plant.la1.position), (ABORT, 500));
+    park(&mut cell);
+    assert_eq!((cell.seen.phase, cell.plant.la1.position), (PARKED, 0));
 }
 
 proptest! {
@@ -58,40 +148,10 @@ proptest! {
             cell.press(START);
         }
         for (trouble, scans) in troubles {
-            match trouble {
-                Trouble::Press(button) => cell.press(button),
-                Trouble::Link(alive) => cell.alive = alive,
-                Trouble::Jam(la1, la2) => {
-                    cell.plant.la1.jammed = la1;
-                    cell.plant.la2.jammed = la2;
-                }
-                Trouble::NotOk => cell.plant.not_ok = true,
-                Trouble::Mute(mute) => cell.plant.mute = mute,
-                Trouble::Blind(blind) => cell.plant.im1.blind = blind,
-                Trouble::Noise(flips) => {
-                    let image = cell.plant.image();
-                    cell.scan_inputs(std::array::from_fn(|byte| image[byte] ^ flips[byte]));
-                }
-            }
+            trouble.befalls(&mut cell);
             cell.scans(scans);
         }
-
-        cell.alive = true;
-        cell.plant.la1.jammed = false;
-        cell.plant.la2.jammed = false;
-        cell.plant.mute = false;
-        cell.plant.im1.blind = false;
-        cell.scans(2);
-        for _ in 0..4 {
-            if cell.seen.phase != PARKED {
-                cell.press(STOP);
-            }
-            cell.until("a rest", |cell| [ABORT, PARKED].contains(&cell.seen.phase));
-            if cell.seen.phase == PARKED {
-                break;
-            }
-            cell.press(RESET);
-        }
+        park(&mut cell);
         prop_assert_eq!(cell.seen.phase, PARKED);
         prop_assert_eq!(cell.plant.la1.position, 0);
     }

@@ -19,6 +19,11 @@ enum IntegerKind {
         return (slot >>> 1 | slot & 1) * 2.0;
     }
 
+    /** Whether the number that the value is rounded to, halves away from zero, fits. */
+    boolean holds(double value) {
+        return this == SIGNED ? value >= -0x1p63 && value < 0x1p63 : value > -0.5 && value < 0x1p64;
+    }
+
     /** The nearest number that fits, halves away from zero; NaN gives 0. */
     long fromDouble(double value) {
         double whole = value;

@@ -2,11 +2,11 @@ package tickbus;
 
 import java.io.IOException;
 import java.io.InputStream;
+import java.io.OutputStream;
 import java.net.URISyntaxException;
 import java.nio.file.Files;
 import java.nio.file.InvalidPathException;
 import java.nio.file.Path;
-import java.nio.file.StandardCopyOption;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Locale;
@@ -143,7 +143,11 @@ final class NativeLibrary {
         Path copy = Files.createTempFile("tickbus-", "-" + file);
         // Where a loaded library cannot be deleted (Windows), the file stays until the JVM ends, or longer.
         copy.toFile().deleteOnExit();
-        Files.copy(content, copy, StandardCopyOption.REPLACE_EXISTING);
+        // Into the file that is there, which nobody else may write: a copy that replaces it would have the rights of the
+        // umask.
+        try (OutputStream into = Files.newOutputStream(copy)) {
+            content.transferTo(into);
+        }
         try {
             System.load(copy.toString());
             return true;

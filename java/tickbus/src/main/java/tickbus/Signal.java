@@ -85,7 +85,8 @@ public final class Signal {
             throw new IllegalArgumentException(
                 "signal '" + name() + "' cannot be set to " + value + "; a finite number is needed");
         }
-        slots.put(entry.slot(), integer.fromDouble(value));
+        // No infinity and no NaN comes here, and for those alone a fail-safe value is needed.
+        slots.put(entry.slot(), bus.conversions().slot(integer, value, 0));
     }
 
     /**

@@ -15,8 +15,12 @@ final class SignalGroup {
     /** Which of the signals hold an integer; mostly none. */
     private final int[] integers;
     private final IntegerKind[] kinds;
+    /** What each integer is where NaN is set. */
+    private final long[] failSafe;
+    private final Conversions conversions;
 
-    SignalGroup(Layout layout, List<Signal> signals) {
+    /** The slots still have the values of an open driver that has not ticked: the fail-safe ones. */
+    SignalGroup(Layout layout, List<Signal> signals, Conversions conversions) {
         this.slots = layout.slots();
         this.doubles = layout.doubles();
         this.at = signals.stream().mapToInt(Signal::slot).toArray();
@@ -24,6 +28,8 @@ final class SignalGroup {
         List<Signal> wide = signals.stream().filter(signal -> signal.integer() != null).toList();
         this.integers = wide.stream().mapToInt(signals::indexOf).toArray();
         this.kinds = wide.stream().map(Signal::integer).toArray(IntegerKind[]::new);
+        this.failSafe = wide.stream().mapToLong(signal -> slots.get(signal.slot())).toArray();
+        this.conversions = conversions;
     }
 
     int size() {
@@ -39,7 +45,7 @@ final class SignalGroup {
             }
         }
         for (int i = 0; i < integers.length; i++) {
-            slots.put(at[integers[i]], kinds[i].fromDouble(values[integers[i]]));
+            slots.put(at[integers[i]], conversions.slot(kinds[i], values[integers[i]], failSafe[i]));
         }
     }
 

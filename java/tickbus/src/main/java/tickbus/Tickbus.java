@@ -92,6 +92,7 @@ public final class Tickbus implements AutoCloseable {
     private final LongBuffer words;
     private final List<Signal> signals;
     private final Map<String, Signal> byName = new HashMap<>();
+    private final Conversions conversions = new Conversions();
     private final SignalGroup written;
     private final SignalGroup read;
     /** Events that were fetched; those from {@code nextEvent} to {@code endOfEvents} are yet to be handed over. */
@@ -113,8 +114,9 @@ public final class Tickbus implements AutoCloseable {
         LongBuffer slots = layout.slots();
         this.signals = layout.signals().stream().map(entry -> new Signal(this, slots, entry)).toList();
         signals.forEach(signal -> byName.put(signal.name(), signal));
-        this.written = new SignalGroup(layout, signals.stream().filter(Signal::isWritten).toList());
-        this.read = new SignalGroup(layout, signals.stream().filter(signal -> !signal.isWritten()).toList());
+        this.written = new SignalGroup(layout, signals.stream().filter(Signal::isWritten).toList(), conversions);
+        this.read = new SignalGroup(layout, signals.stream().filter(signal -> !signal.isWritten()).toList(),
+            conversions);
     }
 
     /**
@@ -378,7 +380,18 @@ public final class Tickbus implements AutoCloseable {
             int equals = line.startsWith("plc.rises.") ? line.lastIndexOf('=') : line.indexOf('=');
             statistics.put(line.substring(0, equals), line.substring(equals + 1));
         });
+        add(statistics, "saturated", conversions.saturated());
+        add(statistics, "not_a_number", conversions.notANumber());
         return Collections.unmodifiableMap(statistics);
+    }
+
+    private static void add(Map<String, String> statistics, String key, long count) {
+        statistics.computeIfPresent(key, (same, text) -> Long.toString(Long.parseLong(text) + count));
+    }
+
+    /** For the signals of this driver. */
+    Conversions conversions() {
+        return conversions;
     }
 
     /**

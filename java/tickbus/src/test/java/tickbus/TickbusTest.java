@@ -209,6 +209,24 @@ class TickbusTest {
     }
 
     @Test
+    void whatA64BitIntegerCannotHoldIsCountedAndNanIsItsFailSafeValue() {
+        try (Tickbus bus = DriverCfg.mirror(1).signal("in", "%IL0", "type = \"LINT\"\nfail_safe = -7")
+                .signal("back", "%QL0", "type = \"LINT\"").open(directory)) {
+            bus.setAll(new double[] {Double.NaN});
+            tick(bus);
+            assertEquals(-7, bus.signal("back").getLong());
+            bus.setAll(new double[] {1e300});
+            tick(bus);
+            assertEquals(Long.MAX_VALUE, bus.signal("back").getLong());
+            bus.signal("in").set(-1e300);
+            tick(bus);
+            assertEquals(Long.MIN_VALUE, bus.signal("back").getLong());
+            assertEquals("1", bus.statistics().get("not_a_number"));
+            assertEquals("2", bus.statistics().get("saturated"));
+        }
+    }
+
+    @Test
     void aLinkWithNobodyAtItsOtherEndIsStale() {
         try (Tickbus bus = DriverCfg.link(1, DriverCfg.freshLink(), "device").signal("in", "%IX0.0").open(directory)) {
             assertEquals(Status.STALE.code(), bus.exchange());

@@ -7,6 +7,7 @@ import java.util.Map;
 import org.junit.jupiter.api.extension.ExtensionConfigurationException;
 import org.junit.jupiter.api.extension.ExtensionContext;
 import org.opentest4j.AssertionFailedError;
+import tickbus.FieldbusException;
 import tickbus.Tickbus;
 
 /** All that stands on the bench for one test: the line with the program behind it, the machine, the PLC's outside. */
@@ -76,8 +77,13 @@ final class Bench {
     void close(ExtensionContext context) {
         Throwable failure = context.getExecutionException().orElse(null);
         AssertionFailedError unfinished = failure == null ? plc.unfinished() : null;
-        Map<String, String> statistics = bus.statistics();
-        bus.close();
+        Map<String, String> statistics;
+        // After a defect of the library there are no statistics, and the driver is to be closed all the same.
+        try (bus) {
+            statistics = bus.statistics();
+        } catch (FieldbusException e) {
+            statistics = Map.of("reason", e.getMessage());
+        }
         String kept = keep.finish(failure != null ? failure : unfinished, statistics, context);
         if (failure != null) {
             failure.addSuppressed(new Note("the test stood at " + plc.where() + kept));

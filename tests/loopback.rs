@@ -334,6 +334,7 @@ fn where_receive_failed_no_send_of_that_tick_sends() {
         rig.controller.tick();
         (found.code, rig.controller.get("position"))
     };
+    tick(5, 3.0);
     assert_eq!(tick(10, 3.0).1, 3.0);
     assert_eq!(tick(0, 4.0), (Code::BusFailed, 3.0));
     assert_eq!(tick(20, 5.0).1, 5.0);

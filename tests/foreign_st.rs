@@ -71,19 +71,19 @@ fn reader(files: &[PathBuf]) -> Result<Command, Absent> {
 fn blark_reads_every_source_in_structured_text() -> Result<(), Absent> {
     let folder = tempfile::tempdir().expect("a folder");
     let mut files = Vec::new();
-    for file in [
-        "driver.cfg",
-        "tests/export/right/everything.cfg",
-        "tests/export/right/modbus-server.cfg",
-        "plc/peeler/lathe.cfg",
-    ] {
+    let (codesys, twincat, openplc) = (Target::Codesys, Target::TwinCat, Target::OpenPlc);
+    for (file, targets) in [
         // TwinCAT's file differs from that for CODESYS in what brings records alone.
-        let twincat = (file == "driver.cfg").then_some(Target::TwinCat);
-        for target in [Target::Codesys, Target::OpenPlc]
-            .into_iter()
-            .chain(twincat)
-        {
-            files.extend(write(file, target, folder.path()));
+        ("driver.cfg", &[codesys, twincat, openplc][..]),
+        // A hosted program serves one station, and OpenPLC has no OPC UA.
+        ("tests/export/right/everything.cfg", &[codesys]),
+        ("tests/export/right/opcua-client.cfg", &[codesys]),
+        ("tests/export/right/loopback-life.cfg", &[codesys, openplc]),
+        ("tests/export/right/modbus-server.cfg", &[codesys, openplc]),
+        ("plc/peeler/lathe.cfg", &[codesys, openplc]),
+    ] {
+        for target in targets {
+            files.extend(write(file, *target, folder.path()));
         }
     }
     let output = reader(&files)?.output().expect("python runs");

@@ -42,7 +42,9 @@ pub fn did_you_mean(word: &str, kinds: &str, candidates: &[&str]) -> String {
         .filter(alike)
         .map(|c| format!("\"{c}\""))
         .collect();
-    if near.is_empty() {
+    if candidates.is_empty() {
+        format!("there are no {kinds} yet; add one first")
+    } else if near.is_empty() {
         format!("{kinds} are {}", candidates.join(", "))
     } else {
         format!("did you mean {}?", near.join(" or "))
@@ -68,5 +70,9 @@ mod tests {
             assert_eq!(nearest(wrong, keys), right, "{wrong}");
         }
         assert_eq!(nearest(&"a".repeat(1_000_000), keys), None);
+        assert_eq!(
+            did_you_mean("x", "signals", &[]),
+            "there are no signals yet; add one first"
+        );
     }
 }

@@ -31,6 +31,8 @@ pub(super) struct Spots {
     pub(super) data_type: Option<DataType>,
     /// The size of what it names, if it states no type.
     pub(super) width: Width,
+    /// It names the lower or the upper half of a register, or that half's first bit.
+    pub(super) is_half: bool,
     /// The direction that follows from the place; most places can be both read and written.
     pub(super) area: Option<Area>,
 }
@@ -82,6 +84,7 @@ pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String
             let is_bit = table.is_bits() || spot.bit.is_some();
             Ok(Spots {
                 data_type: spot.data_type,
+                is_half: matches!(spot.bit, Some(0 | 8)),
                 width: if is_bit { Width::Bit } else { Width::Word },
                 area: (!table.is_writable()).then_some(Area::Output),
             })
@@ -97,6 +100,7 @@ pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String
             Ok(Spots {
                 data_type: variable.data_type,
                 width: variable.width,
+                is_half: false,
                 area: match variable.object {
                     Object::Inputs => Some(Area::Input),
                     Object::Outputs => Some(Area::Output),
@@ -105,6 +109,20 @@ pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String
             })
         }
     }
+}
+
+/// The direction of a module's point in a Logix controller (`Local:1:I.Data.0`, `Rack:2:O1[3]`); `None` for what is no such
+/// point.
+pub(super) fn module_side(target: &str) -> Option<Area> {
+    let (_, rest) = target.rsplit_once(':')?;
+    let side = rest.split(['.', '[']).next()?;
+    let area = match side.chars().next()? {
+        'I' => Area::Input,
+        'O' => Area::Output,
+        _ => return None,
+    };
+    let is_numbered = side[1..].bytes().all(|byte| byte.is_ascii_digit());
+    is_numbered.then_some(area)
 }
 
 /// The type that KEPServer calls so.

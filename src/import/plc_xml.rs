@@ -1,12 +1,13 @@
 //! Variables of a PLC project as XML: PLCopen XML (CODESYS, TwinCAT, Beremiz, OpenPLC Editor), and L5X (Studio 5000).
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::Sheet;
 use super::cells::{Cell, Record};
 use super::columns::Columns;
+use super::device;
 use crate::config::{Collector, Mistakes};
 
 /// More nodes than this are no list of variables.
@@ -122,9 +123,38 @@ fn record(
     ]
 }
 
+/// The names of variables so far.
+#[derive(Default)]
+struct Names {
+    given: HashSet<String>,
+}
+
+impl Names {
+    /// The name of a variable; where another one has it already, behind that of the program or list that it is local to.
+    fn give(
+        &mut self,
+        variable: Node<'_, '_>,
+        name: &str,
+        scopes: &[&str],
+        attribute: &str,
+    ) -> String {
+        let mut wanted = name.to_owned();
+        if self.given.contains(name) {
+            let mut around = variable.ancestors();
+            let scope = around.find(|node| scopes.contains(&node.tag_name().name()));
+            if let Some(scope) = scope.and_then(|scope| scope.attribute(attribute)) {
+                wanted = format!("{scope}.{name}");
+            }
+        }
+        self.given.insert(wanted.clone());
+        wanted
+    }
+}
+
 /// Variables with an `address`: of lists of global variables, and of programs.
 fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     let (mut records, mut without) = (Vec::new(), Vec::new());
+    let mut names = Names::default();
     for variable in named(root, "variable") {
         let Some(address) = variable.attribute("address") else {
             // Only declarations have types; `variable` is also what blocks in a picture have.
@@ -141,6 +171,7 @@ fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
         let at = place(variable, "address");
         let kind_at = kind.map_or(at, |kind| kind.range().start);
         let name = variable.attribute("name").unwrap_or_default();
+        let name = &names.give(variable, name, &["pou", "globalVars"], "name");
         let comment = words(child(variable, "documentation"));
         records.push(record(
             variable,
@@ -168,10 +199,11 @@ fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
 fn logix(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     let types = member_types(root);
     let (mut records, mut others) = (Vec::new(), Vec::new());
+    let mut names = Names::default();
     for tag in named(root, "Tag") {
         let name = tag.attribute("Name").unwrap_or_default();
         let target = tag.attribute("AliasFor").unwrap_or_default();
-        if !target.contains(":I") && !target.contains(":O") {
+        if device::module_side(target).is_none() {
             others.push(tag);
             continue;
         }
@@ -204,6 +236,7 @@ fn logix(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
             );
             continue;
         }
+        let name = &names.give(tag, name, &["Program"], "Name");
         let mut record = record(
             tag,
             name,

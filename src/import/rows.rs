@@ -250,13 +250,15 @@ impl Row<'_> {
             }
         };
         let data_type = match spots.data_type {
-            Some(data_type) => data_type,
+            Some(stated) => self.agreed(stated, cell, client)?,
             None => self.client_type()?.unwrap_or(spots.width.data_type()),
         };
         // Several registers make a wider value; nothing else is put together.
         let is_of_registers = client == Client::Modbus && spots.width == Width::Word;
+        let is_half = data_type.width() == Width::Byte;
         let fits = data_type.width() == spots.width
-            || (is_of_registers && data_type.width() != Width::Bit);
+            || (is_of_registers && !is_half && data_type.width() != Width::Bit)
+            || (spots.is_half && is_half);
         if !fits {
             self.wrong.report(
                 self.cell(self.columns.kind).unwrap_or(cell).at,
@@ -266,7 +268,9 @@ impl Row<'_> {
                     data_type.width().bits(),
                     spots.width.bits()
                 ),
-                if is_of_registers {
+                if is_of_registers && is_half {
+                    "write \"400021.0\" for the low byte of the register and \"400021.8\" for the high one, or another type"
+                } else if is_of_registers {
                     "name a bit of the register, such as 400021.0, or another type"
                 } else {
                     "correct the one or the other"
@@ -274,23 +278,65 @@ impl Row<'_> {
             );
             return None;
         }
-        let area = self.direction()?.or(spots.area).unwrap_or(Area::Output);
+        let stated = self.direction()?;
+        if (stated, spots.area) == (Some(Area::Input), Some(Area::Output)) {
+            self.wrong.report(
+                self.cell(self.columns.direction).unwrap_or(cell).at,
+                format!("the simulation cannot write {}", quoted(&cell.text)),
+                "write \"output\" or RO for what it reads, or name a place that it can write",
+            );
+            return None;
+        }
+        // Who lists a PLC's inputs reads them; the simulation is what writes them.
+        let area = spots.area.or(stated).unwrap_or(Area::Output);
         Some(Found {
             area,
             address: None,
             at: cell.text.clone(),
             data_type,
         })
+    }
+
+    /// The type that an address states, unless its column says something else.
+    fn agreed(&self, stated: DataType, address: &Cell, client: Client) -> Option<DataType> {
+        // What is no type there is a comment.
+        let column = self.cell(self.columns.kind);
+        let known = column.and_then(|cell| Some((cell, self.known_type(&cell.text)?)));
+        let Some((cell, other)) = known.filter(|(_, other)| *other != stated) else {
+            return Some(stated);
+        };
+        // In KEPServer's addresses the type is hardly more than a size.
+        let is_float = |kind| matches!(kind, DataType::Real | DataType::Lreal);
+        let is_size = client == Client::S7 && self.columns.scale.is_some();
+        if is_size && other.width() == stated.width() && is_float(other) == is_float(stated) {
+            return Some(other);
+        }
+        self.wrong.report(
+            cell.at,
+            format!(
+                "{other} is not the type {stated} that {} states",
+                quoted(&address.text)
+            ),
+            "correct the one or the other",
+        );
+        None
+    }
+
+    /// The type that a text is, in the words of IEC 61131-3 or of KEPServer.
+    fn known_type(&self, text: &str) -> Option<DataType> {
+        // Both have a BYTE and a WORD; with KEPServer's headings they are KEPServer's.
+        let (iec, kepserver) = (text.parse().ok(), kepserver_type(text));
+        if self.columns.scale.is_some() {
+            kepserver.or(iec)
+        } else {
+            iec.or(kepserver)
+        }
     }
 
     /// An input or output of a module: `Local:1:I.Data.0`.
     fn in_module(&self, cell: &Cell) -> Option<Found> {
         let data_type = self.client_type()?.unwrap_or(DataType::Bool);
-        let area = if cell.text.contains(":I") {
-            Area::Input
-        } else {
-            Area::Output
-        };
+        let area = device::module_side(&cell.text).unwrap_or(Area::Output);
         Some(Found {
             area,
             address: None,
@@ -299,7 +345,7 @@ impl Row<'_> {
         })
     }
 
-    /// The type that its column states, in the words of IEC 61131-3 or of KEPServer.
+    /// The type that its column states.
     #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
     fn client_type(&self) -> Option<Option<DataType>> {
         let Some(cell) = self
@@ -308,13 +354,7 @@ impl Row<'_> {
         else {
             return Some(None);
         };
-        // Both have a BYTE and a WORD; with KEPServer's headings they are KEPServer's.
-        let (iec, kepserver) = (cell.text.parse().ok(), kepserver_type(&cell.text));
-        let known = if self.columns.scale.is_some() {
-            kepserver.or(iec)
-        } else {
-            iec.or(kepserver)
-        };
+        let known = self.known_type(&cell.text);
         if known.is_none() {
             unknown_type(cell, self.wrong);
         }
@@ -372,8 +412,8 @@ impl Row<'_> {
                 .filter(|n| n.is_finite())
         });
         if let [Some(one), Some(two), Some(three), Some(four)] = numbers
-            && one < two
-            && three < four
+            && one != two
+            && three != four
         {
             return Some(Some([one, two, three, four]));
         }

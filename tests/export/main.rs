@@ -197,3 +197,111 @@ fn the_end_of_the_plc_itself_is_refused() {
     assert!(err(&output).contains("there is no such file"));
     assert_eq!(run(&["driver.cfg", "--for", "s5"]).status.code(), Some(2));
 }
+
+/// A driver.cfg with these lines in `[fieldbus]` and these sections.
+fn config(fieldbus: &str, sections: &str) -> Config {
+    let text = format!("[driver]\nid = 7\nname = \"Cell\"\n[fieldbus]\n{fieldbus}\n{sections}");
+    Config::parse("driver.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
+}
+
+const LIFE: &str = "alive = { signal = \"PLC life\", within = \"500ms\" }\nheartbeat = { signal = \"Beat\", every = \"100ms\" }\n";
+
+#[test]
+fn over_opc_ua_the_programs_leave_the_variables_alone_and_watch_the_signs_of_life() {
+    for bus in [
+        "kind = \"opcua-client\"\nurl = \"opc.tcp://192.168.0.1:4840\"",
+        "kind = \"opcua-server\"\nanonymous = true",
+    ] {
+        let config = config(
+            &format!("{bus}\n{LIFE}"),
+            "[[signal]]\nname = \"PLC life\"\naddress = \"%QD0\"\ntype = \"REAL\"\n\
+             [[signal]]\nname = \"Beat\"\naddress = \"%IW0\"\ntype = \"UINT\"\n\
+             [[signal]]\nname = \"Torque\"\naddress = \"%ID4\"\ntype = \"REAL\"\n",
+        );
+        for target in [Target::Codesys, Target::TwinCat] {
+            let xml = export(&config, target)
+                .expect("sources")
+                .files
+                .remove(0)
+                .text;
+            for copied in [
+                "In[",
+                "Out[",
+                "name=\"In\"",
+                "name=\"Out\"",
+                "tickbus_",
+                "Cell_io.Torque",
+            ] {
+                assert!(!xml.contains(copied), "{copied}\n{xml}");
+            }
+            for watched in [
+                "Beat_1 := Cell_io.Beat;",
+                "Cell_io.PLC_life := 1.0 - Cell_io.PLC_life;",
+            ] {
+                assert!(xml.contains(watched), "{watched}\n{xml}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_tags_for_tia_portal_leave_out_signals_that_lie_elsewhere_in_the_plc() {
+    let sections = "[[signal]]\nname = \"Run\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"Count\"\naddress = \"%QW2\"\n";
+    for (bus, at) in [
+        ("s7-client\"\naddress = \"192.168.0.1", "DB20,W8"),
+        ("modbus-client", "400021"),
+    ] {
+        let config = config(
+            &format!("kind = \"{bus}\"\n[fieldbus.at]\n\"Count\" = \"{at}\""),
+            sections,
+        );
+        let made = export(&config, Target::S71500).expect("sources");
+        let text = |ending: &str| {
+            let mut files = made.files.iter();
+            &files
+                .find(|file| file.name.ends_with(ending))
+                .expect(ending)
+                .text
+        };
+        assert!(
+            text(".sdf").contains("\"Run\",\"%Q0.0\""),
+            "{}",
+            text(".sdf")
+        );
+        assert!(!text(".sdf").contains("Count"), "{}", text(".sdf"));
+        assert!(text("README.txt").contains("all signals but those of [fieldbus.at]"));
+    }
+}
+
+#[test]
+fn a_program_to_host_is_refused_where_it_would_not_compile_or_not_run() {
+    let of = |fieldbus: &str, sections: &str| {
+        let made = export(
+            &config(
+                &format!("kind = \"loopback\"\nlink = \"cell\"\n{fieldbus}"),
+                sections,
+            ),
+            Target::OpenPlc,
+        );
+        made.expect_err("refused").to_string()
+    };
+    for (life, beat) in [(1, 2), (2, 1)] {
+        let told = of(
+            LIFE,
+            &format!(
+                "[[signal]]\nname = \"PLC life\"\naddress = \"%QW{life}\"\n[[signal]]\nname = \"Beat\"\naddress = \"%IW{beat}\"\n"
+            ),
+        );
+        assert!(
+            told.ends_with("give it an address whose byte is a multiple of 2"),
+            "{told}"
+        );
+    }
+    let told = of(
+        "",
+        "[[station]]\nname = \"a\"\n[[station]]\nname = \"b\"\n\
+         [[signal]]\nname = \"x\"\naddress = \"%IX0.0\"\nstation = \"a\"\n\
+         [[signal]]\nname = \"y\"\naddress = \"%IX0.0\"\nstation = \"b\"\n",
+    );
+    assert!(told.contains("this file has several stations"), "{told}");
+}

@@ -151,3 +151,87 @@ fn wrong_addresses_types_and_directions_of_a_client_are_told_with_their_places()
         "{told}"
     );
 }
+
+/// The places and texts of what is left out when the wrong lines are.
+fn left_out(text: &str) -> Vec<String> {
+    let reading = Reading {
+        lenient: true,
+        ..Reading::default()
+    };
+    let imported = import("tags.csv", text.as_bytes(), reading).expect("the rest");
+    let skipped = imported.skipped.iter();
+    skipped
+        .map(|mistake| format!("{:?} {}", mistake.place.expect("a place"), mistake.what))
+        .collect()
+}
+
+#[test]
+fn a_type_that_contradicts_its_address_is_told_at_its_cell() {
+    for (address, kind) in [
+        ("holding-register:21:UINT", "REAL"),
+        ("%DB10.DBW2:INT", "UINT"),
+        ("%DB10.DBD4:REAL", "DINT"),
+    ] {
+        let told = left_out(&format!(
+            "name;address;type\nA;{address};{kind}\nB;{address};\n"
+        ));
+        assert_eq!(told.len(), 1, "{told:?}");
+        assert!(
+            told[0].starts_with(&format!("(2, {})", 4 + address.len())),
+            "{told:?}"
+        );
+        assert!(
+            told[0].contains(&format!("{kind} is not the type")),
+            "{told:?}"
+        );
+    }
+    // What is no type is a comment.
+    assert_eq!(
+        signals(&read("Level;holding-register:21:UINT;in the tank\n")).len(),
+        1
+    );
+}
+
+#[test]
+fn what_the_bus_would_refuse_is_told_at_its_cell_and_left_out_when_asked_for() {
+    let told = left_out(
+        "name;address;type;direction\n\
+         Half;400021;USINT;\nLow;400022.0;USINT;\nHigh;400022.8;BYTE;\n\
+         Ambient;300007;INT;WO\nSecond;400023.4;BYTE;\n",
+    );
+    assert_eq!(
+        told,
+        [
+            "(2, 13) USINT does not fit \"400021\": the one has 8 bits, the other 16",
+            "(5, 20) the simulation cannot write \"300007\"",
+            "(6, 17) BYTE does not fit \"400023.4\": the one has 8 bits, the other 1",
+        ]
+    );
+}
+
+#[test]
+fn an_input_of_the_cpu_is_written_even_where_the_list_only_reads_it() {
+    let imported = read("name;address;type;direction\nDoor;%I0.3:BOOL;;RO\nLamp;%Q1.0:BOOL;;RO\n");
+    assert_eq!(
+        signals(&imported),
+        expected(&[("Door", "%IX0.0", "BOOL"), ("Lamp", "%QX0.0", "BOOL")])
+    );
+}
+
+#[test]
+fn a_falling_scale_of_kepserver_is_kept() {
+    let heading = "Tag Name,Address,Data Type,Respect Data Type,Client Access,Scan Rate,Scaling,Raw Low,Raw High,Scaled Low,\
+                   Scaled High,Scaled Data Type,Clamp Low,Clamp High,Eng Units,Description,Negate Value\n";
+    let imported = read(&format!(
+        "{heading}\"Level\",400021,Word,1,RO,100,Linear,0,27648,100,0,Double,0,0,\"\",\"\",0\n"
+    ));
+    assert!(
+        imported.text.contains("value = [100.0, 0.0]"),
+        "{}",
+        imported.text
+    );
+    let flat = told(&format!(
+        "{heading}\"Level\",400021,Word,1,RO,100,Linear,0,27648,5,5,Double,0,0,\"\",\"\",0\n"
+    ));
+    assert!(flat.contains("the linear scale has wrong values"), "{flat}");
+}

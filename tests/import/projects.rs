@@ -150,3 +150,51 @@ fn broken_foreign_and_malicious_xml_is_refused_with_its_place() {
     );
     assert!(!told(&deep).is_empty());
 }
+
+#[test]
+fn local_variables_of_one_name_get_that_of_their_program_in_front() {
+    let pou = |name: &str, address: &str| {
+        format!(
+            "<pou name=\"{name}\" pouType=\"program\"><interface><localVars><variable name=\"Start\" address=\"{address}\">\
+             <type><BOOL/></type></variable></localVars></interface></pou>"
+        )
+    };
+    let text = format!(
+        "<project><types><pous>{}{}</pous></types></project>",
+        pou("Left", "%IX0.0"),
+        pou("Right", "%IX0.1")
+    );
+    let names = |imported: &Imported| {
+        let signals = signals(imported).into_iter();
+        signals.map(|(name, ..)| name).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&read("plant.xml", &text)), ["Start", "Right.Start"]);
+
+    let program = |name: &str, point: usize| {
+        format!(
+            "<Program Name=\"{name}\"><Tags><Tag Name=\"Start\" TagType=\"Alias\" AliasFor=\"Local:1:I.Data.{point}\"/></Tags></Program>"
+        )
+    };
+    let text = format!(
+        "<RSLogix5000Content><Controller><Programs>{}{}</Programs></Controller></RSLogix5000Content>",
+        program("Left", 0),
+        program("Right", 1)
+    );
+    assert_eq!(names(&read("cell.L5X", &text)), ["Start", "Right.Start"]);
+}
+
+#[test]
+fn modules_whose_names_begin_with_i_have_outputs_all_the_same() {
+    let text = "<RSLogix5000Content><Controller><Tags>\
+                <Tag Name=\"a\" TagType=\"Alias\" DataType=\"BOOL\" AliasFor=\"Rack:Inlet:O.Data.0\"/>\
+                <Tag Name=\"b\" TagType=\"Alias\" DataType=\"BOOL\" AliasFor=\"Rack:Outlet:I1[2].0\"/>\
+                <Tag Name=\"c\" TagType=\"Alias\" DataType=\"BOOL\" AliasFor=\"Rack:Inlet.Data.0\"/>\
+                </Tags></Controller></RSLogix5000Content>";
+    let imported = read("cell.L5X", text);
+    let found: Vec<_> = signals(&imported)
+        .into_iter()
+        .map(|(name, address, _)| format!("{name} {address}"))
+        .collect();
+    assert_eq!(found, ["a %QX0.0", "b %IX0.0"]);
+    assert!(imported.skipped[0].what.contains("\"c\" the first"));
+}

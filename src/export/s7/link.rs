@@ -223,6 +223,11 @@ pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
         Options::Socket(options) => socket::steps(plan, options),
         Options::S7Server(_) => s7comm::steps_for_puts_and_gets(),
         Options::S7Client(options) => s7comm::steps_for_nothing(plan, options),
+        Options::OpcuaClient(_) => vec![format!(
+            "In the CPU's properties activate the OPC UA server and its licence. Share \"{}\" and \"{}\": accessible from OPC UA, \
+             and the inputs writable. In driver.cfg let node_pattern name their members.",
+            plan.outputs.block, plan.inputs.block
+        )],
         _ => Vec::new(),
     }
 }

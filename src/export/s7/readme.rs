@@ -1,6 +1,6 @@
 //! What to do with the files in TIA Portal, step by step.
 
-use super::{Plan, head_lines, line, link};
+use super::{Plan, head_lines, line, link, tags};
 
 /// The README.
 pub(super) fn text(plan: &Plan<'_>, notes: &[String]) -> String {
@@ -10,6 +10,9 @@ pub(super) fn text(plan: &Plan<'_>, notes: &[String]) -> String {
         line(&mut text, &head);
     }
     line(&mut text, "");
+    let images = [&plan.inputs, &plan.outputs];
+    let mut places = images.into_iter().flat_map(|image| &image.record.places);
+    let is_any_elsewhere = places.any(|place| tags::is_elsewhere(plan, place.signal));
     let mut steps = vec![format!(
         "External source files > Add new external file: {prefix}_1_data.scl, {prefix}_2_link.scl, {prefix}_3_copy.scl. \
          Generate blocks from source, in this order."
@@ -33,7 +36,12 @@ pub(super) fn text(plan: &Plan<'_>, notes: &[String]) -> String {
          them out of the hardware configuration, or switch their power off."
             .to_owned(),
         format!(
-            "{prefix}_tags.sdf has the tags of all signals: PLC tags > Import, into a tag table of its own."
+            "{prefix}_tags.sdf has the tags of all signals{}: PLC tags > Import, into a tag table of its own.",
+            if is_any_elsewhere {
+                " but those of [fieldbus.at], which lie where the program has them"
+            } else {
+                ""
+            }
         ),
     ]);
     for (number, step) in steps.iter().enumerate() {

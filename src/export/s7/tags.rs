@@ -10,13 +10,24 @@ use crate::export::File;
 use crate::export::record::Place;
 use crate::export::siemens::{address, spelling};
 use crate::export::symbols::comment;
-use crate::signal::{Area, DataType, Width};
+use crate::fieldbus::Options;
+use crate::signal::{Area, DataType, Signal, Width};
 
-/// The file.
+/// Whether a signal lies where `[fieldbus.at]` says, and not at its address.
+pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
+    match &plan.config.bus {
+        Options::S7Client(options) => options.variables.contains_key(&signal.name),
+        Options::ModbusClient(options) => options.at.contains_key(&signal.name),
+        _ => false,
+    }
+}
+
+/// The file. Signals that lie elsewhere have their tags in the PLC's program already.
 pub(super) fn file(plan: &Plan<'_>) -> File {
     let mut text = String::new();
     for (image, area) in [(&plan.inputs, Area::Input), (&plan.outputs, Area::Output)] {
-        for place in &image.record.places {
+        let places = image.record.places.iter();
+        for place in places.filter(|place| !is_elsewhere(plan, place.signal)) {
             let comment = comment(place, area);
             let name = &place.signal.name;
             if place.data_type().width() != Width::Long {

@@ -67,16 +67,21 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
             .chain(life_names),
     );
     let records = records(config, aligned, &mut names);
-    let [bring, take] = copies(
-        &records,
-        &|name| format!("{list}.{name}"),
-        &|register| format!("{list}.In[{register}]"),
-        &|register| format!("{list}.Out[{register}]"),
-    );
+    let [bring, take] = if link.is_by_name {
+        Default::default()
+    } else {
+        copies(
+            &records,
+            &|name| format!("{list}.{name}"),
+            &|register| format!("{list}.In[{register}]"),
+            &|register| format!("{list}.Out[{register}]"),
+        )
+    };
     let is_known = link.globals.iter().any(|own| own.name == ALIVE);
     let life = Life::of(
         config,
         &records,
+        &kind,
         &|name| format!("{list}.{name}"),
         [&format!("{list}.{ALIVE}"), &format!("{list}.Simulated")],
         is_known,
@@ -89,10 +94,8 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
     }
     let is_real = |place: &Place<'_>| place.data_type() == DataType::Real;
     let mut units = Vec::new();
-    if records
-        .iter()
-        .any(|record| record.places.iter().any(is_real))
-    {
+    let mut places = records.iter().flat_map(|record| &record.places);
+    if !link.is_by_name && places.any(is_real) {
         units.extend(functions());
     }
     let mut lines = link.before.lines.clone();
@@ -127,7 +130,12 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
         "copy the variables to the real outputs here; while simulated they stay as they are",
     ));
     lines.extend(link.after.lines.clone());
-    let mut locals: Vec<Variable> = temporaries(&records[1])
+    let needed = if link.is_by_name {
+        Vec::new()
+    } else {
+        temporaries(&records[1])
+    };
+    let mut locals: Vec<Variable> = needed
         .into_iter()
         .map(|(name, kind)| variable(name, Kind::Basic(kind)))
         .collect();
@@ -158,13 +166,20 @@ pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
         editor.import()
     )];
     steps.extend(link.steps);
-    steps.extend([
-        format!("In the task of your program, call {begin} first and {end} last."),
+    steps.push(format!(
+        "In the task of your program, call {begin} first and {end} last."
+    ));
+    steps.push(if link.is_by_name {
+        format!(
+            "Your program reads and writes {list}.NAME, which OPC UA carries at any time. While {list}.Simulated is TRUE, the \
+             real inputs and outputs are left out; FALSE is its start value."
+        )
+    } else {
         format!(
             "Your program reads and writes {list}.NAME. While {list}.Simulated is TRUE, they come from the simulation and go \
              to it; while it is FALSE, its start value, neither is copied."
-        ),
-    ]);
+        )
+    });
     let mut readme = about;
     readme.push(String::new());
     let numbered = steps.iter().enumerate();
@@ -212,7 +227,7 @@ fn globals(records: &[Record<'_>; 2], link: &Link) -> Vec<Variable> {
     all.extend(link.globals.clone());
     for (record, name, way) in [(&records[0], "In", "from"), (&records[1], "Out", "to")] {
         let count = record.bytes.div_ceil(2);
-        if count > 0 {
+        if count > 0 && !link.is_by_name {
             let comment = format!(
                 "registers {way} the simulation: n holds bytes 2n and 2n + 1 of the record, the first one is the high byte"
             );

@@ -1,7 +1,6 @@
 //! Signs of life: the heartbeat of the simulation, which the program watches, and the signal that the simulation watches,
 //! which the program counts up.
 
-use super::registers::kind;
 use crate::driver::Config;
 use crate::export::record::{Place, Record};
 use crate::fieldbus::Role;
@@ -37,11 +36,12 @@ pub(super) fn declared(config: &Config) -> impl Iterator<Item = String> {
 }
 
 impl Life {
-    /// `variable` is how the program writes the variable of a signal; `alive` and `simulated` are those of these names;
+    /// `kind` is the type of a signal's variable, and `variable` how the program writes it; `alive` and `simulated` are those of these names;
     /// `is_known` says that `alive` tells already whether anything comes.
     pub(super) fn of(
         config: &Config,
         records: &[Record<'_>; 2],
+        kind: &dyn Fn(&Place<'_>) -> DataType,
         variable: &dyn Fn(&str) -> String,
         [alive, simulated]: [&str; 2],
         is_known: bool,
@@ -87,7 +87,7 @@ impl Life {
         let watched = watched.filter_map(|alive| place(alive.signal));
         let outputs = watched.filter(|place| place.signal.area == Role::Device.areas().1);
         life.after = outputs
-            .map(|place| counted(place, &variable(&place.name)))
+            .map(|place| counted(kind(place), &variable(&place.name)))
             .collect();
         life
     }
@@ -99,8 +99,8 @@ impl Life {
 }
 
 /// The statement that makes a value another one, in whatever type it has.
-fn counted(place: &Place<'_>, name: &str) -> String {
-    let (unsigned, own) = match kind(place) {
+fn counted(data_type: DataType, name: &str) -> String {
+    let (unsigned, own) = match data_type {
         DataType::Bool => return format!("{name} := NOT {name};"),
         DataType::Real | DataType::Lreal => return format!("{name} := 1.0 - {name};"),
         DataType::Usint | DataType::Uint | DataType::Udint | DataType::Ulint => {

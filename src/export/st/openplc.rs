@@ -35,7 +35,7 @@ pub(in crate::export) fn export(config: &Config) -> Result<Export, Mistakes> {
     let text = match &config.bus {
         Options::ModbusServer(options) => polled::text(config, options, &mut notes)?,
         Options::ModbusClient(options) => served::text(config, options)?,
-        Options::Loopback(_) | Options::Socket(_) => hosted::text(config, &mut notes),
+        Options::Loopback(_) | Options::Socket(_) => hosted::text(config, &mut notes)?,
         Options::S7Client(_) => {
             return Err(refusal(
                 config,

@@ -64,6 +64,14 @@ impl FromStr for Spot {
         };
         let (rest, bit) = match rest.rsplit_once('.') {
             None => (rest, None),
+            // "DB10.DBW0" is no register with a bit.
+            Some((_, digits)) if digits.starts_with(|c: char| c.is_ascii_alphabetic()) => {
+                return Err(wrong(
+                    format!("\"{}\" is no place in a table", shown(text)),
+                    "an address of an S7 needs kind = \"s7-client\"; for a Modbus device write \"holding-register:21\", \
+                     \"4x00021\" or \"400021\"",
+                ));
+            }
             Some((rest, digits)) => {
                 let is_number = matches!(digits.len(), 1 | 2)
                     && digits.bytes().all(|digit| digit.is_ascii_digit());
@@ -210,6 +218,7 @@ mod tests {
             ("400021.", "go from 0, the lowest, to 15"),
             ("400021.+5", "go from 0, the lowest, to 15"),
             ("coil:5.3", "one bit itself"),
+            ("DB10.DBW0", "\"s7-client\""),
             ("%MW65536", "offsets go from 0 to 65535"),
             ("%MD20", "the first %MW"),
             ("%MWx", "%MW20.5"),

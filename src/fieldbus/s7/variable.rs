@@ -111,14 +111,29 @@ impl FromStr for Variable {
             Some((bare, word)) => (bare, Some(kind(word).ok_or_else(wrong)?)),
             None => (bare, None),
         };
-        let (object, inner) = split(bare).ok_or_else(wrong)?;
+        let (object, inner) = split(bare).ok_or_else(|| match block(bare) {
+            Some((digits, _)) if number(digits, usize::from(u16::MAX)).is_none_or(|n| n == 0) => {
+                format!(
+                    "\"{}\" names DB{digits}; data blocks go from 1 to 65535",
+                    shown(text)
+                )
+            }
+            _ => wrong(),
+        })?;
         let digits = inner.find(|c: char| c.is_ascii_digit()).ok_or_else(wrong)?;
         let (code, place) = inner.split_at(digits);
         let (byte, bit) = match place.split_once('.') {
             None => (place, None),
             Some((byte, bit)) => (byte, Some(number(bit, 7).ok_or_else(wrong)?)),
         };
-        let byte = number(byte, LAST).ok_or_else(wrong)?;
+        let beyond = || {
+            format!(
+                "\"{}\" reaches beyond byte {LAST}, which is the last one",
+                shown(text)
+            )
+        };
+        let is_number = !byte.is_empty() && byte.bytes().all(|byte| byte.is_ascii_digit());
+        let byte = number(byte, LAST).ok_or_else(|| if is_number { beyond() } else { wrong() })?;
         let within = match (code, bit, stated) {
             // No letter: a bit, or what the type says.
             ("", Some(_), None) => Kind::plain(Width::Bit),
@@ -144,7 +159,7 @@ impl FromStr for Variable {
             _ => return Err(wrong()),
         };
         if byte + width.bytes() > LAST + 1 {
-            return Err(wrong());
+            return Err(beyond());
         }
         Ok(Self {
             object,
@@ -199,7 +214,7 @@ fn kind(word: &str) -> Option<Kind> {
 
 /// The object that an address begins with, and the rest of it.
 fn split(text: &str) -> Option<(Object, &str)> {
-    let Some(block) = text.strip_prefix("DB") else {
+    let Some((digits, rest)) = block(text) else {
         let object = match text.chars().next()? {
             'I' => Object::Inputs,
             'Q' => Object::Outputs,
@@ -209,14 +224,20 @@ fn split(text: &str) -> Option<(Object, &str)> {
         };
         return Some((object, &text[1..]));
     };
-    let end = block.find(|c: char| !c.is_ascii_digit())?;
-    let (digits, rest) = block.split_at(end);
     let rest = match rest.strip_prefix(".DB") {
         Some(rest) => rest,
         None => rest.strip_prefix([',', ':', '.'])?,
     };
     let block = number(digits, usize::from(u16::MAX)).filter(|block| *block > 0)?;
     Some((Object::Block(u16::try_from(block).ok()?), rest))
+}
+
+/// The digits behind `DB`, and what follows them.
+fn block(text: &str) -> Option<(&str, &str)> {
+    let block = text.strip_prefix("DB")?;
+    let end = block.find(|c: char| !c.is_ascii_digit());
+    let (digits, rest) = block.split_at(end.unwrap_or(block.len()));
+    (!digits.is_empty()).then_some((digits, rest))
 }
 
 /// A whole number without a sign, up to `last`.
@@ -303,5 +324,14 @@ mod tests {
         }
         let why = "DB1.DBW0:REAL".parse::<Variable>().expect_err("16 and 32");
         assert!(why.contains("16 bits with a type of 32"), "{why}");
+        for (text, range) in [
+            ("DB0.DBW3", "from 1 to 65535"),
+            ("DB65536.DBW0", "from 1 to 65535"),
+            ("DB10.DBW70000", "beyond byte 65535"),
+            ("DB10.DBW65535", "beyond byte 65535"),
+        ] {
+            let why = text.parse::<Variable>().expect_err(text);
+            assert!(why.contains(range), "{why}");
+        }
     }
 }

@@ -33,6 +33,8 @@ pub(super) struct Link {
     pub(super) steps: Vec<String>,
     /// What a person should know.
     pub(super) notes: Vec<String>,
+    /// The variables of signals come and go by themselves: there are no registers to copy from and to.
+    pub(super) is_by_name: bool,
 }
 
 /// What the texts for records over TCP need to know.
@@ -67,10 +69,12 @@ impl Link {
                     cycle: config.timing.cycle.unwrap_or(CYCLE),
                     max_age: config.timing.max_age,
                 };
-                match editor {
+                let mut link = match editor {
                     Editor::Codesys => socket::link(&stream),
                     Editor::TwinCat => tcpip::link(&stream),
-                }
+                };
+                link.notes.extend(loopback_note(&options.address));
+                link
             }
             Options::ModbusServer(options) => modbus::link(config, options, editor, list),
             Options::ModbusClient(options) if editor == Editor::Codesys && options.at.is_empty() => Self::of_steps([
@@ -81,10 +85,14 @@ impl Link {
                 "So in driver.cfg write inputs = \"holding-register offset:0\" and outputs = \"input-register offset:0\"."
                     .to_owned(),
             ]),
-            Options::OpcuaClient(_) | Options::OpcuaServer(_) => Self::of_steps([format!(
-                "OPC UA carries the variables themselves: share {list} with its server (in CODESYS the symbol configuration, \
-                 in TwinCAT the attribute OPC.UA.DA). The registers In and Out and the two programs are not needed then."
-            )]),
+            // Registers that nothing fills would wipe what OPC UA has written.
+            Options::OpcuaClient(_) | Options::OpcuaServer(_) => Self {
+                is_by_name: true,
+                ..Self::of_steps([format!(
+                    "OPC UA carries the variables themselves: share {list} with its server (in CODESYS the symbol \
+                     configuration, in TwinCAT the attribute OPC.UA.DA). The registers In and Out of other buses are not there."
+                )])
+            },
             bus => {
                 let kind = bus.kind();
                 let mut link = Self::of_steps([format!(
@@ -134,6 +142,20 @@ pub(super) fn dialled(address: &Address) -> String {
         Host::Ip(_) => "192.168.0.20".to_owned(),
         Host::Name(name) => name.clone(),
     }
+}
+
+/// What is to be known of an address that the PLC can reach only on the computer of the simulation itself.
+pub(super) fn loopback_note(address: &Address) -> Option<String> {
+    let is_loopback = match &address.host {
+        Host::Ip(ip) => ip.is_loopback(),
+        Host::Name(name) => name.eq_ignore_ascii_case("localhost"),
+    };
+    is_loopback.then(|| {
+        format!(
+            "the address {address} is reached from the simulation's computer alone: a PLC elsewhere needs that computer's own, \
+             in driver.cfg and here"
+        )
+    })
 }
 
 /// What tells that nothing came for too long.

@@ -1,7 +1,7 @@
 //! The editor's own Modbus client, which is set in the device tree (CODESYS), or called (TwinCAT's TF6250).
 
 use super::Editor;
-use super::link::{Link, dialled};
+use super::link::{Link, dialled, loopback_note};
 use crate::driver::Config;
 use crate::export::st::telegrams::Telegrams;
 use crate::fieldbus::modbus::{Line, ServerOptions};
@@ -27,7 +27,9 @@ pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, lis
                 dialled(address),
                 address.port
             ),
-            "Take FB_MBReadInputRegs and no read of holding registers: those are the PLC's own outputs here.".to_owned(),
+            "Take FB_MBReadInputRegs and no read of holding registers: those are the PLC's own outputs here, unless \
+             they begin at 1024 (`inputs`)."
+                .to_owned(),
         ],
         (Line::Serial(serial), Editor::TwinCat) => vec![format!(
             "Install TF6255 (Modbus RTU) with its licence on the target, {}; for each line below call ReadInputRegs and \
@@ -54,9 +56,13 @@ pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, lis
     if editor == Editor::Codesys {
         steps.push(
             "Do not take function code 23 for both: its read half reads holding registers, which are the PLC's own \
-             outputs here."
+             outputs here, unless they begin at 1024 (`inputs`)."
                 .to_owned(),
         );
     }
-    Link::of_steps(steps)
+    let mut link = Link::of_steps(steps);
+    if let Line::Tcp(address) = &options.line {
+        link.notes.extend(loopback_note(address));
+    }
+    link
 }

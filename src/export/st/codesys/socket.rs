@@ -30,6 +30,7 @@ pub(super) fn link(stream: &Stream<'_>) -> Link {
             ),
         ],
         notes: Vec::new(),
+        is_by_name: false,
     }
 }
 

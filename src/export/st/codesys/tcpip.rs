@@ -32,6 +32,7 @@ pub(super) fn link(stream: &Stream<'_>) -> Link {
                 .to_owned(),
         ],
         notes: Vec::new(),
+        is_by_name: false,
     }
 }
 

@@ -1,13 +1,23 @@
 //! A program that tickbus itself hosts: located variables are the image.
 
 use super::{COMPILED, EDITOR, configuration, declared, program, remarks};
+use crate::config::Mistakes;
 use crate::driver::Config;
 use crate::export::record::Place;
 use crate::export::st::life::{self, ALIVE, Life};
 use crate::export::st::{add, comment, records, source, taken};
-use crate::signal::DataType;
+use crate::signal::{DataType, Signal};
 
-pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
+pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> Result<String, Mistakes> {
+    let wrong = |what: String, right: &str| {
+        Mistakes::of_file(&config.path.display().to_string(), what, right)
+    };
+    if config.table.stations.len() > 1 {
+        return Err(wrong(
+            "a hosted program is one PLC, and this file has several stations".to_owned(),
+            "export from a driver.cfg for each program, with the signals of its station",
+        ));
+    }
     let mut names = taken(declared(config).chain(life::declared(config)));
     let records = records(config, 1, &mut names);
     let mut text = source(
@@ -42,6 +52,18 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
                 );
                 continue;
             }
+            if is_life_sign(config, place.signal) {
+                let size = place.size();
+                return Err(wrong(
+                    format!(
+                        "\"{}\" is a sign of life at {}: the program counts with elements, and none of {size} bytes begins \
+                         there",
+                        place.signal.name,
+                        place.signal.address()
+                    ),
+                    &format!("give it an address whose byte is a multiple of {size}"),
+                ));
+            }
             odd += 1;
             for number in 0..place.size() {
                 let remark = if number == 0 { remark.as_str() } else { "" };
@@ -61,7 +83,14 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
             "{odd} signals do not begin at a multiple of their size, where no element does: they are there as bytes"
         ));
     }
-    let life = Life::of(config, &records, &str::to_owned, [ALIVE, "TRUE"], false);
+    let life = Life::of(
+        config,
+        &records,
+        &|place| place.data_type(),
+        &str::to_owned,
+        [ALIVE, "TRUE"],
+        false,
+    );
     if life.is_beating() {
         add(&mut text, "  VAR");
         add(
@@ -85,7 +114,15 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> String {
     add(&mut text, "  RETURN;");
     add(&mut text, "END_PROGRAM");
     configuration(&mut text, config);
-    text
+    Ok(text)
+}
+
+/// Whether one of both ends counts a signal up.
+fn is_life_sign(config: &Config, signal: &Signal) -> bool {
+    let signs = &config.life_signs;
+    let beats = signs.heartbeat.iter().map(|beat| beat.signal);
+    let mut counted = signs.alive.iter().map(|alive| alive.signal).chain(beats);
+    counted.any(|index| std::ptr::eq(&raw const config.table.signals[index], signal))
 }
 
 /// The address of a signal, counted in elements of its size; `None` where it begins between two of them.

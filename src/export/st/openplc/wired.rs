@@ -77,6 +77,7 @@ pub(super) fn text(config: &Config, wires: &Wires) -> String {
     let life = Life::of(
         config,
         &records,
+        &kind,
         &str::to_owned,
         [ALIVE, "Simulated"],
         false,

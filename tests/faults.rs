@@ -224,6 +224,28 @@ fn a_cable_that_is_pulled_makes_the_data_stale_and_comes_back_true_stepped() {
     );
 }
 
+#[test]
+fn a_line_that_was_in_trouble_when_its_cable_was_pulled_runs_for_its_own_reason_afterwards() {
+    let mut bus = Stepped::with("", "alive = { signal = \"speed\", within = \"50ms\" }");
+    bus.count(3);
+    let running = bus.end.link();
+    assert_eq!(running.state, LinkState::Running);
+    (0..10).for_each(|_| {
+        bus.tick();
+    });
+    assert_eq!(bus.end.link().cause, Cause::Frozen);
+    let cable = inject(&mut bus.end, DOWN);
+    bus.tick();
+    assert_eq!(bus.end.link().cause, Cause::Injected);
+    assert!(bus.end.driver.end_fault(cable));
+    bus.count(5);
+    let link = bus.end.link();
+    assert_eq!(
+        (link.state, link.reason),
+        (LinkState::Running, running.reason)
+    );
+}
+
 /// Pulls the cable of a running line, waits until both ends have noticed, and plugs it in again.
 fn pulls_the_cable(bus: &impl Bus) {
     let mut rig = Rig::new(bus);

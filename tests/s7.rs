@@ -538,6 +538,11 @@ fn a_signal_is_read_where_its_line_says_and_else_in_its_area() {
 
 /// A machine with two stations in data blocks 5 and 7 of `cpu`.
 fn machine_of_two(cpu: Cpu) -> (Alone, Arc<Mutex<Cpu>>) {
+    machine_with(cpu, "output = \"DB7\"", "%QB0")
+}
+
+/// The same, whose right station lies elsewhere, as does its signal.
+fn machine_with(cpu: Cpu, right: &str, address: &str) -> (Alone, Arc<Mutex<Cpu>>) {
     logged::expect("nothing is written into the PLC");
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let at = listener.local_addr().expect("it is bound");
@@ -546,9 +551,9 @@ fn machine_of_two(cpu: Cpu) -> (Alone, Arc<Mutex<Cpu>>) {
     let machine = Alone::open(&format!(
         "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\ncycle = \"1ms\"\n\
          max_age = \"300ms\"\nreconnect = [\"10ms\"]\n\
-         [[station]]\nname = \"left\"\noutput = \"DB5\"\n[[station]]\nname = \"right\"\noutput = \"DB7\"\n\
+         [[station]]\nname = \"left\"\noutput = \"DB5\"\n[[station]]\nname = \"right\"\n{right}\n\
          [[signal]]\nname = \"l\"\nstation = \"left\"\naddress = \"%QB0\"\nfail_safe = 99\n\
-         [[signal]]\nname = \"r\"\nstation = \"right\"\naddress = \"%QB0\"\nfail_safe = 99\n"
+         [[signal]]\nname = \"r\"\nstation = \"right\"\naddress = \"{address}\"\nfail_safe = 99\n"
     ));
     (machine, cpu)
 }
@@ -562,7 +567,7 @@ fn a_cpu_in_stop_is_stale_with_that_cause_until_it_runs() {
     let (mut machine, cpu) = machine_of_two(Cpu {
         blocks: vec![5, 7],
         state: Some(0x04),
-        asked: 0,
+        ..Cpu::default()
     });
     machine.until("it is in STOP from the beginning", |end| {
         end.link().cause.name() == "stopped"
@@ -590,7 +595,7 @@ fn a_cpu_that_does_not_tell_its_state_is_asked_once_a_connection() {
     let (mut machine, cpu) = machine_of_two(Cpu {
         blocks: vec![5, 7],
         state: None,
-        asked: 0,
+        ..Cpu::default()
     });
     machine.until("values come", |end| both(end) == (5.0, 7.0));
     for _ in 0..1000 {
@@ -608,7 +613,7 @@ fn a_station_of_which_something_is_refused_is_stale_alone_and_tried_again() {
     let (mut machine, cpu) = machine_of_two(Cpu {
         blocks: vec![5],
         state: Some(8),
-        asked: 0,
+        ..Cpu::default()
     });
     machine.until("one station is served, the other one told", |end| {
         let told = end
@@ -631,6 +636,102 @@ fn a_station_of_which_something_is_refused_is_stale_alone_and_tried_again() {
     machine.until("the other one is left out", |end| both(end) == (99.0, 7.0));
     cpu.lock().expect("no panic").blocks = Vec::new();
     assert_eq!(machine.until_reason("refuses reading DB"), "refused");
+}
+
+#[test]
+fn a_station_that_works_after_a_reconnect_is_not_told_as_refused_any_more() {
+    logged::expect("it is stale, and is tried again");
+    let (mut machine, cpu) = machine_of_two(Cpu {
+        blocks: vec![5],
+        state: Some(8),
+        ..Cpu::default()
+    });
+    machine.until("one station is refused", |end| {
+        end.driver
+            .statistics()
+            .contains("refused=station \"right\"")
+    });
+    cpu.lock().expect("no panic").hangs_up = true;
+    machine.until("the connection is gone", |end| {
+        end.statistic("link.failed") != "0"
+    });
+    let mut one = cpu.lock().expect("no panic");
+    (one.hangs_up, one.blocks) = (false, vec![5, 7]);
+    drop(one);
+    machine.until("both are served", |end| both(end) == (5.0, 7.0));
+    assert_eq!(machine.end.statistic("refused"), "nothing");
+}
+
+#[test]
+fn a_station_of_which_nothing_is_read_is_fresh_again_after_a_stop() {
+    let (mut machine, cpu) = machine_with(
+        Cpu {
+            blocks: vec![5],
+            state: Some(4),
+            ..Cpu::default()
+        },
+        "input = \"DB7\"",
+        "%IB0",
+    );
+    machine.until("it is in STOP", |end| end.link().cause.name() == "stopped");
+    cpu.lock().expect("no panic").state = Some(8);
+    machine.until("all of it is fresh", |end| {
+        end.tick().code != Code::Stale && end.link().cause.name() == "running"
+    });
+    assert_eq!(machine.end.get("l"), 5.0);
+}
+
+#[test]
+fn cycles_that_send_nothing_do_not_keep_a_station_fresh() {
+    logged::expect("it is stale, and is tried again");
+    let (mut machine, _cpu) = machine_with(
+        Cpu {
+            state: Some(8),
+            ..Cpu::default()
+        },
+        "input = \"DB7\"",
+        "%IB0",
+    );
+    let cause = machine.until_reason("station \"right\" for");
+    assert_eq!(cause, "silent");
+}
+
+#[test]
+fn a_stop_said_before_a_reconnect_is_forgotten_when_it_cannot_be_asked_for_any_more() {
+    logged::expect("does not say whether it is in RUN");
+    let (mut machine, cpu) = machine_of_two(Cpu {
+        blocks: vec![5, 7],
+        state: Some(4),
+        ..Cpu::default()
+    });
+    machine.until("it is in STOP", |end| end.link().cause.name() == "stopped");
+    // It is replaced by one that hangs up when it is asked for a list.
+    cpu.lock().expect("no panic").hangs_up = true;
+    machine.until("its values count", |end| both(end) == (5.0, 7.0));
+    assert_eq!(machine.end.statistic("cpu"), "unknown");
+}
+
+#[test]
+fn a_cpu_in_stop_that_once_refuses_to_say_so_stays_in_stop() {
+    let (mut machine, cpu) = machine_of_two(Cpu {
+        blocks: vec![5, 7],
+        state: Some(4),
+        ..Cpu::default()
+    });
+    machine.until("it is in STOP", |end| end.link().cause.name() == "stopped");
+    let asked = {
+        let mut cpu = cpu.lock().expect("no panic");
+        cpu.refuses = 2;
+        cpu.asked
+    };
+    machine.until("it is asked on", |end| {
+        assert_eq!(end.tick().code, Code::Stale);
+        assert_eq!(end.statistic("cpu"), "stop");
+        cpu.lock().expect("no panic").asked > asked + 3
+    });
+    cpu.lock().expect("no panic").state = Some(8);
+    machine.until("it runs", |end| both(end) == (5.0, 7.0));
+    assert_eq!(machine.end.statistic("cpu"), "run");
 }
 
 #[test]

@@ -63,16 +63,34 @@ impl Station {
         slots: &mut [Slot],
         map: &SlotMap,
     ) -> Arrival {
-        let decode = &self.decode;
         let valid = self.tick.is_valid();
+        self.receive_as(valid, (now, max_age), slots, map)
+    }
+
+    /// Receives data that were `valid` a moment ago.
+    fn receive_as(
+        &mut self,
+        valid: bool,
+        (now, max_age): (Nanos, Nanos),
+        slots: &mut [Slot],
+        map: &SlotMap,
+    ) -> Arrival {
+        let decode = &self.decode;
         let mut receiver = Receiver {
             decode,
             slots,
             map,
             valid,
         };
-        let arrival = self.tick.read(now, &mut receiver);
-        let stale = !valid || arrival.age > max_age;
+        let mut arrival = self.tick.read(now, &mut receiver);
+        let still_valid = valid && self.tick.is_valid();
+        if valid && !still_valid {
+            // The PLC stopped in between, and this may be its first frame of STOP: it is read once more as that.
+            receiver.valid = false;
+            self.tick.shown_instead();
+            arrival = self.tick.read(now, &mut receiver);
+        }
+        let stale = !still_valid || arrival.age > max_age;
         if stale && (arrival.changed || !self.stale) {
             self.decode.fail_safe(slots);
             self.tick.shown_instead();
@@ -139,5 +157,12 @@ mod tests {
         assert_eq!(shown(bus, false, &[0, 8]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown(bus, false, &[1, 8]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown(bus, true, &[1, 9]), (false, 1.0, 9.0, 0.0));
+        // It stops, and its first frame comes, after the tick has asked whether it runs.
+        bus.set_valid(false);
+        bus.received(Nanos(3), &[0, 8]);
+        station.receive_as(true, (Nanos(3), Nanos(10)), &mut slots, &map);
+        let shown = [0, 1, edges].map(|slot| slots[slot].real());
+        assert!(station.stale);
+        assert_eq!(shown, [0.0, 7.0, 0.0]);
     }
 }

@@ -264,6 +264,11 @@ impl LinkStatus {
         LinkState::ALL[usize::from(self.0.state.load(Ordering::Relaxed)) % LinkState::ALL.len()]
     }
 
+    /// What a running line says of itself; empty before it ran for the first time.
+    pub fn running_reason(&self) -> String {
+        self.lock().running.clone()
+    }
+
     /// How often the line came up.
     pub fn runs(&self) -> u64 {
         self.lock().entered[LinkState::Running as usize]
@@ -298,16 +303,30 @@ impl LinkStatus {
     }
 
     /// Data that arrive do not count, for a cause and a reason in words, or they do again (`None`). A line that is
-    /// running is stale meanwhile; one that is not will be when it comes up.
-    pub fn doubt(&self, now: Nanos, doubt: Option<(Cause, String)>) {
+    /// running is stale meanwhile; one that is not will be when it comes up. These are the `ages` of the stations'
+    /// data: silence is told before a signal that stands still, as nothing can change without data.
+    pub fn doubt(
+        &self,
+        now: Nanos,
+        doubt: Option<(Cause, String)>,
+        ages: impl Iterator<Item = Nanos> + Clone,
+    ) {
         let mut record = self.lock();
         let before = std::mem::replace(&mut record.doubt, doubt);
         if !matches!(record.link.state, LinkState::Running | LinkState::Stale) {
             return;
         }
+        let limit = self.0.max_age;
+        let stale = ages.clone().filter(|age| *age > limit).count();
         let (state, cause, reason) = match (record.doubt.clone(), before) {
+            (Some((Cause::Frozen, _)), _) if record.link.cause == Cause::Silent => return,
             (Some((cause, reason)), _) => (LinkState::Stale, cause, reason),
             (None, Some((cause, _))) if record.link.cause == cause => {
+                if stale > 0 {
+                    let reason = self.0.silence(&record, Nanos::MAX, ages);
+                    self.0.silent(record, now, stale, &reason);
+                    return;
+                }
                 (LinkState::Running, Cause::Running, record.running.clone())
             }
             (None, _) => return,
@@ -316,7 +335,7 @@ impl LinkStatus {
     }
 
     /// Looks at the clock: a running line becomes stale when the newest data of a station, whose `ages` these are,
-    /// are too old, and running again when all are young. Lock-free unless something changes.
+    /// are too old, and running again when all are young and none is in doubt. Lock-free unless something changes.
     pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
         let limit = self.0.max_age;
         let stale = ages.clone().filter(|age| *age > limit).count();
@@ -331,9 +350,13 @@ impl LinkStatus {
             // A line that has only just come up may still have the old data.
             LinkState::Running if shown > limit && stale > 0 => {
                 let reason = self.0.silence(&record, shown, ages);
-                self.0.stale.store(stale, Ordering::Relaxed);
-                let (state, cause) = (LinkState::Stale, Cause::Silent);
-                self.0.enter(record, now, state, cause, &reason);
+                self.0.silent(record, now, stale, &reason);
+            }
+            LinkState::Stale if stale > 0 && record.link.cause == Cause::Frozen => {
+                if shown > limit {
+                    let reason = self.0.silence(&record, Nanos::MAX, ages);
+                    self.0.silent(record, now, stale, &reason);
+                }
             }
             LinkState::Stale if stale > 0 => {
                 self.0.stale.store(stale, Ordering::Relaxed);
@@ -341,9 +364,11 @@ impl LinkStatus {
                     record.link.reason = self.0.silence(&record, Nanos::MAX, ages);
                 }
             }
-            LinkState::Stale if record.doubt.is_none() && !record.is_hung(now) => {
-                let reason = record.running.clone();
-                let (state, cause) = (LinkState::Running, Cause::Running);
+            LinkState::Stale if stale == 0 && !record.is_hung(now) => {
+                let (state, cause, reason) = match record.doubt.clone() {
+                    Some((cause, reason)) => (LinkState::Stale, cause, reason),
+                    None => (LinkState::Running, Cause::Running, record.running.clone()),
+                };
                 self.0.enter(record, now, state, cause, &reason);
             }
             _ => {}
@@ -494,6 +519,12 @@ impl Shared {
         }
     }
 
+    /// The line is stale as the data of so many stations are too old.
+    fn silent(&self, record: MutexGuard<'_, Record>, now: Nanos, stale: usize, reason: &str) {
+        self.enter(record, now, LinkState::Stale, Cause::Silent, reason);
+        self.stale.store(stale, Ordering::Relaxed);
+    }
+
     /// Changes the state, and gives what the log is to know of that.
     fn change(
         &self,
@@ -512,6 +543,8 @@ impl Shared {
         record.entered[state as usize] += 1;
         record.caused[cause as usize] += 1;
         self.state.store(state as u8, Ordering::Relaxed);
+        // What was counted for an earlier silence says nothing of the next one.
+        self.stale.store(0, Ordering::Relaxed);
         let trouble = matches!(state, LinkState::Stale | LinkState::Failed)
             || (state == LinkState::Opening && cause != Cause::Waiting);
         let level = if trouble {

@@ -249,12 +249,16 @@ impl Port {
         }
     }
 
-    /// Says that the peer was alive at `now`.
+    /// Says that the peer was alive at `now`. After a STOP that is over, the data of the station count again from
+    /// then on; where something of it is read, its first frame has to be handed in before.
     pub fn touch(&mut self, station: usize, now: Nanos) {
         let wires = self.troubles.wires();
         // Who is late must not seem alive by what has not come yet.
         if wires.is_none_or(|wires| !wires.is_cut(station) && !wires.holds_back(station)) {
             self.image.stations[station].touch(now);
+            if self.vitals.heard(station) {
+                self.doubt(station, now);
+            }
         }
     }
 
@@ -277,7 +281,9 @@ impl Port {
     fn doubt(&mut self, station: usize, now: Nanos) {
         let is_valid = self.vitals.is_valid(station);
         self.image.stations[station].set_valid(is_valid);
-        self.status.doubt(now, self.vitals.doubt());
+        let stations = self.image.stations.iter();
+        let ages = stations.map(|station| station.peer_age(now));
+        self.status.doubt(now, self.vitals.doubt(), ages);
     }
 
     /// When the port itself has something to do next, for which [`observe`](Self::observe) is to be called;

@@ -78,16 +78,19 @@ impl Troubles {
             (true, beneath) => {
                 self.beneath = Some(beneath.unwrap_or_else(|| {
                     let link = status.link();
-                    // Silence is told by the clock, not by the bus.
-                    let stale = link.state == LinkState::Stale;
-                    Beneath {
-                        state: if stale {
-                            LinkState::Running
-                        } else {
-                            link.state
-                        },
-                        cause: if stale { Cause::Running } else { link.cause },
-                        reason: link.reason,
+                    if link.state == LinkState::Stale {
+                        // Silence is told by the clock, not by the bus.
+                        Beneath {
+                            state: LinkState::Running,
+                            cause: Cause::Running,
+                            reason: status.running_reason(),
+                        }
+                    } else {
+                        Beneath {
+                            state: link.state,
+                            cause: link.cause,
+                            reason: link.reason,
+                        }
                     }
                 }));
                 let reason = format!("the link is down by injected fault: {active}");

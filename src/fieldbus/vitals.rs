@@ -36,7 +36,7 @@ struct Station {
     /// As the driver.cfg names it; empty where there is one.
     name: String,
     plc: Option<PlcState>,
-    /// Its PLC stopped, and has sent nothing since it runs again.
+    /// Its PLC stopped, and nothing has come from it since it runs again.
     is_stopped: bool,
 }
 
@@ -132,10 +132,15 @@ impl Vitals {
                 changes |= watched.arrived(now, frame);
             }
         }
+        changes | self.heard(station)
+    }
+
+    /// `station` gave a sign of life. Gives whether that changes what is thought of its data.
+    pub(super) fn heard(&mut self, station: usize) -> bool {
         let station = &mut self.stations[station];
         let revives = station.is_stopped && station.plc == Some(PlcState::Run);
         station.is_stopped &= !revives;
-        changes | revives
+        revives
     }
 
     /// Looks at the clock; gives a station, if there is one, of which a signal has just been found to stand still.
@@ -324,13 +329,88 @@ mod tests {
         assert_eq!(status.runs(), 1, "it came up, though");
     }
 
+    #[test]
+    fn a_station_of_which_nothing_is_read_is_fresh_with_the_first_sign_of_life_of_run() {
+        let (tick, mut port, status) = line(&["charger", "lathe"]);
+        port.running("both are there");
+        for station in 0..2 {
+            port.touch(station, at(0));
+            port.plc_state(station, at(1), PlcState::Stop);
+            port.touch(station, at(2));
+        }
+        assert!(!tick.stations[1].is_valid(), "it is in STOP");
+        for station in 0..2 {
+            port.plc_state(station, at(3), PlcState::Run);
+        }
+        port.received(0, at(4), &[1]);
+        assert_eq!(status.link().cause, Cause::Stopped);
+        port.touch(1, at(4));
+        assert!(tick.stations[0].is_valid() && tick.stations[1].is_valid());
+        let link = status.link();
+        assert_eq!(
+            (link.state, &*link.reason),
+            (LinkState::Running, "both are there")
+        );
+    }
+
+    #[test]
+    fn a_line_is_silent_and_not_running_while_another_station_of_it_is() {
+        let (_tick, mut port, status) = line(&["charger", "lathe"]);
+        port.running("both are there");
+        port.received(0, at(0), &[0]);
+        port.received(1, at(0), &[0]);
+        port.plc_state(1, at(150), PlcState::Stop);
+        port.observe(at(151));
+        assert_eq!(status.link().cause, Cause::Stopped);
+        port.plc_state(1, at(160), PlcState::Run);
+        port.received(1, at(161), &[1]);
+        let link = status.link();
+        assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Silent));
+        port.received(0, at(170), &[1]);
+        port.observe(at(170));
+        assert_eq!(status.link().reason, "both are there");
+    }
+
+    #[test]
+    fn a_silent_line_is_told_as_silent_whatever_stands_still_and_first() {
+        for within in [30, 200] {
+            let (_tick, mut port, status) = line(&[""]);
+            port.running("the peer is there");
+            watch_within(&mut port, 0, at(within));
+            let cause = |port: &mut Port, now| {
+                port.observe(at(now));
+                status.link().cause
+            };
+            // The first round leaves behind what the second one must not be misled by.
+            for round in [0, 1000] {
+                port.received(0, at(round), &[u8::from(round > 0)]);
+                assert_eq!(cause(&mut port, round + 1), Cause::Running);
+                cause(&mut port, round + 31);
+                for silent in [140, 201, 300] {
+                    assert_eq!(
+                        cause(&mut port, round + silent),
+                        Cause::Silent,
+                        "{within} {silent}"
+                    );
+                }
+                // It comes again, and is the same.
+                port.received(0, at(round + 310), &[u8::from(round > 0)]);
+                assert_eq!(cause(&mut port, round + 310), Cause::Frozen, "{within}");
+            }
+        }
+    }
+
     fn watch(port: &mut Port, station: usize) {
+        watch_within(port, station, at(10));
+    }
+
+    fn watch_within(port: &mut Port, station: usize, within: Nanos) {
         port.watch_life(vec![Watch {
             name: "Life".to_owned(),
             station,
             bytes: 0..1,
             mask: 1,
-            within: at(10),
+            within,
         }]);
     }
 

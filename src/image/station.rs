@@ -231,8 +231,8 @@ impl TickStation {
         age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
 
-    /// Whether the data of the peer count. To be asked before [`read`](Self::read): once this says yes, that does
-    /// not give a frame from the time when they did not.
+    /// Whether the data of the peer count. To be asked before [`read`](Self::read) and after it: if both times this
+    /// says yes, that has not given a frame from the time when they did not.
     #[inline]
     pub fn is_valid(&self) -> bool {
         !self.beside.invalid.load(Ordering::Acquire)

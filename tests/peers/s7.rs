@@ -313,6 +313,7 @@ impl Client {
 }
 
 /// A CPU by hand: its blocks, its state, and what it was asked.
+#[derive(Default)]
 pub struct Cpu {
     /// Blocks that are there; each of their bytes is their number.
     pub blocks: Vec<u8>,
@@ -320,6 +321,10 @@ pub struct Cpu {
     pub state: Option<u8>,
     /// How often it was asked for that list.
     pub asked: u32,
+    /// How many more questions for that list it refuses.
+    pub refuses: u32,
+    /// Whether it hangs up when it is asked for any list.
+    pub hangs_up: bool,
 }
 
 impl Cpu {
@@ -330,15 +335,22 @@ impl Cpu {
                 let mut client = Client(stream);
                 while let Some(packet) = client.receive() {
                     let answer = cpu.lock().expect("no panic").answer(&packet);
+                    let Some(answer) = answer else {
+                        break;
+                    };
                     client.send(&answer);
                 }
             }
         });
     }
 
-    fn answer(&mut self, request: &[u8]) -> Vec<u8> {
+    /// The answer to a packet; `None` to hang up.
+    fn answer(&mut self, request: &[u8]) -> Option<Vec<u8>> {
         if request[5] == 0xE0 {
-            return CONFIRM.to_vec();
+            return Some(CONFIRM.to_vec());
+        }
+        if request[8] == 7 && self.hangs_up {
+            return None;
         }
         let reference = [request[11], request[12]];
         let unit = |kind: u8, parameters: &[u8], data: &[u8]| {
@@ -353,7 +365,7 @@ impl Cpu {
             packet(&[&unit, parameters, data].concat())
         };
         let parameters = &request[17..];
-        match (request[8], parameters[0]) {
+        Some(match (request[8], parameters[0]) {
             (1, 0xF0) => unit(3, &[0xF0, 0, 0, 1, 0, 1, 1, 0xE0], &[]),
             (1, 4) => {
                 let count = parameters[1];
@@ -375,9 +387,11 @@ impl Cpu {
             (7, _) => {
                 let is_state = request[request.len() - 4..][..2] == [0x04, 0x24];
                 self.asked += u32::from(is_state);
-                let Some(state) = self.state.filter(|_| is_state) else {
+                let is_refused = is_state && self.refuses > 0;
+                self.refuses -= u32::from(is_refused);
+                let Some(state) = self.state.filter(|_| is_state && !is_refused) else {
                     let refuses = [0, 1, 0x12, 8, 0x12, 0x84, 1, 0, 0, 0, 0xD4, 1];
-                    return unit(7, &refuses, &[0x0A, 0, 0, 0]);
+                    return Some(unit(7, &refuses, &[0x0A, 0, 0, 0]));
                 };
                 let mut data = vec![
                     0xFF, 9, 0, 28, 4, 0x24, 0, 0, 0, 20, 0, 1, 0x51, 0x44, 0xFF, state,
@@ -386,6 +400,6 @@ impl Cpu {
                 unit(7, &[0, 1, 0x12, 8, 0x12, 0x84, 1, 0, 0, 0, 0, 0], &data)
             }
             other => panic!("{other:?} was not expected"),
-        }
+        })
     }
 }

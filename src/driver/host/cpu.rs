@@ -79,7 +79,8 @@ impl Other {
         let valid = image.is_valid();
         let arrival = image.read(now, &mut Taking { inputs, tape: None });
         tally.count((*station, reads), &inputs.before, &inputs.bytes);
-        let alive = valid && arrival.age <= max_age;
+        // A frame that was written after the peer stopped may have been read: asked once more.
+        let alive = valid && image.is_valid() && arrival.age <= max_age;
         outputs_before.copy_from_slice(outputs);
         program.scan(&mut Scan {
             now,
@@ -167,7 +168,8 @@ impl Cpu {
             faults.received(&mut inputs.bytes);
         }
         tally.count((0, *reads), &inputs.before, &inputs.bytes);
-        let alive = in_time && valid && arrival.age <= *max_age;
+        // As of the other stations, whose scan says why.
+        let alive = in_time && valid && station.is_valid() && arrival.age <= *max_age;
         outputs_before.copy_from_slice(outputs);
         program.scan(&mut Scan {
             now,

@@ -162,8 +162,14 @@ impl Readings {
     pub(super) fn commit(&mut self, port: &mut Port, now: Nanos, fields: &[Field]) {
         debug_assert_eq!(fields.len(), self.quality.len(), "one per signal");
         for station in 0..self.frames.len() {
-            if self.is_sound(station) && !self.frames[station].is_empty() {
-                let frame = &mut self.frames[station];
+            if !self.is_sound(station) {
+                continue;
+            }
+            let frame = &mut self.frames[station];
+            if frame.is_empty() {
+                // Nothing of it is read, but the server that has it is there.
+                port.touch(station, now);
+            } else {
                 self.values.give(station, frame);
                 port.received(station, now, frame);
             }

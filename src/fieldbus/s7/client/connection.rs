@@ -16,6 +16,10 @@ const BUFFER: usize = 4096;
 /// How often a CPU is asked whether it runs.
 const STATE: Nanos = Nanos::from_millis(200);
 
+/// A CPU that has said whether it runs may refuse to say it so many times in a row, less one, before it is believed
+/// to be another one, which does not say it: a busy CPU refuses now and then.
+const UNTOLD: u8 = 5;
+
 /// When a station is tried again of which the CPU refused something.
 const RETRY: Nanos = Nanos::from_secs(1);
 
@@ -154,7 +158,7 @@ impl<'a> Connection<'a> {
             self.state = self.bus.state.is_asked().then_some(now);
         }
         if self.state.is_none() {
-            port.tell("cpu", "unknown");
+            self.presume_run(now, port);
         }
         let line = identity.map(|identity| identity.line()).unwrap_or_default();
         let line = if line.is_empty() {
@@ -188,10 +192,35 @@ impl<'a> Connection<'a> {
         port: &mut Port,
     ) -> Result<(), BusError> {
         self.bus.state.unanswered = 0;
-        if state.is_none() {
-            self.state = None;
+        if let Some(state) = state {
+            self.bus.untold = 0;
+            self.bus.said = Some(state);
+            for station in 0..self.stations.len() {
+                port.plc_state(station, now, state);
+            }
+        } else {
+            self.bus.untold = self.bus.untold.saturating_add(1);
+            if self.bus.said.is_none() || self.bus.untold >= UNTOLD {
+                self.state = None;
+                self.presume_run(now, port);
+            }
         }
-        if state.is_none() && !std::mem::replace(&mut self.bus.told_unknown, true) {
+        if std::mem::take(&mut self.is_due) {
+            return self.cycle(now, port);
+        }
+        Ok(())
+    }
+
+    /// The CPU does not say whether it runs, and its data count. One that said STOP and does not say anything any
+    /// more is another one.
+    fn presume_run(&mut self, now: Nanos, port: &mut Port) {
+        if self.bus.said.take() == Some(PlcState::Stop) {
+            for station in 0..self.stations.len() {
+                port.plc_state(station, now, PlcState::Run);
+            }
+        }
+        port.tell("cpu", "unknown");
+        if !std::mem::replace(&mut self.bus.told_unknown, true) {
             log::warn!(
                 "the CPU at {} does not say whether it is in RUN (system status list 0x0424), so its values count as \
                  fresh in STOP, too; name a signal that has to change: alive = {{ signal = \"...\", within = \
@@ -199,21 +228,6 @@ impl<'a> Connection<'a> {
                 self.peer
             );
         }
-        let said_stop = std::mem::replace(&mut self.bus.said_stop, state == Some(PlcState::Stop));
-        // One that said STOP and does not say anything any more is another one, whose data count.
-        let state = state.or(said_stop.then_some(PlcState::Run));
-        if let Some(state) = state {
-            for station in 0..self.stations.len() {
-                port.plc_state(station, now, state);
-            }
-        }
-        if self.state.is_none() {
-            port.tell("cpu", "unknown");
-        }
-        if std::mem::take(&mut self.is_due) {
-            return self.cycle(now, port);
-        }
-        Ok(())
     }
 
     /// A cycle is due.
@@ -248,8 +262,11 @@ impl<'a> Connection<'a> {
     /// A cycle is complete.
     fn done(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let may_write = self.bus.guard.may_write();
-        // Where nothing is read and nothing may be written, the CPU has not been heard of.
-        let is_heard = may_write || self.stations.iter().any(|station| station.has[1]);
+        // In a cycle in which nothing was read and nothing written, the CPU has not been heard of.
+        let is_heard = self.stations.iter().any(|station| {
+            let [is_written, is_read] = station.has;
+            station.resume.is_none() && (is_read || is_written && may_write)
+        });
         for (index, station) in self.stations.iter_mut().enumerate() {
             if station.resume.is_some() {
                 continue;
@@ -269,8 +286,11 @@ impl<'a> Connection<'a> {
             if is_written && may_write {
                 port.sent(index);
             }
-            if station.refusal.take().is_some() {
-                self.bus.told_refusals[index].clear();
+            station.refusal = None;
+            // It may have been told by an earlier connection.
+            let told = &mut self.bus.told_refusals[index];
+            if !told.is_empty() {
+                told.clear();
                 port.tell("refused", &refusals(&self.bus.told_refusals));
             }
         }

@@ -11,7 +11,7 @@ mod traffic;
 
 use crate::fieldbus::rarely::Rarely;
 use crate::fieldbus::tcp::{self, no_wait};
-use crate::fieldbus::{BusError, CYCLE, Free, Guard, Port, Role};
+use crate::fieldbus::{BusError, CYCLE, Free, Guard, PlcState, Port, Role};
 use crate::os::Poller;
 use crate::signal::SignalTable;
 use crate::time::{Nanos, Stop};
@@ -38,8 +38,9 @@ pub struct S7Client {
     /// Asking who the CPU is, and whether it runs.
     identity: Question,
     state: Question,
-    /// Whether the CPU said last that it is in STOP.
-    said_stop: bool,
+    /// What the CPU said last of whether it runs, and how often in a row it has not answered that since.
+    said: Option<PlcState>,
+    untold: u8,
     /// Whether the log knows that it does not say.
     told_unknown: bool,
     /// What the log knows of that the CPU refuses, by station.
@@ -82,7 +83,8 @@ impl S7Client {
             cycle: cycle.unwrap_or(CYCLE),
             identity: Question::default(),
             state: Question::default(),
-            said_stop: false,
+            said: None,
+            untold: 0,
             told_unknown: false,
             told_refusals: vec![String::new(); table.stations.len()],
             rarely: Rarely::default(),

@@ -321,6 +321,26 @@ fn stepped_ends_of_halves_see_each_other_within_the_tick() {
 }
 
 #[test]
+fn where_receive_failed_no_send_of_that_tick_sends() {
+    let mut rig = Rig::with(&Link::new(), "mode = \"stepped\"");
+    let device = &mut rig.device;
+    let mut tick = |millis, position| {
+        let found = device
+            .driver
+            .receive(Nanos::from_millis(millis), &mut device.slots);
+        device.set("position", position);
+        assert_eq!(device.send().code, found.code);
+        assert_eq!(device.send().code, found.code);
+        rig.controller.tick();
+        (found.code, rig.controller.get("position"))
+    };
+    tick(5, 3.0);
+    assert_eq!(tick(10, 3.0).1, 3.0);
+    assert_eq!(tick(0, 4.0), (Code::BusFailed, 3.0));
+    assert_eq!(tick(20, 5.0).1, 5.0);
+}
+
+#[test]
 fn a_tick_is_a_receive_and_the_first_send_after_it() {
     let mut end = mirror("stepped", &Manual::new());
     assert_eq!(end.send().code, Code::Stale, "nothing was received yet");

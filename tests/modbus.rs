@@ -29,6 +29,7 @@ use peers::{Alone, client, is_closed, leave};
 use socket2::SockRef;
 use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;
+use tickbus::time::Nanos;
 
 conformance!(device_serves, crate::Tcp::device_serves());
 conformance!(controller_serves, crate::Tcp::controller_serves());
@@ -153,6 +154,50 @@ fn a_pulse_is_held_until_a_client_has_read_it() {
     }
     assert_eq!(ask(&mut stream, 2, &[2, 0, 0, 0, 1]), [2, 1, 1]);
     assert_eq!(ask(&mut stream, 3, &[2, 0, 0, 0, 1]), [2, 1, 0]);
+}
+
+/// Lets a fault of the line begin.
+fn suffer(device: &mut Alone, fault: &str) {
+    let injected = device.end.driver.inject_text(fault);
+    injected.unwrap_or_else(|why| panic!("{why}"));
+    device.end.tick();
+}
+
+#[test]
+fn a_pulse_in_slow_answers_is_held_until_a_client_has_read_it() {
+    let (mut device, mut stream) = device("");
+    suffer(&mut device, "kind = \"slow-answers\"\nby = \"20ms\"");
+    for level in [1.0, 0.0] {
+        device.end.set("sensor", level);
+        device.end.tick();
+        assert_eq!(ask(&mut stream, 1, &[2, 0, 0, 0, 1]), [2, 1, 0]);
+    }
+    device.clock.advance(Nanos::from_millis(25));
+    for _ in 0..3 {
+        assert_eq!(ask(&mut stream, 2, &[4, 0, 1, 0, 2])[0], 4);
+        assert_eq!(ask(&mut stream, 2, &[2, 0, 1, 0, 7])[0], 2);
+    }
+    assert_eq!(ask(&mut stream, 3, &[2, 0, 0, 0, 1]), [2, 1, 1]);
+    assert_eq!(ask(&mut stream, 4, &[2, 0, 0, 0, 1]), [2, 1, 0]);
+}
+
+#[test]
+fn writes_that_are_held_back_are_events_with_their_own_values() {
+    let (mut device, mut stream) = device("events = \"writes\"");
+    suffer(&mut device, "kind = \"delay\"\nby = \"50ms\"");
+    ask(&mut stream, 1, &[6, 0, 1, 0, 5]);
+    device.clock.advance(Nanos::from_millis(40));
+    ask(&mut stream, 2, &[5, 0, 0, 0xFF, 0]);
+    device.clock.advance(Nanos::from_millis(20));
+    ask(&mut stream, 3, &[6, 0, 2, 0, 9]);
+    device.until("all is there", |end| end.get("echo") == 9.0);
+    let mut events = [tickbus::image::Event::default(); 16];
+    let count = device.end.driver.poll_events(&mut events);
+    let seen = events[..count].iter();
+    let seen: Vec<_> = seen
+        .map(|event| (event.signal, event.value.real()))
+        .collect();
+    assert_eq!(seen, [(1, 5.0), (0, 1.0), (2, 9.0)]);
 }
 
 #[test]

@@ -616,6 +616,37 @@ fn a_full_disc_ends_the_recording_and_not_the_run() {
     assert_eq!(run.exchange(tick + 1).code, Code::Fresh);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_refused_at_once_though_nobody_reads_it() {
+    let folder = Folder::new();
+    let made = std::process::Command::new("mkfifo")
+        .arg(folder.path("run.vcd"))
+        .status();
+    assert!(made.expect("mkfifo runs").success());
+    let error = folder.refusal(&rig(RIG, "run.vcd"));
+    assert!(
+        error.contains("this is a pipe, and a recording is a file; name a file"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_tick_that_nobody_answered_is_recorded_with_what_was_there_at_its_end() {
+    let folder = Folder::new();
+    let text = rig(RIG, "run.vcd");
+    let mut run = Run::open(&folder, &text);
+    run.ticks(1..=5);
+    let time = Nanos::from_millis(12);
+    run.driver.receive(time, &mut run.slots);
+    run.driver.end_tick(&run.slots);
+    run.driver.end_tick(&run.slots);
+    run.driver.close();
+    let ticks = read(&folder.path("run.vcd"), &folder.config(&text));
+    assert_eq!(ticks.len(), 6);
+    assert_eq!((ticks[5].number, ticks[5].time), (6, time));
+}
+
 #[test]
 fn a_file_is_recorded_to_by_one_driver_and_must_be_possible() {
     let folder = Folder::new();

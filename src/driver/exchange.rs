@@ -108,7 +108,7 @@ impl Driver {
     /// As [`exchange`](Self::exchange).
     pub fn send(&mut self, slots: &mut [Slot]) -> Exchange {
         self.check(slots);
-        if self.tick.is_some() && self.last.code == Code::BusFailed {
+        if self.last.code == Code::BusFailed {
             self.end(self.last.code, slots);
             return self.last;
         }
@@ -121,6 +121,17 @@ impl Driver {
         let done = self.judged(sent);
         self.end(done.code, slots);
         done
+    }
+
+    /// Ends the tick that [`receive`](Self::receive) began and nobody answered, with what is in `slots`: a recording
+    /// has it then. To be called before the driver is closed; without such a tick it does nothing.
+    ///
+    /// # Panics
+    ///
+    /// As [`exchange`](Self::exchange).
+    pub fn end_tick(&mut self, slots: &[Slot]) {
+        self.check(slots);
+        self.end(self.last.code, slots);
     }
 
     fn check(&self, slots: &[Slot]) {

@@ -292,7 +292,8 @@ impl Driver {
         taken
     }
 
-    /// Closes the driver: stops its threads and waits for their end. Its last statistics go to the log.
+    /// Closes the driver: stops its threads and waits for their end. Its last statistics go to the log. A tick that
+    /// is under way is recorded only if [`end_tick`](Self::end_tick) has ended it.
     pub fn close(self) {
         self.board.tell(self.status.driver());
         if log::log_enabled!(log::Level::Info) {

@@ -1,5 +1,6 @@
 //! Frames of the line, lost, repeated and held back.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -8,6 +9,9 @@ use super::random::Random;
 use super::ring::Ring;
 use super::{Board, Phase, Trouble};
 use crate::time::Nanos;
+
+/// How long a pulse holds up the frames behind it while the peer reads other bits only. Peers poll faster than that.
+const PATIENCE: Nanos = Nanos::from_secs(1);
 
 /// One trouble of the line, as the bus's side has it.
 #[derive(Debug)]
@@ -89,6 +93,12 @@ struct Outgoing {
     current: Box<[u8]>,
     /// What the peer got last.
     sent: Box<[u8]>,
+    /// The bits that the peer reads: all, until it leaves one out for [`PATIENCE`].
+    read: Box<[u8]>,
+    /// Whether the peer has read anything since `current` took its place, and since when a pulse in it has held up
+    /// the frames behind it nonetheless.
+    reads: bool,
+    held_up: Option<Nanos>,
     /// Changes that wait.
     waiting: Option<Ring>,
     /// Whose bytes the bus was given: that decides who is told that they were sent.
@@ -127,7 +137,10 @@ impl Wires {
                 latched: shape.latched,
                 newest: shape.last_sent.clone(),
                 current: shape.last_sent.clone(),
+                read: vec![0xFF; shape.last_sent.len()].into(),
                 sent: shape.last_sent,
+                reads: false,
+                held_up: None,
                 waiting: None,
                 given: Given::Image,
             },
@@ -291,6 +304,21 @@ impl Wires {
         let out = &mut self.stations[station].out;
         if out.given != Given::Nothing {
             out.sent.copy_from_slice(&out.current);
+            out.read.fill(0xFF);
+        }
+        out.given == Given::Image
+    }
+
+    /// As [`sent`](Self::sent), for a peer that has these bits alone (bit n of byte k is 8k + n).
+    pub fn sent_bits(&mut self, station: usize, bits: &Range<usize>) -> bool {
+        let out = &mut self.stations[station].out;
+        if out.given != Given::Nothing {
+            for bit in bits.start..bits.end.min(8 * out.sent.len()) {
+                let (byte, mask) = (bit / 8, 1 << (bit % 8));
+                out.sent[byte] = out.sent[byte] & !mask | out.current[byte] & mask;
+                out.read[byte] |= mask;
+            }
+            out.reads = true;
         }
         out.given == Given::Image
     }
@@ -401,16 +429,38 @@ impl Outgoing {
     /// Whether a latched bit of `current`, which the peer has not seen, would be lost if `next` took its place.
     fn loses(&self, next: &[u8]) -> bool {
         let bytes = self.current.iter().zip(&self.sent).zip(next);
-        let mut bits = bytes.zip(&self.latched);
-        bits.any(|(((current, sent), next), latched)| {
-            (current ^ sent) & (current ^ next) & latched != 0
+        let mut bits = bytes.zip(self.watched());
+        bits.any(|(((current, sent), next), watched)| {
+            (current ^ sent) & (current ^ next) & watched != 0
         })
+    }
+
+    /// The latched bits that the peer reads.
+    fn watched(&self) -> impl Iterator<Item = u8> {
+        let bytes = self.latched.iter().zip(&self.read);
+        bytes.map(|(latched, read)| latched & read)
+    }
+
+    /// Whether the peer has read on for so long without the pulse in `current` that it does not read that at all.
+    /// What it does read must not wait for ever.
+    fn is_left_out(&mut self, now: Nanos) -> bool {
+        if !self.reads {
+            return false;
+        }
+        if now < *self.held_up.get_or_insert(now) + PATIENCE {
+            return false;
+        }
+        let bytes = self.current.iter().zip(&self.sent);
+        for (read, (current, sent)) in self.read.iter_mut().zip(bytes) {
+            *read &= !(current ^ sent);
+        }
+        true
     }
 
     /// Whether `bytes` have a latched bit that differs from what the peer has seen.
     fn has_unseen(&self, bytes: &[u8]) -> bool {
-        let mut bits = bytes.iter().zip(&self.sent).zip(&self.latched);
-        bits.any(|((bytes, sent), latched)| (bytes ^ sent) & latched != 0)
+        let mut bits = bytes.iter().zip(&self.sent).zip(self.watched());
+        bits.any(|((bytes, sent), watched)| (bytes ^ sent) & watched != 0)
     }
 
     /// Holds the image's bytes back and finds what is due by `now`; true if something had to go early.
@@ -429,8 +479,14 @@ impl Outgoing {
         }
         while let Some((taken, next)) = self.waiting.as_ref().and_then(Ring::front) {
             let due = slow == Nanos::ZERO || taken + slow <= now;
-            if !due || self.loses(next) {
+            if !due {
                 break;
+            }
+            if self.loses(next) {
+                if !self.is_left_out(now) {
+                    break;
+                }
+                hurried = true;
             }
             self.advance();
         }
@@ -451,6 +507,7 @@ impl Outgoing {
         {
             self.current.copy_from_slice(next);
             ring.pop();
+            (self.reads, self.held_up) = (false, None);
         }
     }
 }

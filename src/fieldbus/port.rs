@@ -167,7 +167,7 @@ impl Port {
         if self
             .troubles
             .wires()
-            .is_none_or(|wires| wires.sent(station))
+            .is_none_or(|wires| wires.sent_bits(station, &bits))
         {
             self.image.stations[station].sent_bits(&bits);
         }
@@ -183,13 +183,13 @@ impl Port {
         let times = match self.troubles.wires() {
             None => 1,
             Some(wires) => match wires.arrives(station, now, bytes) {
-                Fate::Lost => {
+                Fate::Lost | Fate::Held => {
+                    // When a held frame comes in, its changes are events.
                     if let Some(changes) = self.changes.get_mut(station) {
                         changes.forget();
                     }
                     0
                 }
-                Fate::Held => 0,
                 Fate::Passes(times) => times,
             },
         };
@@ -226,6 +226,8 @@ impl Port {
         bytes: &[u8],
         written: impl IntoIterator<Item = Range<usize>>,
     ) {
+        // What was held back comes in first: these writes are none of its own.
+        self.attend(now);
         if let Some(changes) = self.changes.get_mut(station) {
             written.into_iter().for_each(|bits| changes.written(bits));
         }

@@ -145,7 +145,8 @@ impl<K> Device<K> {
         count
     }
 
-    pub(super) fn close(self) {
+    pub(super) fn close(mut self) {
+        self.driver.end_tick(self.shared.slots());
         self.driver.close();
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -27,6 +28,9 @@ const LOOKS_PER_FLUSH: u32 = 20;
 
 /// Bytes that go to the file at once.
 const CHUNK: usize = 64 << 10;
+
+/// So long may the file take nothing while the recording is closed.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Words of a tick in the ring before the statuses of the stations: number, time, status.
 const HEAD: usize = 3;
@@ -138,6 +142,9 @@ pub struct Recorder {
     lossless: bool,
     tally: Arc<Tally>,
     bell: Arc<Bell>,
+    pub(super) close_timeout: Duration,
+    /// Disconnected when the thread ends.
+    ended: Receiver<()>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -154,8 +161,22 @@ pub enum RecorderError {
     Thread(std::io::Error),
 }
 
-/// Makes the file at `path` anew, once it is certain that nobody else of this process uses it. A device or a pipe
-/// is taken as it is.
+/// Whether there is a pipe at `path`: to open it would wait for somebody who reads it.
+#[cfg(unix)]
+fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+
+    std::fs::metadata(path).is_ok_and(|metadata| metadata.file_type().is_fifo())
+}
+
+/// Nothing here waits for a reader.
+#[cfg(not(unix))]
+fn is_pipe(_path: &Path) -> bool {
+    false
+}
+
+/// Makes the file at `path` anew, once it is certain that nobody else of this process uses it. A device is taken as
+/// it is.
 fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
     let shown = path.display();
     let cannot = |error: std::io::Error| {
@@ -163,6 +184,11 @@ fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
             "{shown}: the recording cannot be made: {error}; check the folder and its permissions"
         ))
     };
+    if is_pipe(path) {
+        return Err(RecorderError::File(format!(
+            "{shown}: this is a pipe, and a recording is a file; name a file in [record]"
+        )));
+    }
     // Nothing is cut before it is known to be nobody's.
     let open = OpenOptions::new()
         .write(true)
@@ -232,7 +258,8 @@ impl Recorder {
             file: path,
             ..Tally::default()
         });
-        let mut writing = Writing {
+        let (end, ended) = mpsc::channel::<()>();
+        let writing = Writing {
             ring: reader,
             words: vec![0; head + slots].into(),
             tick: Tick::new(&columns),
@@ -246,7 +273,12 @@ impl Recorder {
         };
         let thread = std::thread::Builder::new()
             .name("record".to_owned())
-            .spawn(move || writing.run())?;
+            .spawn(move || {
+                let _end = end;
+                // Dropped before that, so that its file is free by then.
+                let mut writing = writing;
+                writing.run();
+            })?;
         Ok(Self {
             ring,
             head: Vec::with_capacity(head),
@@ -254,6 +286,8 @@ impl Recorder {
             lossless,
             tally,
             bell,
+            close_timeout: CLOSE_TIMEOUT,
+            ended,
             thread: Some(thread),
         })
     }
@@ -314,6 +348,21 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         self.bell.lock().stop = true;
         self.bell.work.notify_one();
+        let written = || self.tally.ticks.load(Ordering::Relaxed);
+        let mut before = written();
+        while self.ended.recv_timeout(self.close_timeout) == Err(Timeout) {
+            let ticks = written();
+            if ticks == before {
+                log::error!(
+                    "{}: the file has taken nothing for {:?}, and the thread that records is left behind; the \
+                     recording may lack its end, see whether its disc answers",
+                    self.tally.file.display(),
+                    self.close_timeout
+                );
+                return;
+            }
+            before = ticks;
+        }
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {

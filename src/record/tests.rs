@@ -411,6 +411,41 @@ fn on_a_full_disc_the_recording_ends_whole_and_says_so() {
     }
 }
 
+/// A file whose disc does not answer until the sender is gone.
+struct Stuck(std::sync::mpsc::Receiver<()>);
+
+impl std::io::Write for Stuck {
+    fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+        let _ = self.0.recv();
+        Err(std::io::ErrorKind::BrokenPipe.into())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl super::file::Target for Stuck {
+    fn cut(&mut self, _: u64) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_file_that_takes_nothing_does_not_keep_its_recorder_from_closing() {
+    let columns = columns(&table(&[""]));
+    let (answers, stuck) = std::sync::mpsc::channel();
+    let target = Box::new(Stuck(stuck));
+    let path = PathBuf::from("run");
+    let mut recorder = Recorder::over(target, Format::Csv, columns.clone(), 8, false, path, None)
+        .expect("a thread");
+    recorder.close_timeout = std::time::Duration::from_millis(20);
+    let slots = Tick::new(&columns).values;
+    recorder.record(1, Nanos(0), 0, std::iter::empty(), &slots);
+    drop(recorder);
+    drop(answers);
+}
+
 #[test]
 fn time_that_goes_back_is_recorded_as_standing_still() {
     let table = table(&[""]);

@@ -190,6 +190,48 @@ fn a_frame_that_the_peer_has_not_taken_keeps_its_pulse() {
 }
 
 #[test]
+fn a_pulse_waits_for_the_peer_that_reads_other_bits_only() {
+    let mut rig = Rig::new();
+    rig.add(Trouble::SlowAnswers(Nanos(10)), 1);
+    rig.send(0, [1, 5], false);
+    rig.send(1, [0, 6], false);
+    for bits in [8..16, 1..8] {
+        assert_eq!(rig.send(20, [0, 6], false).0, [1, 5], "{bits:?}");
+        rig.wires.sent_bits(0, &bits);
+    }
+    assert_eq!(rig.send(21, [0, 6], false).0, [1, 5]);
+    rig.wires.sent_bits(0, &(0..1));
+    assert_eq!(rig.send(22, [0, 6], false).0, [0, 6]);
+}
+
+#[test]
+fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_ever() {
+    let mut rig = Rig::new();
+    let slow = rig.add(Trouble::SlowAnswers(Nanos(10)), 1);
+    rig.send(0, [1, 5], false);
+    rig.send(1, [0, 6], false);
+    // A peer that reads nothing may come back.
+    let long = PATIENCE.0 * 5;
+    assert_eq!(rig.send(20, [0, 6], false).0, [1, 5]);
+    assert_eq!(rig.send(long, [0, 6], false).0, [1, 5]);
+    rig.wires.sent_bits(0, &(8..16));
+    assert_eq!(rig.send(long + 1, [0, 6], false).0, [1, 5]);
+    let after = long + 1 + PATIENCE.0;
+    assert_eq!(rig.send(after, [1, 7], false).0, [0, 6]);
+    assert_eq!(rig.board.hurried.load(Ordering::Relaxed), 1);
+    rig.send(after + 1, [0, 8], false);
+    assert_eq!(rig.send(after + 20, [0, 8], false).0, [0, 8]);
+    rig.end(slow);
+    assert_eq!(rig.send(after + 21, [1, 9], false), ([1, 9], false));
+    // Once it has read it, it waits again.
+    rig.wires.sent_bits(0, &(0..1));
+    rig.add(Trouble::SlowAnswers(Nanos(10)), 1);
+    rig.send(after + 30, [0, 0], false);
+    rig.send(after + 31, [1, 0], false);
+    assert_eq!(rig.send(after + 50, [1, 0], false).0, [0, 0]);
+}
+
+#[test]
 fn a_link_that_is_down_takes_nothing_and_gives_nothing_back() {
     let mut rig = Rig::new();
     rig.send(0, [1, 2], true);

@@ -119,6 +119,17 @@ impl Exception {
         )
     }
 
+    /// Whether the server, or the gateway before it, may do the same a little later.
+    pub const fn passes(self) -> bool {
+        matches!(
+            self,
+            Self::ACKNOWLEDGE
+                | Self::SERVER_DEVICE_BUSY
+                | Self::GATEWAY_PATH_UNAVAILABLE
+                | Self::GATEWAY_TARGET_FAILED
+        )
+    }
+
     /// Its name in the standard; empty where that has none.
     pub const fn name(self) -> &'static str {
         match self {

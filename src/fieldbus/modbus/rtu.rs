@@ -3,8 +3,11 @@
 use super::PDU_LIMIT;
 use crate::time::Nanos;
 
+/// Bytes of the checksum.
+pub const CHECKSUM: usize = 2;
+
 /// The longest telegram: unit, PDU, checksum.
-pub const ADU_LIMIT: usize = 1 + PDU_LIMIT + 2;
+pub const ADU_LIMIT: usize = 1 + PDU_LIMIT + CHECKSUM;
 
 /// The shortest: unit, function code, checksum.
 const SHORTEST: usize = 4;
@@ -67,7 +70,7 @@ pub fn parse(telegram: &[u8]) -> Option<(u8, &[u8])> {
     if !(SHORTEST..=ADU_LIMIT).contains(&telegram.len()) {
         return None;
     }
-    let (body, sum) = telegram.split_last_chunk::<2>()?;
+    let (body, sum) = telegram.split_last_chunk::<CHECKSUM>()?;
     (checksum(body) == *sum).then(|| (body[0], &body[1..]))
 }
 

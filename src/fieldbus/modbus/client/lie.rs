@@ -163,6 +163,41 @@ impl Lie {
         }
         Ok(blocks)
     }
+
+    /// Whether the blocks of `area`, which is written, lie beside one another.
+    ///
+    /// # Errors
+    ///
+    /// Two lie over one another: what is wrong, and what would be right.
+    pub(super) fn check_apart(area: Area, blocks: &[Block]) -> Result<(), (String, String)> {
+        for (index, block) in blocks.iter().enumerate() {
+            let other = blocks[..index].iter().find(|other| {
+                let (own, others) = (block.span(), other.span());
+                other.table == block.table && own.first < others.end() && others.first < own.end()
+            });
+            let Some(other) = other else {
+                continue;
+            };
+            let place = |block: &Block| Place {
+                table: block.table,
+                offset: block.first,
+            };
+            return Err((
+                format!(
+                    "the parts of {area} at {} and at {} would be written over one another: the first has {} {}, the \
+                     second {}",
+                    place(other),
+                    place(block),
+                    other.span().count,
+                    block.table,
+                    block.span().count
+                ),
+                "begin the second one behind the first; a register has 2 bytes of the image, a coil 1 bit"
+                    .to_owned(),
+            ));
+        }
+        Ok(())
+    }
 }
 
 fn read_place(value: &Value<'_>, table: Table, writes: bool) -> Option<Place> {

@@ -9,7 +9,7 @@ use crate::fieldbus::modbus::stations::{Stations, Units, read_write_to};
 use crate::fieldbus::modbus::table::Table as OfTable;
 use crate::fieldbus::modbus::{INPUTS, Place, Spot};
 use crate::fieldbus::tcp::Address;
-use crate::signal::{Area, SignalTable};
+use crate::signal::{Area, Signal, SignalTable};
 use crate::time::Nanos;
 
 use super::lie::Lie;
@@ -103,12 +103,27 @@ impl ClientOptions {
 
     /// Reports what does not go together with the sizes of the stations.
     pub(in crate::fieldbus) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let (writes, _) = self.role.areas();
         for area in [Area::Input, Area::Output] {
-            if !self.lies_as_a_whole(area, table) {
-                continue;
-            }
-            for station in &table.stations {
-                if let Err((what, right)) = self.blocks(area, station.bytes(area)) {
+            for (index, station) in table.stations.iter().enumerate() {
+                let mut signals = table.signals.iter();
+                let lies_there = |signal: &Signal| {
+                    signal.station == index
+                        && signal.area == area
+                        && !self.at.contains_key(&signal.name)
+                };
+                if !signals.any(lies_there) {
+                    continue;
+                }
+                let fits = self.blocks(area, station.bytes(area));
+                let fits = fits.and_then(|blocks| {
+                    if area == writes {
+                        Lie::check_apart(area, &blocks)
+                    } else {
+                        Ok(())
+                    }
+                });
+                if let Err((what, right)) = fits {
                     collector.report(self.lie(area).at, what, right);
                     break;
                 }

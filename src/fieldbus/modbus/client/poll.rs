@@ -5,6 +5,8 @@ mod identify;
 mod station;
 mod trouble;
 
+use std::ops::Range;
+
 use crate::fieldbus::identity::Guard;
 use crate::fieldbus::modbus::function::EXCEPTION_BIT;
 use crate::fieldbus::modbus::mbap::{self, Telegram};
@@ -82,9 +84,9 @@ pub(super) struct Poll<'a> {
     /// When it was last looked at what is due.
     looked: Nanos,
     asking: Option<Asking>,
-    /// The request as it goes over the line, where its PDU begins, and how much of it the system has taken.
+    /// The request as it goes over the line, where its PDU lies, and how much of it the system has taken.
     request: Vec<u8>,
-    pdu: usize,
+    pdu: Range<usize>,
     written: usize,
     /// Whether the line is said to be lost, as no station is in order.
     lost: bool,
@@ -115,7 +117,7 @@ impl<'a> Poll<'a> {
             looked: now,
             asking: None,
             request: Vec::new(),
-            pdu: 0,
+            pdu: 0..0,
             written: 0,
             lost: false,
         }
@@ -206,10 +208,12 @@ impl<'a> Poll<'a> {
                     return Ok(());
                 }
                 // The beginning of an answer tells how long it is. So pauses within one, which some adapters make, do
-                // no harm, and none has to be waited for.
-                match inbox.get(1..).and_then(length).map(|pdu| 1 + pdu + 2) {
+                // no harm, and none has to be waited for. Nor does noise behind it, as when the line's driver is
+                // switched off.
+                let expected = inbox.get(1..).and_then(length);
+                match expected.map(|pdu| 1 + pdu + rtu::CHECKSUM) {
                     Some(expected) if inbox.len() >= expected => {
-                        let telegram = inbox.clone();
+                        let telegram = inbox[..expected].to_vec();
                         self.hear(&telegram, now, port)
                     }
                     _ => Ok(()),
@@ -224,6 +228,7 @@ impl<'a> Poll<'a> {
             return Ok(());
         };
         let (station, code) = (asking.station, asking.code);
+        let is_identity = matches!(asking.what, Asked::Identity { .. });
         let unit = self.stations[station].unit;
         self.clear();
         match rtu::parse(telegram) {
@@ -240,7 +245,11 @@ impl<'a> Poll<'a> {
             }
             None => {
                 port.count("modbus-client.damaged");
-                self.miss("gave a damaged answer", now, port)
+                let what = "gave a damaged answer";
+                if is_identity {
+                    self.is_unclear(station, what, port);
+                }
+                self.miss(what, now, port)
             }
         }
     }
@@ -260,11 +269,14 @@ impl<'a> Poll<'a> {
     ) -> Result<usize, BusError> {
         let mut taken = 0;
         loop {
-            let parsed = Telegram::parse(&bytes[taken..]);
-            let parsed =
-                parsed.map_err(|error| BusError::Protocol(format!("of {}: {error}", self.peer)))?;
-            let Some((telegram, length)) = parsed else {
-                return Ok(taken);
+            let (telegram, length) = match Telegram::parse(&bytes[taken..]) {
+                Ok(Some(parsed)) => parsed,
+                Ok(None) => return Ok(taken),
+                Err(error) => {
+                    // This end hangs up now; if it had asked who the device is, that counts as if the device had.
+                    self.hung_up();
+                    return Err(BusError::Protocol(format!("of {}: {error}", self.peer)));
+                }
             };
             taken += length;
             let Framing::Tcp { transaction, .. } = &self.framing else {
@@ -289,7 +301,7 @@ impl<'a> Poll<'a> {
                 self.identified(station, so_far, requests, pdu, now, port)
             }
             Asked::Query(index) => {
-                let asked = &self.request[self.pdu..];
+                let asked = &self.request[self.pdu.clone()];
                 let polled = &mut self.stations[station];
                 let taken = polled.queries[index].take(asked, pdu, &mut polled.receives);
                 match taken {
@@ -389,8 +401,8 @@ impl<'a> Poll<'a> {
         match &mut self.framing {
             Framing::Tcp { transaction, .. } => {
                 *transaction = transaction.wrapping_add(1);
-                self.pdu = mbap::HEADER;
                 mbap::append(*transaction, polled.unit, request, |pdu| write(polled, pdu));
+                self.pdu = mbap::HEADER..request.len();
             }
             Framing::Rtu {
                 inbox,
@@ -399,8 +411,8 @@ impl<'a> Poll<'a> {
                 ..
             } => {
                 inbox.clear();
-                self.pdu = 1;
                 rtu::append(polled.unit, request, |pdu| write(polled, pdu));
+                self.pdu = 1..request.len() - rtu::CHECKSUM;
                 // The line needs its time for both, and for what is around the answer.
                 let characters = i64::try_from(request.len() + answer + 3).unwrap_or(i64::MAX);
                 limit = limit.max(*quiet_until + self.timeout) + character.times(characters);

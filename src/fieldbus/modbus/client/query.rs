@@ -57,7 +57,8 @@ impl Region {
     /// How many bits of the elements are no piece's, and are written as zero.
     pub fn zeros(&self) -> usize {
         let own: usize = self.pieces.iter().map(|piece| piece.bits).sum();
-        self.span.count * self.table.width() - own
+        // Those that lie over one another count twice; no driver.cfg may have them where it writes.
+        (self.span.count * self.table.width()).saturating_sub(own)
     }
 
     /// Appends the elements' values, with zeros where no piece is.
@@ -169,6 +170,11 @@ impl Query {
             | Self::Both { write, .. } => Some(write),
             Self::Read(_) => None,
         }
+    }
+
+    /// Whether it only looks whether the device is there: whatever it reads, nothing takes that.
+    pub(super) fn is_look(&self) -> bool {
+        matches!(self, Self::Read(read) if read.pieces.is_empty())
     }
 
     /// How many bytes the PDU of the answer has.

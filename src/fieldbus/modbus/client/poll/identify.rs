@@ -2,7 +2,7 @@
 
 use crate::fieldbus::modbus::identification::{READ_DEVICE_IDENTIFICATION, Taken};
 use crate::fieldbus::modbus::rtu;
-use crate::fieldbus::modbus::{Exception, Function, Identification};
+use crate::fieldbus::modbus::{Function, Identification};
 use crate::fieldbus::{BusError, Port};
 use crate::time::Nanos;
 
@@ -15,8 +15,8 @@ const IDENTIFYING: usize = 8;
 /// How long it is until a device is asked again that did not say who it is.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// So many times in a row a device is silent, or hangs up, when it is asked who it is, until that counts as its answer.
-/// Each time it has answered something else before, so it is there.
+/// So many times in a row a device is silent, fails or hangs up when it is asked who it is, until that counts as its
+/// answer. Each time it has answered something else before, so it is there.
 const SILENCES: u8 = 2;
 
 /// What is known of who a device is.
@@ -82,41 +82,58 @@ impl Poll<'_> {
                 so_far = Identification::default();
             }
             // A device that is busy or away says who it is another time.
-            Err(Fault::Refused(
-                Exception::ACKNOWLEDGE
-                | Exception::SERVER_DEVICE_BUSY
-                | Exception::GATEWAY_PATH_UNAVAILABLE
-                | Exception::GATEWAY_TARGET_FAILED,
-            )) => {
-                if let Identity::Unknown { not_before, .. } = &mut self.stations[station].identity {
-                    *not_before = now + PAUSE;
+            Err(Fault::Refused(exception)) => {
+                if !exception.passes() {
+                    self.says_nothing(station, port);
                 }
-                return self.begin(station + 1, now, port);
+                return self.ask_later(station, now, port);
             }
-            Ok(None) | Err(_) => return self.says_nothing(station, now, port),
+            Ok(None) | Err(Fault::Malformed(_)) => {
+                self.is_unclear(station, "gave a malformed answer", port);
+                return self.ask_later(station, now, port);
+            }
         }
         self.stations[station].hang_ups = 0;
         self.meet(station, &so_far, port);
         self.begin(station + 1, now, port)
     }
 
-    /// The device gave no answer, or none that can be understood, when it was asked who it is.
-    pub(super) fn says_nothing(
+    /// The device gave no answer when it was asked who it is, or has failed at it.
+    pub(super) fn says_nothing(&mut self, station: usize, port: &mut Port) {
+        if let Identity::Unknown { silences, .. } = &mut self.stations[station].identity {
+            *silences += 1;
+            if *silences >= SILENCES {
+                self.meet(station, &Identification::default(), port);
+            }
+        }
+    }
+
+    /// The device gave an answer that cannot be understood when it was asked who it is. As it does answer, it does not
+    /// count as nameless.
+    pub(super) fn is_unclear(&mut self, station: usize, what: &str, port: &Port) {
+        if let Identity::Unknown { silences, .. } = &mut self.stations[station].identity {
+            *silences = 0;
+        }
+        port.log(
+            log::Level::Warn,
+            "identity",
+            format_args!(
+                "{} {what} when it was asked who it is (function 43); nothing is written before it has said so; it is \
+                 asked again in {PAUSE}",
+                self.named(station)
+            ),
+        );
+    }
+
+    /// Goes on with the next station, and asks this one another time who it is, if that is not known yet.
+    pub(super) fn ask_later(
         &mut self,
         station: usize,
         now: Nanos,
         port: &mut Port,
     ) -> Result<(), BusError> {
-        if let Identity::Unknown {
-            silences,
-            not_before,
-        } = &mut self.stations[station].identity
-        {
-            *silences += 1;
+        if let Identity::Unknown { not_before, .. } = &mut self.stations[station].identity {
             *not_before = now + PAUSE;
-            if *silences >= SILENCES {
-                self.meet(station, &Identification::default(), port);
-            }
         }
         self.begin(station + 1, now, port)
     }

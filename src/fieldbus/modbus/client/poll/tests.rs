@@ -47,6 +47,7 @@ impl Client {
     fn new(stations: usize, reads: &[Piece], writes: &[Piece], write_to: Option<&str>) -> Self {
         for words in [
             "nothing is written into the PLC",
+            "nothing is written before it has said so",
             "the other stations go on",
         ] {
             logged::expect(words);
@@ -76,7 +77,11 @@ impl Client {
 
     /// A connection over a serial line, or over TCP.
     fn connect(&mut self, framing: Framing) -> Line<'_> {
-        let able = Abilities::new(false, usize::MAX);
+        self.connect_with(framing, Abilities::new(false, usize::MAX))
+    }
+
+    /// A connection with a device that is taken to be able to do this.
+    fn connect_with(&mut self, framing: Framing, able: Abilities) -> Line<'_> {
         let poll = Poll::new(
             &mut self.stations,
             &mut self.guards,
@@ -169,8 +174,12 @@ impl Line<'_> {
                 });
             }
         }
-        let arrived = self.poll.arrived(self.now, &telegram, self.port);
-        arrived.expect("it goes on");
+        self.hear(&telegram).expect("it goes on");
+    }
+
+    /// These bytes come, whatever they are.
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), BusError> {
+        self.poll.arrived(self.now, bytes, self.port)
     }
 
     #[track_caller]
@@ -427,27 +436,29 @@ fn a_device_without_the_functions_for_many_is_asked_for_single_ones() {
         signal(Table::HoldingRegisters, 48, 0, 16),
     ];
     let mut client = Client::new(1, &[], &coils, Some(FALLBACK));
-    let mut line = client.connect(tcp());
-    assert_eq!(line.asked(), [1, 0, 4, 0, 1], "it is looked at");
-    line.answer(&[1, 1, 0]);
-    assert_eq!(line.asked(), WHO);
-    line.answer(&[0xAB, 1]);
-    assert_eq!(line.asked(), [15, 0, 4, 0, 2, 1, 0]);
-    line.answer(&[0x8F, 1]);
-    for _ in 0..2 {
-        for coil in [4, 5] {
-            let one = [5, 0, coil, 0, 0];
-            assert_eq!(line.asked(), one);
-            line.answer(&one);
+    for framing in [serial(), tcp()] {
+        let mut line = client.connect(framing);
+        assert_eq!(line.asked(), [1, 0, 4, 0, 1], "it is looked at");
+        line.answer(&[1, 1, 0]);
+        assert_eq!(line.asked(), WHO);
+        line.answer(&[0xAB, 1]);
+        assert_eq!(line.asked(), [15, 0, 4, 0, 2, 1, 0]);
+        line.answer(&[0x8F, 1]);
+        for _ in 0..2 {
+            for coil in [4, 5] {
+                let one = [5, 0, coil, 0, 0];
+                assert_eq!(line.asked(), one);
+                line.answer(&one);
+            }
+            let many = line.asked();
+            if many[0] == 16 {
+                assert_eq!(many, [16, 0, 3, 0, 1, 2, 0, 0]);
+                line.answer(&[0x90, 1]);
+                continue;
+            }
+            assert_eq!(many, [6, 0, 3, 0, 0]);
+            line.answer(&many);
         }
-        let many = line.asked();
-        if many[0] == 16 {
-            assert_eq!(many, [16, 0, 3, 0, 1, 2, 0, 0]);
-            line.answer(&[0x90, 1]);
-            continue;
-        }
-        assert_eq!(many, [6, 0, 3, 0, 0]);
-        line.answer(&many);
     }
 }
 
@@ -458,13 +469,15 @@ fn a_device_without_what_lies_between_the_signals_is_read_in_pieces() {
         signal(Table::InputRegisters, 160, 8, 8),
     ];
     let mut client = Client::new(1, &reads, &[], None);
-    let mut line = client.connect(tcp());
-    assert_eq!(line.asked(), [4, 0, 1, 0, 10]);
-    line.answer(&[0x84, 2]);
-    for _ in 0..2 {
-        for register in [1, 10] {
-            assert_eq!(line.asked(), [4, 0, register, 0, 1]);
-            line.answer(&[4, 2, 0, 7]);
+    for exception in 1..=4 {
+        let mut line = client.connect(tcp());
+        assert_eq!(line.asked(), [4, 0, 1, 0, 10]);
+        line.answer(&[0x84, exception]);
+        for _ in 0..2 {
+            for register in [1, 10] {
+                assert_eq!(line.asked(), [4, 0, register, 0, 1]);
+                line.answer(&[4, 2, 0, 7]);
+            }
         }
     }
 }
@@ -512,4 +525,126 @@ fn the_echo_of_a_request_is_not_its_answer() {
     }
     assert_eq!(line.statistic("modbus-client.damaged"), None);
     assert_eq!(line.statistic("modbus-client.unasked"), None);
+}
+
+#[test]
+fn a_bit_of_a_register_is_written_over_a_serial_line_as_over_tcp() {
+    // 400021.5: bit 5 of the register with the offset 20, in its low byte.
+    let bit = [signal(Table::HoldingRegisters, 20 * 16 + 8 + 5, 0, 1)];
+    let mut client = Client::new(1, &[], &bit, Some(FALLBACK));
+    for framing in [serial(), tcp()] {
+        let mut line = client.connect(framing);
+        assert_eq!(line.asked(), [3, 0, 20, 0, 1]);
+        line.answer(&[3, 2, 0, 0]);
+        assert_eq!(line.asked(), WHO);
+        line.answer(&[0xAB, 1]);
+        for _ in 0..3 {
+            let mask = [22, 0, 20, 0xFF, 0xDF, 0, 0];
+            assert_eq!(line.asked(), mask);
+            line.answer(&mask);
+            assert_eq!(line.status.link().cause.name(), "running");
+        }
+    }
+}
+
+#[test]
+fn a_station_that_is_only_written_need_not_have_anything_to_be_read() {
+    for exception in 1..=3 {
+        let mut client = Client::new(1, &[], &[register(0)], Some(FALLBACK));
+        let mut line = client.connect(tcp());
+        assert_eq!(line.asked(), [3, 0, 0, 0, 1], "it is looked at");
+        line.answer(&[0x83, exception]);
+        assert_eq!(line.asked(), WHO);
+        line.answer(&[0xAB, 1]);
+        for _ in 0..2 {
+            assert_eq!(line.asked(), WRITE);
+            line.answer(&WRITE[..5]);
+        }
+        assert_eq!(line.statistic("modbus-client.refused"), None);
+    }
+}
+
+#[test]
+fn a_device_that_is_busy_or_away_is_not_taken_to_lack_function_23() {
+    const BOTH: &[u8] = &[23, 0, 5, 0, 1, 0, 0, 0, 1, 2, 0, 0];
+    let mut client = Client::new(1, &[register(5)], &[register(0)], Some(FALLBACK));
+    for exception in [1, 2, 3, 4, 5, 6, 0x0A, 0x0B] {
+        let mut line = client.connect_with(tcp(), Abilities::new(true, usize::MAX));
+        line.read();
+        assert_eq!(line.asked(), WHO);
+        line.answer(&[0xAB, 1]);
+        assert_eq!(line.asked(), BOTH);
+        line.answer(&[0x97, exception]);
+        match exception {
+            1..=4 => assert_eq!(line.asked(), WRITE),
+            5 | 6 => assert_eq!(line.asked(), BOTH),
+            _ => {
+                // It is another device, perhaps, that the gateway finds there.
+                line.read();
+                line.introduce("8");
+                assert_eq!(line.asked(), READ);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_device_whose_answers_cannot_be_understood_is_asked_who_it_is_until_one_can() {
+    let mut client = Client::new(1, &[register(5)], &[register(0)], Some(FALLBACK));
+    for framing in [serial(), tcp()] {
+        let mut line = client.connect(framing);
+        for _ in 0..5 {
+            while line.asked() == READ {
+                line.answer(&[3, 2, 0, 7]);
+            }
+            if matches!(line.poll.framing, Framing::Rtu { .. }) {
+                line.hear(&[1, 0xAB, 1, 0, 0]).expect("it goes on");
+            } else {
+                line.answer(&[43, READ_DEVICE_IDENTIFICATION, 1, 0x81, 0, 0, 1, 0]);
+            }
+        }
+        while line.asked() == READ {
+            line.answer(&[3, 2, 0, 7]);
+        }
+        let identification = Identification::of_driver("7");
+        let mut pdu = Vec::new();
+        let answered = identification.answer(&WHO[1..], &mut pdu);
+        answered.expect("an answer");
+        line.answer(&pdu);
+        assert_eq!(line.statistic("identity").as_deref(), Some("tickbus 7"));
+        assert_eq!(line.statistic("writes").as_deref(), Some("blocked"));
+    }
+}
+
+#[test]
+fn a_device_that_answers_with_no_telegram_when_asked_who_it_is_is_not_asked_for_ever() {
+    let mut client = Client::new(1, &[register(5)], &[register(0)], Some(FALLBACK));
+    for _ in 0..2 {
+        let mut line = client.connect(tcp());
+        line.read();
+        assert_eq!(line.asked(), WHO);
+        let answered = line.hear(&[0, 2, 0, 9, 0, 3, 1, 0xAB, 1]);
+        assert!(
+            matches!(answered, Err(BusError::Protocol(_))),
+            "{answered:?}"
+        );
+    }
+    let mut line = client.connect(tcp());
+    line.read();
+    line.write_and_read();
+}
+
+#[test]
+fn a_stray_byte_behind_an_answer_does_it_no_harm() {
+    let mut client = Client::new(1, &[register(5)], &[], None);
+    let mut line = client.connect(serial());
+    for _ in 0..2 {
+        assert_eq!(line.asked(), READ);
+        let mut telegram = Vec::new();
+        rtu::append(1, &mut telegram, |pdu| pdu.extend_from_slice(&[3, 2, 0, 7]));
+        telegram.push(0);
+        line.hear(&telegram).expect("it goes on");
+        assert_eq!(line.status.link().cause.name(), "running");
+    }
+    assert_eq!(line.statistic("modbus-client.damaged"), None);
 }

@@ -37,9 +37,10 @@ impl Poll<'_> {
             return Ok(());
         };
         let station = asking.station;
-        if matches!(asking.what, Asked::Query(_)) {
+        match asking.what {
             // Whoever answers next may be another device.
-            self.doubt(station);
+            Asked::Query(_) => self.doubt(station),
+            Asked::Identity { .. } => self.says_nothing(station, port),
         }
         let within = self.timeout;
         self.miss(&format!("did not answer within {within}"), now, port)
@@ -60,7 +61,7 @@ impl Poll<'_> {
         self.request.clear();
         self.written = 0;
         let Asked::Query(index) = asked else {
-            return self.says_nothing(station, now, port);
+            return self.ask_later(station, now, port);
         };
         let query = &self.stations[station].queries[index];
         let error = BusError::Link(format!(
@@ -102,6 +103,10 @@ impl Poll<'_> {
             return self.begin(station, now, port);
         }
         let query = &self.stations[station].queries[index];
+        if query.is_look() && exception.is_about_the_request() {
+            // It lives, and nothing has to be there to be read.
+            return self.go_on(station, index + 1, now, port);
+        }
         let right = match (exception, query) {
             (Exception::ILLEGAL_FUNCTION, Query::Mask(_)) => {
                 "it cannot write single bits of a register: let signals have all 16 of it, or the PLC's program \
@@ -113,13 +118,9 @@ impl Poll<'_> {
             (Exception::ILLEGAL_DATA_ADDRESS, _) => {
                 "correct \"inputs\", \"outputs\" or [fieldbus.at]; offsets count from 0"
             }
-            (
-                Exception::ACKNOWLEDGE
-                | Exception::SERVER_DEVICE_BUSY
-                | Exception::GATEWAY_PATH_UNAVAILABLE
-                | Exception::GATEWAY_TARGET_FAILED,
-                _,
-            ) => "see whether the device runs, and whether \"unit\" is its number",
+            _ if exception.passes() => {
+                "see whether the device runs, and whether \"unit\" is its number"
+            }
             _ => "see what the device's manual says of it",
         };
         let error = BusError::Refused(format!(
@@ -153,11 +154,16 @@ impl Poll<'_> {
         let is_unknown = exception == Exception::ILLEGAL_FUNCTION;
         let instead = match query {
             // Many a server does not know it, or knows it for some registers alone.
-            Query::Both { .. } => {
+            Query::Both { .. } if !exception.passes() => {
                 able.combine = false;
                 "it is asked in two requests"
             }
-            Query::Read(read) if read.joined && exception.is_about_the_request() => {
+            // Some say of a place that is not there that they have failed.
+            Query::Read(read)
+                if read.joined
+                    && (exception.is_about_the_request()
+                        || exception == Exception::SERVER_DEVICE_FAILURE) =>
+            {
                 able.gap = 0;
                 "it is asked without what lies between the signals"
             }

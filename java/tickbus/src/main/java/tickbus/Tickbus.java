@@ -394,7 +394,14 @@ public final class Tickbus implements AutoCloseable {
     public InjectedFault inject(String fault) {
         Objects.requireNonNull(fault, "fault");
         int id = whenIdle(() -> injectNative(handle, fault));
-        return faults().stream().filter(one -> one.id() == id).findFirst().orElseThrow();
+        while (true) {
+            try {
+                return faults().stream().filter(one -> one.id() == id).findFirst().orElseThrow();
+            } catch (FieldbusException e) {
+                // The fault is injected: to throw BUSY now would say that it is not.
+                waitAfter(e);
+            }
+        }
     }
 
     /**
@@ -460,9 +467,15 @@ public final class Tickbus implements AutoCloseable {
         if (events == null) {
             events = new long[EVENTS * EVENT_WORDS];
         }
-        endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
-        nextEvent = 0;
-        return endOfEvents > 0;
+        while (true) {
+            try {
+                endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
+                nextEvent = 0;
+                return endOfEvents > 0;
+            } catch (FieldbusException e) {
+                waitAfter(e);
+            }
+        }
     }
 
     /**
@@ -548,6 +561,14 @@ public final class Tickbus implements AutoCloseable {
                 Thread.onSpinWait();
             }
         }
+    }
+
+    /** Lets a call that met another thread's be tried again; throws what is no such meeting. */
+    private static void waitAfter(FieldbusException e) {
+        if (e.status() != Status.BUSY) {
+            throw e;
+        }
+        Thread.onSpinWait();
     }
 
     /** What a negative code means, with the driver's own reason where it has one. */

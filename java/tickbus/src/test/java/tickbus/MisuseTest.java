@@ -243,6 +243,7 @@ class MisuseTest {
                 try {
                     for (int i = 0; i < 20_000; i++) {
                         assertTrue(bus.exchange() >= 0);
+                        bus.pollEvents((s, v, t) -> { });
                     }
                     return 0;
                 } finally {
@@ -258,6 +259,32 @@ class MisuseTest {
             };
             atOnce(ticks, looks);
             assertEquals("20000", bus.statistics().get("ticks"));
+        }
+    }
+
+    @Test
+    void aFaultThatIsSaidToBeRefusedIsNotInjected() throws Exception {
+        try (Tickbus bus = Tickbus.open(mirror())) {
+            AtomicBoolean injected = new AtomicBoolean();
+            Callable<Integer> ticks = () -> {
+                while (!injected.get()) {
+                    assertTrue(bus.exchange() >= 0);
+                }
+                return 0;
+            };
+            Callable<Integer> injects = () -> {
+                try {
+                    int done = 0;
+                    for (int i = 0; i < 50; i++) {
+                        done += served(() -> bus.inject("kind = \"delay\"\nby = \"1ms\"\nat = \"1h\"")) ? 1 : 0;
+                    }
+                    return done;
+                } finally {
+                    injected.set(true);
+                }
+            };
+            int done = atOnce(ticks, injects).stream().mapToInt(Integer::intValue).sum();
+            assertEquals(done, bus.faults().size());
         }
     }
 

@@ -53,10 +53,6 @@ fn main() -> std::process::ExitCode {
         ),
         ("one_write_of_asyncua_is_one_commit", one_commit),
         ("pulses_reach_a_subscriber_that_has_no_queue", pulses),
-        (
-            "a_change_within_a_long_sampling_interval_is_reported_when_it_is_over",
-            sampled,
-        ),
         ("a_secured_server_lets_in_whom_it_knows", secured),
         (
             "tshark_finds_nothing_malformed_in_what_the_server_says",
@@ -486,23 +482,6 @@ fn pulses() -> Result<(), Absent> {
         });
         let rises = seen.iter().filter(|value| **value == json!(true)).count();
         assert_eq!(rises, 1, "pulse {pulse}: {seen:?}");
-    }
-    Ok(())
-}
-
-fn sampled() -> Result<(), Absent> {
-    let (mut device, mut client) = open_server()?;
-    device.end.tick();
-    // Many publishes within one sampling interval.
-    client.ask(&json!({"subscribe": [["count"], 20, 1, 1000]}));
-    for count in [5.0, 7.0] {
-        device.end.set("count", count);
-        device.end.tick();
-        device.until("the change is reported", |_| {
-            let values = &client.ask(&json!({"changes": "count"}))["values"];
-            let values = values.as_array().expect("a list");
-            values.iter().any(|value| value.as_f64() == Some(count))
-        });
     }
     Ok(())
 }

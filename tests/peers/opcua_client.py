@@ -6,7 +6,7 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"browse": true}                 {"tree": {folder: [names]}}
     {"read": node}                   {"value", "type", "status", "source"}
     {"write": {node: [type, value]}} {"statuses": […]}, all in one Write
-    {"subscribe": [nodes, interval, queue, sampling]}  {}
+    {"subscribe": [nodes, interval, queue]}  {}
     {"changes": node}                {"values": […]} since the last time
     {"properties": node}             {name: value as text}
     {"status": true}                 {"start", "time"}, of the structure ServerStatus, in seconds
@@ -89,12 +89,10 @@ async def serve(client):
             )
             answer["statuses"] = [status.name for status in statuses]
         if "subscribe" in line:
-            names, interval, queue, *sampling = line["subscribe"]
+            names, interval, queue = line["subscribe"]
             subscription = await client.create_subscription(interval, changes)
             await subscription.subscribe_data_change(
-                [node(name) for name in names],
-                queuesize=queue,
-                sampling_interval=sampling[0] if sampling else 0,
+                [node(name) for name in names], queuesize=queue, sampling_interval=0
             )
         if "changes" in line:
             answer["values"] = changes.of.pop(line["changes"], [])

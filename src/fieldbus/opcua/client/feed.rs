@@ -85,17 +85,18 @@ impl OnSubscriptionNotificationCore for Feed {
 /// The name of the item that is no signal: the state of the server.
 const STATE: u32 = u32::MAX;
 
-/// What `Server_ServerStatus_State` says of the PLC; `None` for nothing. Outputs of a server in test mode lead
+/// What `Server_ServerStatus_State` says of the PLC; `None` for nothing yet. A server that does not report it, or
+/// does not know it, is believed to run, also if an earlier one at this place said that it stood. Outputs of a server in test mode lead
 /// nowhere, as those of one that was suspended (OPC 10000-5, 12.6).
 fn state(value: &DataValue) -> Option<PlcState> {
     const RUNNING: i32 = ServerState::Running as i32;
     const UNKNOWN: i32 = ServerState::Unknown as i32;
     match value.value {
-        _ if value.status().is_bad() => None,
-        Some(Variant::Int32(RUNNING)) => Some(PlcState::Run),
-        Some(Variant::Int32(UNKNOWN)) => None,
+        _ if value.status() == StatusCode::BadWaitingForInitialData => None,
+        _ if value.status().is_bad() => Some(PlcState::Run),
+        Some(Variant::Int32(RUNNING | UNKNOWN)) => Some(PlcState::Run),
         Some(Variant::Int32(_)) => Some(PlcState::Stop),
-        _ => None,
+        _ => Some(PlcState::Run),
     }
 }
 
@@ -122,7 +123,15 @@ pub(super) async fn subscribe(
     let quiet = count(Nanos(rhythm.max_age.0 / 3), interval).max(1);
     let life = count(LIFE, interval).max(quiet.saturating_mul(3));
     let id = session
-        .create_subscription(interval.to_duration(), life, quiet, 0, 0, true, Feed(inbox))
+        .create_subscription(
+            interval.to_duration(),
+            life,
+            quiet,
+            0,
+            0,
+            true,
+            Feed(inbox.clone()),
+        )
         .await
         .map_err(|error| no_subscription(&error))?;
     let (revised, quiet) = revised(session, id, (interval, quiet));
@@ -134,7 +143,7 @@ pub(super) async fn subscribe(
         );
     }
     // Before the values, which count for nothing while it is not running.
-    watch_state(session, id, interval).await?;
+    watch_state(session, id, interval, &inbox).await?;
     let read: Vec<usize> = (0..fields.len())
         .filter(|index| fields[*index].is_read)
         .collect();
@@ -177,7 +186,12 @@ pub(super) async fn subscribe(
 }
 
 /// Subscribes to the state of the server. One that does not report it is believed to run.
-async fn watch_state(session: &Session, id: u32, interval: Nanos) -> Result<(), BusError> {
+async fn watch_state(
+    session: &Session,
+    id: u32,
+    interval: Nanos,
+    inbox: &Inbox<News>,
+) -> Result<(), BusError> {
     let request = MonitoredItemCreateRequest::new(
         NodeId::from(VariableId::Server_ServerStatus_State).into(),
         MonitoringMode::Reporting,
@@ -195,6 +209,7 @@ async fn watch_state(session: &Session, id: u32, interval: Nanos) -> Result<(), 
         .map_err(|error| no_subscription(&error))?;
     let refused = made.iter().map(|made| made.result.status_code);
     if let Some(status) = refused.into_iter().find(|status| status.is_bad()) {
+        inbox.push(News::Plc(PlcState::Run));
         log::info!(
             "the server does not report its state ({}), so a PLC in STOP is not noticed by it",
             meaning(status)
@@ -223,4 +238,24 @@ fn no_subscription(error: &Error) -> BusError {
 /// How many times `interval` fits into `span`.
 fn count(span: Nanos, interval: Nanos) -> u32 {
     u32::try_from(span.0 / interval.0.max(1)).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_server_that_does_not_say_its_state_is_believed_to_run() {
+        let says = |value: ServerState| state(&DataValue::new_now(value as i32));
+        assert_eq!(says(ServerState::Suspended), Some(PlcState::Stop));
+        assert_eq!(says(ServerState::Unknown), Some(PlcState::Run));
+        let bad = |status| {
+            state(&DataValue {
+                status: Some(status),
+                ..DataValue::default()
+            })
+        };
+        assert_eq!(bad(StatusCode::BadNotSupported), Some(PlcState::Run));
+        assert_eq!(bad(StatusCode::BadWaitingForInitialData), None);
+    }
 }

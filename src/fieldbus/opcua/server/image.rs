@@ -58,6 +58,20 @@ impl Show {
         }
     }
 
+    /// Tells subscribers what their sampling intervals have kept back.
+    fn tell_due(&self, places: &[Place]) {
+        let node = |variable: Variable| {
+            let place = &places[variable.signal];
+            if variable.is_scaled {
+                place.scaled.as_ref().map(|(node, _)| node)
+            } else {
+                Some(&place.node)
+            }
+        };
+        let now = date((self.wall)());
+        self.watched.tell_due(&self.subscriptions, now, node);
+    }
+
     /// Gives a node a value, and tells those who subscribe to it.
     fn put(&self, node: &NodeId, variable: Variable, value: DataValue) {
         if let Some(NodeType::Variable(shown)) = self.nodes.address_space().write().find_mut(node) {
@@ -191,6 +205,7 @@ impl Image {
                 self.put(now, index, self.receives.bits(index), status);
             }
         }
+        self.show.tell_due(&self.places);
     }
 
     /// Brings the nodes up to date for a client that reads these signals now: pulses in them count as sent.

@@ -12,7 +12,8 @@ use opcua::server::address_space::{AddressSpace, NodeType};
 use opcua::server::diagnostics::NamespaceMetadata;
 use opcua::server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManagerImpl};
 use opcua::server::node_manager::{
-    MonitoredItemRef, ParsedReadValueId, ParsedWriteValue, RequestContext, ServerContext, WriteNode,
+    MonitoredItemRef, MonitoredItemUpdateRef, ParsedReadValueId, ParsedWriteValue, RequestContext,
+    ServerContext, WriteNode,
 };
 use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
 use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
@@ -26,7 +27,7 @@ use crate::time::{Nanos, WallClock};
 
 use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
-use super::watched::{Variable, Watched};
+use super::watched::{Rhythm, Variable, Watched};
 
 /// A sampling interval that keeps no change back, in milliseconds; the crate takes no zero here.
 const UNFILTERED: f64 = 0.001;
@@ -268,24 +269,40 @@ impl InMemoryNodeManagerImpl for Signals {
             .read_values(context, address_space, &wanted, 0.0, both)
             .await;
         for (item, value) in items.iter_mut().zip(values) {
+            let first = value.source_timestamp;
             if value.status() != StatusCode::BadAttributeIdInvalid {
                 item.set_initial_value(value);
             }
             item.set_status(StatusCode::Good);
             if let Some(&variable) = self.by_node.get(&item.item_to_monitor().node_id) {
-                let sampling = millis(item.sampling_interval());
                 let publishing = publishing(context, item.handle());
-                // A queue keeps what is sampled. Without one, what is there when it publishes is seen: the
-                // newest of all items, and so values that belong together.
-                let span = if item.queue_size() > 1 {
-                    sampling
-                } else {
-                    if sampling <= publishing {
-                        item.revise_sampling_interval(UNFILTERED);
-                    }
-                    sampling.max(publishing)
-                };
-                self.own.watched.add(variable, item.handle(), span);
+                let mut rhythm = rhythm(item.sampling_interval(), item.queue_size(), publishing);
+                // Without a queue, what is there when it publishes is seen: the newest of all items, and so values
+                // that belong together.
+                if item.queue_size() <= 1 && rhythm.sampling <= publishing {
+                    item.revise_sampling_interval(UNFILTERED);
+                    rhythm.sampling = millis(item.sampling_interval());
+                }
+                self.own.watched.add(variable, item.handle(), rhythm, first);
+            }
+        }
+    }
+
+    async fn modify_monitored_items(
+        &self,
+        context: &RequestContext,
+        items: &[&MonitoredItemUpdateRef],
+    ) {
+        for item in items {
+            let variable = self.by_node.get(item.node_id());
+            if let Some(&variable) = variable
+                && item.attribute() == AttributeId::Value
+            {
+                let made = item.update();
+                let publishing = publishing(context, item.handle());
+                let queue = made.revised_queue_size as usize;
+                let rhythm = rhythm(made.revised_sampling_interval, queue, publishing);
+                self.own.watched.modify(variable, item.handle(), rhythm);
             }
         }
     }
@@ -355,6 +372,18 @@ pub(super) fn namespace() -> NamespaceMetadata {
         namespace_index: NAMESPACE,
         ..NamespaceMetadata::default()
     }
+}
+
+/// The rhythm of an item with a sampling interval in milliseconds and a queue. A queue keeps what is sampled; without
+/// one, what is there when it publishes is seen.
+fn rhythm(sampling: f64, queue: usize, publishing: Nanos) -> Rhythm {
+    let sampling = millis(sampling);
+    let span = if queue > 1 {
+        sampling
+    } else {
+        sampling.max(publishing)
+    };
+    Rhythm { sampling, span }
 }
 
 /// The publishing interval of the subscription that an item belongs to.

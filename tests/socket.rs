@@ -15,7 +15,7 @@ use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::time::Duration;
 
-use conformance::rig::{CYCLE, End, MAX_AGE, PAUSE, await_that, config, logged, pass};
+use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, logged, pass};
 use peers::{Alone, client, is_closed, leave};
 use socket_peers::{RECORD, Tcp, device, record};
 use socket2::SockRef;
@@ -480,7 +480,8 @@ fn a_controller_whose_server_turns_it_away_says_what_to_do() {
             let link = controller.link();
             link.cause.name() == cause && link.reason.contains("if it serves another client")
         });
-        clock.advance(PAUSE);
+        // The pause before it tries again.
+        clock.advance(Nanos::from_millis(10));
     }
     assert_eq!(controller.statistic("link.running"), "0");
 }

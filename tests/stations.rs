@@ -11,6 +11,7 @@
 mod conformance;
 mod peers;
 
+use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
 use std::net::{SocketAddr, TcpStream};
@@ -28,12 +29,16 @@ fn device() -> (Alone, [SocketAddr; 2]) {
                     cycle = \"1ms\"\nmax_age = \"300ms\"\n"
         .to_owned();
     for name in ["a", "b"] {
-        text += &format!("[[station]]\nname = \"{name}\"\naddress = \"127.0.0.1:0\"\n");
+        let _ = writeln!(
+            text,
+            "[[station]]\nname = \"{name}\"\naddress = \"127.0.0.1:0\""
+        );
     }
     for name in ["a", "b"] {
         for (word, area) in [("to", 'Q'), ("from", 'I')] {
-            text += &format!(
-                "[[signal]]\nname = \"{word} {name}\"\nstation = \"{name}\"\naddress = \"%{area}B0\"\n"
+            let _ = writeln!(
+                text,
+                "[[signal]]\nname = \"{word} {name}\"\nstation = \"{name}\"\naddress = \"%{area}B0\""
             );
         }
     }
@@ -58,7 +63,9 @@ fn until_heard(device: &mut Alone, peers: &mut [(&str, &mut TcpStream)], value: 
             peer.write_all(&[value]).expect("the device reads");
             end.get(&format!("to {name}")) == f64::from(value)
         };
-        peers.iter_mut().map(sent).fold(true, |all, one| all && one)
+        // Each is to send, whatever the others have done.
+        let arrived: Vec<bool> = peers.iter_mut().map(sent).collect();
+        arrived.into_iter().all(|one| one)
     });
 }
 
@@ -139,7 +146,7 @@ fn a_system_without_descriptors_costs_the_served_peer_nothing() {
     let usual = getrlimit(Resource::Nofile);
     let one_more = Rlimit {
         current: Some(u64::try_from(next).expect("a number") + 1),
-        ..usual.clone()
+        ..usual
     };
     setrlimit(Resource::Nofile, one_more).expect("less is always allowed");
     let mut b = client(b);

@@ -139,6 +139,10 @@ impl Config {
     }
 }
 
+#[expect(
+    clippy::too_many_lines,
+    reason = "the tables of a file, one after the other"
+)]
 fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config> {
     let driver = root.require("driver", "write a [driver] table with id and name");
     let fieldbus = root.require("fieldbus", "write a [fieldbus] table with the kind of bus");

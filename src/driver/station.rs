@@ -125,6 +125,7 @@ impl crate::image::Receiver for Receiver<'_> {
 }
 
 #[cfg(all(test, not(loom)))]
+#[expect(clippy::float_cmp, reason = "small whole numbers")]
 mod tests {
     use super::*;
     use crate::driver::frames::directions;

@@ -352,12 +352,14 @@ impl LinkStatus {
                 let reason = self.0.silence(&record, shown, ages);
                 self.0.silent(record, now, stale, &reason);
             }
-            LinkState::Stale if stale > 0 && record.link.cause == Cause::Frozen => {
-                if shown > limit {
-                    let reason = self.0.silence(&record, Nanos::MAX, ages);
-                    self.0.silent(record, now, stale, &reason);
-                }
+            // What stands still and is then too old is silent.
+            LinkState::Stale
+                if stale > 0 && record.link.cause == Cause::Frozen && shown > limit =>
+            {
+                let reason = self.0.silence(&record, Nanos::MAX, ages);
+                self.0.silent(record, now, stale, &reason);
             }
+            LinkState::Stale if stale > 0 && record.link.cause == Cause::Frozen => {}
             LinkState::Stale if stale > 0 => {
                 self.0.stale.store(stale, Ordering::Relaxed);
                 if record.link.cause == Cause::Silent {

@@ -109,7 +109,7 @@ fn record(
     name: &str,
     address: (&str, usize),
     kind: (&str, usize),
-    comment: String,
+    comment: &str,
 ) -> Record {
     let cell = |text: &str, at| Cell {
         text: text.split_whitespace().collect::<Vec<_>>().join(" "),
@@ -119,7 +119,7 @@ fn record(
         cell(name, place(node, "name")),
         cell(address.0, address.1),
         cell(kind.0, kind.1),
-        cell(&comment, node.range().start),
+        cell(comment, node.range().start),
     ]
 }
 
@@ -178,7 +178,7 @@ fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
             name,
             (address, at),
             (called, kind_at),
-            comment,
+            &comment,
         ));
     }
     if let Some(first) = without.first() {
@@ -242,7 +242,7 @@ fn logix(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
             name,
             (target, at),
             (kind, place(tag, "DataType")),
-            words(child(tag, "Description")),
+            &words(child(tag, "Description")),
         );
         record[0].at = place(tag, "Name");
         records.push(record);

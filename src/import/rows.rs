@@ -411,9 +411,10 @@ impl Row<'_> {
                 .ok()
                 .filter(|n| n.is_finite())
         });
+        let differ = |one: f64, two: f64| (one - two).abs() > 0.0;
         if let [Some(one), Some(two), Some(three), Some(four)] = numbers
-            && one != two
-            && three != four
+            && differ(one, two)
+            && differ(three, four)
         {
             return Some(Some([one, two, three, four]));
         }

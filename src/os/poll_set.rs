@@ -215,7 +215,7 @@ mod watch {
                 }
                 Some(span) => {
                     let rest = Duration::from_nanos(u64::from(span.subsec_nanos() % 1_000_000));
-                    Some(span - rest)
+                    Some(span.saturating_sub(rest))
                 }
                 None => None,
             };

@@ -154,9 +154,6 @@ pub struct Rig {
 
 /// The bus cycle of both ends.
 pub const CYCLE: Nanos = Nanos::from_millis(1);
-
-/// The pause before a broken line is tried again: the least that a driver.cfg may name.
-pub const PAUSE: Nanos = Nanos::from_millis(10);
 /// Data older than this are stale.
 pub const MAX_AGE: Nanos = Nanos::from_millis(300);
 

@@ -118,6 +118,7 @@ impl Element {
         )
     }
 
+    #[expect(clippy::format_collect, reason = "a few lines of text")]
     fn declarations(&self, section: &str, keyword: &str) -> String {
         let sections = self.children.iter().filter(|child| child.name == section);
         sections

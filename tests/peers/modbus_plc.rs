@@ -137,7 +137,7 @@ fn act(pdu: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
             )
         }
         function @ (3 | 4) => {
-            let table = if function == 4 { 0 } else { 1 };
+            let table = usize::from(function != 4);
             let registers = memory.registers[table].get(span)?;
             let bytes: Vec<u8> = registers.iter().flat_map(|r| r.to_be_bytes()).collect();
             Some(

@@ -12,6 +12,10 @@ const CYCLE: Nanos = Nanos::from_millis(10);
 /// The longest record that every CPU takes.
 const LONGEST: usize = 8192;
 
+#[expect(
+    clippy::too_many_lines,
+    reason = "one block of the PLC, from its head to its end"
+)]
 pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) -> Body {
     let (sent, received) = (plan.outputs.record.bytes, plan.inputs.record.bytes);
     if sent.max(received) > LONGEST {

@@ -45,6 +45,7 @@ const COMPILED: &str = "Its XML was checked against PLCopen's schema, and its st
                         project in our tests; it was never compiled in the editor.";
 
 /// The files for `config`.
+#[expect(clippy::too_many_lines, reason = "the files in their order")]
 pub(in crate::export) fn export(config: &Config, editor: Editor) -> Export {
     let prefix = block_prefix(&config.name);
     let list = format!("{prefix}_io");

@@ -36,6 +36,10 @@ pub(super) fn link(stream: &Stream<'_>) -> Link {
     }
 }
 
+#[expect(
+    clippy::too_many_lines,
+    reason = "one program of the PLC, from its head to its end"
+)]
 fn before(stream: &Stream<'_>) -> Part {
     let Stream {
         list,

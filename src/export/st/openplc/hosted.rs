@@ -8,6 +8,10 @@ use crate::export::st::life::{self, ALIVE, Life};
 use crate::export::st::{add, comment, records, source, taken};
 use crate::signal::{DataType, Signal};
 
+#[expect(
+    clippy::too_many_lines,
+    reason = "one program of the PLC, from its head to its end"
+)]
 pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> Result<String, Mistakes> {
     let wrong = |what: String, right: &str| {
         Mistakes::of_file(&config.path.display().to_string(), what, right)

@@ -52,16 +52,13 @@ impl ClientOptions {
             if signal.station != station || signal.area != writes {
                 continue;
             }
-            match self.at.get(&signal.name) {
-                Some(spot) => {
-                    let piece = Piece::of_spot(signal, *spot).ok();
-                    claims.extend(piece.map(|piece| (piece, index)));
-                }
-                None => {
-                    let parts = blocks.iter();
-                    let parts = parts.filter_map(|block| Piece::of_block(signal, block));
-                    claims.extend(parts.map(|piece| (piece, index)));
-                }
+            if let Some(spot) = self.at.get(&signal.name) {
+                let piece = Piece::of_spot(signal, *spot).ok();
+                claims.extend(piece.map(|piece| (piece, index)));
+            } else {
+                let parts = blocks.iter();
+                let parts = parts.filter_map(|block| Piece::of_block(signal, block));
+                claims.extend(parts.map(|piece| (piece, index)));
             }
         }
         claims.sort_by_key(|(piece, _)| (piece.table.digit(), piece.claim().start));

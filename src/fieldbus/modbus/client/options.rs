@@ -189,12 +189,11 @@ impl ClientOptions {
             if signal.station != station || signal.area != area {
                 continue;
             }
-            match self.at.get(&signal.name) {
-                Some(spot) => pieces.extend(Piece::of_spot(signal, *spot)),
-                None => {
-                    let parts = blocks.iter();
-                    pieces.extend(parts.filter_map(|block| Piece::of_block(signal, block)));
-                }
+            if let Some(spot) = self.at.get(&signal.name) {
+                pieces.extend(Piece::of_spot(signal, *spot));
+            } else {
+                let parts = blocks.iter();
+                pieces.extend(parts.filter_map(|block| Piece::of_block(signal, block)));
             }
         }
         pieces

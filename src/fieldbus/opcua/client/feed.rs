@@ -208,7 +208,7 @@ async fn watch_state(
         .await
         .map_err(|error| no_subscription(&error))?;
     let refused = made.iter().map(|made| made.result.status_code);
-    if let Some(status) = refused.into_iter().find(|status| status.is_bad()) {
+    if let Some(status) = refused.into_iter().find(StatusCode::is_bad) {
         inbox.push(News::Plc(PlcState::Run));
         log::info!(
             "the server does not report its state ({}), so a PLC in STOP is not noticed by it",

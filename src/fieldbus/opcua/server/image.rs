@@ -73,14 +73,14 @@ impl Show {
     }
 
     /// Gives a node a value, and tells those who subscribe to it.
-    fn put(&self, node: &NodeId, variable: Variable, value: DataValue) {
+    fn put(&self, node: &NodeId, variable: Variable, value: &DataValue) {
         if let Some(NodeType::Variable(shown)) = self.nodes.address_space().write().find_mut(node) {
             shown.set_data_value(value.clone());
         } else {
             debug_assert!(false, "every signal has its nodes: {node}");
         }
         self.watched
-            .tell(&self.subscriptions, node, variable, &value);
+            .tell(&self.subscriptions, node, variable, value);
     }
 }
 
@@ -250,7 +250,7 @@ impl Image {
             is_scaled: false,
         };
         let value = self.show.value(status, raw);
-        self.show.put(&self.places[index].node, variable, value);
+        self.show.put(&self.places[index].node, variable, &value);
     }
 
     /// Brings the node that has a signal in engineering units up to what the signal's own node shows.
@@ -266,7 +266,7 @@ impl Image {
             is_scaled: true,
         };
         self.show
-            .put(node, variable, self.show.value(status, scaled));
+            .put(node, variable, &self.show.value(status, scaled));
     }
 }
 

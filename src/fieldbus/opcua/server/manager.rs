@@ -141,9 +141,10 @@ impl Signals {
         if !self.own.checks_applications {
             return Ok(());
         }
-        let verdict = |is_good| match is_good {
-            true => Ok(()),
-            false => Err(StatusCode::BadCertificateUriInvalid),
+        let verdict = |is_good: bool| {
+            is_good
+                .then_some(())
+                .ok_or(StatusCode::BadCertificateUriInvalid)
         };
         // A list is whole between any two of its changes.
         let mut judged = self.judged.lock().unwrap_or_else(PoisonError::into_inner);
@@ -260,7 +261,9 @@ impl InMemoryNodeManagerImpl for Signals {
         items: &mut [&mut &mut CreateMonitoredItem],
     ) {
         if let Err(status) = self.admits(context) {
-            items.iter_mut().for_each(|item| item.set_status(status));
+            for item in items.iter_mut() {
+                item.set_status(status);
+            }
             return;
         }
         let wanted: Vec<_> = items.iter().map(|item| item.item_to_monitor()).collect();

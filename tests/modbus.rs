@@ -518,10 +518,16 @@ fn a_plc_that_ignores_or_hangs_up_on_the_question_who_it_is_is_read_and_written(
         machine.until("it is written", |_| {
             plc.with(|memory| memory.registers[1][1024] == 7)
         });
-        assert_eq!(machine.end.link().state, LinkState::Running);
-        machine.end.driver.close();
+        machine.until("it is asked for its values alone", |_| {
+            plc.with(|memory| {
+                let mut last = memory.asked.iter().rev().take(50);
+                memory.asked.len() > 50 && last.all(|asked| asked.1 != 43)
+            })
+        });
+        machine.until("it runs", |end| end.link().state == LinkState::Running);
         let asked = plc.with(|memory| memory.asked.iter().filter(|asked| asked.1 == 43).count());
-        assert_eq!(asked, 2);
+        assert!(asked >= 2, "one silence may be an accident: {asked}");
+        machine.end.driver.close();
     }
 }
 

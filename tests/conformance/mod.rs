@@ -92,7 +92,7 @@ pub fn keeps_edges_both_ways(bus: &impl Bus) {
 /// A simulation that receives, computes and sends: its answer goes out with the tick that brought the
 /// question, no pulse is lost, and age and watchdog are those of any other tick.
 pub fn answers_within_the_tick(bus: &impl Bus) {
-    let mut rig = Rig::with(bus, "watchdog = \"50ms\"");
+    let mut rig = Rig::with(bus, "watchdog = \"500ms\"");
     rig.connect();
     for value in [3.0, 4.0] {
         rig.controller.set("speed", value);
@@ -107,7 +107,7 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
         rig.until("the answer arrives without another tick", |rig| {
             rig.controller.tick();
             watched += 1;
-            rig.controller.get("position") == value || watched == 40
+            rig.controller.get("position") == value || watched == 400
         });
         assert_eq!(rig.controller.get("position"), value);
     }

@@ -23,8 +23,10 @@ pub type Habits = fn(unit: u8, function: u8) -> Habit;
 pub struct Memory {
     pub bits: [Vec<bool>; 2],
     pub registers: [Vec<u16>; 2],
-    /// Function and unit of each request.
+    /// Unit and function of each request.
     pub asked: Vec<(u8, u8)>,
+    /// What registers became by function 22, one after the other.
+    pub masked: Vec<u16>,
 }
 
 pub struct Plc {
@@ -44,6 +46,7 @@ impl Plc {
             bits: [bits(), bits()],
             registers: [vec![0xA5A5; 2000], vec![0xA5A5; 2000]],
             asked: Vec::new(),
+            masked: Vec::new(),
         }));
         let over = Arc::new(AtomicBool::new(false));
         let thread = std::thread::spawn({
@@ -172,6 +175,8 @@ fn act(pdu: &[u8], memory: &mut Memory) -> Option<Vec<u8>> {
             let register = memory.registers[1].get_mut(first)?;
             let (and, or) = (second, word(5));
             *register = (*register & and) | (or & !and);
+            let masked = *register;
+            memory.masked.push(masked);
             Some(pdu.to_vec())
         }
     }

@@ -687,15 +687,13 @@ fn the_examples_of_the_documentation_are_right() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let rig = Config::load(&root.join("driver.cfg")).unwrap_or_else(|why| panic!("{why}"));
     let text = std::fs::read_to_string(root.join("docs/faults.md")).expect("the documentation");
-    let blocks: Vec<&str> = text
-        .split("```toml\n")
-        .skip(1)
-        .filter_map(|block| block.split("```").next())
-        .collect();
+    let blocks = text.split("```toml\n").skip(1);
+    let blocks = blocks.filter_map(|block| block.split("```").next());
+    let blocks: Vec<&str> = blocks.collect();
     assert!(blocks.len() >= 5, "{}", blocks.len());
-    let read = |block: &&str| tickbus::faults::read_file("faults.md", block, &rig.table);
     for block in blocks {
-        let faults = read(&block).unwrap_or_else(|why| panic!("{why}\n{block}"));
+        let faults = tickbus::faults::read_file("faults.md", block, &rig.table);
+        let faults = faults.unwrap_or_else(|why| panic!("{why}\n{block}"));
         assert!(!faults.is_empty(), "{block}");
     }
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use tickbus::time::Manual;
 
-use crate::conformance::rig::{Bus, Liar};
+use crate::conformance::rig::{Bus, Liar, logged};
 use crate::peers::{leave, own_address};
 
 /// A server and a client of ours, at an address of their own.
@@ -44,6 +44,8 @@ impl Pair {
 
 impl Bus for Pair {
     fn fieldbus(&self, role: &str) -> String {
+        // A server that is late, or none, is not asked for its state again.
+        logged::expect("does not say whether it is in RUN");
         let Self {
             address,
             serves,

@@ -92,7 +92,7 @@ without_debug_tables() {
 
 # Whether there is an iec2c: the one that IEC2C names, that is on the PATH, or that lies in shared/peers beside the
 # checkout. IEC2C names it from there on.
-iec2c() {
+has_iec2c() {
     if [ -z "${IEC2C:-}" ] && ! have iec2c && [ -x "$ROOT/../shared/peers/iec2c/iec2c" ]; then
         IEC2C=$ROOT/../shared/peers/iec2c/iec2c
     fi

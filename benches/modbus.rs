@@ -23,7 +23,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::time::{Monotonic, Nanos, Spans};
 
 /// Registers that are written and read in one request.

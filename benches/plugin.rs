@@ -23,7 +23,8 @@ mod plugin {
     use std::process::Command;
     use std::sync::Arc;
 
-    use tickbus::driver::{Config, Driver};
+    use tickbus::driver::Driver;
+    use tickbus::driver_cfg::Config;
     use tickbus::time::{Clock as _, Monotonic, Nanos, Stop};
 
     /// Bytes from the PLC and to it: %Q and %I.

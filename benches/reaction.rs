@@ -14,9 +14,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use tickbus::driver::{Asked, Config, Driver, Host};
+use tickbus::driver::{Driver, Host};
+use tickbus::driver_cfg::{Asked, Config};
 use tickbus::fieldbus::Role;
-use tickbus::plc::{Mirror, Program, Reaction};
+use tickbus::plc::Program;
+use tickbus::programs::{Mirror, Reaction};
 use tickbus::time::{Clock, Monotonic, Nanos, Pace, Spans, Stop};
 
 /// Bytes from the PLC and to it: %Q and %I.

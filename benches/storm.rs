@@ -26,7 +26,8 @@ mod storm {
     use std::sync::atomic::{AtomicBool, Ordering};
     use std::time::{Duration, Instant};
 
-    use tickbus::driver::{Config, Driver};
+    use tickbus::driver::Driver;
+    use tickbus::driver_cfg::Config;
     use tickbus::time::{Clock, Monotonic, Nanos, Pace, Spans, Stop};
 
     use super::full_pipe::full_pipe;

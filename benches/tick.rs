@@ -10,7 +10,8 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::image::{Frame, triple_buffer};
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};

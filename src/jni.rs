@@ -24,9 +24,9 @@ use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jboolean, jclass, jint, jlong};
 use jni::vm::JavaVM;
 use jni::{Env, EnvUnowned};
 
-use crate::driver::Code;
-use crate::report::page_beside;
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_driver::Code;
+use tickbus_report::page_beside;
 
 use device::{Device, EVENT_WORDS, EVENTS};
 use failure::{Failure, ThrowFieldbusException};
@@ -46,7 +46,7 @@ const LAST_WORDS: Nanos = Nanos::from_millis(100);
 #[unsafe(no_mangle)]
 unsafe extern "system" fn JNI_OnLoad(vm: *mut jni::sys::JavaVM, _reserved: *mut c_void) -> jint {
     let found = catch_unwind(|| {
-        crate::os::log_to_stderr(log::LevelFilter::Warn);
+        tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
         // SAFETY: the caller's promise.
         unsafe { JavaVM::from_raw(vm) }.attach_current_thread(failure::find_exception)
     });
@@ -117,7 +117,7 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
     env.with_env(|_| {
         let closed = DRIVERS.close(handle, Device::close);
         // The process may end right after this, and nobody has the driver any more.
-        crate::os::flush_log(LAST_WORDS);
+        tickbus_base::os::flush_log(LAST_WORDS);
         closed.map_err(Failure::plain)
     })
     .resolve::<ThrowFieldbusException>();
@@ -246,7 +246,7 @@ fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jin
 fn inject(env: &mut Env<'_>, handle: jlong, fault: &JString<'_>) -> Result<jint, Failure> {
     let text = fault.try_to_string(env)?;
     let config = with(handle, |device| device.config())?;
-    let id = crate::faults::read_one(&text, &config.table)
+    let id = tickbus_fieldbus::faults::read_one(&text, &config.table)
         .and_then(|fault| match with(handle, |device| device.inject(&fault)) {
             Ok(injected) => injected.map(Ok),
             Err(failure) => Ok(Err(failure)),

@@ -1,23 +1,25 @@
 //! Puts a simulated machine on a real PLC's fieldbus.
 //!
-//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms of
-//! this crate follow the way of the data, and each uses only the rooms above it in this list (a
-//! test checks that; `docs/ARCHITECTURE.md` tells why):
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are crates of their own
+//! under `crates/`, each of use without the others; this crate is the native library of the Java driver, the `tickbus`
+//! command, and one name for all of them:
 //!
 //! | room | what lives there |
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
-//! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
+//! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
+//! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
 //! | [`axis`] | axes: their structures of command and feedback, profiles of motion, what a command means |
 //! | [`faults`] | wrong values and troubles of the line, when they are asked for |
-//! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
+//! | [`fieldbus`] | the bus traits, the port, and one room per bus |
 //! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
 //! | [`report`] | one HTML page about one run |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
-//! | [`fieldbus`] | the bus traits, and one room per bus |
-//! | [`driver`] | one device: configuration, open, exchange, statistics, close |
+//! | [`programs`] | the PLC programs of the demos |
+//! | [`driver_cfg`] | driver.cfg, and the list of bus kinds |
+//! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
@@ -27,20 +29,30 @@
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
-pub mod axis;
 pub mod cli;
-pub mod config;
-pub mod driver;
-pub mod export;
-pub mod faults;
-pub mod fieldbus;
-pub mod image;
-pub mod import;
 mod jni;
-pub mod os;
-pub mod plc;
-pub mod record;
-pub mod report;
-pub mod signal;
-pub mod testing;
-pub mod time;
+
+pub use tickbus_axis as axis;
+pub use tickbus_base::{os, time, toml_text};
+pub use tickbus_driver as driver;
+pub use tickbus_driver_cfg as driver_cfg;
+pub use tickbus_export as export;
+pub use tickbus_fieldbus::faults;
+pub use tickbus_image as image;
+pub use tickbus_image::signal;
+pub use tickbus_import as import;
+pub use tickbus_plc as plc;
+pub use tickbus_programs as programs;
+pub use tickbus_record as record;
+pub use tickbus_report as report;
+pub use tickbus_testing as testing;
+
+/// The bus traits, the port, faults, and one room per bus.
+pub mod fieldbus {
+    pub use tickbus_bus_modbus as modbus;
+    pub use tickbus_bus_opcua as opcua;
+    pub use tickbus_bus_plugin as plugin;
+    pub use tickbus_bus_s7 as s7;
+    pub use tickbus_bus_socket as socket;
+    pub use tickbus_fieldbus::*;
+}

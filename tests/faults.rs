@@ -15,10 +15,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use rig::{Bus, CYCLE, End, Liar, MAX_AGE, Rig, await_that, config, pass};
-use tickbus::driver::{Code, Config, Host};
+use tickbus::driver::{Code, Host};
+use tickbus::driver_cfg::Config;
 use tickbus::faults::Phase;
 use tickbus::fieldbus::{Cause, LinkState};
-use tickbus::plc::Mirror;
+use tickbus::programs::Mirror;
 use tickbus::time::{Manual, Nanos};
 
 /// A link name of its own for every test.
@@ -521,7 +522,7 @@ fn a_hosted_program_gets_wrong_inputs_and_its_outputs_arrive_wrong() {
 
 #[test]
 fn a_file_for_both_ends_has_the_faults_of_the_machine() {
-    use tickbus::driver::Asked;
+    use tickbus::driver_cfg::Asked;
     use tickbus::fieldbus::Role;
 
     let directory = tempfile::tempdir().expect("a directory");

@@ -18,7 +18,8 @@ use std::time::{Duration, Instant};
 
 use foreign::Absent;
 use pcap::Tap;
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::LinkState;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};

@@ -7,7 +7,8 @@ use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use foreign::Absent;
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
 

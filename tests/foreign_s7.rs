@@ -18,7 +18,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use foreign::Absent;
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
 

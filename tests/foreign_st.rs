@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use foreign::Absent;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 
 fn main() -> ExitCode {

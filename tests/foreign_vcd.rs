@@ -7,7 +7,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use foreign::Absent;
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};
 

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use tickbus::driver::{Code, Config, Driver, Exchange};
+use tickbus::driver::{Code, Driver, Exchange};
+use tickbus::driver_cfg::Config;
 use tickbus::record::{Recording, Tick};
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};

@@ -9,7 +9,8 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::time::Manual;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);

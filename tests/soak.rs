@@ -22,7 +22,8 @@ use std::time::{Duration, Instant};
 
 use resources::Resources;
 use socket2::SockRef;
-use tickbus::driver::{Config, Driver};
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::time::{Monotonic, Nanos};
 
 const CONFIG: &str = r#"

@@ -21,7 +21,8 @@ use std::time::{Duration, Instant};
 
 use resources::Resources;
 use socket2::SockRef;
-use tickbus::driver::{Code, Config, Driver};
+use tickbus::driver::{Code, Driver};
+use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
 

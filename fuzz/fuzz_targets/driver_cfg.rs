@@ -5,8 +5,8 @@
 use std::collections::HashSet;
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::config::Mistakes;
-use tickbus::driver::Config;
+use tickbus::toml_text::Mistakes;
+use tickbus::driver_cfg::Config;
 use tickbus::faults::{Effect, LIMIT};
 use tickbus::signal::{Area, DataType};
 use tickbus::time::Nanos;

@@ -6,11 +6,12 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::s7::item;
 use tickbus::fieldbus::s7::pdu::{Pdu, function};
 use tickbus::fieldbus::s7::{Frames, News, Terms, Tsap, transport};
-use tickbus::fieldbus::{Options, Role};
+use tickbus::driver_cfg::Options;
+use tickbus::fieldbus::Role;
 use tickbus::time::Nanos;
 
 const CONFIG: &str = "[driver]\nid = 1\nname = \"fuzz\"\n[fieldbus]\nkind = \"s7-client\"\n\

@@ -5,7 +5,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::import::{Client, Reading, import};
 use tickbus::signal::Addressing;
 

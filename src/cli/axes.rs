@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use super::Outcome;
 use super::host::{self, Job, span};
-use crate::driver::{Asked, Config};
-use crate::fieldbus::Role;
-use crate::plc::Axes;
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::{Asked, Config};
+use tickbus_fieldbus::Role;
+use tickbus_plc::Axes;
 
 /// Stand in for the machine: every axis that FILE describes is an ideal drive that follows its commands.
 #[derive(Debug, clap::Args)]

@@ -8,13 +8,19 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use super::Outcome;
-use crate::config::{short_number, shown};
-use crate::driver::{Config, Timing};
-use crate::fieldbus::socket::{self, Sending, TcpRole};
-use crate::fieldbus::{Options, Role, loopback, plugin, s7};
-use crate::record;
-use crate::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width};
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{short_number, shown};
+use tickbus_bus_plugin as plugin;
+use tickbus_bus_s7 as s7;
+use tickbus_bus_socket as socket;
+use tickbus_bus_socket::{Sending, TcpRole};
+use tickbus_driver_cfg::Options;
+use tickbus_driver_cfg::{Config, Timing, loopback};
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::{
+    Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width,
+};
+use tickbus_record as record;
 
 /// Read a driver.cfg; print its signal table, or every mistake in it.
 #[derive(Debug, clap::Args)]

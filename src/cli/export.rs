@@ -4,12 +4,11 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Outcome;
-use crate::driver::Config;
-use crate::export::{Export, Target, export};
+use tickbus_driver_cfg::Config;
+use tickbus_export::{Export, Target, export};
 
 /// Write the PLC's half of a driver.cfg: sources for the editor of the PLC, and a symbol table.
 ///
@@ -20,7 +19,7 @@ pub(super) struct Arguments {
     file: PathBuf,
 
     /// The editor that the sources are for.
-    #[arg(long = "for", value_name = "EDITOR")]
+    #[arg(long = "for", value_name = "EDITOR", value_parser = targets())]
     target: Target,
 
     /// Folder for the files [default: beside FILE, called like it and the editor].
@@ -32,14 +31,13 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-impl ValueEnum for Target {
-    fn value_variants<'a>() -> &'a [Self] {
-        &Self::ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()))
-    }
+/// Reads the name of an editor.
+fn targets() -> impl TypedValueParser<Value = Target> {
+    PossibleValuesParser::new(Target::ALL.map(Target::name)).map(|name| {
+        let mut all = Target::ALL.into_iter();
+        all.find(|target| target.name() == name)
+            .expect("a possible value")
+    })
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Outcome;
-use crate::driver::{Asked, Config, Host};
-use crate::faults::{Injected, Phase};
-use crate::fieldbus::{Link, LinkState, Role};
-use crate::plc::Program;
-use crate::record;
-use crate::time::{Clock, Monotonic, Nanos, Stop};
+use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
+use tickbus_driver::Host;
+use tickbus_driver_cfg::{Asked, Config};
+use tickbus_fieldbus::faults::{Injected, Phase};
+use tickbus_fieldbus::{Link, LinkState, Role};
+use tickbus_plc::Program;
+use tickbus_record as record;
 
 /// How often the command looks after its line.
 const LOOK: Nanos = Nanos::from_millis(20);

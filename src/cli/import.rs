@@ -3,13 +3,12 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Outcome;
-use crate::config::{Mistake, Mistakes};
-use crate::import::{Client, Imported, Reading, import};
-use crate::signal::Addressing;
+use tickbus_base::toml_text::{Mistake, Mistakes};
+use tickbus_image::signal::Addressing;
+use tickbus_import::{Client, Imported, Reading, import};
 
 /// Make a driver.cfg from a list of PLC tags: name, address, type, comment.
 ///
@@ -38,18 +37,18 @@ pub(super) struct Arguments {
     iec: bool,
 
     /// The client bus whose addresses the list has, where the list alone does not tell: %MW20 can be of either.
-    #[arg(long, value_name = "KIND")]
+    #[arg(long, value_name = "KIND", value_parser = clients())]
     bus: Option<Client>,
 }
 
-impl ValueEnum for Client {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Modbus, Self::S7]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.kind()))
-    }
+/// Reads the kind of a client bus.
+fn clients() -> impl TypedValueParser<Value = Client> {
+    const ALL: [Client; 2] = [Client::Modbus, Client::S7];
+    PossibleValuesParser::new(ALL.map(Client::kind)).map(|kind| {
+        let mut all = ALL.into_iter();
+        all.find(|client| client.kind() == kind)
+            .expect("a possible value")
+    })
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {

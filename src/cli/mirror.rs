@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::Outcome;
 use super::host::{self, Job, span};
-use crate::fieldbus::Role;
-use crate::plc::Mirror;
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::Role;
+use tickbus_programs::Mirror;
 
 /// Stand in for the machine: every %Q byte comes back on the %I byte of the same offset.
 #[derive(Debug, clap::Args)]

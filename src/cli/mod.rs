@@ -18,7 +18,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
 
 /// Puts a simulated machine on a real PLC's fieldbus.
 #[derive(Debug, Parser)]
@@ -75,7 +75,7 @@ const LAST_WORDS: Nanos = Nanos::from_secs(1);
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // What happens to the line is told on stdout.
-    crate::os::log_to_stderr(log::LevelFilter::Error);
+    tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
@@ -88,6 +88,6 @@ pub fn main() -> ExitCode {
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),
     };
-    crate::os::flush_log(LAST_WORDS);
+    tickbus_base::os::flush_log(LAST_WORDS);
     outcome.into()
 }

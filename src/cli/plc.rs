@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::Outcome;
 use super::host::{self, Job, span};
-use crate::fieldbus::Role;
-use crate::plc;
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::Role;
+use tickbus_plc as plc;
 
 /// Run a PLC program as the controller of a bus.
 ///
@@ -44,7 +44,7 @@ fn pair(text: &str) -> Result<(String, String), String> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let program = match plc::program(&arguments.program, &arguments.options) {
+    let program = match tickbus_programs::program(&arguments.program, &arguments.options) {
         Ok(program) => program,
         Err(error) => {
             eprintln!("plc: {error}");

@@ -1,7 +1,7 @@
 //! `tickbus plugin-helper`: the process that calls a plug-in for its host.
 
 use super::Outcome;
-use crate::fieldbus::plugin;
+use tickbus_bus_plugin as plugin;
 
 pub(super) fn run() -> Outcome {
     match plugin::serve_host() {

@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Outcome;
-use crate::config::nearest;
-use crate::record::Recording;
-use crate::report::{self, Contents, DEFAULT_BUDGET, Run, Statistics};
+use tickbus_base::toml_text::nearest;
+use tickbus_record::Recording;
+use tickbus_report as report;
+use tickbus_report::{Contents, DEFAULT_BUDGET, Run, Statistics};
 
 /// Make an HTML page from a recording: chart, steps, faults, states of the line, distributions.
 ///

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::Outcome;
-use crate::config::Mistakes;
-use crate::report::page_beside;
-use crate::testing::{Case, Group, Suite, Test, Verdict, junit_xml};
+use tickbus_base::toml_text::Mistakes;
+use tickbus_report::page_beside;
+use tickbus_testing::{Case, Group, Suite, Test, Verdict, junit_xml};
 
 /// Run tests of PLC programs from TOML files, on simulation time.
 ///

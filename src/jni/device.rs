@@ -4,11 +4,12 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-use crate::config::Mistakes;
-use crate::driver::{Config, Driver, Exchange, Snapshot};
-use crate::faults::{Board, Fault, Injected};
-use crate::image::Event;
-use crate::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::Mistakes;
+use tickbus_driver::{Driver, Exchange, Snapshot};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::{Board, Fault, Injected};
+use tickbus_image::Event;
 
 use super::shared::{NO_TIME, Shared, Word};
 

@@ -8,7 +8,7 @@ use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
 use once_cell::sync::OnceCell;
 
-use crate::driver::{Code, DriverError};
+use tickbus_driver::{Code, DriverError};
 
 use super::handles::said;
 

@@ -14,7 +14,7 @@ use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::driver::{Code, panic_text};
+use tickbus_driver::{Code, panic_text};
 
 /// How many drivers can be open in one process at once.
 pub(super) const PLACES: usize = 64;

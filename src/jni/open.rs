@@ -10,10 +10,11 @@ use jni::objects::{JByteBuffer, JObject, JValue};
 use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
 
-use crate::driver::{Code, Config, Driver};
-use crate::fieldbus::Role;
-use crate::signal::{Area, Signal};
-use crate::time::Monotonic;
+use tickbus_base::time::Monotonic;
+use tickbus_driver::{Code, Driver};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::{Area, Signal};
 
 use super::device::Device;
 use super::failure::Failure;

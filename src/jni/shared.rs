@@ -12,7 +12,7 @@
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::signal::Slot;
+use tickbus_image::signal::Slot;
 
 /// Version of the layout; Java compares it with its own.
 pub(super) const VERSION: u64 = 1;

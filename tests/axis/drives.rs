@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Plan, Slot};
 use tickbus::time::Nanos;
 

@@ -13,7 +13,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use tickbus::axis::{COMMAND_BYTES, Field, Kind};
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Plan, Slot};
 
 fn peeler(name: &str) -> Config {

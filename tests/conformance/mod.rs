@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use resources::Resources;
 use rig::{Bus, End, MAX_AGE, Rig, await_that, config, pass};
-use tickbus::driver::{Code, Config, Driver};
+use tickbus::driver::{Code, Driver};
+use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::{Cause, LinkState};
 use tickbus::time::{Manual, Nanos};
 

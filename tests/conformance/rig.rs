@@ -1,13 +1,12 @@
 //! The fixture: a Device and a Controller at two ends of a bus, on one manual clock.
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-#[path = "logged.rs"]
-pub mod logged;
+pub use tickbus_test_log as logged;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tickbus::driver::{Code, Config, Driver, Exchange};
+use tickbus::driver::{Code, Driver, Exchange};
+use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::Link;
 use tickbus::signal::Slot;
 use tickbus::time::{Clock, Manual, Nanos};

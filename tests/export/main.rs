@@ -12,7 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 
 fn repository() -> &'static Path {

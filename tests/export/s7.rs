@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use proptest::prelude::*;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 use tickbus::signal::{Area, ByteOrder, DataType};
 

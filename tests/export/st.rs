@@ -1,7 +1,7 @@
 //! The sources in Structured Text, run by a machine of our own from the syntax tree of another project's parser.
 
 use proptest::prelude::*;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 use tickbus::signal::{Area, DataType, Signal};
 

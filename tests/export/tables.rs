@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use proptest::prelude::*;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 
 /// A driver.cfg on the socket bus with these lines in `[fieldbus]`, and these sections.
 pub(crate) fn parse(fieldbus: &str, sections: &str) -> Config {

@@ -1,6 +1,6 @@
 //! Lists of clients, PLC4X and KEPServer: their addresses go to `[fieldbus.at]`.
 
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::import::{Client, Reading, import};
 
 use crate::{read, signals, told};

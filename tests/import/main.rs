@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use proptest::prelude::*;
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 use tickbus::import::{Imported, Reading, import};
 

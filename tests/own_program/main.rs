@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use fixture::{Cpu, IEC, by_hand, compile, folder, options};
-use tickbus::driver::{Code, Config, Driver};
+use tickbus::driver::{Code, Driver};
+use tickbus::driver_cfg::Config;
 use tickbus::plc::{self, Hosted, Program};
+use tickbus::programs;
 use tickbus::signal::{Addressing, Slot};
 use tickbus::time::{Manual, Nanos};
 
@@ -437,7 +439,7 @@ fn addresses_count_as_the_driver_cfg_says_unless_the_option_does() {
     };
     let elements = cfg("addressing = \"iec\"");
     assert_eq!(elements.addressing, Addressing::Elements);
-    let mut program = plc::program(path.to_str().expect("text"), &[]).expect("loads");
+    let mut program = programs::program(path.to_str().expect("text"), &[]).expect("loads");
     program
         .fit(&elements.table, Addressing::Elements)
         .expect("fits");
@@ -448,7 +450,7 @@ fn addresses_count_as_the_driver_cfg_says_unless_the_option_does() {
         error.to_string().contains("say addressing = \"iec\""),
         "{error}"
     );
-    let mut program = plc::program(path.to_str().expect("text"), &options(&[IEC])).expect("loads");
+    let mut program = programs::program(path.to_str().expect("text"), &options(&[IEC])).expect("loads");
     program
         .fit(&elements.table, Addressing::Bytes)
         .expect("the option counts");

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tickbus::axis::{Field, Reflexes};
-use tickbus::driver::Config;
-use tickbus::plc::{self, Program, Report, Scan};
+use tickbus::driver_cfg::Config;
+use tickbus::plc::{Program, Report, Scan};
+use tickbus::programs;
 use tickbus::signal::{Area, Plan, Slot};
 use tickbus::time::Nanos;
 
@@ -33,7 +34,7 @@ impl End {
             .iter()
             .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
             .collect();
-        let mut program = plc::program(name, &options).expect("a program");
+        let mut program = programs::program(name, &options).expect("a program");
         let table = &config.table;
         program
             .fit(table, config.addressing)

@@ -136,7 +136,7 @@ fn refusal(name: &str, options: &[(&str, &str)]) -> String {
         .iter()
         .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
         .collect();
-    let refused = tickbus::plc::program(name, &options).err();
+    let refused = tickbus::programs::program(name, &options).err();
     refused.expect("refused").to_string()
 }
 
@@ -182,8 +182,8 @@ fn a_table_that_lacks_a_signal_is_told_by_its_name() {
         ),
     ] {
         let text = text.replace(from, to);
-        let config = tickbus::driver::Config::parse("charger.cfg", &text).expect("a good file");
-        let mut program = tickbus::plc::program("charger", &[]).expect("a program");
+        let config = tickbus::driver_cfg::Config::parse("charger.cfg", &text).expect("a good file");
+        let mut program = tickbus::programs::program("charger", &[]).expect("a program");
         let told = program.fit(&config.table, config.addressing);
         let told = told.expect_err("a signal is missing").to_string();
         assert!(told.contains(part), "{told}");

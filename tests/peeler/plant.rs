@@ -4,7 +4,7 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use tickbus::axis::{Demand, Drive, Feedback, Field};
-use tickbus::driver::Config;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 
 const TICK: f64 = 0.01;

@@ -18,8 +18,10 @@ use std::process::Command;
 
 use conformance::rig::{CYCLE, await_that, logged};
 use fixture::{HELPER, Misbehaving, Udp, build, misbehaving, until, until_by, until_it_echoes};
-use tickbus::driver::{Code, Config, Driver};
-use tickbus::fieldbus::{Options, plugin};
+use tickbus::driver::{Code, Driver};
+use tickbus::driver_cfg::Config;
+use tickbus::driver_cfg::Options;
+use tickbus::fieldbus::plugin;
 use tickbus::time::{Manual, Nanos};
 
 conformance!(plain, crate::Udp::new(false));

@@ -1,7 +1,7 @@
 //! The axes of a driver.cfg, one line each.
 
-use crate::axis::{Axis, COMMAND_BYTES, Field};
-use crate::config::short_number;
+use tickbus_axis::{Axis, COMMAND_BYTES, Field};
+use tickbus_base::toml_text::short_number;
 
 pub(super) const HEADINGS: [&str; 7] = [
     "axis", "kind", "command", "feedback", "unit", "limits", "with",

@@ -1,0 +1,207 @@
+//! The two structures of an axis, field by field.
+
+use tickbus_image::signal::{Area, DataType};
+
+use super::Kind;
+
+/// Size of a command structure, in `%Q`.
+pub const COMMAND_BYTES: usize = 30;
+
+/// Size of a feedback structure, in `%I`.
+pub const FEEDBACK_BYTES: usize = 10;
+
+/// Size of a feedback structure with diagnostics, or with the number of the last command that was done.
+pub const EXTENDED_FEEDBACK_BYTES: usize = 16;
+
+/// One field of the structures of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Field {
+    /// `%Q` bit: its rising edge gives the command.
+    Execute,
+    /// `%Q` bit: follow; on axes that open and close, close.
+    Tracking,
+    /// `%Q` bit: move with a torque; on axes that open and close, open.
+    TorqueControl,
+    /// `%Q` bit: run for as long as it is on.
+    SpeedControl,
+    /// `%Q` bit: without it the axis does not move.
+    Enable,
+    /// `%Q` REAL: where to.
+    TargetPosition,
+    /// `%Q` REAL: how fast at most.
+    Speed,
+    /// `%Q` REAL: how fast to get there.
+    Acceleration,
+    /// `%Q` REAL: how fast to stop.
+    Deceleration,
+    /// `%Q` REAL: torque, pressure, or thickness of the veneer.
+    Torque,
+    /// `%Q` UINT, in the first reserved REAL: which command of the simulator's table.
+    CommandNumber,
+    /// `%Q` REAL, the second reserved one: how fast the acceleration may change.
+    Jerk,
+    /// `%I` bit: the axis is doing well. The thesis calls it Enable, as the command's bit.
+    Healthy,
+    /// `%I` bit: the target of the last command is reached.
+    InPosition,
+    /// `%I` bit, a reserved one: the machine has taken the command, so that Execute may fall.
+    Acknowledge,
+    /// `%I` REAL: where the axis is.
+    ActualPosition,
+    /// `%I` REAL: how fast it moves, with its sign.
+    ActualSpeed,
+    /// `%I` WORD, extended: what the axis is doing.
+    Status,
+    /// `%I` WORD, extended: what is wrong with it.
+    Error,
+    /// `%I` UINT, extended: the number of the command that was done last.
+    CommandDone,
+}
+
+/// What a field carries, and so how its value scales.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Quantity {
+    /// A bit, by its number in its byte.
+    Bit(u8),
+    /// A position: scale and offset.
+    Position,
+    /// A speed with a sign.
+    Velocity,
+    /// The size of a speed, acceleration or jerk: the power of the second in its unit.
+    Magnitude(u8),
+    /// A number as it stands.
+    Torque,
+    /// A whole number of 16 bits.
+    Number,
+    /// 16 bits.
+    Word,
+}
+
+impl Field {
+    /// How many there are.
+    pub const COUNT: usize = 20;
+
+    /// All of them, in the order of their addresses, commands first.
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Execute,
+        Self::Tracking,
+        Self::TorqueControl,
+        Self::SpeedControl,
+        Self::Enable,
+        Self::TargetPosition,
+        Self::Speed,
+        Self::Acceleration,
+        Self::Deceleration,
+        Self::Torque,
+        Self::CommandNumber,
+        Self::Jerk,
+        Self::Healthy,
+        Self::InPosition,
+        Self::Acknowledge,
+        Self::ActualPosition,
+        Self::ActualSpeed,
+        Self::Status,
+        Self::Error,
+        Self::CommandDone,
+    ];
+
+    /// Its position in [`ALL`](Self::ALL).
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// What its signal is called behind the axis' name and a dot.
+    pub const fn name(self, kind: Kind) -> &'static str {
+        match (self, kind) {
+            (Self::Tracking, Kind::Torque) => "Close",
+            (Self::TorqueControl, Kind::Torque) => "Open",
+            (Self::Execute, _) => "Execute",
+            (Self::Tracking, _) => "Tracking",
+            (Self::TorqueControl, _) => "TorqueControl",
+            (Self::SpeedControl, _) => "SpeedControl",
+            (Self::Enable, _) => "Enable",
+            (Self::TargetPosition, _) => "TargetPosition",
+            (Self::Speed, _) => "Speed",
+            (Self::Acceleration, _) => "Acceleration",
+            (Self::Deceleration, _) => "Deceleration",
+            (Self::Torque, _) => "Torque",
+            (Self::CommandNumber, _) => "CommandNumber",
+            (Self::Jerk, _) => "Jerk",
+            (Self::Healthy, _) => "Healthy",
+            (Self::InPosition, _) => "InPosition",
+            (Self::Acknowledge, _) => "Acknowledge",
+            (Self::ActualPosition, _) => "ActualPosition",
+            (Self::ActualSpeed, _) => "ActualSpeed",
+            (Self::Status, _) => "Status",
+            (Self::Error, _) => "Error",
+            (Self::CommandDone, _) => "CommandDone",
+        }
+    }
+
+    /// `%Q` for commands, `%I` for feedback.
+    pub const fn area(self) -> Area {
+        if self.index() < Self::Healthy.index() {
+            Area::Output
+        } else {
+            Area::Input
+        }
+    }
+
+    /// The offset of its first byte in its structure.
+    pub const fn offset(self) -> usize {
+        match self {
+            Self::Execute
+            | Self::Tracking
+            | Self::TorqueControl
+            | Self::SpeedControl
+            | Self::Enable
+            | Self::Healthy
+            | Self::InPosition
+            | Self::Acknowledge => 0,
+            Self::TargetPosition | Self::ActualPosition => 2,
+            Self::Speed | Self::ActualSpeed => 6,
+            Self::Acceleration | Self::Status => 10,
+            Self::Error => 12,
+            Self::Deceleration | Self::CommandDone => 14,
+            Self::Torque => 18,
+            Self::CommandNumber => 22,
+            Self::Jerk => 26,
+        }
+    }
+
+    /// Its bit within that byte; 0 unless it is a BOOL.
+    pub const fn bit(self) -> u8 {
+        match self.quantity() {
+            Quantity::Bit(bit) => bit,
+            _ => 0,
+        }
+    }
+
+    /// The type of its signal.
+    pub const fn data_type(self) -> DataType {
+        match self.quantity() {
+            Quantity::Bit(_) => DataType::Bool,
+            Quantity::Number => DataType::Uint,
+            Quantity::Word => DataType::Word,
+            _ => DataType::Real,
+        }
+    }
+
+    pub(super) const fn quantity(self) -> Quantity {
+        match self {
+            Self::Execute | Self::Healthy => Quantity::Bit(0),
+            Self::Tracking | Self::InPosition => Quantity::Bit(1),
+            Self::TorqueControl | Self::Acknowledge => Quantity::Bit(2),
+            Self::SpeedControl => Quantity::Bit(3),
+            Self::Enable => Quantity::Bit(4),
+            Self::TargetPosition | Self::ActualPosition => Quantity::Position,
+            Self::ActualSpeed => Quantity::Velocity,
+            Self::Speed => Quantity::Magnitude(1),
+            Self::Acceleration | Self::Deceleration => Quantity::Magnitude(2),
+            Self::Jerk => Quantity::Magnitude(3),
+            Self::Torque => Quantity::Torque,
+            Self::CommandNumber | Self::CommandDone => Quantity::Number,
+            Self::Status | Self::Error => Quantity::Word,
+        }
+    }
+}

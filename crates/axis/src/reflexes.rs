@@ -1,0 +1,240 @@
+//! What a machine's side does on every tick for its axes, beside the machine's own model.
+
+use super::{Axis, Command, Field, Mode};
+use tickbus_image::signal::Slot;
+
+/// What the word `Error` says while the PLC asks for a command that the table does not have.
+pub const UNKNOWN_COMMAND: u16 = 3;
+
+/// The reflexes of all axes of a driver in the role Device: acknowledging, commands by number, end switches.
+///
+/// They work on slots, between the simulation and the codec, so that a simulation knows nothing of them: a
+/// command that came as a number stands in the slots as if the PLC had sent all of it. They allocate nothing.
+#[derive(Debug)]
+pub struct Reflexes {
+    axes: Box<[Reflex]>,
+}
+
+#[derive(Debug)]
+struct Reflex {
+    execute: usize,
+    /// Whether the simulation has been given `Execute`.
+    delivered: bool,
+    acknowledge: Option<usize>,
+    numbers: Option<Numbers>,
+    switches: Box<[Trip]>,
+}
+
+/// Commands by number.
+#[derive(Debug)]
+struct Numbers {
+    commands: Box<[Command]>,
+    number: usize,
+    done: usize,
+    error: Option<usize>,
+    in_position: usize,
+    bits: [usize; 3],
+    values: [usize; 5],
+    /// The command that the simulation is at.
+    pending: Option<u16>,
+    /// What the PLC asks for is not in the table.
+    unknown: bool,
+    /// The simulation's own error, while that stands in its place.
+    error_of_simulation: Option<Slot>,
+}
+
+#[derive(Debug)]
+struct Trip {
+    slot: usize,
+    position: usize,
+    at: f64,
+    above: bool,
+    hysteresis: f64,
+    on: bool,
+}
+
+const fn level(on: bool) -> Slot {
+    Slot::from_real(if on { 1.0 } else { 0.0 })
+}
+
+impl Reflexes {
+    /// The reflexes that `axes` ask for; `None` when they ask for none.
+    pub fn new(axes: &[Axis]) -> Option<Self> {
+        let axes: Box<[Reflex]> = axes.iter().filter_map(Reflex::new).collect();
+        (!axes.is_empty()).then_some(Self { axes })
+    }
+
+    /// Before the simulation's values are encoded.
+    pub fn sending(&mut self, slots: &mut [Slot]) {
+        for axis in &mut self.axes {
+            axis.sending(slots);
+        }
+    }
+
+    /// After they were encoded: what was sent in the place of a value of the simulation is no more.
+    pub fn sent(&mut self, slots: &mut [Slot]) {
+        for axis in &mut self.axes {
+            if let Some(numbers) = &mut axis.numbers {
+                numbers.sent(slots);
+            }
+        }
+    }
+
+    /// After the PLC's values were decoded.
+    pub fn received(&mut self, slots: &mut [Slot]) {
+        for axis in &mut self.axes {
+            axis.received(slots);
+        }
+    }
+}
+
+impl Reflex {
+    fn new(axis: &Axis) -> Option<Self> {
+        let slot = |field| axis.slot(field);
+        let position = slot(Field::ActualPosition)?;
+        let numbers = || {
+            Some(Numbers {
+                commands: axis.commands.clone().into(),
+                number: slot(Field::CommandNumber)?,
+                done: slot(Field::CommandDone)?,
+                error: slot(Field::Error),
+                in_position: slot(Field::InPosition)?,
+                bits: [
+                    slot(Field::Tracking)?,
+                    slot(Field::TorqueControl)?,
+                    slot(Field::SpeedControl)?,
+                ],
+                values: [
+                    slot(Field::TargetPosition)?,
+                    slot(Field::Speed)?,
+                    slot(Field::Acceleration)?,
+                    slot(Field::Deceleration)?,
+                    slot(Field::Torque)?,
+                ],
+                pending: None,
+                unknown: false,
+                error_of_simulation: None,
+            })
+        };
+        let switches = axis.switches.iter().map(|switch| Trip {
+            slot: switch.slot,
+            position,
+            at: switch.at,
+            above: switch.above,
+            hysteresis: switch.hysteresis,
+            on: false,
+        });
+        let reflex = Self {
+            execute: slot(Field::Execute)?,
+            delivered: false,
+            acknowledge: slot(Field::Acknowledge),
+            numbers: numbers(),
+            switches: switches.collect(),
+        };
+        let asked =
+            reflex.acknowledge.is_some() || reflex.numbers.is_some() || !reflex.switches.is_empty();
+        asked.then_some(reflex)
+    }
+
+    fn sending(&mut self, slots: &mut [Slot]) {
+        if let Some(acknowledge) = self.acknowledge {
+            slots[acknowledge] = level(self.delivered);
+        }
+        if let Some(numbers) = &mut self.numbers {
+            numbers.sending(slots);
+        }
+        for switch in &mut self.switches {
+            let position = slots[switch.position].real();
+            // Beyond the trip point as a distance: on from 0, off from minus the hysteresis.
+            let beyond = if switch.above {
+                position - switch.at
+            } else {
+                switch.at - position
+            };
+            let needed = if switch.on { -switch.hysteresis } else { 0.0 };
+            switch.on = beyond >= needed;
+            slots[switch.slot] = level(switch.on);
+        }
+    }
+
+    fn received(&mut self, slots: &mut [Slot]) {
+        if let Some(numbers) = &mut self.numbers {
+            numbers.received(slots, self.execute);
+        }
+        let executes = slots[self.execute].real() != 0.0;
+        if let Some(numbers) = &mut self.numbers
+            && executes
+            && !self.delivered
+        {
+            numbers.begin(slots);
+        }
+        self.delivered = executes;
+    }
+}
+
+impl Numbers {
+    /// Puts the command that the PLC names in the place of what it sent.
+    fn received(&mut self, slots: &mut [Slot], execute: usize) {
+        self.unknown = false;
+        let number = slots[self.number].real();
+        if number == 0.0 {
+            return;
+        }
+        let commands = self.commands.iter();
+        let Some(command) = commands
+            .copied()
+            .find(|command| f64::from(command.number).total_cmp(&number).is_eq())
+        else {
+            self.unknown = true;
+            slots[execute] = level(false);
+            return;
+        };
+        for (slot, on) in self.bits.into_iter().zip(Mode::bits(command.mode)) {
+            slots[slot] = level(on);
+        }
+        let motion = command.motion;
+        let values = [
+            motion.position,
+            motion.speed,
+            motion.acceleration,
+            motion.deceleration,
+            motion.torque,
+        ];
+        for (slot, value) in self.values.into_iter().zip(values) {
+            if let Some(value) = value {
+                slots[slot] = Slot::from_real(value);
+            }
+        }
+    }
+
+    /// The simulation is given a new command.
+    fn begin(&mut self, slots: &[Slot]) {
+        let number = slots[self.number].real();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "decoded from 16 bits"
+        )]
+        let number = number as u16;
+        self.pending = (number != 0).then_some(number);
+    }
+
+    fn sending(&mut self, slots: &mut [Slot]) {
+        let there = slots[self.in_position].real() != 0.0;
+        let done = self.pending.filter(|_| there).unwrap_or(0);
+        slots[self.done] = Slot::from_real(f64::from(done));
+        if let Some(error) = self.error
+            && self.unknown
+        {
+            self.error_of_simulation = Some(slots[error]);
+            slots[error] = Slot::from_real(f64::from(UNKNOWN_COMMAND));
+        }
+    }
+
+    /// The simulation finds its own error again.
+    fn sent(&mut self, slots: &mut [Slot]) {
+        if let (Some(error), Some(own)) = (self.error, self.error_of_simulation.take()) {
+            slots[error] = own;
+        }
+    }
+}

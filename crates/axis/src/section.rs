@@ -1,0 +1,353 @@
+//! The `[[axis]]` sections of a driver.cfg: each expands into signals.
+
+mod commands;
+mod switches;
+
+use std::collections::HashMap;
+
+use commands::read_commands;
+use switches::read_switches;
+
+use super::field::Quantity;
+use super::{Axis, COMMAND_BYTES, EXTENDED_FEEDBACK_BYTES, FEEDBACK_BYTES, Field, Kind};
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value, short_number, shown};
+use tickbus_image::signal::section::{
+    NAME_LIMIT, Section, Structure, dead_band_of, name_of, pair_of, scale_of,
+};
+use tickbus_image::signal::{
+    AREA_LIMIT, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot,
+};
+
+/// What the name of a field adds to that of its axis, at most.
+const FIELD_NAME: usize = 16;
+
+/// The longest unit, in characters; "mm" becomes "mm/s³".
+const UNIT_LIMIT: usize = 36;
+
+/// The most commands of one axis, and the most end switches.
+const LIST_LIMIT: usize = 1000;
+
+/// What the axis tables before this one have taken up.
+#[derive(Debug, Default)]
+pub struct Places<'a> {
+    /// By the name of the station: the first free bytes of `%Q` and of `%I`.
+    free: HashMap<&'a str, (usize, usize)>,
+}
+
+impl<'a> Places<'a> {
+    /// Takes room for the two structures of an axis: where its table says, or behind the axis before it.
+    fn take(
+        &mut self,
+        station: Option<&Value<'a>>,
+        offsets: &[Option<Value<'a>>; 2],
+        feedback_bytes: usize,
+    ) -> (Option<usize>, Option<usize>) {
+        let key = station.and_then(Value::as_text).unwrap_or("");
+        let free = self.free.entry(key).or_default();
+        let command = offset_of(offsets[0].as_ref(), free.0, COMMAND_BYTES);
+        let feedback = offset_of(offsets[1].as_ref(), free.1, feedback_bytes);
+        *free = (
+            command.unwrap_or(free.0) + COMMAND_BYTES,
+            feedback.unwrap_or(free.1) + feedback_bytes,
+        );
+        (command, feedback)
+    }
+}
+
+/// One `[[axis]]` table, read.
+#[derive(Debug)]
+pub struct Read<'a> {
+    /// The axis. Its signals are not yet [resolved](super::resolve).
+    pub axis: Axis,
+    /// Its signals, in the order of their addresses, with those of its end switches behind them.
+    pub sections: Vec<Section<'a>>,
+}
+
+/// How the numbers of an axis become raw ones.
+#[derive(Clone, Copy, Debug)]
+struct Scales {
+    scale: Option<Scale>,
+    /// Where the axis is inverted: the sum of its limits.
+    mirror: Option<f64>,
+}
+
+impl Scales {
+    fn of(self, quantity: Quantity) -> Option<Scale> {
+        let Scale { gain, offset } = self.scale.unwrap_or(Scale {
+            gain: 1.0,
+            offset: 0.0,
+        });
+        let (sign, offset) = match self.mirror {
+            Some(mirror) => (-1.0, mirror - offset),
+            None => (1.0, offset),
+        };
+        let scale = match quantity {
+            Quantity::Position => Scale {
+                gain: gain * sign,
+                offset,
+            },
+            Quantity::Velocity => Scale {
+                gain: gain * sign,
+                offset: 0.0,
+            },
+            Quantity::Magnitude(_) => Scale {
+                gain: gain.abs(),
+                offset: 0.0,
+            },
+            _ => return None,
+        };
+        let plain = Scale {
+            gain: 1.0,
+            offset: 0.0,
+        };
+        (scale != plain).then_some(scale)
+    }
+}
+
+/// Reads one section, the one with this `number` from 0, and reports its mistakes; `None` when its signals
+/// cannot be placed.
+pub fn read<'a>(
+    mut table: Table<'a>,
+    number: usize,
+    addressing: Addressing,
+    places: &mut Places<'a>,
+) -> Option<Read<'a>> {
+    let name = table.require("name", "give the axis a name of its own");
+    let kind = table.take("kind");
+    let unit = table.take("unit");
+    let scale = table.take("scale");
+    let limits = table.take("limits");
+    let inverted = table.take("inverted");
+    let dead_band = table.take("dead_band");
+    let station = table.take("station");
+    let offsets = ["command_offset", "feedback_offset"].map(|key| table.take(key));
+    let [acknowledge, diagnostics, jerk] =
+        ["acknowledge", "diagnostics", "jerk"].map(|key| table.take(key));
+    let commands = table.take("command");
+    let switches = table.take("switch");
+    let whole = table.is_whole();
+    table.finish();
+
+    let named = name
+        .as_ref()
+        .and_then(|value| name_of(value).map(|name| (name, value)))
+        .filter(|(name, value)| is_short(name, value));
+    let kind = kind.map_or(Some(Kind::Position), |value| {
+        value.choice("kinds of axes", &Kind::ALL)
+    });
+    let unit = unit.and_then(|unit| unit.label(UNIT_LIMIT, "leave it out if the axis has no unit"));
+    let scaled = scale.as_ref().map(|value| scale_of(value, DataType::Real));
+    let stated = limits.as_ref().map(limits_of);
+    let mirrored = inverted.as_ref().map(|value| (value.boolean(), value));
+    let flag = |value: Option<Value<'_>>| value.map_or(Some(false), |value| value.boolean());
+    let [acknowledge, diagnostics, jerk] = [flag(acknowledge), flag(diagnostics), flag(jerk)];
+    let band = dead_band.as_ref().map(dead_band_of);
+    let bounds = stated.flatten();
+    if let (Some((Some(true), value)), None, true) = (mirrored, &limits, whole) {
+        value.wrong(
+            "\"inverted\" stands without \"limits\"",
+            "add limits = [0.0, 650.0], so that it is known where the other end is",
+        );
+    }
+    let commands = commands.map(|value| read_commands(&value, kind, bounds));
+    let numbered = commands.is_some();
+    let switches = switches
+        .map(|value| read_switches(&value, number, addressing, bounds))
+        .unwrap_or_default();
+
+    let feedback_bytes = if diagnostics == Some(true) || numbered {
+        EXTENDED_FEEDBACK_BYTES
+    } else {
+        FEEDBACK_BYTES
+    };
+    let (command, feedback) = places.take(station.as_ref(), &offsets, feedback_bytes);
+    let (command, feedback) = (command?, feedback?);
+    let ((name, value), kind) = (named?, kind?);
+    let end = (command + COMMAND_BYTES).max(feedback + feedback_bytes);
+    let judged = whole && !matches!(scaled, Some(None));
+    if !judged || (mirrored.is_some() && bounds.is_none()) || !fits(end, name, value) {
+        return None;
+    }
+    let axis = Axis {
+        name: name.to_owned(),
+        kind,
+        unit: unit.map(str::to_owned),
+        limits: bounds,
+        inverted: matches!(mirrored, Some((Some(true), _))),
+        command,
+        feedback,
+        feedback_bytes,
+        commands: commands.unwrap_or_default(),
+        switches: switches.iter().map(|(switch, _)| switch.clone()).collect(),
+        slots: [None; Field::COUNT],
+    };
+    let scales = Scales {
+        scale: scaled.flatten(),
+        mirror: bounds
+            .filter(|_| axis.inverted)
+            .map(|[low, high]| low + high),
+    };
+    let has = |field| match field {
+        Field::Acknowledge => acknowledge == Some(true),
+        Field::Jerk => jerk == Some(true),
+        Field::Status | Field::Error => diagnostics == Some(true),
+        Field::CommandNumber | Field::CommandDone => numbered,
+        _ => true,
+    };
+    let fields = Field::ALL.into_iter().filter(|field| has(*field));
+    let signals = fields.map(|field| signal(&axis, field, scales, band.flatten()));
+    let structures = Structures {
+        name: value,
+        offsets: &offsets,
+        station: station.as_ref(),
+        number,
+    };
+    let mut sections: Vec<Section<'a>> = signals
+        .map(|signal| structures.section(&axis, signal))
+        .collect();
+    for (_, mut section) in switches {
+        section.station.clone_from(&station);
+        sections.push(section);
+    }
+    Some(Read { axis, sections })
+}
+
+/// What the sections of all fields of one axis have in common.
+struct Structures<'t, 'a> {
+    name: &'t Value<'a>,
+    /// Where `command_offset` and `feedback_offset` stand.
+    offsets: &'t [Option<Value<'a>>; 2],
+    station: Option<&'t Value<'a>>,
+    number: usize,
+}
+
+impl<'a> Structures<'_, 'a> {
+    fn section(&self, axis: &Axis, signal: Signal) -> Section<'a> {
+        let (offset, end) = match signal.area {
+            Area::Output => (&self.offsets[0], axis.command + COMMAND_BYTES),
+            Area::Input => (&self.offsets[1], axis.feedback + axis.feedback_bytes),
+        };
+        Section {
+            name: Some(self.name.clone()),
+            address: offset.as_ref().unwrap_or(self.name).clone(),
+            station: self.station.cloned(),
+            structure: Some(Structure {
+                table: self.number,
+                end,
+            }),
+            signal,
+        }
+    }
+}
+
+fn is_short(name: &str, value: &Value<'_>) -> bool {
+    let most = NAME_LIMIT - FIELD_NAME;
+    let short = name.chars().nth(most).is_none();
+    if !short {
+        value.wrong(
+            format!(
+                "the axis' name is longer than {most} characters: \"{}\"",
+                shown(name)
+            ),
+            "shorten it; the names of its signals begin with it",
+        );
+    }
+    short
+}
+
+/// Whether structures that reach up to `end` are within their areas.
+fn fits(end: usize, name: &str, value: &Value<'_>) -> bool {
+    if end > AREA_LIMIT {
+        value.wrong(
+            format!("the axis \"{}\" ends at byte {}", shown(name), end - 1),
+            format!("an area has at most {AREA_LIMIT} bytes; use several stations"),
+        );
+    }
+    end <= AREA_LIMIT
+}
+
+/// The signal of one field.
+fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signal {
+    let quantity = field.quantity();
+    let scale = scales.of(quantity);
+    let base = match field.area() {
+        Area::Output => axis.command,
+        Area::Input => axis.feedback,
+    };
+    let unit = axis.unit.as_deref();
+    let feedback = matches!(field, Field::ActualPosition | Field::ActualSpeed);
+    Signal {
+        name: axis.signal(field),
+        station: 0,
+        area: field.area(),
+        byte: base + field.offset(),
+        bit: field.bit(),
+        data_type: field.data_type(),
+        order: ByteOrder::Abcd,
+        scale,
+        unit: match quantity {
+            Quantity::Position => unit.map(str::to_owned),
+            Quantity::Velocity | Quantity::Magnitude(1) => unit.map(|unit| format!("{unit}/s")),
+            Quantity::Magnitude(2) => unit.map(|unit| format!("{unit}/s²")),
+            Quantity::Magnitude(_) => unit.map(|unit| format!("{unit}/s³")),
+            Quantity::Torque if axis.kind == Kind::Torque => Some("%".to_owned()),
+            _ => None,
+        },
+        // Either may be shorter than a tick, or than a bus cycle.
+        latch: matches!(field, Field::Execute | Field::Acknowledge).then_some(Latch::Rising),
+        hold: Nanos::ZERO,
+        fail_safe: scale.map_or_else(Slot::default, |scale| Slot::from_real(scale.offset)),
+        dead_band: band.filter(|_| feedback).unwrap_or_default(),
+        range: None,
+    }
+}
+
+fn limits_of(value: &Value<'_>) -> Option<[f64; 2]> {
+    let [(low, _), (high, _)] = pair_of(value, "write two numbers, such as [0.0, 650.0]")?;
+    if !(low + high).is_finite() {
+        value.wrong(
+            "the sum of these \"limits\" is beyond every number",
+            "write smaller ones, such as [0.0, 650.0]",
+        );
+        return None;
+    }
+    if low >= high {
+        value.wrong(
+            format!(
+                "\"limits\" go from {} to {}",
+                short_number(low),
+                short_number(high)
+            ),
+            "write the lower one first, such as [0.0, 650.0]",
+        );
+        return None;
+    }
+    Some([low, high])
+}
+
+fn offset_of(value: Option<&Value<'_>>, free: usize, bytes: usize) -> Option<usize> {
+    let Some(value) = value else {
+        return Some(free);
+    };
+    let most = i128::try_from(AREA_LIMIT - bytes).ok()?;
+    let offset = value.whole(0..=most)?;
+    usize::try_from(offset).ok()
+}
+
+/// Tells where a position lies outside of the limits.
+fn check_within(value: &Value<'_>, position: f64, limits: Option<[f64; 2]>) {
+    if let Some([low, high]) = limits
+        && !(low..=high).contains(&position)
+    {
+        value.wrong(
+            format!(
+                "{} is beyond the limits of the axis, {} and {}",
+                value.written(),
+                short_number(low),
+                short_number(high)
+            ),
+            "write a position between them",
+        );
+    }
+}

@@ -1,0 +1,11 @@
+//! What every room of tickbus stands on: time that is handed in, the operating system's corner, and reading TOML.
+//!
+//! | room | what lives there |
+//! |---|---|
+//! | [`time`] | integer nanoseconds, the injected clock, the stop token |
+//! | [`os`] | what only the operating system can do: waiting for sockets, and time |
+//! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
+
+pub mod os;
+pub mod time;
+pub mod toml_text;

@@ -1,0 +1,92 @@
+//! The lines of `[fieldbus.at]`: signals that lie where the device has them.
+
+use crate::Spot;
+use tickbus_fieldbus::At;
+use tickbus_image::signal::SignalTable;
+
+use super::lie::nobody_writes;
+use super::{ClientOptions, Piece};
+
+impl ClientOptions {
+    /// Takes the lines, and reports those that are none, that do not fit their signals, and that would let two signals
+    /// be written into one place.
+    pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        let (writes, _) = self.role.areas();
+        let mut placed = Vec::new();
+        for line in lines {
+            let signal = &table.signals[line.signal];
+            let spot: Spot = match line.text.parse() {
+                Ok(spot) => spot,
+                Err(error) => {
+                    let error: super::super::PlaceError = error;
+                    line.wrong(error.what, error.right);
+                    continue;
+                }
+            };
+            if let Err((what, right)) = Piece::of_spot(signal, spot) {
+                line.wrong(what, right);
+                continue;
+            }
+            let of_table = spot.place.table;
+            if signal.area == writes && !of_table.is_writable() {
+                let (what, right) = nobody_writes(of_table);
+                line.wrong(what, right);
+                continue;
+            }
+            self.at.insert(signal.name.clone(), spot);
+            placed.push(line);
+        }
+        for station in 0..table.stations.len() {
+            self.check_claims(&placed, table, station);
+        }
+    }
+
+    /// Reports lines of signals that would be written into bits that are another one's.
+    fn check_claims(&self, lines: &[&At<'_>], table: &SignalTable, station: usize) {
+        let (writes, _) = self.role.areas();
+        let blocks = self.blocks(writes, table.stations[station].bytes(writes));
+        let blocks = blocks.unwrap_or_default();
+        // All that is written: the bits, and which signal's they are.
+        let mut claims: Vec<(Piece, usize)> = Vec::new();
+        for (index, signal) in table.signals.iter().enumerate() {
+            if signal.station != station || signal.area != writes {
+                continue;
+            }
+            if let Some(spot) = self.at.get(&signal.name) {
+                let piece = Piece::of_spot(signal, *spot).ok();
+                claims.extend(piece.map(|piece| (piece, index)));
+            } else {
+                let parts = blocks.iter();
+                let parts = parts.filter_map(|block| Piece::of_block(signal, block));
+                claims.extend(parts.map(|piece| (piece, index)));
+            }
+        }
+        claims.sort_by_key(|(piece, _)| (piece.table.digit(), piece.claim().start));
+        // The one that reaches furthest so far.
+        let mut furthest: Option<(Piece, usize)> = None;
+        for (piece, index) in claims {
+            if let Some((other, of)) = furthest
+                && other.table == piece.table
+                && piece.claim().start < other.claim().end
+            {
+                // Those that lie as a whole may share a register: it is written once.
+                let line = |index| lines.iter().find(move |line| line.signal == index);
+                let (line, name) = match (line(index), line(of)) {
+                    (Some(line), _) => (Some(line), &table.signals[of].name),
+                    (None, line) => (line, &table.signals[index].name),
+                };
+                if let Some(line) = line {
+                    line.wrong(
+                        format!("\"{name}\" is written there, too"),
+                        "give each signal that this end writes a place of its own; a signal without a line has the \
+                         whole of its registers",
+                    );
+                }
+                if piece.claim().end <= other.claim().end {
+                    continue;
+                }
+            }
+            furthest = Some((piece, index));
+        }
+    }
+}

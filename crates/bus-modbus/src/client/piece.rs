@@ -1,0 +1,150 @@
+//! Where each signal lies in the tables, bit for bit.
+
+use crate::table::{ADDRESSES, Span, Table};
+use crate::{Place, Spot};
+use tickbus_image::signal::{DataType, Signal};
+
+use super::Block;
+
+/// Bits of a frame, and the bits of a table that carry them, in the same order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// The table.
+    pub table: Table,
+    /// The first bit in the table. That of a coil or discrete input is its offset; of registers the bytes follow one
+    /// another as on the wire, the high one first, and bit n of byte k is 8k + n.
+    pub wire: usize,
+    /// The first bit in the frame; bit n of byte k is 8k + n.
+    pub bit: usize,
+    /// How many bits; at most [`LONGEST`](Self::LONGEST).
+    pub bits: usize,
+    /// Whether the rest of a register that it does not fill belongs to the image, too, and is written as zero.
+    pub fills: bool,
+}
+
+impl Piece {
+    /// Bits of the longest signal.
+    pub const LONGEST: usize = 64;
+
+    /// The elements that it touches.
+    pub const fn span(self) -> Span {
+        let width = self.table.width();
+        let first = self.wire / width;
+        let end = (self.wire + self.bits).div_ceil(width);
+        Span {
+            first,
+            count: end - first,
+        }
+    }
+
+    /// The bits of the table from `begin` to `end`, without the second, as far as they are of this piece.
+    pub(super) fn within(self, begin: usize, end: usize) -> Option<Self> {
+        let from = self.wire.max(begin);
+        let to = (self.wire + self.bits).min(end);
+        (from < to).then(|| Self {
+            wire: from,
+            bit: self.bit + from - self.wire,
+            bits: to - from,
+            ..self
+        })
+    }
+
+    /// The bits that a write claims: to the register where it fills that.
+    pub(super) fn claim(self) -> std::ops::Range<usize> {
+        if self.fills {
+            let (span, width) = (self.span(), self.table.width());
+            span.first * width..span.end() * width
+        } else {
+            self.wire..self.wire + self.bits
+        }
+    }
+
+    /// What `signal` has of `block`, where the image lies as a whole.
+    pub(super) fn of_block(signal: &Signal, block: &Block) -> Option<Self> {
+        let bits = signal.address().bits();
+        let begin = bits.start.max(block.byte * 8);
+        let end = bits.end.min((block.byte + block.bytes) * 8);
+        (begin < end).then(|| Self {
+            table: block.table,
+            wire: block.first * block.table.width() + begin - block.byte * 8,
+            bit: begin,
+            bits: end - begin,
+            fills: true,
+        })
+    }
+
+    /// Where `signal` lies whose own place is `spot`.
+    ///
+    /// # Errors
+    ///
+    /// It cannot lie there: what is wrong, and what would be right.
+    pub(super) fn of_spot(signal: &Signal, spot: Spot) -> Result<Self, (String, String)> {
+        let Place { table, offset } = spot.place;
+        let data_type = signal.data_type;
+        if let Some(stated) = spot.data_type
+            && stated != data_type
+        {
+            return Err((
+                format!("the address says {stated}, and the signal is {data_type}"),
+                format!(
+                    "write \"type\" in its [[signal]] section as the device has it, or \":{data_type}\""
+                ),
+            ));
+        }
+        let bits = signal.address().bits();
+        let (bit, bits) = (bits.start, bits.len());
+        let first = offset * table.width();
+        let within = if table.is_bits() {
+            if data_type != DataType::Bool {
+                return Err((
+                    format!("a {data_type} does not fit into a {}", table.element()),
+                    "that is a single bit, for a BOOL; a longer value lies in registers".to_owned(),
+                ));
+            }
+            0
+        } else {
+            match (bits, spot.bit) {
+                // Bit n of a register lies in its second byte, which is the low one, or in its first.
+                (1, Some(bit)) => 8 * (1 - usize::from(bit / 8)) + usize::from(bit % 8),
+                (1, None) => {
+                    return Err((
+                        format!("a BOOL is one bit, and a {} has 16", table.element()),
+                        "name the bit behind a dot, from 0 for the lowest to 15, as in \"400021.5\"".to_owned(),
+                    ));
+                }
+                (8, Some(half @ (0 | 8))) => 8 - usize::from(half),
+                (8, _) => {
+                    return Err((
+                        format!("a {data_type} is half of a {}", table.element()),
+                        "write \"400021.0\" for the low byte and \"400021.8\" for the high one"
+                            .to_owned(),
+                    ));
+                }
+                (_, Some(_)) => {
+                    return Err((
+                        format!("the address names a bit, and the signal is a {data_type}"),
+                        "remove the dot and what follows it, or write type = \"BOOL\"".to_owned(),
+                    ));
+                }
+                (_, None) => 0,
+            }
+        };
+        let piece = Self {
+            table,
+            wire: first + within,
+            bit,
+            bits,
+            fills: false,
+        };
+        if piece.span().end() > ADDRESSES {
+            return Err((
+                format!(
+                    "a {data_type} from {} on reaches beyond the table",
+                    spot.place
+                ),
+                "the last offset is 65535".to_owned(),
+            ));
+        }
+        Ok(piece)
+    }
+}

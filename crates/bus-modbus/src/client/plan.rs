@@ -1,0 +1,225 @@
+//! The planning of requests: which of them bring the signals of a station across, and as few as there can be.
+
+use std::collections::BTreeMap;
+
+use crate::function::{
+    READ_BITS, READ_REGISTERS, READ_WRITE_REGISTERS, WRITE_BITS, WRITE_REGISTERS,
+};
+use crate::table::{Span, Table};
+
+use super::Piece;
+use super::query::{Query, Region};
+
+/// What is known of a device, and how its requests are to be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Abilities {
+    /// One request may write and read holding registers: function 23.
+    pub combine: bool,
+    /// A request may read over a gap of so many bits of a table rather than that two requests are made.
+    pub gap: usize,
+    /// It has function 15; else its coils are written one by one.
+    pub many_coils: bool,
+    /// It has function 16; else its registers are written one by one.
+    pub many_registers: bool,
+}
+
+impl Abilities {
+    /// Those of a device of which nothing is known yet.
+    pub const fn new(combine: bool, gap: usize) -> Self {
+        Self {
+            combine,
+            gap,
+            many_coils: true,
+            many_registers: true,
+        }
+    }
+}
+
+/// The requests of one cycle, what is written first.
+///
+/// Every piece is read or written once. Reading may join pieces over gaps; nothing is written but what pieces have.
+/// Only a piece that shares its registers with others beyond the limit of a request is divided.
+pub fn queries(reads: &[Piece], writes: &[Piece], able: &Abilities) -> Vec<Query> {
+    let is_holding = |piece: &Piece| piece.table == Table::HoldingRegisters;
+    let combine = able.combine
+        && able.many_registers
+        && reads.iter().any(is_holding)
+        && writes.iter().any(is_holding);
+    let able = Abilities { combine, ..*able };
+    let mut queries = Vec::new();
+    let mut reads: Vec<Region> = by_table(reads)
+        .flat_map(|(table, pieces)| readings(table, &pieces, able.gap))
+        .collect();
+    for (table, pieces) in by_table(writes) {
+        for query in writings(table, &pieces, &able) {
+            let beside = |read: &Region| read.table == Table::HoldingRegisters;
+            queries.push(match query {
+                Query::Write(write) if combine && beside(&write) => {
+                    match reads.iter().position(beside) {
+                        Some(read) => Query::Both {
+                            write,
+                            read: reads.remove(read),
+                        },
+                        None => Query::Write(write),
+                    }
+                }
+                query => query,
+            });
+        }
+    }
+    queries.extend(reads.into_iter().map(Query::Read));
+    queries
+}
+
+/// The pieces of each table by their place, tables in the order in which they are met first.
+fn by_table(pieces: &[Piece]) -> impl Iterator<Item = (Table, Vec<Piece>)> {
+    let mut tables: Vec<Table> = Vec::new();
+    for piece in pieces {
+        if !tables.contains(&piece.table) {
+            tables.push(piece.table);
+        }
+    }
+    tables.into_iter().map(|table| {
+        let of_table = pieces.iter().filter(|piece| piece.table == table);
+        let mut of_table: Vec<Piece> = of_table.copied().collect();
+        of_table.sort_by_key(|piece| (piece.wire, piece.bits));
+        (table, of_table)
+    })
+}
+
+/// What is read of one table, whose pieces are in order.
+fn readings(table: Table, pieces: &[Piece], gap: usize) -> Vec<Region> {
+    let limit = if table.is_bits() {
+        READ_BITS
+    } else {
+        READ_REGISTERS
+    };
+    let mut regions: Vec<Region> = Vec::new();
+    for piece in pieces {
+        let span = piece.span();
+        if let Some(last) = regions.last_mut() {
+            let end = last.span.end().max(span.end());
+            let between = span.first.saturating_sub(last.span.end()) * table.width();
+            if end - last.span.first <= limit && between <= gap {
+                last.span.count = end - last.span.first;
+                last.joined |= between > 0;
+                last.take(*piece);
+                continue;
+            }
+        }
+        let mut region = Region::new(table, span);
+        region.take(*piece);
+        regions.push(region);
+    }
+    regions
+}
+
+/// What is written into one table, whose pieces are in order.
+fn writings(table: Table, pieces: &[Piece], able: &Abilities) -> Vec<Query> {
+    let (most, many) = match (table.is_bits(), able.combine) {
+        (true, _) => (WRITE_BITS, able.many_coils),
+        (false, true) => (READ_WRITE_REGISTERS, able.many_registers),
+        (false, false) => (WRITE_REGISTERS, able.many_registers),
+    };
+    let (whole, partial) = elements(table, pieces);
+    let mut queries: Vec<Query> = partial
+        .into_iter()
+        .map(|first| Query::Mask(region(table, Span { first, count: 1 }, pieces)))
+        .collect();
+    let mut rest = whole.into_iter().peekable();
+    while let Some(first) = rest.next() {
+        let mut run = Span { first, count: 1 };
+        while rest.next_if_eq(&run.end()).is_some() {
+            run.count += 1;
+        }
+        while run.count > 0 {
+            let count = if many { cut(run, most, pieces) } else { 1 };
+            let part = Span {
+                first: run.first,
+                count,
+            };
+            let region = region(table, part, pieces);
+            queries.push(if many {
+                Query::Write(region)
+            } else {
+                Query::WriteOne(region)
+            });
+            run = Span {
+                first: part.end(),
+                count: run.count - count,
+            };
+        }
+    }
+    queries
+}
+
+/// The offsets of the elements that pieces have as a whole, and of those that they have in part; both in order.
+fn elements(table: Table, pieces: &[Piece]) -> (Vec<usize>, Vec<usize>) {
+    const ALL: u16 = 0xFFFF;
+    let mut covered: BTreeMap<usize, u16> = BTreeMap::new();
+    for piece in pieces {
+        let span = piece.span();
+        for offset in span.first..span.end() {
+            let bits = if table.is_bits() || piece.fills {
+                ALL
+            } else {
+                let own = piece.within(offset * 16, offset * 16 + 16);
+                own.map_or(0, |own| mask(own.wire - offset * 16, own.bits))
+            };
+            *covered.entry(offset).or_default() |= bits;
+        }
+    }
+    let (whole, partial): (Vec<_>, Vec<_>) =
+        covered.into_iter().partition(|(_, bits)| *bits == ALL);
+    let offsets = |elements: Vec<(usize, u16)>| elements.into_iter().map(|(at, _)| at).collect();
+    (offsets(whole), offsets(partial))
+}
+
+/// So many bits from one on, of 16.
+fn mask(from: usize, bits: usize) -> u16 {
+    (from..from + bits).fold(0, |mask, bit| mask | 1 << bit)
+}
+
+/// How many elements of `run`, at most `most`, one request writes, such that no piece is divided if that can be.
+fn cut(run: Span, most: usize, pieces: &[Piece]) -> usize {
+    if run.count <= most {
+        return run.count;
+    }
+    let mut end = run.first + most;
+    while let Some(span) = near(pieces, end)
+        .map(|piece| piece.span())
+        .find(|span| span.first < end && end < span.end())
+    {
+        if span.first <= run.first {
+            return most;
+        }
+        end = span.first;
+    }
+    end - run.first
+}
+
+/// The pieces in order of which some could touch the elements around the one with this offset.
+fn near(pieces: &[Piece], offset: usize) -> impl Iterator<Item = &Piece> {
+    let width = pieces.first().map_or(1, |piece| piece.table.width());
+    let bit = offset * width;
+    let begin = pieces.partition_point(|piece| piece.wire + Piece::LONGEST + width < bit);
+    let end = pieces.partition_point(|piece| piece.wire < bit + width);
+    pieces[begin..end.max(begin)].iter()
+}
+
+/// Elements of a table with what pieces have of them.
+fn region(table: Table, span: Span, pieces: &[Piece]) -> Region {
+    let (begin, end) = (span.first * table.width(), span.end() * table.width());
+    let from = pieces.partition_point(|piece| piece.wire + Piece::LONGEST < begin);
+    let to = pieces.partition_point(|piece| piece.wire < end);
+    let mut region = Region::new(table, span);
+    for piece in &pieces[from..to] {
+        if let Some(own) = piece.within(begin, end) {
+            region.take(own);
+        }
+    }
+    region
+}
+
+#[cfg(test)]
+mod tests;

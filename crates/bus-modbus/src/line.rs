@@ -1,0 +1,170 @@
+//! What a driver.cfg says of the line: a TCP address, or a serial port.
+
+use std::fmt;
+
+use tickbus_base::os::{Parity, SerialSettings};
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value};
+use tickbus_fieldbus::tcp::{Address, AddressError};
+
+use super::rtu;
+
+/// The longest name of a serial port, in characters.
+const DEVICE_LIMIT: usize = 1000;
+
+/// Speeds that a serial port may have, in bits per second.
+const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
+
+/// The line to the other end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Line {
+    /// Modbus TCP.
+    Tcp(Address),
+    /// Modbus RTU over a serial port.
+    Serial(Serial),
+}
+
+/// A serial port, and how it is set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Serial {
+    /// The system's name of the port.
+    pub device: String,
+    /// How it is set.
+    pub settings: SerialSettings,
+    /// The silence that ends a telegram.
+    pub silence: Nanos,
+    /// Whether what is sent comes back, and is to be dropped.
+    pub echo: bool,
+}
+
+impl fmt::Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(address) => address.fmt(f),
+            Self::Serial(serial) => {
+                write!(f, "{} at {}", serial.device, serial.settings)?;
+                f.write_str(if serial.echo { ", which echoes" } else { "" })
+            }
+        }
+    }
+}
+
+impl Serial {
+    /// The echo that is to be dropped, if there is one.
+    pub(super) fn new_echo(&self) -> Option<rtu::Echo> {
+        self.echo.then(|| rtu::Echo::new(self.settings.baud))
+    }
+}
+
+impl Line {
+    /// Takes another address than the driver.cfg names, if `check` has nothing against it.
+    pub fn set_address(
+        &mut self,
+        address: &str,
+        check: impl FnOnce(&Address) -> Result<(), AddressError>,
+    ) -> Result<(), String> {
+        let why = |error: AddressError| error.to_string();
+        let address: Address = address.parse().map_err(why)?;
+        check(&address).map_err(why)?;
+        *self = Self::Tcp(address);
+        Ok(())
+    }
+
+    /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without any of them it is
+    /// `address`. `check` has its say about what the driver.cfg states.
+    pub(super) fn read(
+        table: &mut Table<'_>,
+        address: Address,
+        check: impl FnOnce(&Address) -> Result<(), AddressError>,
+    ) -> Option<Self> {
+        let stated = table.take("address");
+        let device = table.take("device");
+        let serial = ["baud", "parity", "stop_bits", "silence", "echo", "rs485"]
+            .map(|key| (key, table.take(key)));
+        let Some(device) = device else {
+            for (key, value) in &serial {
+                if let Some(value) = value
+                    && table.is_whole()
+                {
+                    value.wrong(
+                        format!("\"{key}\" stands without \"device\""),
+                        "name the serial port, such as device = \"/dev/ttyUSB0\", or remove it",
+                    );
+                }
+            }
+            let Some(value) = stated else {
+                return Some(Self::Tcp(address));
+            };
+            let text =
+                value.text("write a host and a port in quotes, such as \"127.0.0.1:1502\"")?;
+            let read = text.parse().and_then(|address| {
+                check(&address)?;
+                Ok(address)
+            });
+            return match read {
+                Ok(address) => Some(Self::Tcp(address)),
+                Err(error) => {
+                    value.wrong(error.what, error.right);
+                    None
+                }
+            };
+        };
+        if let Some(value) = &stated {
+            value.wrong(
+                "\"address\" stands beside \"device\"",
+                "remove one of the two: \"address\" is for Modbus TCP, \"device\" for RTU over a serial port",
+            );
+        }
+        let device = device.label(
+            DEVICE_LIMIT,
+            "name the serial port, such as \"/dev/ttyUSB0\"",
+        );
+        let [baud, parity, stop_bits, silence, echo, rs485] = serial.map(|(_, value)| value);
+        let flag = |value: Option<Value<'_>>| value.map_or(Some(false), |value| value.boolean());
+        let (echo, rs485) = (flag(echo), flag(rs485));
+        let settings = read_settings(baud.as_ref(), parity.as_ref(), stop_bits.as_ref(), rs485);
+        let silence = silence.as_ref().map(Value::duration);
+        let (device, settings) = (device?.to_owned(), settings?);
+        let silence = match silence {
+            None => rtu::silence(settings.baud),
+            Some(stated) => stated?,
+        };
+        Some(Self::Serial(Serial {
+            device,
+            settings,
+            silence,
+            echo: echo?,
+        }))
+    }
+}
+
+fn read_settings(
+    baud: Option<&Value<'_>>,
+    parity: Option<&Value<'_>>,
+    stop_bits: Option<&Value<'_>>,
+    rs485: Option<bool>,
+) -> Option<SerialSettings> {
+    let baud = match baud {
+        None => Some(19_200),
+        Some(value) => value.whole(BAUDS).and_then(|baud| u32::try_from(baud).ok()),
+    };
+    let parities = [
+        ("even", Parity::Even),
+        ("odd", Parity::Odd),
+        ("none", Parity::None),
+    ];
+    let parity = parity.map_or(Some(Parity::Even), |value| {
+        value.choice("parities", &parities)
+    });
+    // The standard's characters have eleven bits: without a parity there are two stop bits.
+    let two_by_default = parity == Some(Parity::None);
+    let two_stop_bits = stop_bits.map_or(Some(two_by_default), |value| {
+        value.whole(1..=2).map(|bits| bits == 2)
+    });
+    Some(SerialSettings {
+        baud: baud?,
+        parity: parity?,
+        two_stop_bits: two_stop_bits?,
+        rs485: rs485?,
+    })
+}

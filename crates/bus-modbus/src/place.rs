@@ -1,0 +1,187 @@
+//! Places in the tables as people write them.
+
+use std::fmt;
+use std::str::FromStr;
+
+use tickbus_base::toml_text::shown;
+
+use super::table::{ADDRESSES, Table};
+
+/// An element of a table.
+///
+/// Written either as an offset on the wire, which counts from 0 (`offset:20`, or with its table
+/// `holding-register offset:20`), or as a number, which counts from 1: `holding-register:21`, `4x00021`,
+/// `400021` and `40021` are the same element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Place {
+    /// Its table.
+    pub table: Table,
+    /// Its offset on the wire, from 0.
+    pub offset: usize,
+}
+
+/// What to write for a place.
+pub(super) const SHAPE: &str = "write \"offset:20\", which counts from 0, or \"holding-register:21\", \
+                                \"4x00021\" or \"400021\", which count from 1";
+
+/// Why a text is no place.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}; {right}")]
+pub struct PlaceError {
+    /// What is wrong with it.
+    pub what: String,
+    /// What would be right.
+    pub right: String,
+}
+
+impl Place {
+    /// Reads a place; one that names no table is in `table`.
+    ///
+    /// # Errors
+    ///
+    /// The text is no place.
+    pub fn parse(text: &str, table: Table) -> Result<Self, PlaceError> {
+        let wrong = |what: String| PlaceError {
+            what,
+            right: SHAPE.to_owned(),
+        };
+        let none = || wrong(format!("\"{}\" is no place in a table", shown(text)));
+        // An offset, or a number from 1, and the digits of it.
+        let (table, from, digits) = if let Some((head, digits)) = text.rsplit_once("offset:") {
+            let table = match head.strip_suffix(' ') {
+                Some(name) => named(name).ok_or_else(none)?,
+                None if head.is_empty() => table,
+                None => return Err(none()),
+            };
+            (table, 0, digits)
+        } else if let Some((name, digits)) = text.split_once(':') {
+            (named(name).ok_or_else(none)?, 1, digits)
+        } else {
+            let mut letters = text.chars();
+            let table = letters.next().and_then(numbered).ok_or_else(none)?;
+            let digits = letters.as_str();
+            match digits.strip_prefix('x') {
+                Some(digits) => (table, 1, digits),
+                // Without its letter a number has all of its digits.
+                None if matches!(digits.len(), 4 | 5) => (table, 1, digits),
+                None => return Err(none()),
+            }
+        };
+        if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
+            return Err(none());
+        }
+        let number = digits.parse().unwrap_or(usize::MAX);
+        if !(from..from + ADDRESSES).contains(&number) {
+            let last = from + ADDRESSES - 1;
+            let kind = if from == 0 { "offsets" } else { "numbers" };
+            return Err(wrong(format!(
+                "\"{}\" is beyond the table, whose {kind} go from {from} to {last}",
+                shown(text)
+            )));
+        }
+        let offset = number - from;
+        Ok(Self { table, offset })
+    }
+}
+
+fn named(name: &str) -> Option<Table> {
+    Table::ALL.into_iter().find(|table| table.element() == name)
+}
+
+fn numbered(digit: char) -> Option<Table> {
+    Table::ALL.into_iter().find(|table| table.digit() == digit)
+}
+
+/// A place that names its table.
+impl FromStr for Place {
+    type Err = PlaceError;
+
+    fn from_str(text: &str) -> Result<Self, PlaceError> {
+        if text.starts_with("offset:") {
+            return Err(PlaceError {
+                what: format!("\"{}\" names no table", shown(text)),
+                right: "write it before the offset, as in \"holding-register offset:20\""
+                    .to_owned(),
+            });
+        }
+        Self::parse(text, Table::HoldingRegisters)
+    }
+}
+
+/// Both ways to write it.
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { table, offset } = *self;
+        let (element, digit, number) = (table.element(), table.digit(), offset + 1);
+        write!(f, "{element} offset:{offset} ({digit}x{number:05})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ways_to_count_are_read() {
+        let holding = |offset| Place {
+            table: Table::HoldingRegisters,
+            offset,
+        };
+        for text in [
+            "offset:20",
+            "holding-register offset:20",
+            "holding-register:21",
+            "4x00021",
+            "4x21",
+            "400021",
+            "40021",
+        ] {
+            assert_eq!(Place::parse(text, Table::HoldingRegisters), Ok(holding(20)));
+        }
+        for (text, table, offset) in [
+            ("000001", Table::Coils, 0),
+            ("coil:65536", Table::Coils, 65_535),
+            ("1x00017", Table::DiscreteInputs, 16),
+            ("discrete-input offset:0", Table::DiscreteInputs, 0),
+            ("365536", Table::InputRegisters, 65_535),
+            ("input-register:1", Table::InputRegisters, 0),
+        ] {
+            assert_eq!(text.parse(), Ok(Place { table, offset }), "{text}");
+        }
+        assert_eq!(
+            Place::parse("offset:65535", Table::InputRegisters).map(|place| place.table),
+            Ok(Table::InputRegisters)
+        );
+        assert_eq!(
+            holding(20).to_string(),
+            "holding-register offset:20 (4x00021)"
+        );
+    }
+
+    #[test]
+    fn what_is_no_place_is_told_why() {
+        for (text, part) in [
+            ("", "no place"),
+            ("20", "no place"),
+            ("offset:", "no place"),
+            ("offset:-1", "no place"),
+            ("offset:65536", "offsets go from 0 to 65535"),
+            ("holding-register:0", "numbers go from 1 to 65536"),
+            ("400000", "numbers go from 1 to 65536"),
+            ("4x65537", "numbers go from 1 to 65536"),
+            ("4x999999999999999999999999", "numbers go from 1"),
+            ("holding-registers:1", "no place"),
+            ("holding-register:21:UINT", "no place"),
+            ("200001", "no place"),
+            ("4000021", "no place"),
+            ("4021", "no place"),
+            ("coiloffset:1", "no place"),
+            ("offset:+1", "no place"),
+        ] {
+            let told = Place::parse(text, Table::HoldingRegisters).expect_err(text);
+            assert!(told.what.contains(part), "\"{part}\" in {told}");
+        }
+        let told = "offset:20".parse::<Place>().expect_err("no table");
+        assert!(told.to_string().contains("names no table"), "{told}");
+    }
+}

@@ -1,0 +1,272 @@
+//! Modbus RTU: telegrams that a silence ends, with a checksum.
+
+use super::PDU_LIMIT;
+use tickbus_base::time::Nanos;
+
+/// Bytes of the checksum.
+pub const CHECKSUM: usize = 2;
+
+/// The longest telegram: unit, PDU, checksum.
+pub const ADU_LIMIT: usize = 1 + PDU_LIMIT + CHECKSUM;
+
+/// The shortest: unit, function code, checksum.
+const SHORTEST: usize = 4;
+
+/// Bits of one character: start, eight, parity or a second stop, stop.
+const CHARACTER: i64 = 11;
+
+/// Above so many bits per second the silence is as at that speed.
+const FASTEST: u32 = 19_200;
+
+/// The silence between two telegrams there.
+const LEAST_SILENCE: Nanos = Nanos::from_micros(1_750);
+
+/// The silence that ends a telegram: 3.5 characters, and above 19,200 bits per second 1.75 ms.
+pub fn silence(baud: u32) -> Nanos {
+    if baud > FASTEST {
+        return LEAST_SILENCE;
+    }
+    let half_character = CHARACTER * 1_000_000_000 / (2 * i64::from(baud.max(1)));
+    Nanos(7 * half_character)
+}
+
+/// How long one character takes.
+pub fn character(baud: u32) -> Nanos {
+    Nanos(CHARACTER * 1_000_000_000 / i64::from(baud.max(1)))
+}
+
+/// The checksum over the bytes of a telegram, as it is sent: the low byte first.
+pub fn checksum(bytes: &[u8]) -> [u8; 2] {
+    let mut crc = 0xFFFF_u16;
+    for byte in bytes {
+        crc ^= u16::from(*byte);
+        for _ in 0..8 {
+            let carry = crc & 1 == 1;
+            crc >>= 1;
+            if carry {
+                crc ^= 0xA001;
+            }
+        }
+    }
+    crc.to_le_bytes()
+}
+
+/// Appends a telegram, whose PDU `write` appends; nothing if it appends nothing.
+pub fn append<R>(unit: u8, bytes: &mut Vec<u8>, write: impl FnOnce(&mut Vec<u8>) -> R) -> R {
+    let begin = bytes.len();
+    bytes.push(unit);
+    let result = write(bytes);
+    if bytes.len() == begin + 1 {
+        bytes.truncate(begin);
+        return result;
+    }
+    let checksum = checksum(&bytes[begin..]);
+    bytes.extend_from_slice(&checksum);
+    result
+}
+
+/// Unit and PDU of a whole telegram; `None` when its length or its checksum is wrong.
+pub fn parse(telegram: &[u8]) -> Option<(u8, &[u8])> {
+    if !(SHORTEST..=ADU_LIMIT).contains(&telegram.len()) {
+        return None;
+    }
+    let (body, sum) = telegram.split_last_chunk::<CHECKSUM>()?;
+    (checksum(body) == *sum).then(|| (body[0], &body[1..]))
+}
+
+/// Cuts what comes over a line into telegrams, by the silence between them.
+#[derive(Debug)]
+pub struct Framer {
+    silence: Nanos,
+    bytes: Vec<u8>,
+    /// Longer than any telegram: whatever follows, it is none.
+    overlong: bool,
+    /// When the last byte came.
+    last: Option<Nanos>,
+}
+
+impl Framer {
+    /// A framer for telegrams with this silence between them.
+    pub fn new(silence: Nanos) -> Self {
+        Self {
+            silence,
+            bytes: Vec::with_capacity(ADU_LIMIT),
+            overlong: false,
+            last: None,
+        }
+    }
+
+    /// These bytes came at `now`. What has been ended by silence before that must have been
+    /// [taken](Self::take).
+    pub fn arrived(&mut self, now: Nanos, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        self.last = Some(now);
+        let room = ADU_LIMIT - self.bytes.len();
+        self.overlong |= bytes.len() > room;
+        self.bytes
+            .extend_from_slice(&bytes[..bytes.len().min(room)]);
+    }
+
+    /// Until when to wait for the silence; [`Nanos::MAX`] when nothing has come.
+    pub fn deadline(&self) -> Nanos {
+        self.last.map_or(Nanos::MAX, |last| last + self.silence)
+    }
+
+    /// Whether the line has been silent for long enough at `now`.
+    fn is_silent(&self, now: Nanos) -> bool {
+        self.last.is_none_or(|last| now >= last + self.silence)
+    }
+
+    /// If silence has ended a telegram by `now`, hands it to `take`; `None` in its place when it was longer than
+    /// any telegram is.
+    pub fn take<R>(&mut self, now: Nanos, take: impl FnOnce(Option<&[u8]>) -> R) -> Option<R> {
+        if self.last.is_none() || !self.is_silent(now) {
+            return None;
+        }
+        let result = take((!self.overlong).then_some(&self.bytes));
+        self.clear();
+        Some(result)
+    }
+
+    fn clear(&mut self) {
+        self.bytes.clear();
+        self.overlong = false;
+        self.last = None;
+    }
+}
+
+/// What a line that echoes gives back of what was sent, such as a two-wire adapter whose receiver stays on.
+#[derive(Debug)]
+pub struct Echo {
+    /// How long one character takes.
+    character: Nanos,
+    expected: Vec<u8>,
+    /// When the rest of it will not come any more.
+    until: Nanos,
+}
+
+impl Echo {
+    /// How much later than the line needs an echo may come: adapters keep what they receive for up to 16 ms.
+    const SLACK: Nanos = Nanos::from_millis(50);
+
+    /// The echo of a line with this speed.
+    pub fn new(baud: u32) -> Self {
+        Self {
+            character: character(baud),
+            expected: Vec::new(),
+            until: Nanos::ZERO,
+        }
+    }
+
+    /// These bytes were sent at `now`.
+    pub fn sent(&mut self, now: Nanos, bytes: &[u8]) {
+        if now > self.until {
+            self.expected.clear();
+        }
+        self.expected.extend_from_slice(bytes);
+        let characters = i64::try_from(self.expected.len()).unwrap_or(i64::MAX);
+        self.until = now + self.character.times(characters) + Self::SLACK;
+    }
+
+    /// How many of the bytes that came at `now` are the echo of what was sent. What differs from that is none, and
+    /// what comes behind it neither.
+    pub fn strip(&mut self, now: Nanos, bytes: &[u8]) -> usize {
+        if now > self.until {
+            self.expected.clear();
+        }
+        let pairs = self.expected.iter().zip(bytes);
+        let count = pairs
+            .take_while(|(expected, came)| expected == came)
+            .count();
+        if count < bytes.len() {
+            self.expected.clear();
+        } else {
+            self.expected.drain(..count);
+        }
+        count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A request that reads two holding registers of unit 1, known from many manuals.
+    const READ: [u8; 8] = [1, 3, 0, 0, 0, 2, 0xC4, 0x0B];
+
+    #[test]
+    fn the_checksum_is_the_one_of_the_standard() {
+        assert_eq!(checksum(&READ[..6]), READ[6..]);
+        // The standard's own worked example.
+        assert_eq!(checksum(&[0x02, 0x07]), [0x41, 0x12]);
+        let mut bytes = Vec::new();
+        append(1, &mut bytes, |pdu| pdu.extend([3, 0, 0, 0, 2]));
+        assert_eq!(bytes, READ);
+        assert_eq!(parse(&READ), Some((1, &READ[1..6])));
+    }
+
+    #[test]
+    fn every_truncation_and_every_flipped_bit_is_found() {
+        for cut in 0..READ.len() {
+            assert_eq!(parse(&READ[..cut]), None, "{cut} bytes");
+        }
+        for bit in 0..READ.len() * 8 {
+            let mut wrong = READ;
+            wrong[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(parse(&wrong), None, "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn silence_is_three_and_a_half_characters() {
+        assert_eq!(silence(9_600), Nanos(4_010_412));
+        assert_eq!(silence(19_200).rounded(), Nanos(2_005_202).rounded());
+        assert_eq!(silence(115_200), Nanos::from_micros(1_750));
+        assert!(silence(0) > Nanos::ZERO);
+    }
+
+    #[test]
+    fn silence_ends_a_telegram_and_nothing_else_does() {
+        let mut framer = Framer::new(Nanos(100));
+        assert_eq!(framer.deadline(), Nanos::MAX);
+        framer.arrived(Nanos(0), &READ[..3]);
+        framer.arrived(Nanos(99), &READ[3..]);
+        assert_eq!(framer.deadline(), Nanos(199));
+        assert_eq!(framer.take(Nanos(198), |_| ()), None);
+        let taken = framer.take(Nanos(199), |telegram| telegram.map(<[u8]>::to_vec));
+        assert_eq!(taken, Some(Some(READ.to_vec())));
+        assert_eq!(framer.take(Nanos(999), |_| ()), None, "it is taken once");
+    }
+
+    #[test]
+    fn the_echo_of_what_was_sent_is_dropped_and_what_follows_it_is_not() {
+        let mut echo = Echo::new(9_600);
+        echo.sent(Nanos(0), &READ);
+        assert_eq!(echo.strip(Nanos(10), &READ[..5]), 5);
+        let rest = [&READ[5..], &[1, 3]].concat();
+        assert_eq!(echo.strip(Nanos(20), &rest), 3);
+        assert_eq!(echo.strip(Nanos(30), &READ), 0, "it comes once");
+        echo.sent(Nanos(40), &READ);
+        assert_eq!(echo.strip(Nanos(50), &[2, 3]), 0, "that is another one's");
+        assert_eq!(echo.strip(Nanos(60), &READ), 0);
+        echo.sent(Nanos(70), &READ);
+        let late = Nanos::from_millis(100);
+        assert_eq!(echo.strip(late, &READ), 0, "no echo is so late");
+    }
+
+    #[test]
+    fn what_is_too_long_is_no_telegram_and_takes_no_memory() {
+        let mut framer = Framer::new(Nanos(100));
+        for now in 0..1_000 {
+            framer.arrived(Nanos(now), &[0; 64]);
+        }
+        assert_eq!(framer.bytes.len(), ADU_LIMIT);
+        let taken = framer.take(Nanos(5_000), |telegram| telegram.is_none());
+        assert_eq!(taken, Some(true));
+        framer.arrived(Nanos(6_000), &READ);
+        let taken = framer.take(Nanos(7_000), |telegram| telegram == Some(&READ[..]));
+        assert_eq!(taken, Some(true), "the next one is whole again");
+    }
+}

@@ -1,0 +1,52 @@
+//! The bus `modbus-server`: clients read and write the image.
+
+mod options;
+#[cfg(unix)]
+mod serial;
+mod tcp;
+mod units;
+
+use tickbus_base::time::Stop;
+use tickbus_fieldbus::{BusError, Free, Port, Role, tcp as many};
+use tickbus_image::signal::SignalTable;
+
+use super::Line;
+pub use options::ServerOptions;
+use tcp::TcpService;
+use units::UnitSet;
+
+/// The bus of kind `modbus-server`.
+#[derive(Debug)]
+pub struct ModbusServer {
+    options: ServerOptions,
+    units: UnitSet,
+}
+
+impl ModbusServer {
+    /// The bus that `options` describe, for the end with `role`, of the driver called `driver`.
+    pub fn new(options: &ServerOptions, table: &SignalTable, role: Role, driver: &str) -> Self {
+        Self {
+            options: options.clone(),
+            units: UnitSet::new(options, table, role, driver),
+        }
+    }
+}
+
+impl Free for ModbusServer {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        match &self.options.line {
+            Line::Tcp(address) => {
+                let mut service = TcpService {
+                    units: &mut self.units,
+                    clients: self.options.clients,
+                    patience: port.max_age(),
+                };
+                many::serve(address, &mut service, port, stop)
+            }
+            #[cfg(unix)]
+            Line::Serial(line) => serial::serve(line, &mut self.units, port, stop),
+            #[cfg(not(unix))]
+            Line::Serial(_) => Err(super::no_serial_port()),
+        }
+    }
+}

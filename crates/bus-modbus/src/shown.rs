@@ -1,0 +1,171 @@
+//! Where signals lie, for people: both ways to count, side by side.
+
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
+
+use super::{Block, ClientOptions, Place, Query, ServerOptions, Side, Table};
+
+impl ServerOptions {
+    /// What the line is and does, with the signals of `signals`.
+    pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
+        let mut parts = vec![format!("listens on {}", self.line)];
+        parts.extend(self.stations.shown(None));
+        let bytes = |area| {
+            signals
+                .stations
+                .iter()
+                .map(move |station| station.bytes(area))
+                .max()
+        };
+        let outputs = bytes(Area::Output).unwrap_or_default();
+        let table = Table::HoldingRegisters;
+        if bytes(Area::Input) > Some(0)
+            && let Some(offset) = self.map(outputs).window
+        {
+            parts.push(format!("%I also from {} on", Place { table, offset }));
+        }
+        if outputs > 0 && self.input == Side::Sends {
+            // Whoever expects %I there sees plausible numbers: what he wrote himself.
+            parts.push(format!(
+                "{} and the {} behind it are %Q: read, they give back what was written last",
+                Place { table, offset: 0 },
+                table.elements(outputs) - 1
+            ));
+        }
+        if self.every_write {
+            parts.push("every write".to_owned());
+        }
+        parts
+    }
+
+    /// Where a signal lies.
+    pub fn place(&self, signal: &Signal) -> String {
+        let is_bit = signal.data_type == DataType::Bool;
+        let table = match (signal.area, is_bit) {
+            (Area::Input, true) => Table::DiscreteInputs,
+            (Area::Input, false) => Table::InputRegisters,
+            (Area::Output, true) => Table::Coils,
+            (Area::Output, false) => Table::HoldingRegisters,
+        };
+        let whole = Block {
+            table,
+            first: 0,
+            byte: 0,
+            bytes: signal.byte + 1,
+        };
+        place_in(whole, signal)
+    }
+}
+
+impl ClientOptions {
+    /// What the line is and does, for the end with `role` and the signals of `table`.
+    pub fn shown(&self, role: Role, table: &SignalTable) -> Vec<String> {
+        let (writes, reads) = role.areas();
+        let mut parts = vec![format!("asks {}", self.line)];
+        parts.extend(self.stations.shown(Some(self.unit(0))));
+        parts.extend([(reads, "reads"), (writes, "writes")].map(|(area, does)| {
+            if !self.lies_as_a_whole(area, table) {
+                return format!("{does} {area} where [fieldbus.at] says");
+            }
+            let places: Vec<String> = self.places(area).map(|place| place.to_string()).collect();
+            let places = places.join(" and from ");
+            let elsewhere =
+                |signal: &Signal| signal.area == area && self.at.contains_key(&signal.name);
+            if table.signals.iter().any(elsewhere) {
+                format!("{does} {area} where [fieldbus.at] says, the rest from {places} on")
+            } else {
+                format!("{does} {area} from {places} on")
+            }
+        }));
+        parts.push(match self.timeout {
+            Some(timeout) => format!("answers within {timeout}"),
+            None if table.stations.len() > 1 => {
+                "answers within half of max_age, at most 1s".to_owned()
+            }
+            None => "answers within 1s".to_owned(),
+        });
+        if !self.combine {
+            parts.push("never writes and reads in one request".to_owned());
+        }
+        parts.push(match self.stations.write_to(0) {
+            Some(identity) => format!("writes only into \"{identity}\""),
+            None => "writes nothing, as no \"write_to\" names the device".to_owned(),
+        });
+        parts
+    }
+
+    /// The requests of a cycle, a line for each.
+    pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
+        let mut lines = Vec::new();
+        for station in 0..table.stations.len() {
+            let unit = match table.stations.len() {
+                1 => String::new(),
+                _ => format!("unit {}: ", self.unit(station)),
+            };
+            let blocked = match self.stations.write_to(station) {
+                Some(_) => "",
+                None => "; written once \"write_to\" names the device",
+            };
+            for query in self.requests(table, station) {
+                let Some(write) = query.write() else {
+                    lines.push(format!("{unit}{query}"));
+                    continue;
+                };
+                let zeros = match query {
+                    Query::Mask(_) => 0,
+                    _ => write.zeros(),
+                };
+                let rest = match zeros {
+                    0 => String::new(),
+                    1 => "; 1 of the bits written has no signal and becomes 0".to_owned(),
+                    bits => format!("; {bits} of the bits written have no signal and become 0"),
+                };
+                lines.push(format!("{unit}{query}{rest}{blocked}"));
+            }
+        }
+        lines
+    }
+
+    /// Where a signal of a station with areas of so many bytes lies.
+    pub fn place(&self, signal: &Signal, bytes: usize) -> String {
+        if let Some(spot) = self.at.get(&signal.name) {
+            return spot.to_string();
+        }
+        let blocks = self.blocks(signal.area, bytes).unwrap_or_default();
+        let holds = |block: &&Block| (block.byte..block.byte + block.bytes).contains(&signal.byte);
+        let block = blocks.iter().find(holds);
+        block.map_or_else(String::new, |block| place_in(*block, signal))
+    }
+}
+
+/// Where a signal lies whose first byte is in `block`.
+fn place_in(block: Block, signal: &Signal) -> String {
+    let byte = signal.byte - block.byte;
+    let table = block.table;
+    let element = if table.is_bits() {
+        byte * 8 + usize::from(signal.bit)
+    } else {
+        byte / 2
+    };
+    let place = Place {
+        table,
+        offset: block.first + element,
+    };
+    let is_bit = signal.data_type == DataType::Bool;
+    if table.is_bits() == is_bit {
+        let half = match (is_bit, signal.data_type.size_bytes(), byte % 2) {
+            (false, 1, 0) => ", high byte",
+            (false, _, 1) => ", low byte",
+            _ => "",
+        };
+        return format!("{place}{half}");
+    }
+    if is_bit {
+        // The high byte of a register comes first.
+        return format!(
+            "{place}, bit {}",
+            8 * (1 - byte % 2) + usize::from(signal.bit)
+        );
+    }
+    format!("{place} and {} more", signal.data_type.size_bytes() * 8 - 1)
+}

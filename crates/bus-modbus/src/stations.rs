@@ -1,0 +1,131 @@
+//! Which unit each station is: what driver.cfg says in `[fieldbus]` and in its `[[station]]` tables.
+
+use tickbus_base::toml_text::{Table, Value};
+
+/// The longest identity that is written down.
+const IDENTITY_LIMIT: usize = 1000;
+
+/// The numbers that units of a line may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Units {
+    /// All that fit into a byte.
+    Tcp,
+    /// On a serial line 0 is everyone and those above 247 are reserved.
+    Serial,
+    /// The same, by a server: it has to know which requests of the line are meant for it.
+    ServedOnSerial,
+}
+
+/// What a driver.cfg says of one station, or of all of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Keys {
+    /// Its unit.
+    pub unit: Option<u8>,
+    /// The identity of the device that may be written to.
+    pub write_to: Option<String>,
+}
+
+/// The units of a driver.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stations {
+    units: Units,
+    /// What stands in `[fieldbus]`.
+    common: Keys,
+    /// What stands in the `[[station]]` tables; empty where there are none.
+    own: Vec<(Keys, usize)>,
+}
+
+impl Stations {
+    /// Reads what `[fieldbus]` says.
+    pub(super) fn read(units: Units, unit: Option<&Value<'_>>) -> Option<Self> {
+        let stated = unit.map(|value| read_unit(units, value));
+        let unit = match stated {
+            None => None,
+            Some(stated) => Some(stated?),
+        };
+        // The first number that a station can have.
+        let unit = unit.or((units == Units::ServedOnSerial).then_some(1));
+        Some(Self {
+            units,
+            common: Keys {
+                unit,
+                write_to: None,
+            },
+            own: Vec::new(),
+        })
+    }
+
+    /// Sets the identity that stands in `[fieldbus]`.
+    pub(super) fn allow(&mut self, write_to: Option<String>) {
+        self.common.write_to = write_to;
+    }
+
+    /// Reads the keys of the next of `count` `[[station]]` tables; `write_to` is one where this end may write.
+    pub fn read_station(&mut self, count: usize, guarded: bool, table: &mut Table<'_>) {
+        let unit = if count > 1 {
+            table.require(
+                "unit",
+                "write the number of its Modbus unit, such as unit = 1",
+            )
+        } else {
+            table.take("unit")
+        };
+        let write_to = guarded.then(|| table.take("write_to")).flatten();
+        let mut keys = Keys {
+            unit: None,
+            write_to: write_to.as_ref().and_then(read_write_to),
+        };
+        let mut line = 0;
+        if let Some(value) = unit {
+            keys.unit = read_unit(self.units, &value);
+            line = value.line();
+            let twin = self
+                .own
+                .iter()
+                .find(|(other, _)| keys.unit.is_some() && other.unit == keys.unit);
+            if let Some((_, first)) = twin {
+                value.wrong(
+                    format!("\"unit\" is that of the station on line {first}"),
+                    "give each station a unit of its own",
+                );
+            }
+        }
+        self.own.push((keys, line));
+    }
+
+    /// The unit of a station; `None` for one that is any.
+    pub fn unit(&self, station: usize) -> Option<u8> {
+        let own = self.own.get(station).and_then(|(keys, _)| keys.unit);
+        own.or(self.common.unit)
+    }
+
+    /// The units, for people; `default` is that of a station without one. `None` where any is right.
+    pub fn shown(&self, default: Option<u8>) -> Option<String> {
+        let stations = 0..self.own.len().max(1);
+        let units = stations.map(|station| Some(self.unit(station).or(default)?.to_string()));
+        let units: Vec<String> = units.collect::<Option<_>>()?;
+        let word = if units.len() == 1 { "unit" } else { "units" };
+        Some(format!("{word} {}", units.join(" ")))
+    }
+
+    /// The identity of the device that a station may write to.
+    pub fn write_to(&self, station: usize) -> Option<&str> {
+        let own = self.own.get(station);
+        let own = own.and_then(|(keys, _)| keys.write_to.as_deref());
+        own.or(self.common.write_to.as_deref())
+    }
+}
+
+fn read_unit(units: Units, value: &Value<'_>) -> Option<u8> {
+    let range = match units {
+        Units::Tcp => 0..=255,
+        Units::Serial | Units::ServedOnSerial => 1..=247,
+    };
+    value.whole(range).and_then(|unit| u8::try_from(unit).ok())
+}
+
+/// Reads the identity of a device.
+pub(super) fn read_write_to(value: &Value<'_>) -> Option<String> {
+    let right = "write the identity that the device reports; the log and the statistics have it";
+    value.label(IDENTITY_LIMIT, right).map(str::to_owned)
+}

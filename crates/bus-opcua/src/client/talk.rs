@@ -1,0 +1,133 @@
+//! The session while it stands: what comes goes into the image, what has changed goes out.
+
+use std::sync::Arc;
+
+use opcua::client::Session;
+use opcua::types::NodeId;
+
+use crate::pki::meaning;
+use crate::reactor::{Inbox, Reactor};
+use tickbus_base::time::{Nanos, Pace, Stop};
+use tickbus_fieldbus::{BusError, PlcState, Port};
+use tickbus_image::signal::SignalTable;
+
+use super::Field;
+use super::feed::News;
+use super::readings::Readings;
+use super::writings::Writings;
+
+/// A session with all that belongs to it.
+pub(super) struct Talk<'a> {
+    pub(super) session: Arc<Session>,
+    pub(super) reactor: &'a Reactor,
+    pub(super) inbox: Inbox<News>,
+    pub(super) fields: &'a [Field],
+    pub(super) table: &'a SignalTable,
+    pub(super) nodes: Vec<NodeId>,
+    pub(super) readings: Readings,
+    /// `None` while nothing may be written.
+    pub(super) writings: Option<Writings>,
+    /// The most values of one Write; 0 for no limit.
+    pub(super) most_writes: usize,
+    pub(super) cycle: Nanos,
+    /// What a running line says.
+    pub(super) running: String,
+}
+
+impl Talk<'_> {
+    /// Serves the session until `stop`.
+    ///
+    /// # Errors
+    ///
+    /// Why the session cannot go on.
+    pub(super) fn serve(mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let clock = Arc::clone(port.clock());
+        let mut pace = Pace::new(clock.now(), self.cycle);
+        let mut news = Vec::new();
+        // What was said of the values last; `None` for nothing.
+        let mut said = None;
+        while !stop.is_stopped() {
+            let now = clock.now();
+            self.inbox.take(&mut news);
+            for news in news.drain(..) {
+                self.hear(port, now, news)?;
+            }
+            let trouble = self.readings.trouble(self.fields);
+            let can_tell = trouble.is_some() || self.readings.is_complete();
+            if can_tell && said.as_ref() != Some(&trouble) {
+                match &trouble {
+                    Some(trouble) => {
+                        let error = BusError::Link(trouble.clone());
+                        port.lost(&error, "it goes on when there is one");
+                    }
+                    None => port.running(&self.running),
+                }
+                said = Some(trouble);
+            }
+            if pace.take(now) {
+                self.write(port, now);
+            }
+            port.observe(now);
+            self.reactor.wait(&*clock, pace.due().min(port.due()));
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, port: &mut Port, now: Nanos, news: News) -> Result<(), BusError> {
+        match news {
+            News::Values(values) => self.readings.take(port, now, self.fields, &values)?,
+            News::Alive => self.readings.touch(port, now),
+            News::Plc(state) => {
+                for station in 0..port.stations() {
+                    port.plc_state(station, now, state);
+                }
+                // Values that have not changed while it stood are not reported again: they count from now on.
+                if state == PlcState::Run {
+                    self.readings.commit(port, now, self.fields);
+                }
+            }
+            News::Written(answer) => {
+                if let Some(writings) = &mut self.writings {
+                    writings.answered(port, self.table, &answer?);
+                }
+            }
+            News::Ended(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// Sends what has changed, unless an answer is awaited: one Write at a time.
+    fn write(&mut self, port: &mut Port, now: Nanos) {
+        let Some(writings) = &mut self.writings else {
+            return;
+        };
+        if writings.is_under_way() || !port.sends(now) {
+            return;
+        }
+        let values = writings.due(port, now, self.fields, &self.nodes);
+        if values.is_empty() {
+            return;
+        }
+        let (session, inbox) = (Arc::clone(&self.session), self.inbox.clone());
+        let most = match self.most_writes {
+            0 => values.len(),
+            most => most,
+        };
+        self.reactor.spawn(async move {
+            let mut statuses = Vec::new();
+            for part in values.chunks(most) {
+                match session.write(part).await {
+                    Ok(more) => statuses.extend(more),
+                    Err(error) => {
+                        let why = meaning(error.status());
+                        let error =
+                            BusError::Link(format!("the server did not answer a Write ({why})"));
+                        inbox.push(News::Written(Err(error)));
+                        return;
+                    }
+                }
+            }
+            inbox.push(News::Written(Ok(statuses)));
+        });
+    }
+}

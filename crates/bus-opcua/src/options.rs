@@ -1,0 +1,450 @@
+//! What a driver.cfg says to the two OPC UA buses.
+
+use std::collections::{BTreeMap, HashMap};
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
+use tickbus_fieldbus::At;
+use tickbus_fieldbus::read_events;
+use tickbus_fieldbus::tcp::{Address, AddressError, Host};
+use tickbus_image::signal::{Signal, SignalTable, Station};
+
+use super::security::{Credentials, Keys, Mode, Policy};
+use super::{NodeName, NodeNameError, Pattern, Url, UrlError};
+
+/// The longest `write_to`, in characters.
+const IDENTITY_LIMIT: usize = 1000;
+
+/// The shortest publishing and sampling interval: both are whole milliseconds at best.
+const SHORTEST: Nanos = Nanos::from_millis(1);
+
+/// Where a server listens, unless a driver.cfg says otherwise: on this machine alone.
+const ADDRESS: Address = Address::local(super::url::PORT);
+
+/// What a driver.cfg says to a client.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClientOptions {
+    /// The server.
+    pub url: Url,
+    /// How messages are protected.
+    pub security: Policy,
+    /// Certificates and login.
+    pub credentials: Credentials,
+    /// How often the server reports changes; `None` leaves it to the cycle. At least 1 ms.
+    pub publishing_interval: Option<Nanos>,
+    /// How often the server looks for changes; `None` leaves it to the publishing interval.
+    pub sampling_interval: Option<Nanos>,
+    /// The nodes of signals that have one of their own, by the signals' names.
+    pub nodes: BTreeMap<String, Node>,
+    /// How the node ids of all other signals are made.
+    pub node_pattern: Pattern,
+    /// The identity of the one server that is written to.
+    pub write_to: Option<String>,
+    /// Whether every change that the server reports is an event, beside the image.
+    pub events: bool,
+    /// Where the table stands in the text.
+    at: usize,
+}
+
+/// The node of one signal.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// Its name.
+    pub name: NodeName,
+    /// Where it stands in the text.
+    at: usize,
+}
+
+/// What a driver.cfg says to a server.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ServerOptions {
+    /// Where it listens; port 0 lets the system choose one.
+    pub address: Address,
+    /// The host that it announces to clients; `None` for the one that it listens at, or the computer's name.
+    pub host: Option<String>,
+    /// How messages may be protected; never empty.
+    pub security: Vec<Policy>,
+    /// Certificates, and the user that may log in.
+    pub credentials: Credentials,
+    /// Whether everybody may log in.
+    pub anonymous: bool,
+    /// Whether every change that a client makes is reported as an event, beside the image.
+    pub events: bool,
+    /// Whether every write is one, changed or not.
+    pub every_write: bool,
+}
+
+impl ClientOptions {
+    /// Takes another address than the driver.cfg names, as a URL or as `HOST:PORT`.
+    ///
+    /// # Errors
+    ///
+    /// The text is neither.
+    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
+        if address.contains("://") {
+            self.url = address.parse().map_err(|why: UrlError| why.to_string())?;
+            return Ok(());
+        }
+        let parsed: Address = address
+            .parse()
+            .map_err(|why: AddressError| why.to_string())?;
+        parsed
+            .check_dialled()
+            .map_err(|why: AddressError| why.to_string())?;
+        self.url.address = parsed;
+        Ok(())
+    }
+
+    /// Reads the keys of a client. `moved` says that [`set_address`](Self::set_address) follows.
+    pub fn read(moved: bool, mut table: Table<'_>) -> Option<Self> {
+        let right = "write where the server is, such as url = \"opc.tcp://192.168.0.1:4840\"";
+        let url = if moved {
+            table.take("url")
+        } else {
+            table.require("url", right)
+        };
+        let at = table.at();
+        let keys = Keys::take(&mut table);
+        let intervals = ["publishing_interval", "sampling_interval"].map(|key| table.take(key));
+        let nodes = table.take("nodes");
+        let pattern = table.take("node_pattern");
+        let write_to = table.take("write_to");
+        let events = table.take("events");
+        table.finish();
+
+        let url = match &url {
+            None => moved.then(|| Url {
+                address: ADDRESS,
+                path: String::new(),
+            }),
+            Some(value) => value.text(right).and_then(|text| {
+                let parsed = text.parse();
+                parsed
+                    .map_err(|error: UrlError| value.wrong(error.what, error.right))
+                    .ok()
+            }),
+        };
+        let security = match &keys.security {
+            None => Some(Policy::Basic256Sha256),
+            Some(value) => value.choice("security policies", &Policy::NAMES),
+        };
+        let credentials = keys.read();
+        let [publishing, sampling] = intervals.map(|value| match value {
+            None => Some(None),
+            Some(value) => interval(&value).map(Some),
+        });
+        let nodes = nodes.map_or(Some(BTreeMap::new()), |value| read_nodes(&value));
+        let node_pattern = pattern.map_or(Some(Pattern::default()), |value| read_pattern(&value));
+        let write_to = match write_to {
+            None => Some(None),
+            Some(value) => {
+                let right =
+                    "write the identity that the statistics show, or remove it to stay read-only";
+                let text = value.label(IDENTITY_LIMIT, right);
+                text.map(|text| Some(text.to_owned()))
+            }
+        };
+        let events = events.map_or(Some(false), |value| value.boolean());
+        Some(Self {
+            url: url?,
+            security: security?,
+            credentials: credentials?,
+            publishing_interval: publishing?,
+            sampling_interval: sampling?,
+            nodes: nodes?,
+            node_pattern: node_pattern?,
+            write_to: write_to?,
+            events: events?,
+            at,
+        })
+    }
+}
+
+impl ClientOptions {
+    /// What it says, in words for people.
+    pub fn summary(&self) -> Vec<String> {
+        let mut parts = vec![format!("connects to {}", self.url)];
+        parts.push(protection(&[self.security], self.credentials.mode));
+        parts.push(match &self.credentials.login {
+            Some(login) => format!("as user \"{}\"", shown(&login.user)),
+            None => "as nobody".to_owned(),
+        });
+        let pattern = shown(&self.node_pattern.0);
+        parts.push(match self.nodes.len() {
+            0 => format!("nodes {pattern}"),
+            others => format!("nodes {pattern} but for {others}"),
+        });
+        parts.push(match &self.write_to {
+            Some(identity) => format!("writes into \"{}\" alone", shown(identity)),
+            None => "writes nothing".to_owned(),
+        });
+        parts
+    }
+
+    /// The node of a signal of `station`.
+    ///
+    /// # Errors
+    ///
+    /// What is made of its name is no node id.
+    pub(super) fn node(
+        &self,
+        signal: &Signal,
+        station: &Station,
+    ) -> Result<NodeName, NodeNameError> {
+        if let Some(node) = self.nodes.get(&signal.name) {
+            return Ok(node.name.clone());
+        }
+        self.node_pattern.node(&signal.name, &station.name)
+    }
+
+    /// The node of a signal of `station`, in words for people.
+    pub fn place(&self, signal: &Signal, station: &Station) -> String {
+        // A node id that is none was reported.
+        let node = self.node(signal, station);
+        node.map_or_else(|_| String::new(), |node| shown(&node.to_string()))
+    }
+
+    /// Takes the lines of `[fieldbus.at]`, node ids, and reports those that are none.
+    pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        for line in lines {
+            let name = &table.signals[line.signal].name;
+            let parsed: Result<NodeName, NodeNameError> = line.text.parse();
+            match parsed {
+                Err(error) => line.wrong(error.what, error.right),
+                Ok(_) if self.nodes.contains_key(name) => line.wrong(
+                    format!("the signal \"{}\" stands in \"nodes\", too", shown(name)),
+                    "keep the line in [fieldbus.at], and remove the one in nodes",
+                ),
+                Ok(node) => {
+                    let at = line.at();
+                    self.nodes.insert(name.clone(), Node { name: node, at });
+                }
+            }
+        }
+    }
+
+    /// Reports nodes of signals that are not there, and nodes that several signals have.
+    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let names: Vec<&str> = table.signals.iter().map(|signal| &*signal.name).collect();
+        for (name, node) in &self.nodes {
+            if !names.contains(&&**name) {
+                collector.report(
+                    node.at,
+                    format!("no signal is called \"{}\"", shown(name)),
+                    did_you_mean(name, "signals", &names),
+                );
+            }
+        }
+        let mut taken: HashMap<NodeName, &str> = HashMap::new();
+        for signal in &table.signals {
+            let at = self.nodes.get(&signal.name).map_or(self.at, |node| node.at);
+            match self.node(signal, &table.stations[signal.station]) {
+                Err(error) => {
+                    let what = format!("signal \"{}\": {}", shown(&signal.name), error.what);
+                    collector.report(at, what, error.right);
+                }
+                Ok(node) => {
+                    if let Some(other) = taken.insert(node.clone(), &signal.name) {
+                        collector.report(
+                            at,
+                            format!(
+                                "the signals \"{}\" and \"{}\" are both the node {}",
+                                shown(other),
+                                shown(&signal.name),
+                                shown(&node.to_string())
+                            ),
+                            "give each signal a node of its own, in [fieldbus.at] or by {name} in node_pattern",
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl ServerOptions {
+    /// Takes another address than the driver.cfg names.
+    ///
+    /// # Errors
+    ///
+    /// The text is no address.
+    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
+        self.address = address
+            .parse()
+            .map_err(|why: AddressError| why.to_string())?;
+        Ok(())
+    }
+
+    /// What it says, in words for people.
+    pub fn summary(&self) -> Vec<String> {
+        let mut parts = vec![format!("listens on {}", self.address)];
+        if let Some(host) = &self.host {
+            parts.push(format!("announces \"{}\"", shown(host)));
+        }
+        parts.push(protection(&self.security, self.credentials.mode));
+        let user = self.credentials.login.as_ref();
+        parts.push(match (user, self.anonymous) {
+            (_, true) => "for everybody".to_owned(),
+            (Some(login), false) => format!("for user \"{}\"", shown(&login.user)),
+            (None, false) => "for nobody".to_owned(),
+        });
+        parts
+    }
+
+    /// Reads the keys of a server.
+    pub fn read(mut table: Table<'_>) -> Option<Self> {
+        let address = table.take("address");
+        let host = table.take("host");
+        let keys = Keys::take(&mut table);
+        let anonymous = table.take("anonymous");
+        let events = table.take("events");
+        if !keys.has_user() && anonymous.is_none() {
+            table.require_one_of(
+                &["user", "anonymous"],
+                "name the user that may log in, with password_file or password_env, or write \
+                 anonymous = true to let everybody in",
+            );
+        }
+        let whole = table.is_whole();
+        table.finish();
+
+        let read = address.as_ref().map_or(Some(ADDRESS), Address::read);
+        let host = host.map_or(Some(None), |value| read_host(&value).map(Some));
+        let security = keys
+            .security
+            .as_ref()
+            .map_or_else(|| Some(Policy::SECURE.to_vec()), read_policies);
+        let credentials = keys.read();
+        let allowed = anonymous.as_ref().map_or(Some(false), Value::boolean);
+        if let (Some(value), Some(false)) = (&anonymous, allowed)
+            && whole
+            && !keys.has_user()
+        {
+            value.wrong(
+                "nobody may log in",
+                "name a user with password_file or password_env, or write anonymous = true",
+            );
+        }
+        let events = events.as_ref().map_or(Some((false, false)), read_events);
+        Some(Self {
+            address: read?,
+            host: host?,
+            security: security?,
+            credentials: credentials?,
+            anonymous: allowed?,
+            events: events?.0,
+            every_write: events?.1,
+        })
+    }
+}
+
+/// A host as clients write it into a URL: brackets around an IPv6 address.
+fn read_host(value: &Value<'_>) -> Option<String> {
+    let right = "write this computer's address, such as \"192.168.0.5\", or a name that every client can look up";
+    let text = value.text(right)?;
+    // Any port makes an address of it.
+    match format!("{text}:{}", super::url::PORT).parse::<Address>() {
+        Ok(Address {
+            host: Host::Ip(ip), ..
+        }) if ip.is_unspecified() => {
+            value.wrong(format!("nobody can go to the host \"{ip}\""), right);
+            None
+        }
+        Ok(_) => Some(text.to_owned()),
+        Err(_) => {
+            value.wrong(format!("\"{}\" is no host", shown(text)), right);
+            None
+        }
+    }
+}
+
+/// How messages are, or may be, protected.
+fn protection(policies: &[Policy], mode: Mode) -> String {
+    let names: Vec<String> = (policies.iter())
+        .map(|policy| match policy {
+            Policy::None => "unprotected".to_owned(),
+            policy => format!("{} {}", policy.name(), mode.name()),
+        })
+        .collect();
+    names.join(" or ")
+}
+
+fn interval(value: &Value<'_>) -> Option<Nanos> {
+    let span = value.duration()?;
+    if span < SHORTEST {
+        value.wrong(
+            format!("{span} is shorter than OPC UA servers can count"),
+            format!("write at least \"{SHORTEST}\""),
+        );
+        return None;
+    }
+    Some(span)
+}
+
+/// One policy, or a list of them.
+fn read_policies(value: &Value<'_>) -> Option<Vec<Policy>> {
+    let choose = |value: &Value<'_>| value.choice("security policies", &Policy::NAMES);
+    if value.as_text().is_some() {
+        return choose(value).map(|policy| vec![policy]);
+    }
+    let list = value.list("write a list of policies, such as [\"Basic256Sha256\"]")?;
+    if list.is_empty() {
+        value.wrong(
+            "\"security\" names no policy, so nobody could connect",
+            "name at least one; \"None\" is the one without protection",
+        );
+        return None;
+    }
+    let read: Vec<Option<Policy>> = list.iter().map(choose).collect();
+    let mut read: Vec<Policy> = read.into_iter().collect::<Option<_>>()?;
+    let named = read.len();
+    read.sort_by_key(|policy| policy.name());
+    read.dedup();
+    if read.len() < named {
+        value.wrong("\"security\" names a policy twice", "name each once");
+        return None;
+    }
+    Some(read)
+}
+
+fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, Node>> {
+    let right = "write them as { \"name of a signal\" = \"ns=3;s=…\" }";
+    let table = value.table("nodes", right)?;
+    let mut nodes = BTreeMap::new();
+    let mut sound = true;
+    for (name, value) in table.all() {
+        let node = value.text("write a node id in quotes, such as \"ns=2;s=Motor.Speed\"");
+        let node: Option<NodeName> = node.and_then(|text| {
+            let parsed: Result<NodeName, NodeNameError> = text.parse();
+            parsed
+                .map_err(|error| value.wrong(error.what, error.right))
+                .ok()
+        });
+        match node {
+            Some(node) => {
+                let at = value.at();
+                nodes.insert(name.to_owned(), Node { name: node, at });
+            }
+            None => sound = false,
+        }
+    }
+    sound.then_some(nodes)
+}
+
+fn read_pattern(value: &Value<'_>) -> Option<Pattern> {
+    let text = value.text("write a node id with {name} in it, such as \"ns=2;s={name}\"")?;
+    let pattern = Pattern(text.to_owned());
+    if !text.contains(Pattern::NAME) {
+        value.wrong(
+            format!("the pattern \"{}\" has no {}", shown(text), Pattern::NAME),
+            "write {name} where the name of the signal belongs, and {station} for that of its station",
+        );
+        return None;
+    }
+    // A name of letters alone: what is wrong now is the pattern's own fault.
+    if let Err(error) = pattern.node("name", "station") {
+        value.wrong(error.what, error.right);
+        return None;
+    }
+    Some(pattern)
+}

@@ -1,0 +1,240 @@
+//! What a driver.cfg says of encryption, certificates and logins: the same for both ends.
+
+use std::path::PathBuf;
+
+use tickbus_base::toml_text::{Table, Value};
+
+/// The longest path, name or password, in characters.
+const TEXT_LIMIT: usize = 1000;
+
+/// The folder of certificates where a driver.cfg names none.
+const PKI: &str = "pki";
+
+/// How messages are encrypted and signed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Policy {
+    /// Not at all.
+    None,
+    /// `Basic256Sha256`: what nearly every server has.
+    Basic256Sha256,
+    /// `Aes128_Sha256_RsaOaep`.
+    Aes128Sha256RsaOaep,
+    /// `Aes256_Sha256_RsaPss`: the strongest.
+    Aes256Sha256RsaPss,
+}
+
+impl Policy {
+    /// All of them, by the names that OPC UA gives them.
+    pub const NAMES: [(&'static str, Self); 4] = [
+        ("None", Self::None),
+        ("Basic256Sha256", Self::Basic256Sha256),
+        ("Aes128_Sha256_RsaOaep", Self::Aes128Sha256RsaOaep),
+        ("Aes256_Sha256_RsaPss", Self::Aes256Sha256RsaPss),
+    ];
+
+    /// Those that protect.
+    pub const SECURE: [Self; 3] = [
+        Self::Basic256Sha256,
+        Self::Aes128Sha256RsaOaep,
+        Self::Aes256Sha256RsaPss,
+    ];
+
+    /// The name that OPC UA gives it.
+    pub fn name(self) -> &'static str {
+        let mut names = Self::NAMES.iter();
+        names
+            .find(|(_, policy)| *policy == self)
+            .map_or("None", |(name, _)| name)
+    }
+}
+
+/// How much of that is done to messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// Signed, and readable by everybody.
+    Sign,
+    /// Signed and encrypted.
+    #[default]
+    SignAndEncrypt,
+}
+
+impl Mode {
+    const NAMES: [(&'static str, Self); 2] = [
+        ("Sign", Self::Sign),
+        ("SignAndEncrypt", Self::SignAndEncrypt),
+    ];
+
+    /// The name that OPC UA gives it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sign => "Sign",
+            Self::SignAndEncrypt => "SignAndEncrypt",
+        }
+    }
+}
+
+/// Whose certificates are believed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Trust {
+    /// Those in the folder `trusted`.
+    #[default]
+    Listed,
+    /// Everybody's; each is filed in the folder `trusted`.
+    Any,
+}
+
+/// A user and where the password is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Login {
+    /// The user's name.
+    pub user: String,
+    /// Where the password is.
+    pub password: Secret,
+}
+
+/// Where a password is.
+#[derive(Clone, PartialEq, Eq)]
+pub enum Secret {
+    /// In the first line of a file; relative to the folder of the driver.cfg.
+    File(PathBuf),
+    /// In an environment variable.
+    Environment(String),
+    /// In the driver.cfg itself.
+    Clear(String),
+}
+
+/// Without the password: options go into logs.
+impl std::fmt::Debug for Secret {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::File(file) => f.debug_tuple("File").field(file).finish(),
+            Self::Environment(name) => f.debug_tuple("Environment").field(name).finish(),
+            Self::Clear(_) => f.write_str("Clear"),
+        }
+    }
+}
+
+/// The keys of a driver.cfg that both ends have, as they stand there.
+pub(super) struct Keys<'a> {
+    pub(super) security: Option<Value<'a>>,
+    mode: Option<Value<'a>>,
+    user: Option<Value<'a>>,
+    passwords: [Option<Value<'a>>; 3],
+    pki: Option<Value<'a>>,
+    trust: Option<Value<'a>>,
+    whole: bool,
+}
+
+/// A mistake was taken down.
+struct Reported;
+
+/// What those keys say.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Credentials {
+    /// How much is done to messages that are protected at all.
+    pub mode: Mode,
+    /// The user, if there is one.
+    pub login: Option<Login>,
+    /// The folder of certificates; relative to the folder of the driver.cfg.
+    pub pki: PathBuf,
+    /// Whose certificates are believed.
+    pub trust: Trust,
+}
+
+impl<'a> Keys<'a> {
+    /// Takes them from the table.
+    pub(super) fn take(table: &mut Table<'a>) -> Self {
+        Self {
+            security: table.take("security"),
+            mode: table.take("mode"),
+            user: table.take("user"),
+            passwords: ["password_file", "password_env", "password_in_clear"]
+                .map(|key| table.take(key)),
+            pki: table.take("pki"),
+            trust: table.take("trust"),
+            whole: table.is_whole(),
+        }
+    }
+
+    /// Whether a user is named, rightly or wrongly.
+    pub(super) fn has_user(&self) -> bool {
+        self.user.is_some()
+    }
+
+    /// Reads all but `security`.
+    pub(super) fn read(&self) -> Option<Credentials> {
+        let mode = self.mode.as_ref().map_or(Some(Mode::default()), |value| {
+            value.choice("security modes", &Mode::NAMES)
+        });
+        let trust = self.trust.as_ref().map_or(Some(Trust::default()), |value| {
+            let ways = [("listed", Trust::Listed), ("any", Trust::Any)];
+            value.choice("ways to trust", &ways)
+        });
+        let pki = self.pki.as_ref().map_or(Some(PKI), |value| {
+            value.label(TEXT_LIMIT, "name the folder of certificates")
+        });
+        let login = self.login();
+        Some(Credentials {
+            mode: mode?,
+            login: login.ok()?,
+            pki: pki?.into(),
+            trust: trust?,
+        })
+    }
+
+    /// The user with the password, if there is one; an error has been reported.
+    fn login(&self) -> Result<Option<Login>, Reported> {
+        let user = self.user.as_ref().map(|value| {
+            let user = value.label(TEXT_LIMIT, "write the name of the user")?;
+            Some((value, user.to_owned()))
+        });
+        let mut passwords = self.passwords.iter().flatten();
+        let (first, second) = (passwords.next(), passwords.next());
+        if let Some(second) = second {
+            second.wrong(
+                "the password is named twice",
+                "keep one of password_file, password_env and password_in_clear",
+            );
+            return Err(Reported);
+        }
+        let secret = match &self.passwords {
+            [Some(file), ..] => file
+                .label(TEXT_LIMIT, "name the file whose first line is the password")
+                .map(|file| Secret::File(file.into())),
+            [_, Some(name), _] => name
+                .label(
+                    TEXT_LIMIT,
+                    "name the environment variable that has the password",
+                )
+                .map(|name| Secret::Environment(name.to_owned())),
+            [.., Some(clear)] => clear
+                .text("write the password in quotes")
+                .map(|clear| Secret::Clear(clear.to_owned())),
+            [None, None, None] => None,
+        };
+        match (user, first) {
+            (None, None) => Ok(None),
+            (None, Some(value)) => {
+                if self.whole {
+                    value.wrong("there is a password and no user", "add user = \"…\"");
+                }
+                Err(Reported)
+            }
+            (Some(user), None) => {
+                if let (true, Some((value, _))) = (self.whole, user) {
+                    value.wrong(
+                        "\"user\" stands without a password",
+                        "add password_file = \"plc.password\" or password_env = \"PLC_PASSWORD\"; \
+                         password_in_clear = \"…\" writes it here, where everybody can read it",
+                    );
+                }
+                Err(Reported)
+            }
+            (Some(user), Some(_)) => {
+                let both = user.zip(secret).ok_or(Reported)?;
+                let ((_, user), password) = both;
+                Ok(Some(Login { user, password }))
+            }
+        }
+    }
+}

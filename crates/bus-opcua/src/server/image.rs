@@ -1,0 +1,316 @@
+//! Between the image and the nodes.
+
+use std::sync::Arc;
+
+use opcua::server::SubscriptionCache;
+use opcua::server::address_space::NodeType;
+use opcua::types::{DataValue, NodeId, StatusCode, Variant};
+
+use crate::pki::date;
+use crate::values::{self, Values};
+use tickbus_base::time::{Nanos, WallClock};
+use tickbus_fieldbus::{Port, Role};
+use tickbus_image::Event;
+use tickbus_image::signal::{Plan, Scale, Signal, SignalTable, Slot};
+
+use super::manager::Nodes;
+use super::space;
+use super::watched::{Variable, Watched};
+
+/// All signals, as the image has them and as their nodes show them.
+pub(super) struct Image {
+    table: Arc<SignalTable>,
+    role: Role,
+    sends: Values,
+    receives: Values,
+    places: Vec<Place>,
+    frames: Vec<Box<[u8]>>,
+    show: Show,
+    /// Whether a write is an event though it changes nothing.
+    every_write: bool,
+}
+
+/// Where values are shown: the nodes of the crate's server, and who is told of them.
+#[derive(Clone)]
+pub(super) struct Show {
+    pub(super) nodes: Arc<Nodes>,
+    pub(super) subscriptions: Arc<SubscriptionCache>,
+    pub(super) watched: Watched,
+    pub(super) wall: WallClock,
+}
+
+impl Show {
+    /// A value of this status, made now.
+    fn value(&self, status: StatusCode, value: Variant) -> DataValue {
+        let time = date((self.wall)());
+        DataValue {
+            // None but the empty one where it is bad, so that the first good one is a change also for
+            // subscribers that are not told of a status alone.
+            value: Some(if status.is_bad() {
+                Variant::Empty
+            } else {
+                value
+            }),
+            status: Some(status),
+            source_timestamp: Some(time),
+            server_timestamp: Some(time),
+            ..DataValue::default()
+        }
+    }
+
+    /// Tells subscribers what their sampling intervals have kept back.
+    fn tell_due(&self, places: &[Place]) {
+        let node = |variable: Variable| {
+            let place = &places[variable.signal];
+            if variable.is_scaled {
+                place.scaled.as_ref().map(|(node, _)| node)
+            } else {
+                Some(&place.node)
+            }
+        };
+        let now = date((self.wall)());
+        self.watched.tell_due(&self.subscriptions, now, node);
+    }
+
+    /// Gives a node a value, and tells those who subscribe to it.
+    fn put(&self, node: &NodeId, variable: Variable, value: &DataValue) {
+        if let Some(NodeType::Variable(shown)) = self.nodes.address_space().write().find_mut(node) {
+            shown.set_data_value(value.clone());
+        } else {
+            debug_assert!(false, "every signal has its nodes: {node}");
+        }
+        self.watched
+            .tell(&self.subscriptions, node, variable, value);
+    }
+}
+
+/// A signal's nodes, and what they show.
+struct Place {
+    node: NodeId,
+    scaled: Option<(NodeId, Scale)>,
+    /// What the node shows; `None` before the first time.
+    shown: Option<(Slot, StatusCode)>,
+    /// Since when.
+    since: Nanos,
+    /// Whether a client has written it.
+    written: bool,
+}
+
+impl Image {
+    /// Nothing shown yet.
+    pub(super) fn new(
+        table: &Arc<SignalTable>,
+        role: Role,
+        port: &Port,
+        show: Show,
+        every_write: bool,
+    ) -> Self {
+        let (tx, rx) = role.areas();
+        let place = |signal: &Signal| Place {
+            node: space::node(&signal.name),
+            scaled: space::scaled(table, signal),
+            shown: None,
+            since: Nanos::ZERO,
+            written: false,
+        };
+        let mut receives = Values::new(table, rx);
+        // What no client has written yet is as if there were none.
+        let mut slots = vec![Slot::default(); table.signals.len()];
+        let frames = (0..port.stations()).map(|station| {
+            let plan = Plan::new(table, station, rx);
+            let mut frame = vec![0; port.sizes(station).1];
+            plan.fail_safe(&mut slots);
+            plan.encode(&slots, &mut frame);
+            receives.take(station, &frame);
+            frame.into()
+        });
+        let frames = frames.collect();
+        Self {
+            table: Arc::clone(table),
+            role,
+            sends: Values::new(table, tx),
+            receives,
+            places: table.signals.iter().map(place).collect(),
+            frames,
+            show,
+            every_write,
+        }
+    }
+
+    /// Goes on with another server, which shows nothing yet.
+    pub(super) fn move_to(&mut self, show: Show) {
+        self.show = show;
+        for place in &mut self.places {
+            place.shown = None;
+        }
+    }
+
+    /// How many subscriptions to a node the server remembers, though nobody is there.
+    pub(super) fn left_behind(&self) -> usize {
+        self.show.watched.left_behind()
+    }
+
+    /// Takes the values of one list into the image, as one commit for each station that it touches.
+    pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, Slot)]) {
+        let mut touched = vec![false; self.frames.len()];
+        for &(signal, bits) in list {
+            // A change is reported by the port.
+            if self.every_write && self.receives.bits(signal) == bits {
+                let value = slot(&self.table.signals[signal], bits);
+                let signal = u32::try_from(signal).expect("tables hold fewer than 2^32 signals");
+                port.event(Event {
+                    signal,
+                    value,
+                    time: now,
+                });
+            }
+            self.receives.set(signal, bits);
+            let place = &mut self.places[signal];
+            place.written = true;
+            // The write itself has shown it, but not in engineering units.
+            place.shown = Some((bits, StatusCode::Good));
+            self.put_scaled(signal);
+            touched[self.table.signals[signal].station] = true;
+        }
+        for (station, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
+            let frame = &mut self.frames[station];
+            self.receives.give(station, frame);
+            port.received(station, now, frame);
+        }
+    }
+
+    /// Brings all nodes up to date. Pulses that every subscriber has had the time to see count as sent.
+    pub(super) fn show(&mut self, port: &mut Port, now: Nanos) {
+        if port.sends(now) {
+            self.show_what_is_sent(port, now);
+            for (index, signal) in self.table.signals.iter().enumerate() {
+                let is_sent = signal.area == self.role.areas().0;
+                if is_sent
+                    && let Some(span) = self.show.watched.span(index)
+                    && now - self.places[index].since >= span
+                {
+                    port.sent_bits(signal.station, signal.address().bits());
+                }
+            }
+        }
+        for index in 0..self.places.len() {
+            let signal = &self.table.signals[index];
+            if signal.area == self.role.areas().1 {
+                let stale = port.peer_age(signal.station, now) > port.max_age();
+                let status = match (self.places[index].written, stale) {
+                    (false, _) => StatusCode::BadWaitingForInitialData,
+                    (true, true) => StatusCode::UncertainLastUsableValue,
+                    (true, false) => StatusCode::Good,
+                };
+                self.put(now, index, self.receives.bits(index), status);
+            }
+        }
+        self.show.tell_due(&self.places);
+    }
+
+    /// Brings the nodes up to date for a client that reads these signals now: pulses in them count as sent.
+    pub(super) fn show_to_reader(&mut self, port: &mut Port, now: Nanos, signals: &[usize]) {
+        if port.is_down(now) {
+            return;
+        }
+        self.show_what_is_sent(port, now);
+        for &index in signals {
+            let signal = &self.table.signals[index];
+            if signal.area == self.role.areas().0 {
+                port.sent_bits(signal.station, signal.address().bits());
+            }
+        }
+    }
+
+    fn show_what_is_sent(&mut self, port: &mut Port, now: Nanos) {
+        for station in 0..self.frames.len() {
+            self.sends.take(station, port.outgoing(station, now));
+            let status = quality(port, station, now);
+            for at in 0..self.sends.signals(station).len() {
+                let index = self.sends.signals(station)[at];
+                self.put(now, index, self.sends.bits(index), status);
+            }
+        }
+    }
+
+    /// Writes a value into the nodes of a signal if it is another than they show, and tells subscribers.
+    fn put(&mut self, now: Nanos, index: usize, bits: Slot, status: StatusCode) {
+        let place = &mut self.places[index];
+        if place.shown == Some((bits, status)) {
+            return;
+        }
+        if place.shown.is_none_or(|(before, _)| before != bits) {
+            place.since = now;
+        }
+        place.shown = Some((bits, status));
+        self.put_scaled(index);
+        let raw = values::variant(self.table.signals[index].data_type, bits);
+        let variable = Variable {
+            signal: index,
+            is_scaled: false,
+        };
+        let value = self.show.value(status, raw);
+        self.show.put(&self.places[index].node, variable, &value);
+    }
+
+    /// Brings the node that has a signal in engineering units up to what the signal's own node shows.
+    fn put_scaled(&self, index: usize) {
+        let place = &self.places[index];
+        let (Some((node, scale)), Some((bits, status))) = (&place.scaled, place.shown) else {
+            return;
+        };
+        let raw = values::variant(self.table.signals[index].data_type, bits);
+        let scaled = Variant::Double(scale.value(real(&raw)));
+        let variable = Variable {
+            signal: index,
+            is_scaled: true,
+        };
+        self.show
+            .put(node, variable, &self.show.value(status, scaled));
+    }
+}
+
+/// How far the values of the simulation can be relied on.
+fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
+    let age = port.tick_age(station, now);
+    match port.watchdog() {
+        _ if age == Nanos::MAX => StatusCode::BadWaitingForInitialData,
+        Some(limit) if age > limit => StatusCode::UncertainSubstituteValue,
+        None if age > port.max_age() => StatusCode::UncertainLastUsableValue,
+        _ => StatusCode::Good,
+    }
+}
+
+/// The slot of a signal with these bits, in engineering units.
+fn slot(signal: &Signal, bits: Slot) -> Slot {
+    if signal.is_integer_slot() {
+        return bits;
+    }
+    let raw = values::variant(signal.data_type, bits);
+    let raw = match raw {
+        Variant::Boolean(value) => f64::from(u8::from(value)),
+        other => real(&other),
+    };
+    Slot::from_real(signal.scale.map_or(raw, |scale| scale.value(raw)))
+}
+
+/// A raw value as a double.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "as everywhere that values are scaled"
+)]
+fn real(value: &Variant) -> f64 {
+    match *value {
+        Variant::SByte(value) => value.into(),
+        Variant::Byte(value) => value.into(),
+        Variant::Int16(value) => value.into(),
+        Variant::UInt16(value) => value.into(),
+        Variant::Int32(value) => value.into(),
+        Variant::UInt32(value) => value.into(),
+        Variant::Float(value) => value.into(),
+        Variant::Int64(value) => value as f64,
+        Variant::UInt64(value) => value as f64,
+        Variant::Double(value) => value,
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,415 @@
+//! What clients do to the nodes: they read, subscribe and write.
+
+use std::collections::{HashMap, VecDeque};
+use std::fmt;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use async_trait::async_trait;
+use opcua::core::sync::RwLock;
+use opcua::server::address_space::{AddressSpace, NodeType};
+use opcua::server::diagnostics::NamespaceMetadata;
+use opcua::server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManagerImpl};
+use opcua::server::node_manager::{
+    MonitoredItemRef, MonitoredItemUpdateRef, ParsedReadValueId, ParsedWriteValue, RequestContext,
+    ServerContext, WriteNode,
+};
+use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
+use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
+use tokio::sync::oneshot;
+
+use crate::pki::date;
+use crate::reactor::Inbox;
+use crate::{application, values};
+use tickbus_base::time::{Nanos, WallClock};
+use tickbus_image::signal::{Area, SignalTable, Slot};
+
+use super::SESSIONS;
+use super::space::{self, NAMESPACE, NAMESPACE_URI};
+use super::watched::{Rhythm, Variable, Watched};
+
+/// A sampling interval that keeps no change back, in milliseconds; the crate takes no zero here.
+const UNFILTERED: f64 = 0.001;
+
+/// A session of a client, as far as one can be looked at: the crate does not give its type a name.
+pub(super) struct Visitor {
+    /// The number of the session.
+    pub(super) id: u32,
+    /// The name of the client, or else of the session.
+    pub(super) name: String,
+    /// When the session would expire, which every request puts off; `None` when it is over.
+    pub(super) deadline: Box<dyn Fn() -> Option<Instant> + Send>,
+}
+
+impl Visitor {
+    fn of(context: &RequestContext) -> Self {
+        let session = Arc::clone(&context.session);
+        let read = session.read();
+        let application = read
+            .application_description()
+            .application_name
+            .text
+            .to_string();
+        let name = if application.is_empty() {
+            read.session_name().to_owned()
+        } else {
+            application
+        };
+        drop(read);
+        Self {
+            id: context.session_id,
+            name,
+            deadline: Box::new(move || {
+                let session = session.read();
+                session.is_activated().then(|| session.deadline())
+            }),
+        }
+    }
+}
+
+/// What clients have done.
+pub(super) enum News {
+    /// Values were written, all in one request. A signal that was written twice in it begins a new list.
+    Written(Visitor, Vec<Vec<(usize, Slot)>>),
+    /// These signals are about to be read: their nodes have to be brought up to date first.
+    Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
+    /// A client was refused, as the text says: its certificate is that of another application.
+    Impostor(String),
+    /// Certificates were turned away: the new files, and how many there were in all.
+    Rejected(Vec<String>, usize),
+    /// The server has ended.
+    Ended(String),
+}
+
+/// All the nodes and their values.
+pub(super) type Nodes = InMemoryNodeManager<Signals>;
+
+/// The signals, as the crate's server asks for them.
+pub(super) struct Signals {
+    table: Arc<SignalTable>,
+    by_node: HashMap<NodeId, Variable>,
+    own: Own,
+    /// What was found of the applications of sessions, the latest last.
+    judged: Mutex<VecDeque<(u32, bool)>>,
+}
+
+/// What the nodes belong to.
+pub(super) struct Own {
+    /// The area that clients write.
+    pub(super) reads: Area,
+    pub(super) watched: Watched,
+    pub(super) inbox: Inbox<News>,
+    pub(super) wall: WallClock,
+    /// Whether a client's certificate has to be that of its application.
+    pub(super) checks_applications: bool,
+    /// How many tasks the server has while nobody is connected; known from when it begins to listen.
+    pub(super) tasks_alone: Arc<AtomicUsize>,
+}
+
+impl fmt::Debug for Signals {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Signals").finish_non_exhaustive()
+    }
+}
+
+impl Signals {
+    /// The signals of `table`.
+    pub(super) fn new(table: Arc<SignalTable>, own: Own) -> Self {
+        let mut by_node = HashMap::new();
+        for (index, signal) in table.signals.iter().enumerate() {
+            let variable = |is_scaled| Variable {
+                signal: index,
+                is_scaled,
+            };
+            if let Some((scaled, _)) = space::scaled(&table, signal) {
+                by_node.insert(scaled, variable(true));
+            }
+            by_node.insert(space::node(&signal.name), variable(false));
+        }
+        Self {
+            table,
+            by_node,
+            own,
+            judged: Mutex::default(),
+        }
+    }
+
+    /// Whether the certificate of a client is that of the application that it says it is. The crate looks after the
+    /// rest of it before there is a session.
+    fn admits(&self, context: &RequestContext) -> Result<(), StatusCode> {
+        if !self.own.checks_applications {
+            return Ok(());
+        }
+        let verdict = |is_good: bool| {
+            is_good
+                .then_some(())
+                .ok_or(StatusCode::BadCertificateUriInvalid)
+        };
+        // A list is whole between any two of its changes.
+        let mut judged = self.judged.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = judged.iter().find(|(id, _)| *id == context.session_id);
+        if let Some((_, is_good)) = known {
+            return verdict(*is_good);
+        }
+        let session = context.session.read();
+        let uri = session.application_description().application_uri.as_ref();
+        let checked = match session.client_certificate() {
+            Some(certificate) => application::check(certificate, uri),
+            // An unprotected session.
+            None => Ok(()),
+        };
+        if judged.len() >= SESSIONS {
+            judged.pop_front();
+        }
+        judged.push_back((context.session_id, checked.is_ok()));
+        let is_good = checked.is_ok();
+        if let Err(why) = checked {
+            self.own.inbox.push(News::Impostor(why));
+        }
+        verdict(is_good)
+    }
+
+    /// The signal and its bits that a client wants to write.
+    fn judge(
+        &self,
+        space: &AddressSpace,
+        write: &ParsedWriteValue,
+    ) -> Result<(usize, Slot), StatusCode> {
+        let Some(&variable) = self.by_node.get(&write.node_id) else {
+            return Err(if space.node_exists(&write.node_id) {
+                StatusCode::BadNotWritable
+            } else {
+                StatusCode::BadNodeIdUnknown
+            });
+        };
+        let signal = &self.table.signals[variable.signal];
+        if write.attribute_id != AttributeId::Value || variable.is_scaled {
+            return Err(StatusCode::BadNotWritable);
+        }
+        if signal.area != self.own.reads {
+            return Err(StatusCode::BadUserAccessDenied);
+        }
+        if write.index_range != NumericRange::None {
+            return Err(StatusCode::BadWriteNotSupported);
+        }
+        // Who writes a bad value says that it has none.
+        if write.value.status.is_some_and(|status| !status.is_good()) {
+            return Err(StatusCode::BadWriteNotSupported);
+        }
+        let value = write.value.value.as_ref();
+        let bits = value.and_then(|value| values::bits(signal.data_type, value));
+        Ok((variable.signal, bits.ok_or(StatusCode::BadTypeMismatch)?))
+    }
+}
+
+#[async_trait]
+#[expect(clippy::mut_mut, reason = "the crate's own signature")]
+impl InMemoryNodeManagerImpl for Signals {
+    async fn init(&self, _: &mut AddressSpace, _: ServerContext) {
+        // The last manager to be asked, just before the server listens.
+        let tasks = tokio::runtime::Handle::current()
+            .metrics()
+            .num_alive_tasks();
+        self.own.tasks_alone.store(tasks, Ordering::Relaxed);
+    }
+
+    fn name(&self) -> &'static str {
+        "signals"
+    }
+
+    fn namespaces(&self) -> Vec<NamespaceMetadata> {
+        vec![namespace()]
+    }
+
+    async fn read_values(
+        &self,
+        context: &RequestContext,
+        address_space: &RwLock<AddressSpace>,
+        nodes: &[&ParsedReadValueId],
+        max_age: f64,
+        timestamps: TimestampsToReturn,
+    ) -> Vec<DataValue> {
+        if let Err(status) = self.admits(context) {
+            let refused = DataValue {
+                status: Some(status),
+                ..DataValue::default()
+            };
+            return vec![refused; nodes.len()];
+        }
+        let variables = nodes
+            .iter()
+            .filter_map(|node| self.by_node.get(&node.node_id));
+        let signals = variables.map(|variable| variable.signal).collect();
+        let (done, ready) = oneshot::channel();
+        self.own
+            .inbox
+            .push(News::Reads(Visitor::of(context), signals, done));
+        // It fails when the bus has stopped; then the nodes are as they were.
+        let _ = ready.await;
+        let space = address_space.read();
+        let read = nodes
+            .iter()
+            .map(|node| space.read(context, node, max_age, timestamps));
+        read.collect()
+    }
+
+    async fn create_value_monitored_items(
+        &self,
+        context: &RequestContext,
+        address_space: &RwLock<AddressSpace>,
+        items: &mut [&mut &mut CreateMonitoredItem],
+    ) {
+        if let Err(status) = self.admits(context) {
+            for item in items.iter_mut() {
+                item.set_status(status);
+            }
+            return;
+        }
+        let wanted: Vec<_> = items.iter().map(|item| item.item_to_monitor()).collect();
+        let both = TimestampsToReturn::Both;
+        let values = self
+            .read_values(context, address_space, &wanted, 0.0, both)
+            .await;
+        for (item, value) in items.iter_mut().zip(values) {
+            let first = value.source_timestamp;
+            if value.status() != StatusCode::BadAttributeIdInvalid {
+                item.set_initial_value(value);
+            }
+            item.set_status(StatusCode::Good);
+            if let Some(&variable) = self.by_node.get(&item.item_to_monitor().node_id) {
+                let publishing = publishing(context, item.handle());
+                let mut rhythm = rhythm(item.sampling_interval(), item.queue_size(), publishing);
+                // Without a queue, what is there when it publishes is seen: the newest of all items, and so values
+                // that belong together.
+                if item.queue_size() <= 1 && rhythm.sampling <= publishing {
+                    item.revise_sampling_interval(UNFILTERED);
+                    rhythm.sampling = millis(item.sampling_interval());
+                }
+                self.own.watched.add(variable, item.handle(), rhythm, first);
+            }
+        }
+    }
+
+    async fn modify_monitored_items(
+        &self,
+        context: &RequestContext,
+        items: &[&MonitoredItemUpdateRef],
+    ) {
+        for item in items {
+            let variable = self.by_node.get(item.node_id());
+            if let Some(&variable) = variable
+                && item.attribute() == AttributeId::Value
+            {
+                let made = item.update();
+                let publishing = publishing(context, item.handle());
+                let queue = made.revised_queue_size as usize;
+                let rhythm = rhythm(made.revised_sampling_interval, queue, publishing);
+                self.own.watched.modify(variable, item.handle(), rhythm);
+            }
+        }
+    }
+
+    async fn delete_monitored_items(&self, _: &RequestContext, items: &[&MonitoredItemRef]) {
+        for item in items {
+            if let Some(&variable) = self.by_node.get(item.node_id()) {
+                self.own.watched.remove(variable, item.handle());
+            }
+        }
+    }
+
+    async fn write(
+        &self,
+        context: &RequestContext,
+        address_space: &RwLock<AddressSpace>,
+        nodes_to_write: &mut [&mut WriteNode],
+    ) -> Result<(), StatusCode> {
+        // Every node of a service that fails has its status.
+        self.admits(context)?;
+        let mut lists: Vec<Vec<(usize, Slot)>> = vec![Vec::new()];
+        let mut space = address_space.write();
+        let now = date((self.own.wall)());
+        for node in nodes_to_write {
+            let (index, bits) = match self.judge(&space, node.value()) {
+                Ok(judged) => judged,
+                Err(status) => {
+                    node.set_status(status);
+                    continue;
+                }
+            };
+            node.set_status(StatusCode::Good);
+            let written = &node.value().value;
+            let value = DataValue {
+                value: written.value.clone(),
+                status: Some(StatusCode::Good),
+                source_timestamp: written.source_timestamp.or(Some(now)),
+                server_timestamp: Some(now),
+                ..DataValue::default()
+            };
+            let id = &node.value().node_id;
+            if let Some(NodeType::Variable(variable)) = space.find_mut(id) {
+                variable.set_data_value(value.clone());
+            }
+            let variable = self.by_node[id];
+            let watched = &self.own.watched;
+            watched.tell(&context.subscriptions, id, variable, &value);
+            let last = lists.last_mut().expect("there is always one");
+            if last.iter().any(|(other, _)| *other == index) {
+                lists.push(vec![(index, bits)]);
+            } else {
+                last.push((index, bits));
+            }
+        }
+        if !lists[0].is_empty() {
+            let inbox = &self.own.inbox;
+            inbox.push(News::Written(Visitor::of(context), lists));
+        }
+        Ok(())
+    }
+}
+
+/// What is told of the namespace of the signals.
+pub(super) fn namespace() -> NamespaceMetadata {
+    NamespaceMetadata {
+        namespace_uri: NAMESPACE_URI.to_owned(),
+        namespace_index: NAMESPACE,
+        ..NamespaceMetadata::default()
+    }
+}
+
+/// The rhythm of an item with a sampling interval in milliseconds and a queue. A queue keeps what is sampled; without
+/// one, what is there when it publishes is seen.
+fn rhythm(sampling: f64, queue: usize, publishing: Nanos) -> Rhythm {
+    let sampling = millis(sampling);
+    let span = if queue > 1 {
+        sampling
+    } else {
+        sampling.max(publishing)
+    };
+    Rhythm { sampling, span }
+}
+
+/// The publishing interval of the subscription that an item belongs to.
+fn publishing(context: &RequestContext, item: MonitoredItemHandle) -> Nanos {
+    let of_session = context
+        .subscriptions
+        .get_session_subscriptions(context.session_id);
+    of_session.map_or(Nanos::ZERO, |of_session| {
+        let of_session = of_session.lock();
+        let interval = of_session
+            .get(item.subscription_id)
+            .map(Subscription::publishing_interval);
+        interval.map_or(Nanos::ZERO, |interval| {
+            Nanos(i64::try_from(interval.as_nanos()).unwrap_or(i64::MAX))
+        })
+    })
+}
+
+/// A span that is given in milliseconds; negative ones stand for the publishing interval.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a sampling interval, in nanoseconds"
+)]
+fn millis(millis: f64) -> Nanos {
+    Nanos((millis.max(0.0) * 1e6) as i64)
+}

@@ -1,0 +1,364 @@
+//! The server: the signals as nodes, for PLCs and other programs that are OPC UA clients.
+
+mod image;
+mod manager;
+mod peers;
+mod setup;
+mod space;
+mod status;
+mod units;
+mod watched;
+
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use opcua::server::ServerHandle;
+use opcua::types::{VariableId, Variant};
+use socket2::SockRef;
+use tokio::sync::Notify;
+
+use tickbus_base::time::{Nanos, Pace, Stop};
+use tickbus_fieldbus::Rarely;
+use tickbus_fieldbus::{BusError, Free, Port, Role, tcp};
+use tickbus_image::signal::SignalTable;
+
+use super::pki::Pki;
+use super::reactor::{Inbox, Reactor};
+use super::rejects::Rejects;
+use super::{Line, Policy, ServerOptions, Trust};
+use image::{Image, Show};
+use manager::{News, Own, Visitor};
+use peers::{Peers, Seen};
+use watched::Watched;
+
+/// How long clients are given to hear of the end, in real time.
+const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
+
+/// How often the folder of rejected certificates is looked at, in real time.
+const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// The most sessions at once.
+const SESSIONS: usize = 100;
+
+/// async-opcua 0.19 does not forget the monitored items of a subscription that ends as a whole, up to 200 bytes each.
+/// When at least this many have ended and nobody at all is connected, its server is made anew; the listener stays.
+const WORN: usize = 10;
+
+/// The bus of kind `opcua-server`.
+#[derive(Debug)]
+pub struct Server {
+    options: ServerOptions,
+    pki: Pki,
+    name: String,
+    table: Arc<SignalTable>,
+    role: Role,
+    cycle: Nanos,
+}
+
+impl Server {
+    /// The bus that `options` describe, for `line`.
+    pub fn new(options: &ServerOptions, line: Line<'_>) -> Self {
+        let mut pki = Pki::new(&options.credentials, line);
+        pki.host.clone_from(&options.host);
+        Self {
+            options: options.clone(),
+            pki,
+            name: line.name.to_owned(),
+            table: Arc::new(line.table.clone()),
+            role: line.role,
+            cycle: line.cycle(),
+        }
+    }
+
+    fn is_secure(&self) -> bool {
+        self.options
+            .security
+            .iter()
+            .any(|policy| *policy != Policy::None)
+    }
+}
+
+impl Server {
+    /// Starts the crate's server on `listener`.
+    fn start(
+        &self,
+        reactor: &Reactor,
+        max_age: Nanos,
+        listener: TcpListener,
+        rejects: &Arc<Mutex<Rejects>>,
+    ) -> Result<Started, BusError> {
+        let bound = listener
+            .local_addr()
+            .map_err(|error| tcp::no_wait(&error))?;
+        let inbox: Inbox<News> = reactor.inbox();
+        let (watched, tasks_alone) = (Watched::default(), Arc::default());
+        let wall = self.pki.wall;
+        let own = Own {
+            reads: self.role.areas().1,
+            watched: watched.clone(),
+            inbox: inbox.clone(),
+            wall,
+            checks_applications: self.pki.trust == Trust::Listed,
+            tasks_alone: Arc::clone(&tasks_alone),
+        };
+        let signals = manager::Signals::new(Arc::clone(&self.table), own);
+        let login = self.pki.login()?;
+        let (server, handle) =
+            reactor.within(|| setup::build(self, max_age, login, bound, signals))?;
+        let nodes = handle.node_managers().get_of_type();
+        let show = Show {
+            nodes: nodes.expect("it was handed to the server"),
+            subscriptions: Arc::clone(handle.subscriptions()),
+            watched,
+            wall,
+        };
+        if self.is_secure() {
+            reactor.spawn(look_after(Arc::clone(rejects), inbox.clone()));
+        }
+        let ended = Arc::new(Notify::new());
+        reactor.spawn({
+            let (inbox, ended) = (inbox.clone(), Arc::clone(&ended));
+            async move {
+                let why = match tokio::net::TcpListener::from_std(listener) {
+                    Ok(listener) => server.run_with(listener).await.err(),
+                    Err(error) => Some(error.to_string()),
+                };
+                inbox.push(News::Ended(why.unwrap_or_default()));
+                ended.notify_one();
+            }
+        });
+        Ok(Started {
+            inbox,
+            handle,
+            ended,
+            show,
+            tasks_alone,
+        })
+    }
+}
+
+/// Looks after the folder of rejected certificates, beside the bus thread: files take the time that they take.
+async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
+    loop {
+        tokio::time::sleep(LOOK).await;
+        let rejects = Arc::clone(&rejects);
+        let look = move || {
+            // A list is whole between any two of its changes.
+            let mut rejects = rejects.lock().unwrap_or_else(PoisonError::into_inner);
+            rejects.look()
+        };
+        match tokio::task::spawn_blocking(look).await {
+            Ok(found) if found.count > 0 => {
+                inbox.push(News::Rejected(found.files, found.count));
+            }
+            Ok(_) => {}
+            // The bus is ending.
+            Err(_) => return,
+        }
+    }
+}
+
+/// The crate's server, running.
+struct Started {
+    inbox: Inbox<News>,
+    handle: ServerHandle,
+    /// Told when it has ended.
+    ended: Arc<Notify>,
+    show: Show,
+    /// How many tasks it has while nobody is connected.
+    tasks_alone: Arc<AtomicUsize>,
+}
+
+impl Started {
+    /// Whether nobody is connected, not even on the way to a session, and no session waits for its client to come
+    /// back.
+    fn is_alone(&self, reactor: &Reactor) -> bool {
+        let sessions =
+            VariableId::Server_ServerDiagnostics_ServerDiagnosticsSummary_CurrentSessionCount;
+        let sessions = self.handle.info().diagnostics.get(sessions);
+        let none = Some(Variant::UInt32(0));
+        reactor.tasks() <= self.tasks_alone.load(Ordering::Relaxed)
+            && sessions.is_some_and(|sessions| sessions.value == none)
+    }
+}
+
+impl Free for Server {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        if self.is_secure() {
+            self.pki.prepare()?;
+        }
+        let Some((listener, bound)) = tcp::listen(&self.options.address, port, stop)? else {
+            return Ok(());
+        };
+        // Every connection inherits it: an answer waits for no other.
+        let refused = |error: std::io::Error| tcp::no_wait(&error);
+        SockRef::from(&listener)
+            .set_tcp_nodelay(true)
+            .map_err(refused)?;
+        let waiting = format!("listening on {bound}, and nobody has written yet");
+        port.opening(&waiting);
+        let rejects = Rejects::new(self.pki.folder.join("rejected"));
+        let rejects = Arc::new(Mutex::new(rejects));
+        let mut service: Option<Service<'_>> = None;
+        loop {
+            let reactor = Reactor::new(stop)?;
+            let listener = listener.try_clone().map_err(refused)?;
+            let mut started = self.start(&reactor, port.max_age(), listener, &rejects)?;
+            let show = started.show.clone();
+            let service = match &mut service {
+                Some(service) => {
+                    service.image.move_to(show);
+                    service
+                }
+                None => service.insert(Service {
+                    image: Image::new(&self.table, self.role, port, show, self.options.every_write),
+                    peers: Peers::default(),
+                    table: &self.table,
+                    waiting: waiting.clone(),
+                    pki: &self.pki,
+                    turned_away: Rarely::default(),
+                }),
+            };
+            match service.serve(&reactor, &mut started, self.cycle, port, stop) {
+                // Nobody is there to take leave of; who comes now waits at the listener.
+                Ok(Served::Worn) => port.count("opcua.begun_anew"),
+                ended => {
+                    started.handle.cancel();
+                    reactor.farewell(FAREWELL, started.ended.notified());
+                    return ended.map(|_| ());
+                }
+            }
+        }
+    }
+}
+
+/// How serving ended.
+enum Served {
+    Stopped,
+    /// The crate's server remembers too much of clients that are gone.
+    Worn,
+}
+
+/// The server while it runs, as its bus sees it.
+struct Service<'a> {
+    image: Image,
+    peers: Peers,
+    table: &'a SignalTable,
+    waiting: String,
+    pki: &'a Pki,
+    /// Clients that were turned away, for certificates that are unknown or not their own.
+    turned_away: Rarely,
+}
+
+impl Service<'_> {
+    fn serve(
+        &mut self,
+        reactor: &Reactor,
+        started: &mut Started,
+        cycle: Nanos,
+        port: &mut Port,
+        stop: &Stop,
+    ) -> Result<Served, BusError> {
+        let clock = Arc::clone(port.clock());
+        let mut pace = Pace::new(clock.now(), cycle);
+        let mut news = Vec::new();
+        while !stop.is_stopped() {
+            let now = clock.now();
+            started.inbox.take(&mut news);
+            for news in news.drain(..) {
+                self.hear(port, now, news)?;
+            }
+            if pace.take(now) {
+                self.look(port, now);
+                if self.image.left_behind() >= WORN && started.is_alone(reactor) {
+                    return Ok(Served::Worn);
+                }
+                self.image.show(port, now);
+            }
+            port.observe(now);
+            reactor.wait(&*clock, pace.due().min(port.due()));
+        }
+        Ok(Served::Stopped)
+    }
+
+    fn hear(&mut self, port: &mut Port, now: Nanos, news: News) -> Result<(), BusError> {
+        match news {
+            News::Written(visitor, lists) => {
+                for list in &lists {
+                    self.image.received(port, now, list);
+                }
+                let table = self.table;
+                let written = lists.iter().flatten();
+                let stations = written.map(|(signal, _)| table.signals[*signal].station);
+                self.meet(port, visitor, stations);
+            }
+            News::Reads(visitor, signals, done) => {
+                self.image.show_to_reader(port, now, &signals);
+                // Where nothing is written, readers are the peers.
+                let stations = signals.iter().map(|at| self.table.signals[*at].station);
+                let fed: Vec<usize> = stations
+                    .filter(|station| port.sizes(*station).1 == 0)
+                    .collect();
+                if !fed.is_empty() {
+                    self.meet(port, visitor, fed);
+                }
+                // The reader may be gone.
+                let _ = done.send(());
+            }
+            News::Impostor(why) => {
+                port.count("opcua.refused_applications");
+                if let Some(times) = self.turned_away.count(("opcua", "application")) {
+                    log::warn!(
+                        "a client gets no values, as its certificate is not its own ({why}); give it a \
+                         certificate for its ApplicationUri, or write trust = \"any\"{times}"
+                    );
+                }
+            }
+            News::Rejected(files, count) => {
+                let folder = self.pki.folder.display();
+                for file in files {
+                    if let Some(times) = self.turned_away.count(("opcua", "certificate")) {
+                        log::warn!(
+                            "a client with an unknown certificate was turned away; to trust it, move \
+                             \"{folder}/rejected/{file}\" to \"{folder}/trusted\"{times}"
+                        );
+                    }
+                }
+                for _ in 0..count {
+                    port.count("opcua.rejected_certificates");
+                }
+            }
+            News::Ended(why) => {
+                return Err(BusError::Link(format!(
+                    "the server ended by itself ({why})"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// A client is a peer of these stations from now on.
+    fn meet(
+        &mut self,
+        port: &mut Port,
+        visitor: Visitor,
+        stations: impl IntoIterator<Item = usize>,
+    ) {
+        if let Some(name) = self.peers.add(visitor, stations) {
+            port.running(&format!("serving \"{name}\""));
+            port.tell("clients", &self.peers.count().to_string());
+        }
+    }
+
+    fn look(&mut self, port: &mut Port, now: Nanos) {
+        let seen = self.peers.look(|station| port.touch(station, now));
+        if seen != Seen::Same {
+            port.tell("clients", &self.peers.count().to_string());
+        }
+        if seen == Seen::Gone {
+            let error = BusError::Left("the last client closed its session".to_owned());
+            port.lost(&error, &self.waiting);
+        }
+    }
+}

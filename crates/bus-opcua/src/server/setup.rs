@@ -1,0 +1,151 @@
+//! The crate's server, set up as a driver.cfg asks for it.
+
+use std::net::{IpAddr, SocketAddr};
+
+use opcua::crypto::X509Data;
+use opcua::server::diagnostics::DiagnosticsNodeManagerBuilder;
+use opcua::server::node_manager::ServerContext;
+use opcua::server::node_manager::memory::{CoreNodeManagerBuilder, InMemoryNodeManagerBuilder};
+use opcua::server::{
+    ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
+};
+use opcua::types::{BuildInfo, DateTime, MessageSecurityMode};
+
+use crate::pki::{PRODUCT, PRODUCT_URI, security_policy};
+use crate::{Mode, Policy, Trust};
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::BusError;
+
+use super::manager::{self, Signals};
+use super::status::Status;
+use super::{SESSIONS, space};
+
+/// The name of the one user among the crate's.
+const USER: &str = "user";
+
+/// How often subscriptions are looked at: the shortest publishing interval. At most every millisecond, at least
+/// every ten.
+fn rhythm(cycle: Nanos) -> u64 {
+    let millis = cycle.0 / Nanos::from_millis(1).0;
+    u64::try_from(millis.clamp(1, 10)).expect("it is positive")
+}
+
+/// For how many publishing intervals a subscription may have nothing to say: three times within `max_age` for one
+/// that publishes every 100 ms, as most do.
+fn keep_alives(max_age: Nanos) -> u32 {
+    u32::try_from(max_age.0 / Nanos::from_millis(300).0)
+        .unwrap_or(u32::MAX)
+        .max(1)
+}
+
+/// Makes the server of the bus `of`, bound to `bound`, with the nodes of `signals`.
+pub(super) fn build(
+    of: &super::Server,
+    max_age: Nanos,
+    login: Option<(String, String)>,
+    bound: SocketAddr,
+    signals: Signals,
+) -> Result<(Server, ServerHandle), BusError> {
+    let (options, pki) = (&of.options, &of.pki);
+    let folder = if of.is_secure() {
+        pki.folder.clone()
+    } else {
+        // The crate makes folders wherever it can. Within a file it cannot.
+        std::env::current_exe().unwrap_or_default().join("none")
+    };
+    let rhythm = rhythm(of.cycle);
+    let host = match &options.host {
+        Some(host) => host.clone(),
+        None => announced(bound.ip()),
+    };
+    let mut builder = ServerBuilder::new()
+        .application_name(&pki.application)
+        .application_uri(&pki.uri)
+        .product_uri(PRODUCT_URI)
+        .pki_dir(folder)
+        .certificate_path(&pki.certificate)
+        .private_key_path(&pki.key)
+        .trust_client_certs(pki.trust == Trust::Any)
+        .discovery_urls(vec![format!("opc.tcp://{host}:{}/", bound.port())])
+        .host(host)
+        .port(bound.port())
+        // They count the sessions.
+        .diagnostics_enabled(true)
+        .subscription_poll_interval_ms(rhythm)
+        .max_sessions(SESSIONS)
+        .build_info(BuildInfo {
+            product_uri: PRODUCT_URI.into(),
+            manufacturer_name: PRODUCT.into(),
+            product_name: PRODUCT.into(),
+            software_version: env!("CARGO_PKG_VERSION").into(),
+            build_number: "0".into(),
+            build_date: DateTime::null(),
+        });
+    let limits = &mut builder.limits_mut().subscriptions;
+    #[expect(clippy::cast_precision_loss, reason = "a few milliseconds")]
+    let shortest = rhythm as f64;
+    limits.min_publishing_interval_ms = shortest;
+    // A client that asks for the next publish shows that it is there: it is answered often enough.
+    limits.max_keep_alive_count = keep_alives(max_age);
+    limits.default_keep_alive_count = limits.max_keep_alive_count;
+    // Changes are reported when they happen.
+    limits.min_sampling_interval_ms = 0.0;
+    limits.max_monitored_items_per_sub = limits
+        .max_monitored_items_per_sub
+        .max(2 * of.table.signals.len());
+    let mut users = Vec::new();
+    if options.anonymous {
+        users.push(ANONYMOUS_USER_TOKEN_ID.to_owned());
+    }
+    if let Some((name, password)) = login {
+        builder = builder.add_user_token(USER, ServerUserToken::user_pass(name, password));
+        users.push(USER.to_owned());
+    }
+    let mode = match options.credentials.mode {
+        Mode::Sign => MessageSecurityMode::Sign,
+        Mode::SignAndEncrypt => MessageSecurityMode::SignAndEncrypt,
+    };
+    for policy in &options.security {
+        let mode = match policy {
+            Policy::None => MessageSecurityMode::None,
+            _ => mode,
+        };
+        let endpoint = ServerEndpoint::new("/", security_policy(*policy), mode, &users);
+        builder = builder.add_endpoint(policy.name(), endpoint);
+    }
+    let (table, name, reads) = (of.table.clone(), of.name.clone(), of.role.areas().1);
+    let nodes = move |context: ServerContext, address_space: &mut _| {
+        let namespace = manager::namespace();
+        let uri = &namespace.namespace_uri;
+        let index = context
+            .type_tree
+            .write()
+            .namespaces_mut()
+            .add_namespace(uri);
+        debug_assert_eq!(index, space::NAMESPACE, "node ids promise it");
+        let address_space: &mut opcua::server::address_space::AddressSpace = address_space;
+        address_space.add_namespace(uri, index);
+        space::build(address_space, &name, &table, reads);
+        signals
+    };
+    let wall = pki.wall;
+    let built = builder
+        // The first that owns a node has it, and the signals' own has to be the last.
+        .without_node_managers()
+        .with_node_manager(move |context| Status::new(context, wall))
+        .with_node_manager(InMemoryNodeManagerBuilder::new(CoreNodeManagerBuilder))
+        .with_node_manager(DiagnosticsNodeManagerBuilder)
+        .with_node_manager(InMemoryNodeManagerBuilder::new(nodes))
+        .build();
+    built.map_err(|error| BusError::Refused(format!("there can be no server ({error})")))
+}
+
+/// The host that clients are told: where it listens, or the name of the machine if that is everywhere.
+fn announced(ip: IpAddr) -> String {
+    let name = || X509Data::computer_hostnames().into_iter().next();
+    match ip {
+        _ if ip.is_unspecified() => name().unwrap_or_else(|| ip.to_string()),
+        IpAddr::V4(ip) => ip.to_string(),
+        IpAddr::V6(ip) => format!("[{ip}]"),
+    }
+}

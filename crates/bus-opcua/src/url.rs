@@ -1,0 +1,119 @@
+//! Where a server is, as a URL.
+
+use std::fmt;
+use std::str::FromStr;
+
+use tickbus_base::toml_text::shown;
+use tickbus_fieldbus::tcp::{Address, AddressError};
+
+/// The port of OPC UA.
+pub(super) const PORT: u16 = 4840;
+
+const SCHEME: &str = "opc.tcp://";
+
+/// The URL of a server: `opc.tcp://HOST:PORT/PATH`, where port 4840 and the path may be left out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Url {
+    /// Host and port.
+    pub address: Address,
+    /// What follows them, with its slash; empty for nothing.
+    pub path: String,
+}
+
+/// Why a text is no URL of a server.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}; {right}")]
+pub struct UrlError {
+    pub(super) what: String,
+    pub(super) right: String,
+}
+
+impl From<AddressError> for UrlError {
+    fn from(error: AddressError) -> Self {
+        Self {
+            what: error.what,
+            right: error.right.to_owned(),
+        }
+    }
+}
+
+impl FromStr for Url {
+    type Err = UrlError;
+
+    fn from_str(text: &str) -> Result<Self, UrlError> {
+        let refuse = |what: String| {
+            Err(UrlError {
+                what,
+                right: "write it as \"opc.tcp://192.168.0.1:4840\"".to_owned(),
+            })
+        };
+        let Some(rest) = text.strip_prefix(SCHEME) else {
+            return refuse(format!(
+                "the url \"{}\" does not begin with \"{SCHEME}\"",
+                shown(text)
+            ));
+        };
+        let (host, path) = rest.find('/').map_or((rest, ""), |at| rest.split_at(at));
+        let odd = |c: char| c.is_whitespace() || c.is_control() || "?#\"<>".contains(c);
+        if path.contains(odd) {
+            return refuse(format!("the url \"{}\" has an odd path", shown(text)));
+        }
+        // The last colon of a bare IPv6 address is not that of a port.
+        let has_port = host
+            .rsplit_once(':')
+            .is_some_and(|(_, after)| !after.contains(']'));
+        let address: Address = if has_port {
+            host.parse()?
+        } else {
+            format!("{host}:{PORT}").parse()?
+        };
+        if address.port == 0 {
+            return refuse(format!("the url \"{}\" has port 0", shown(text)));
+        }
+        Ok(Self {
+            address,
+            path: path.to_owned(),
+        })
+    }
+}
+
+impl fmt::Display for Url {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{SCHEME}{}{}", self.address, self.path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn urls_read_and_write_themselves() {
+        for (text, written) in [
+            ("opc.tcp://192.168.0.1:4841", "opc.tcp://192.168.0.1:4841"),
+            ("opc.tcp://192.168.0.1", "opc.tcp://192.168.0.1:4840"),
+            ("opc.tcp://plc-7/a/b", "opc.tcp://plc-7:4840/a/b"),
+            ("opc.tcp://[::1]", "opc.tcp://[::1]:4840"),
+            ("opc.tcp://[::1]:7/", "opc.tcp://[::1]:7/"),
+        ] {
+            let url: Url = text.parse().unwrap_or_else(|why| panic!("{why}"));
+            assert_eq!(url.to_string(), written);
+        }
+    }
+
+    #[test]
+    fn what_is_no_url_is_told_why() {
+        for (text, part) in [
+            ("192.168.0.1:4840", "does not begin with"),
+            ("http://192.168.0.1:4840", "does not begin with"),
+            ("opc.tcp://", "no host"),
+            ("opc.tcp://host:0", "port 0"),
+            ("opc.tcp://host:x", "no port"),
+            ("opc.tcp://::1", "colons in its host"),
+            ("opc.tcp://host/a b", "odd path"),
+        ] {
+            let told = text.parse::<Url>().expect_err(text).to_string();
+            assert!(told.contains(part), "\"{part}\" in {told}");
+        }
+    }
+}

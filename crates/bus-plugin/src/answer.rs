@@ -1,0 +1,204 @@
+//! What a helper tells its host.
+
+use super::Outcome;
+use super::wire::{Fields, Letter, Message, WireError};
+use tickbus_fieldbus::BusError;
+
+/// The longest text of an answer, in bytes.
+const TEXT_LIMIT: usize = 8000;
+
+/// What a helper tells its host.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// It is there. Comes first and unasked.
+    Hello {
+        /// The version of its tickbus; both ends must have the same.
+        version: String,
+    },
+    /// The library is loaded and its bus is open.
+    Opened,
+    /// The exchange is done; what was received lies in the shared memory.
+    Done(Outcome),
+    /// The library failed at what was asked last.
+    Failed(BusError),
+}
+
+impl Answer {
+    /// The bytes to send.
+    pub fn write(&self) -> Vec<u8> {
+        match self {
+            Self::Hello { version } => Letter::new(1).text(version),
+            Self::Opened => Letter::new(2),
+            Self::Done(outcome) => Letter::new(3).byte(outcome.code()),
+            Self::Failed(error) => {
+                let (fault, text) = match error {
+                    BusError::Link(text) => (1, text),
+                    BusError::Protocol(text) => (2, text),
+                    BusError::Refused(text) => (3, text),
+                    BusError::Left(text) => (4, text),
+                };
+                Letter::new(4).byte(fault).text(shortened(text))
+            }
+        }
+        .seal()
+    }
+
+    /// What it is, for messages.
+    pub(super) const fn name(&self) -> &'static str {
+        match self {
+            Self::Hello { .. } => "a hello",
+            Self::Opened => "\"opened\"",
+            Self::Done(_) => "\"done\"",
+            Self::Failed(_) => "\"failed\"",
+        }
+    }
+}
+
+/// As much of a text as an answer takes, in whole characters.
+fn shortened(text: &str) -> &str {
+    let mut end = text.len().min(TEXT_LIMIT);
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    &text[..end]
+}
+
+impl Message for Answer {
+    const MOST: usize = TEXT_LIMIT + 6;
+
+    fn read(kind: u8, fields: &mut Fields<'_>) -> Result<Self, WireError> {
+        Ok(match kind {
+            1 => Self::Hello {
+                version: fields.text()?,
+            },
+            2 => Self::Opened,
+            3 => {
+                let code = fields.byte()?;
+                let outcome = Outcome::from_code(code.into());
+                Self::Done(outcome.ok_or_else(|| fields.wrong("unknown flags"))?)
+            }
+            4 => {
+                let kind = match fields.byte()? {
+                    1 => BusError::Link,
+                    2 => BusError::Protocol,
+                    3 => BusError::Refused,
+                    4 => BusError::Left,
+                    _ => return Err(fields.wrong("an unknown fault")),
+                };
+                Self::Failed(kind(fields.text()?))
+            }
+            other => return Err(WireError::Kind(other)),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::wire::Inbox;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn answers() -> impl Strategy<Value = Answer> {
+        prop_oneof![
+            ".{0,40}".prop_map(|version| Answer::Hello { version }),
+            Just(Answer::Opened),
+            (0..8).prop_map(|code| Answer::Done(Outcome::from_code(code).expect("a sum of flags"))),
+            (0..4_usize, ".{0,200}").prop_map(|(fault, text)| {
+                let kinds: [fn(String) -> BusError; 4] = [
+                    BusError::Link,
+                    BusError::Protocol,
+                    BusError::Refused,
+                    BusError::Left,
+                ];
+                let kind = kinds[fault];
+                Answer::Failed(kind(text))
+            }),
+        ]
+    }
+
+    /// All messages in `bytes`, handed in by pieces of `piece` bytes.
+    fn read(bytes: &[u8], piece: usize) -> Result<Vec<Answer>, WireError> {
+        let (mut inbox, mut found) = (Inbox::new(), Vec::new());
+        for piece in bytes.chunks(piece) {
+            inbox.push(piece);
+            while let Some(answer) = inbox.take()? {
+                found.push(answer);
+            }
+        }
+        Ok(found)
+    }
+
+    proptest! {
+        #[test]
+        fn answers_arrive_as_they_were_sent_in_pieces_of_any_size(
+            sent in prop::collection::vec(answers(), 0..6), piece in 1..50_usize,
+        ) {
+            let bytes: Vec<u8> = sent.iter().flat_map(Answer::write).collect();
+            prop_assert_eq!(read(&bytes, piece), Ok(sent));
+        }
+
+        #[test]
+        fn a_truncated_answer_is_none_yet(answer in answers(), cut in any::<prop::sample::Index>()) {
+            let bytes = answer.write();
+            prop_assert_eq!(read(&bytes[..cut.index(bytes.len())], 1000), Ok(vec![]));
+        }
+
+        #[test]
+        fn a_flipped_bit_makes_another_answer_or_none(
+            answer in answers(), bit in any::<prop::sample::Index>(),
+        ) {
+            let mut bytes = answer.write();
+            let bit = bit.index(bytes.len() * 8);
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            if let Ok(found) = read(&bytes, 1000) {
+                prop_assert_ne!(found, vec![answer]);
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_answers_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..100)) {
+            if let Ok(found) = read(&bytes, 7) {
+                for answer in found {
+                    prop_assert_eq!(read(&answer.write(), 1000), Ok(vec![answer]));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_answer_is_told_apart() {
+        let error = |bytes: &[u8]| read(bytes, 100).expect_err("no answer").to_string();
+        assert_eq!(
+            error(&[0xFF, 0xFF, 0, 0]),
+            "a message of 65535 bytes, expected at most 8006"
+        );
+        assert_eq!(error(&[0, 0, 0, 0]), "a message of the unknown kind 0");
+        assert_eq!(error(&[1, 0, 0, 0, 9]), "a message of the unknown kind 9");
+        assert_eq!(
+            error(&[1, 0, 0, 0, 3]),
+            "a message of kind 3 with fields missing"
+        );
+        assert_eq!(
+            error(&[2, 0, 0, 0, 3, 8]),
+            "a message of kind 3 with unknown flags"
+        );
+        assert_eq!(
+            error(&[2, 0, 0, 0, 2, 0]),
+            "a message of kind 2 with bytes left over"
+        );
+        assert_eq!(
+            error(&[6, 0, 0, 0, 1, 1, 0, 0, 0, 0xFF]),
+            "a message of kind 1 with a text that is no UTF-8"
+        );
+    }
+
+    #[test]
+    fn a_text_that_is_too_long_is_shortened() {
+        let answer = Answer::Failed(BusError::Link("ä".repeat(TEXT_LIMIT)));
+        let read = read(&answer.write(), 100).expect("an answer");
+        let [Answer::Failed(BusError::Link(text))] = &read[..] else {
+            panic!("{read:?}");
+        };
+        assert_eq!(text.len(), TEXT_LIMIT);
+    }
+}

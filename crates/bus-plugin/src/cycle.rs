@@ -1,0 +1,96 @@
+//! The bus cycles of a plug-in, whoever calls the library.
+
+use super::outcome::Outcome;
+use super::setup::Setup;
+use tickbus_base::time::{Nanos, Pace, Stop};
+use tickbus_fieldbus::{BusError, Port};
+
+/// A call that comes back later than this after its time-out is counted as slow: by as much a busy system
+/// delays any thread.
+const LATENESS: Nanos = Nanos::from_millis(10);
+
+/// Makes single exchanges.
+pub(super) trait Exchange {
+    /// The bytes to send in the next exchange.
+    fn input(&mut self) -> &mut [u8];
+
+    /// Makes one exchange; `None` when it was stopped while it waited.
+    fn exchange(&mut self, port: &Port, stop: &Stop) -> Result<Option<Outcome>, BusError>;
+
+    /// The bytes that the last exchange received, if its outcome was fresh.
+    fn output(&self) -> &[u8];
+}
+
+/// Exchanges every cycle until `stop` says so.
+pub(super) fn serve(
+    line: &mut impl Exchange,
+    setup: &Setup,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<(), BusError> {
+    port.opening("the bus is open; waiting for the peer");
+    let mut is_running = false;
+    let mut pace = Pace::new(port.clock().now(), setup.cycle());
+    while !stop.is_stopped() {
+        let now = port.clock().now();
+        // A call sends and receives at once: where nothing is to be sent, there is none.
+        if pace.take(now) && port.sends(now) {
+            match cycle(line, setup, now, port, stop) {
+                Ok(Some(outcome)) if outcome.is_alive() && !is_running => {
+                    is_running = true;
+                    port.running("the peer is there");
+                }
+                Ok(Some(_)) => {}
+                Ok(None) => return Ok(()),
+                Err(error @ BusError::Left(_)) => {
+                    is_running = false;
+                    port.lost(&error, "waiting for the next peer");
+                }
+                Err(error) => return Err(error),
+            }
+        } else {
+            port.observe(now);
+        }
+        port.clock().wait_until(pace.due().min(port.due()), stop);
+    }
+    Ok(())
+}
+
+fn cycle(
+    line: &mut impl Exchange,
+    setup: &Setup,
+    now: Nanos,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<Option<Outcome>, BusError> {
+    let mut rest = line.input();
+    for station in 0..port.stations() {
+        let bytes = port.outgoing(station, now);
+        let (frame, after) = rest.split_at_mut(bytes.len());
+        frame.copy_from_slice(bytes);
+        rest = after;
+    }
+    let outcome = line.exchange(port, stop)?;
+    let begun = now;
+    let now = port.clock().now();
+    if now - begun > setup.timeout() + LATENESS {
+        port.count("plugin.slow_calls");
+    }
+    let Some(outcome) = outcome else {
+        return Ok(None);
+    };
+    let mut rest = line.output();
+    for station in 0..port.stations() {
+        let (frame, after) = rest.split_at(port.sizes(station).1);
+        if outcome.is_taken() {
+            port.sent(station);
+        }
+        if outcome.is_fresh() {
+            port.received(station, now, frame);
+        } else if outcome.is_alive() {
+            port.touch(station, now);
+        }
+        rest = after;
+    }
+    Ok(Some(outcome))
+}

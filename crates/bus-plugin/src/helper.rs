@@ -1,0 +1,160 @@
+//! The helper process: `tickbus plugin-helper`, which calls a library for its host.
+//!
+//! The host gives it two things in place of stdin and stdout: a socket for messages, and the file of the
+//! memory that both share. Both are moved out of the library's way first.
+
+use std::fs::File;
+use std::io::{self, Read as _, Write as _};
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::net::UnixStream;
+use std::sync::mpsc;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::process::{Signal, getpid, kill_process};
+
+use super::VERSION;
+use super::answer::Answer;
+use super::library::{Bus, Library};
+use super::request::Request;
+use super::setup::Setup;
+use super::wire::{Inbox, Message};
+use tickbus_base::os::{SharedMemory, flush_log};
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::BusError;
+
+/// Serves the host at the other end of stdin until that ends.
+///
+/// # Errors
+///
+/// Nobody has started this process as a helper, or the host has gone away.
+pub fn serve() -> io::Result<()> {
+    let (mut host, memory) = Host::take_over()?;
+    host.tell(&Answer::Hello {
+        version: VERSION.to_owned(),
+    })?;
+    let Some(Request::Open { setup, grace_ms }) = host.next()? else {
+        return Ok(());
+    };
+    let _guardian = guard(&host.line, Duration::from_millis(grace_ms))?;
+    let memory = SharedMemory::open(&memory, memory_bytes(&setup))?;
+    let library = match Library::load(&setup.library) {
+        Ok(library) => library,
+        Err(error) => return host.refuse(error),
+    };
+    let bus = match library.open(&setup) {
+        Ok(bus) => bus,
+        Err(error) => return host.refuse(error),
+    };
+    host.tell(&Answer::Opened)?;
+    exchange(&mut host, &setup, &memory, bus)
+}
+
+/// Bytes of the memory that host and helper share: `in`, then `out` at the next whole word.
+pub(super) fn memory_bytes(setup: &Setup) -> usize {
+    out_word(setup) * size_of::<u64>() + setup.rx()
+}
+
+/// The word at which `out` begins in the shared memory.
+pub(super) fn out_word(setup: &Setup) -> usize {
+    SharedMemory::words_for(setup.tx())
+}
+
+fn exchange(
+    host: &mut Host,
+    setup: &Setup,
+    memory: &SharedMemory,
+    mut bus: Bus<'_>,
+) -> io::Result<()> {
+    while let Some(request) = host.next()? {
+        let Request::Exchange = request else {
+            return Err(io::Error::other("the host opened twice"));
+        };
+        memory.read(0, bus.input());
+        let answer = match bus.exchange(setup.timeout_ms) {
+            Ok(outcome) => {
+                if outcome.is_fresh() {
+                    memory.write(out_word(setup), bus.output());
+                }
+                Answer::Done(outcome)
+            }
+            Err(error) => Answer::Failed(error),
+        };
+        host.tell(&answer)?;
+    }
+    Ok(())
+}
+
+/// The host, as its helper sees it.
+struct Host {
+    line: UnixStream,
+    inbox: Inbox,
+}
+
+impl Host {
+    /// Moves the socket and the memory's file away from stdin and stdout. Then a library that reads finds
+    /// nothing, and what it prints goes to stderr.
+    fn take_over() -> io::Result<(Self, OwnedFd)> {
+        let line = io::stdin().as_fd().try_clone_to_owned()?;
+        let memory = io::stdout().as_fd().try_clone_to_owned()?;
+        let line = UnixStream::from(line);
+        line.peer_addr().map_err(|_| {
+            io::Error::other(
+                "this command is for tickbus itself, which starts it for a driver.cfg with \
+                 kind = \"plugin\" and isolated = true",
+            )
+        })?;
+        rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
+        rustix::stdio::dup2_stdout(io::stderr())?;
+        let inbox = Inbox::new();
+        Ok((Self { line, inbox }, memory))
+    }
+
+    fn tell(&mut self, answer: &Answer) -> io::Result<()> {
+        self.line.write_all(&answer.write())
+    }
+
+    /// What the host asks next; `None` when it asks to end.
+    fn next<M: Message>(&mut self) -> io::Result<Option<M>> {
+        loop {
+            if let Some(message) = self.inbox.take().map_err(io::Error::other)? {
+                return Ok(Some(message));
+            }
+            let mut bytes = [0; 4096];
+            match self.line.read(&mut bytes) {
+                Ok(0) => return Ok(None),
+                Ok(count) => self.inbox.push(&bytes[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Says why there is no bus, and waits for the host to end this.
+    fn refuse(&mut self, error: BusError) -> io::Result<()> {
+        self.tell(&Answer::Failed(error))?;
+        while self.next::<Request>()?.is_some() {}
+        Ok(())
+    }
+}
+
+/// Ends this process when its host has gone away and the library does not let it end within `grace`:
+/// nobody else would. Dropping what it gives calls that off.
+fn guard(line: &UnixStream, grace: Duration) -> io::Result<mpsc::Sender<()>> {
+    let line = line.try_clone()?;
+    let (ended, end) = mpsc::channel();
+    std::thread::Builder::new()
+        .name("guard".to_owned())
+        .spawn(move || {
+            // Nothing is asked for, so only the loss of the other end wakes it.
+            let mut watched = [PollFd::new(&line, PollFlags::empty())];
+            while poll(&mut watched, None).is_err() {}
+            if end.recv_timeout(grace) == Err(mpsc::RecvTimeoutError::Timeout) {
+                log::error!("the host has gone away, and the library does not end: ending it");
+                flush_log(Nanos::from_millis(100));
+                // Nothing gentler is sure to work against a library that hangs.
+                let _ = kill_process(getpid(), Signal::KILL);
+            }
+        })?;
+    Ok(ended)
+}

@@ -1,0 +1,425 @@
+//! The plug-in bus whose library lives in a helper process.
+
+#[cfg(target_vendor = "apple")]
+use std::io::Write as _;
+use std::io::{self, ErrorKind, Read as _};
+use std::net::Shutdown;
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+
+use rustix::process::Signal;
+
+use super::answer::Answer;
+use super::cycle::{self, Exchange};
+use super::helper::{memory_bytes, out_word};
+use super::outcome::Outcome;
+use super::request::Request;
+use super::setup::Setup;
+use super::wire::Inbox;
+use super::{Limits, VERSION};
+use tickbus_base::os::{Interest, Poller, SharedMemory, Source};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
+use tickbus_fieldbus::{BusError, Free, Port};
+
+/// How long a helper that is ended by force may take to end.
+const END: Nanos = Nanos::from_secs(1);
+
+/// Has a helper process call the library.
+#[derive(Debug)]
+pub(super) struct Isolated {
+    setup: Setup,
+    limits: Limits,
+    program: PathBuf,
+    name: String,
+    /// What the statistics call the calls.
+    exchange: Arc<str>,
+    close: Arc<str>,
+}
+
+impl Isolated {
+    /// A bus for the library of `setup`, whose helper processes run `program`.
+    pub(super) fn new(setup: Setup, limits: Limits, program: PathBuf) -> Self {
+        let name = setup.library_name();
+        Self {
+            exchange: format!("tickbus_exchange() of {name}").into(),
+            close: format!("the helper process of {name}").into(),
+            setup,
+            limits,
+            program,
+            name,
+        }
+    }
+}
+
+impl Free for Isolated {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let setup = &self.setup;
+        port.tell("library", &setup.library.to_string_lossy());
+        let mut helper = Helper::start(self, stop)?;
+        let process = helper.child.id();
+        let helper_is = format!("{} as process {process}", self.program.display());
+        port.tell("helper", &helper_is);
+        port.count("plugin.helpers");
+        if !helper.open(self, stop)? {
+            return Ok(());
+        }
+        let mut line = Line {
+            helper,
+            setup,
+            input: vec![0; setup.tx()].into(),
+            output: vec![0; setup.rx()].into(),
+            call: &self.exchange,
+            limit: setup.timeout() + self.limits.call,
+        };
+        let ended = cycle::serve(&mut line, setup, port, stop);
+        port.calling(&self.close, self.close_timeout(), || drop(line));
+        ended
+    }
+
+    fn close_timeout(&self) -> Nanos {
+        // The library has its time to close; after that there is the helper to be ended.
+        self.setup.timeout() + self.limits.close + END
+    }
+}
+
+/// An open bus in a helper.
+struct Line<'a> {
+    helper: Helper,
+    setup: &'a Setup,
+    input: Box<[u8]>,
+    output: Box<[u8]>,
+    call: &'a Arc<str>,
+    limit: Nanos,
+}
+
+impl Exchange for Line<'_> {
+    fn input(&mut self) -> &mut [u8] {
+        &mut self.input
+    }
+
+    fn exchange(&mut self, port: &Port, stop: &Stop) -> Result<Option<Outcome>, BusError> {
+        let helper = &mut self.helper;
+        helper.memory.write(0, &self.input);
+        let asked = port.calling(self.call, self.limit, || {
+            let what = Waiting::For("tickbus_exchange");
+            helper.ask(Some(&Request::Exchange), what, self.limit, stop)
+        });
+        let outcome = match asked? {
+            None => return Ok(None),
+            Some(Answer::Done(outcome)) => outcome,
+            Some(other) => return Err(helper.out_of_turn(&other)),
+        };
+        if outcome.is_fresh() {
+            helper.memory.read(out_word(self.setup), &mut self.output);
+        }
+        Ok(Some(outcome))
+    }
+
+    fn output(&self) -> &[u8] {
+        &self.output
+    }
+}
+
+/// What a helper is doing while its host waits.
+#[derive(Clone, Copy, Debug)]
+enum Waiting {
+    /// Starting.
+    ForHello,
+    /// Calling this function of the library.
+    For(&'static str),
+}
+
+/// A helper process; dropping it ends it, first by asking.
+#[derive(Debug)]
+struct Helper {
+    child: Child,
+    line: UnixStream,
+    inbox: Inbox,
+    memory: SharedMemory,
+    poller: Poller,
+    /// The system's own time, in which the helper lives whatever clock the driver has.
+    clock: Arc<Monotonic>,
+    program: PathBuf,
+    library: String,
+    /// How long it may take to end by itself.
+    grace: Nanos,
+}
+
+impl Helper {
+    fn start(bus: &Isolated, stop: &Stop) -> Result<Self, BusError> {
+        let cannot = |error: io::Error| {
+            let program = bus.program.display();
+            BusError::Link(format!(
+                "the helper process {program} cannot be started: {error}; check `helper` in the driver.cfg"
+            ))
+        };
+        let (memory, file) = SharedMemory::create(memory_bytes(&bus.setup)).map_err(cannot)?;
+        let (line, theirs) = UnixStream::pair().map_err(cannot)?;
+        line.set_nonblocking(true).map_err(cannot)?;
+        let poller = Poller::new(stop).map_err(cannot)?;
+        let clock = Monotonic::shared();
+        let child = spawn(&bus.program, theirs.into(), file).map_err(cannot)?;
+        Ok(Self {
+            child,
+            line,
+            inbox: Inbox::new(),
+            memory,
+            poller,
+            clock,
+            program: bus.program.clone(),
+            library: bus.name.clone(),
+            grace: bus.setup.timeout() + bus.limits.close,
+        })
+    }
+
+    /// Has the library loaded and opened; `false` when it was stopped meanwhile.
+    fn open(&mut self, bus: &Isolated, stop: &Stop) -> Result<bool, BusError> {
+        let limit = bus.limits.open;
+        match self.ask(None, Waiting::ForHello, limit, stop)? {
+            None => return Ok(false),
+            Some(Answer::Hello { version }) if version == VERSION => {}
+            Some(Answer::Hello { version }) => {
+                return Err(BusError::Refused(format!(
+                    "the helper {} is tickbus {version}, and this is tickbus {VERSION}; name the right one as \
+                     `helper` in the driver.cfg",
+                    self.program.display()
+                )));
+            }
+            Some(other) => return Err(self.out_of_turn(&other)),
+        }
+        let what = Waiting::For("tickbus_open");
+        let open = Request::Open {
+            setup: bus.setup.clone(),
+            grace_ms: u64::try_from(bus.limits.close.0 / 1_000_000).unwrap_or(0),
+        };
+        match self.ask(Some(&open), what, limit, stop)? {
+            None => Ok(false),
+            Some(Answer::Opened) => Ok(true),
+            Some(other) => Err(self.out_of_turn(&other)),
+        }
+    }
+
+    /// Sends a request, if there is one, and waits for the answer; `None` when stopped. What the library
+    /// says against it is an error.
+    fn ask(
+        &mut self,
+        request: Option<&Request>,
+        what: Waiting,
+        limit: Nanos,
+        stop: &Stop,
+    ) -> Result<Option<Answer>, BusError> {
+        let begun = self.clock.now();
+        let request = request.map(Request::write).unwrap_or_default();
+        let mut unsent = &request[..];
+        loop {
+            unsent = self.send(unsent, what)?;
+            match self.inbox.take() {
+                Ok(None) => {}
+                Ok(Some(Answer::Failed(error))) => return Err(error),
+                Ok(answer) => return Ok(answer),
+                Err(error) => {
+                    return Err(BusError::Protocol(format!(
+                        "{}: the helper process answered with {error}; the library has damaged it: tell the \
+                         library's maker",
+                        self.library
+                    )));
+                }
+            }
+            if stop.is_stopped() {
+                return Ok(None);
+            }
+            let waited = self.clock.now() - begun;
+            if waited > limit {
+                return Err(self.hung(what, waited, limit));
+            }
+            let interest = if unsent.is_empty() {
+                Interest::Read
+            } else {
+                Interest::ReadWrite
+            };
+            let mut sources = [Source::new(&self.line, interest)];
+            // A little past the limit, so that the wait does not end just before it.
+            let deadline = begun + limit + Nanos(1);
+            let ready = self.poller.wait(&*self.clock, deadline, &mut sources);
+            ready.map_err(|error| BusError::Link(format!("waiting for the helper: {error}")))?;
+            if sources[0].is_readable() {
+                self.read(what)?;
+            }
+        }
+    }
+
+    /// Sends as much as goes out at once, and gives the rest.
+    fn send<'b>(&mut self, mut bytes: &'b [u8], what: Waiting) -> Result<&'b [u8], BusError> {
+        while !bytes.is_empty() {
+            match send_quietly(&self.line, bytes) {
+                Ok(count) => bytes = &bytes[count..],
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(self.lost(what, &error.to_string())),
+            }
+        }
+        Ok(bytes)
+    }
+
+    fn read(&mut self, what: Waiting) -> Result<(), BusError> {
+        let mut bytes = [0; 4096];
+        match self.line.read(&mut bytes) {
+            Ok(0) => Err(self.lost(what, "")),
+            Ok(count) => {
+                self.inbox.push(&bytes[..count]);
+                Ok(())
+            }
+            Err(error)
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
+            {
+                Ok(())
+            }
+            Err(error) => Err(self.lost(what, &error.to_string())),
+        }
+    }
+
+    /// The helper has closed its end: it has died, or the library has closed what is not its own.
+    fn lost(&mut self, what: Waiting, detail: &str) -> BusError {
+        // One that has died keeps its exit status, whatever is sent after it.
+        let _ = self.child.kill();
+        let status = self.child.wait();
+        let killed = Some(Signal::KILL.as_raw());
+        let right = if matches!(&status, Ok(status) if status.signal() == killed) {
+            "see who did that; the system does when memory is short"
+        } else {
+            "tell the library's maker"
+        };
+        let how = match status {
+            Ok(status) => end_of(status),
+            Err(error) => format!("ended: {error}"),
+        };
+        log::debug!("the helper process of {} {how} {detail}", self.library);
+        BusError::Link(match what {
+            Waiting::ForHello => format!(
+                "the helper process {} {how} before it said hello; check that it is the tickbus command",
+                self.program.display()
+            ),
+            Waiting::For(function) => format!(
+                "{}: its helper process {how} in {function}; {right}",
+                self.library
+            ),
+        })
+    }
+
+    fn hung(&mut self, what: Waiting, waited: Nanos, limit: Nanos) -> BusError {
+        let _ = self.child.kill();
+        let waited = waited.rounded();
+        BusError::Link(match what {
+            Waiting::ForHello => format!(
+                "the helper process {} has said nothing for {waited}, and was ended; check that it is the \
+                 tickbus command",
+                self.program.display()
+            ),
+            Waiting::For(function) => format!(
+                "{}: {function} has not returned for {waited} (it may take {limit}), and its helper process \
+                 was ended",
+                self.library
+            ),
+        })
+    }
+
+    fn out_of_turn(&self, answer: &Answer) -> BusError {
+        BusError::Protocol(format!(
+            "{}: the helper process answered with {} out of turn; the library has damaged it: tell the \
+             library's maker",
+            self.library,
+            answer.name()
+        ))
+    }
+
+    /// Asks the helper to end, and waits for that; `false` when it has not ended in time.
+    fn ends_by_itself(&mut self) -> io::Result<bool> {
+        self.line.shutdown(Shutdown::Write)?;
+        self.line.set_nonblocking(false)?;
+        let grace = self.grace.to_duration();
+        self.line.set_read_timeout(Some(grace))?;
+        // At most the answer to what was asked last is still to come.
+        for _ in 0..3 {
+            match self.line.read(&mut [0; 4096]) {
+                Ok(0) => return Ok(true),
+                Ok(_) => {}
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(false),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(false)
+    }
+}
+
+impl Drop for Helper {
+    fn drop(&mut self) {
+        let has_ended = matches!(self.child.try_wait(), Ok(Some(_)));
+        if !has_ended && !self.ends_by_itself().unwrap_or(false) {
+            log::warn!(
+                "{}: the helper process has not ended by itself within {}, and is ended",
+                self.library,
+                self.grace
+            );
+        }
+        // One that has ended by itself has closed its line and is at its end; it keeps its status.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Writes to a socket whose other end may be gone, without the signal that would end a process for that:
+/// the process is not ours, and may not ignore it.
+#[cfg(not(target_vendor = "apple"))]
+fn send_quietly(line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
+    Ok(rustix::net::send(
+        line,
+        bytes,
+        rustix::net::SendFlags::NOSIGNAL,
+    )?)
+}
+
+#[cfg(target_vendor = "apple")]
+fn send_quietly(mut line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
+    line.write(bytes)
+}
+
+/// Starts a helper with its line and its memory in place of stdin and stdout. What it prints goes to
+/// stderr, and Ctrl-C at the terminal goes to the host alone.
+fn spawn(program: &Path, line: OwnedFd, memory: OwnedFd) -> io::Result<Child> {
+    Command::new(program)
+        .arg("plugin-helper")
+        .stdin(Stdio::from(line))
+        .stdout(Stdio::from(memory))
+        .stderr(Stdio::from(io::stderr().as_fd().try_clone_to_owned()?))
+        .process_group(0)
+        .spawn()
+}
+
+/// How a process ended, in words.
+fn end_of(status: ExitStatus) -> String {
+    let names = [
+        (Signal::SEGV, "SIGSEGV"),
+        (Signal::ABORT, "SIGABRT"),
+        (Signal::BUS, "SIGBUS"),
+        (Signal::FPE, "SIGFPE"),
+        (Signal::ILL, "SIGILL"),
+        (Signal::TRAP, "SIGTRAP"),
+        (Signal::KILL, "SIGKILL"),
+        (Signal::TERM, "SIGTERM"),
+    ];
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("ended with exit code {code}"),
+        (None, Some(number)) => {
+            let name = names.iter().find(|(signal, _)| signal.as_raw() == number);
+            match name {
+                Some((_, name)) => format!("was ended by {name}"),
+                None => format!("was ended by signal {number}"),
+            }
+        }
+        (None, None) => "ended".to_owned(),
+    }
+}

@@ -1,0 +1,173 @@
+//! What a driver.cfg says to the plug-in bus.
+
+use std::path::PathBuf;
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value, shown};
+
+/// The most entries of `options`.
+const OPTION_LIMIT: usize = 100;
+
+/// The longest key or value of `options`, in bytes.
+const TEXT_LIMIT: usize = 4000;
+
+/// The longest time-out: the library is given it in milliseconds that fit into an `int32_t`.
+const TIMEOUT_LIMIT: Nanos = Nanos::from_secs(24 * 3600);
+
+/// What a driver.cfg says to the plug-in bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// The library's file, as it is written: relative to the folder of the driver.cfg.
+    pub library: PathBuf,
+    /// What the library itself is told, as pairs of key and value, sorted by key.
+    pub options: Vec<(String, String)>,
+    /// How long one exchange may wait for the peer; `None` leaves it to the cycle. Positive.
+    pub timeout: Option<Nanos>,
+    /// How long opening may take. Positive.
+    pub open_timeout: Nanos,
+    /// How long past `timeout` a call may take before it counts as hung. Positive.
+    pub call_timeout: Nanos,
+    /// How long closing waits for the library. Positive.
+    pub close_timeout: Nanos,
+    /// Whether the library runs in a process of its own.
+    pub isolated: bool,
+    /// The tickbus command to start that process with; `None` looks for it. Relative to the folder of
+    /// the driver.cfg.
+    pub helper: Option<PathBuf>,
+    /// Whether every change that the peer makes is reported as an event, beside the image.
+    pub events: bool,
+}
+
+impl Options {
+    /// Reads `library`, `options`, the time-outs, `isolated` with `helper`, and `events`.
+    pub fn read(mut table: Table<'_>) -> Option<Self> {
+        let library = table.require(
+            "library",
+            "name the shared library, such as library = \"libmybus.so\"",
+        );
+        let options = table.take("options");
+        let timeout = table.take("timeout");
+        let open_timeout = table.take("open_timeout");
+        let call_timeout = table.take("call_timeout");
+        let close_timeout = table.take("close_timeout");
+        let isolated = table.take("isolated");
+        let helper = table.take("helper");
+        let events = table.take("events");
+        let whole = table.is_whole();
+        table.finish();
+
+        let library = library.and_then(|value| path(&value, "name the shared library's file"));
+        let options = options.map_or(Some(Vec::new()), |value| read_options(&value));
+        let timeout = match timeout {
+            None => Some(None),
+            Some(value) => time_out(&value).map(Some),
+        };
+        let or = |value: Option<Value<'_>>, seconds| match value {
+            None => Some(Nanos::from_secs(seconds)),
+            Some(value) => time_out(&value),
+        };
+        let open_timeout = or(open_timeout, 10);
+        let call_timeout = or(call_timeout, 1);
+        let close_timeout = or(close_timeout, 2);
+        let isolated = isolated.map_or(Some(false), |value| value.boolean());
+        let helper = match helper {
+            None => Some(None),
+            Some(value) => {
+                if whole && isolated == Some(false) {
+                    value.wrong(
+                        "\"helper\" stands without isolated = true",
+                        "remove it, or add isolated = true to run the library in a helper process",
+                    );
+                }
+                path(&value, "name the tickbus command's file").map(Some)
+            }
+        };
+        let events = events.map_or(Some(false), |value| value.boolean());
+        Some(Self {
+            library: library?,
+            options: options?,
+            timeout: timeout?,
+            open_timeout: open_timeout?,
+            call_timeout: call_timeout?,
+            close_timeout: close_timeout?,
+            isolated: isolated?,
+            helper: helper?,
+            events: events?,
+        })
+    }
+}
+
+fn path(value: &Value<'_>, right: &str) -> Option<PathBuf> {
+    value.label(TEXT_LIMIT, right).map(PathBuf::from)
+}
+
+fn time_out(value: &Value<'_>) -> Option<Nanos> {
+    let span = value.duration()?;
+    if span > TIMEOUT_LIMIT {
+        value.wrong(
+            format!("{span} is longer than anybody waits for a bus"),
+            format!("write at most \"{TIMEOUT_LIMIT}\""),
+        );
+        return None;
+    }
+    Some(span)
+}
+
+fn read_options(value: &Value<'_>) -> Option<Vec<(String, String)>> {
+    let table = value.table("options", "write them as { key = \"value\" }")?;
+    let count = table.all().count();
+    if count > OPTION_LIMIT {
+        value.wrong(
+            format!("there are {count} options"),
+            format!("a library is given at most {OPTION_LIMIT}"),
+        );
+        return None;
+    }
+    let mut read = Some(Vec::new());
+    for (key, value) in table.all() {
+        match (read_option(key, &value), &mut read) {
+            (Some(text), Some(read)) => read.push((key.to_owned(), text)),
+            _ => read = None,
+        }
+    }
+    if let Some(read) = &mut read {
+        read.sort();
+    }
+    read
+}
+
+/// The text that the library is given for one option.
+fn read_option(key: &str, value: &Value<'_>) -> Option<String> {
+    let number = value.written();
+    let text = if number.ends_with('…') {
+        value.wrong(
+            format!("the number is longer than any: {number}"),
+            "write it as a text, in quotes",
+        );
+        return None;
+    } else if !number.is_empty() {
+        number
+    } else if value.is_boolean() {
+        value.boolean()?.to_string()
+    } else {
+        value
+            .text("write a text, a number, true or false")?
+            .to_owned()
+    };
+    // The library gets them as C strings, which end at the first NUL.
+    if let Some(odd) = [key, &text].into_iter().find(|part| part.contains('\0')) {
+        value.wrong(
+            format!("the option has a NUL character in it: \"{}\"", shown(odd)),
+            "remove it",
+        );
+        return None;
+    }
+    if key.len().max(text.len()) > TEXT_LIMIT {
+        value.wrong(
+            format!("the option is longer than {TEXT_LIMIT} bytes"),
+            "shorten it, or let the library read a file",
+        );
+        return None;
+    }
+    Some(text)
+}

@@ -1,0 +1,119 @@
+//! All that a library has to be told to open its bus.
+
+use std::path::{Path, PathBuf};
+
+use super::Options;
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::{CYCLE, Role};
+use tickbus_image::signal::{Area, SignalTable};
+
+/// The least time-out of an exchange where a driver.cfg states none.
+const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);
+
+/// A driver, as its bus is told about it.
+#[derive(Clone, Copy, Debug)]
+pub struct Line<'a> {
+    /// The driver's name.
+    pub name: &'a str,
+    /// Where its driver.cfg stands.
+    pub directory: &'a Path,
+    /// Which end of the bus it is.
+    pub role: Role,
+    /// Its stations.
+    pub table: &'a SignalTable,
+    /// The bus cycle, where the driver.cfg states one.
+    pub cycle: Option<Nanos>,
+    /// Data older than this are stale.
+    pub max_age: Nanos,
+}
+
+/// One station's frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Station {
+    /// Its name; empty when it is the only one.
+    pub name: String,
+    /// Bytes that it sends.
+    pub tx: u32,
+    /// Bytes that it receives.
+    pub rx: u32,
+}
+
+/// All that a library has to be told to open its bus, and where it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Setup {
+    /// The library's file, absolute.
+    pub library: PathBuf,
+    /// The driver's name.
+    pub name: String,
+    /// Where the driver.cfg stands.
+    pub directory: String,
+    /// Which end of the bus this is.
+    pub role: Role,
+    /// The library's own options, as pairs of key and value without NUL.
+    pub options: Vec<(String, String)>,
+    /// The stations, in order; at least one.
+    pub stations: Vec<Station>,
+    /// What an exchange is given, in milliseconds; at least 1.
+    pub timeout_ms: u32,
+    /// The bus cycle in nanoseconds.
+    pub cycle_ns: u64,
+    /// The age at which data are stale, in nanoseconds.
+    pub max_age_ns: u64,
+}
+
+impl Setup {
+    pub(super) fn new(options: &Options, library: PathBuf, line: Line<'_>) -> Self {
+        let (tx, rx) = match line.role {
+            Role::Device => (Area::Input, Area::Output),
+            Role::Controller => (Area::Output, Area::Input),
+        };
+        let size = |bytes: usize| u32::try_from(bytes).expect("an image is far below 4 GiB");
+        let stations = line.table.stations.iter();
+        let stations = stations.map(|station| Station {
+            name: station.name.clone(),
+            tx: size(station.bytes(tx)),
+            rx: size(station.bytes(rx)),
+        });
+        let cycle = line.cycle.unwrap_or(CYCLE);
+        let timeout = options.timeout.unwrap_or(cycle.max(LEAST_TIMEOUT));
+        let millis = u32::try_from((timeout.0 + 999_999) / 1_000_000);
+        let nanos = |span: Nanos| u64::try_from(span.0).unwrap_or(0);
+        Self {
+            library,
+            name: line.name.to_owned(),
+            directory: line.directory.to_string_lossy().into_owned(),
+            role: line.role,
+            options: options.options.clone(),
+            stations: stations.collect(),
+            timeout_ms: millis.unwrap_or(u32::MAX),
+            cycle_ns: nanos(cycle),
+            max_age_ns: nanos(line.max_age),
+        }
+    }
+
+    /// Bytes that one exchange sends.
+    pub(super) fn tx(&self) -> usize {
+        let bytes = self.stations.iter().map(|station| station.tx as usize);
+        bytes.sum()
+    }
+
+    /// Bytes that one exchange receives.
+    pub(super) fn rx(&self) -> usize {
+        let bytes = self.stations.iter().map(|station| station.rx as usize);
+        bytes.sum()
+    }
+
+    pub(super) fn cycle(&self) -> Nanos {
+        Nanos(i64::try_from(self.cycle_ns).unwrap_or(i64::MAX))
+    }
+
+    pub(super) fn timeout(&self) -> Nanos {
+        Nanos::from_millis(self.timeout_ms.into())
+    }
+
+    /// The library's file name, for messages.
+    pub(super) fn library_name(&self) -> String {
+        let name = self.library.file_name().unwrap_or(self.library.as_os_str());
+        name.to_string_lossy().into_owned()
+    }
+}

@@ -1,0 +1,376 @@
+//! One connection with its socket: carries bytes between the socket, the dialog and the port.
+
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+
+use super::{Dialog, News, Refusal, S7Client, Terms};
+use crate::szl::Identity;
+use tickbus_base::os::{Interest, Source};
+use tickbus_base::time::{Nanos, Pace};
+use tickbus_fieldbus::tcp::{bow_out, is_for_later};
+use tickbus_fieldbus::{BusError, PlcState, Port};
+
+/// So many bytes are read at once.
+const BUFFER: usize = 4096;
+
+/// How often a CPU is asked whether it runs.
+const STATE: Nanos = Nanos::from_millis(200);
+
+/// A CPU that has said whether it runs may refuse to say it so many times in a row, less one, before it is believed
+/// to be another one, which does not say it: a busy CPU refuses now and then.
+const UNTOLD: u8 = 5;
+
+/// When a station is tried again of which the CPU refused something.
+const RETRY: Nanos = Nanos::from_secs(1);
+
+/// One connection.
+pub(super) struct Connection<'a> {
+    bus: &'a mut S7Client,
+    stream: TcpStream,
+    peer: SocketAddr,
+    dialog: Dialog,
+    pace: Pace,
+    has_identity: bool,
+    /// When the CPU is asked next whether it runs; never where it does not say.
+    state: Option<Nanos>,
+    /// A cycle became due while it was asked.
+    is_due: bool,
+    stations: Vec<Station>,
+    buffer: [u8; BUFFER],
+}
+
+/// A station as the last cycles left it.
+#[derive(Clone, Debug, Default)]
+struct Station {
+    /// Whether anything of it is written, and whether anything is read.
+    has: [bool; 2],
+    /// The CPU refused something of it, which is tried again at this time.
+    resume: Option<Nanos>,
+    refusal: Option<Refusal>,
+}
+
+impl<'a> Connection<'a> {
+    pub(super) fn new(
+        bus: &'a mut S7Client,
+        stream: TcpStream,
+        peer: SocketAddr,
+        terms: Terms,
+        port: &Port,
+    ) -> Self {
+        let now = port.clock().now();
+        let station = |station| Station {
+            has: bus.frames.has(station),
+            ..Station::default()
+        };
+        Self {
+            dialog: bus.frames.dialog(terms, now),
+            pace: Pace::new(now, bus.cycle),
+            has_identity: false,
+            state: None,
+            is_due: false,
+            stations: (0..port.stations()).map(station).collect(),
+            buffer: [0; BUFFER],
+            stream,
+            peer,
+            bus,
+        }
+    }
+
+    /// The connection has ended by an error.
+    pub(super) fn end(&mut self) {
+        if self.dialog.asks_who() {
+            self.bus.identity.unanswered += 1;
+        } else if self.dialog.asks_state() {
+            self.bus.state.unanswered += 1;
+        }
+    }
+
+    pub(super) fn source(&self) -> Source<'_> {
+        let interest = if self.dialog.to_write().is_empty() {
+            Interest::Read
+        } else {
+            Interest::ReadWrite
+        };
+        Source::new(&self.stream, interest)
+    }
+
+    pub(super) fn deadline(&self, port: &Port) -> Nanos {
+        let mut deadline = self.dialog.deadline().min(port.due());
+        if self.has_identity {
+            deadline = deadline.min(self.pace.due());
+        }
+        if let (Some(state), true) = (self.state, self.dialog.is_idle()) {
+            deadline = deadline.min(state);
+        }
+        deadline
+    }
+
+    pub(super) fn turn(
+        &mut self,
+        (is_readable, is_writable): (bool, bool),
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let now = port.clock().now();
+        if is_readable {
+            self.read(now, port)?;
+        }
+        // First, or a line with more cycles than it can do would never come to it.
+        if self.has_identity {
+            self.ask_state(now);
+        }
+        if self.has_identity && self.pace.take(now) {
+            self.cycle(now, port)?;
+        }
+        if is_writable || !self.dialog.to_write().is_empty() {
+            self.write()?;
+        }
+        self.dialog
+            .check(now)
+            .map_err(|end| end.into_error(self.peer))?;
+        port.observe(now);
+        Ok(())
+    }
+
+    fn read(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let count = match self.stream.read(&mut self.buffer) {
+            Ok(0) => return Err(self.left()),
+            Ok(count) => count,
+            Err(error) if is_for_later(&error) => return Ok(()),
+            Err(error) => return Err(self.broke(&error)),
+        };
+        let mut count = count;
+        loop {
+            let news = self.dialog.hear(now, &self.buffer[..count]);
+            count = 0;
+            match news.map_err(|end| end.into_error(self.peer))? {
+                None => return Ok(()),
+                Some(News::Met(length, identity)) => self.meet(now, length, identity, port),
+                Some(News::Done) => self.done(now, port)?,
+                Some(News::State(state)) => self.learn(now, state, port)?,
+            }
+        }
+    }
+
+    fn meet(&mut self, now: Nanos, length: u16, identity: Option<Identity>, port: &mut Port) {
+        // A CPU that hangs up when it is asked who it is would do so at the next question of that kind.
+        if identity.is_some() {
+            self.bus.identity.unanswered = 0;
+            self.state = self.bus.state.is_asked().then_some(now);
+        }
+        if self.state.is_none() {
+            self.presume_run(now, port);
+        }
+        let line = identity.map(|identity| identity.line()).unwrap_or_default();
+        let line = if line.is_empty() {
+            let called = self.bus.options.called;
+            format!("S7 CPU at {}, TSAP {called}", self.peer)
+        } else {
+            line
+        };
+        let may_write = self.bus.guard.meet(port, &line);
+        self.dialog.allow(may_write);
+        self.has_identity = true;
+        port.tell("pdu", &length.to_string());
+        port.running(&format!("connected with {}, {line}", self.peer));
+        // Before the first cycle: what lies in the memory of a CPU in STOP is not to be taken for its outputs.
+        self.ask_state(now);
+    }
+
+    /// Asks whether the CPU runs, between two cycles, when it is time to.
+    fn ask_state(&mut self, now: Nanos) {
+        if self.dialog.is_idle() && self.state.is_some_and(|due| due <= now) {
+            self.state = Some(now + STATE);
+            self.dialog.ask_state(now);
+        }
+    }
+
+    /// The CPU said whether it runs, or that it does not say.
+    fn learn(
+        &mut self,
+        now: Nanos,
+        state: Option<PlcState>,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        self.bus.state.unanswered = 0;
+        if let Some(state) = state {
+            self.bus.untold = 0;
+            self.bus.said = Some(state);
+            for station in 0..self.stations.len() {
+                port.plc_state(station, now, state);
+            }
+        } else {
+            self.bus.untold = self.bus.untold.saturating_add(1);
+            if self.bus.said.is_none() || self.bus.untold >= UNTOLD {
+                self.state = None;
+                self.presume_run(now, port);
+            }
+        }
+        if std::mem::take(&mut self.is_due) {
+            return self.cycle(now, port);
+        }
+        Ok(())
+    }
+
+    /// The CPU does not say whether it runs, and its data count. One that said STOP and does not say anything any
+    /// more is another one.
+    fn presume_run(&mut self, now: Nanos, port: &mut Port) {
+        if self.bus.said.take() == Some(PlcState::Stop) {
+            for station in 0..self.stations.len() {
+                port.plc_state(station, now, PlcState::Run);
+            }
+        }
+        port.tell("cpu", "unknown");
+        if !std::mem::replace(&mut self.bus.told_unknown, true) {
+            log::warn!(
+                "the CPU at {} does not say whether it is in RUN (system status list 0x0424), so its values count as \
+                 fresh in STOP, too; name a signal that has to change: alive = {{ signal = \"...\", within = \
+                 \"500ms\" }}",
+                self.peer
+            );
+        }
+    }
+
+    /// A cycle is due.
+    fn cycle(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        if self.dialog.asks_state() {
+            self.is_due = true;
+            return Ok(());
+        }
+        if !self.dialog.is_idle() {
+            port.count("s7.skipped");
+            return Ok(());
+        }
+        if !port.sends(now) {
+            return Ok(());
+        }
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            if station.resume.is_some_and(|resume| resume <= now) {
+                station.resume = None;
+                self.dialog.suspend(index, false);
+            }
+            if self.bus.guard.may_write() && station.has[0] && station.resume.is_none() {
+                let frame = port.outgoing(index, now);
+                self.dialog.frame_to_write(index).copy_from_slice(frame);
+            }
+        }
+        match self.dialog.begin(now) {
+            Some(News::Done) => self.done(now, port),
+            _ => Ok(()),
+        }
+    }
+
+    /// A cycle is complete.
+    fn done(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let may_write = self.bus.guard.may_write();
+        // In a cycle in which nothing was read and nothing written, the CPU has not been heard of.
+        let is_heard = self.stations.iter().any(|station| {
+            let [is_written, is_read] = station.has;
+            station.resume.is_none() && (is_read || is_written && may_write)
+        });
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            if station.resume.is_some() {
+                continue;
+            }
+            if let Some(refusal) = self.dialog.refusal(index) {
+                port.count("s7.refused");
+                station.resume = Some(now + RETRY);
+                station.refusal = Some(refusal.clone());
+                continue;
+            }
+            let [is_written, is_read] = station.has;
+            if is_read {
+                port.received(index, now, self.dialog.frame_read(index));
+            } else if is_heard {
+                port.touch(index, now);
+            }
+            if is_written && may_write {
+                port.sent(index);
+            }
+            station.refusal = None;
+            // It may have been told by an earlier connection.
+            let told = &mut self.bus.told_refusals[index];
+            if !told.is_empty() {
+                told.clear();
+                port.tell("refused", &refusals(&self.bus.told_refusals));
+            }
+        }
+        self.put_off(port)
+    }
+
+    /// Leaves the stations out for a while of which the CPU refused something.
+    ///
+    /// # Errors
+    ///
+    /// It refused something of every station.
+    fn put_off(&mut self, port: &Port) -> Result<(), BusError> {
+        let is_used = |station: &&Station| station.has != [false, false];
+        let is_served = |station: &Station| station.resume.is_none();
+        let is_any_served = self.stations.iter().filter(is_used).any(is_served);
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            let (Some(_), Some(refusal)) = (station.resume, &station.refusal) else {
+                continue;
+            };
+            if !is_any_served {
+                return Err(refusal.clone().into_error(self.peer));
+            }
+            self.dialog.suspend(index, true);
+            let name = &self.bus.names[index];
+            let text = format!("station \"{name}\": {} {refusal}", self.peer);
+            let told = &mut self.bus.told_refusals[index];
+            if *told != text {
+                if let Some(times) = self.bus.rarely.count(("s7", "refused")) {
+                    log::warn!("{text}; it is stale, and is tried again every {RETRY}{times}");
+                }
+                *told = text;
+                port.tell("refused", &refusals(&self.bus.told_refusals));
+            }
+        }
+        Ok(())
+    }
+
+    fn write(&mut self) -> Result<(), BusError> {
+        loop {
+            let rest = self.dialog.to_write();
+            if rest.is_empty() {
+                return Ok(());
+            }
+            match self.stream.write(rest) {
+                Ok(count) => self.dialog.wrote(count),
+                Err(error) if is_for_later(&error) => return Ok(()),
+                Err(error) => return Err(self.broke(&error)),
+            }
+        }
+    }
+
+    fn left(&self) -> BusError {
+        let peer = self.peer;
+        BusError::Left(format!(
+            "{peer} closed the connection; if it did so at once, check \"rack\" and \"slot\", and whether all its \
+             connections are taken"
+        ))
+    }
+
+    fn broke(&self, error: &std::io::Error) -> BusError {
+        let peer = self.peer;
+        BusError::Link(format!(
+            "the connection with {peer} broke ({error}); see whether the CPU still runs"
+        ))
+    }
+}
+
+/// What the statistics say of what the CPU refuses.
+fn refusals(told: &[String]) -> String {
+    let told = told.iter().map(String::as_str);
+    let told: Vec<&str> = told.filter(|text| !text.is_empty()).collect();
+    if told.is_empty() {
+        "nothing".to_owned()
+    } else {
+        told.join("; ")
+    }
+}
+
+impl Drop for Connection<'_> {
+    fn drop(&mut self) {
+        bow_out(&self.stream);
+    }
+}

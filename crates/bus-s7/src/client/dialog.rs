@@ -1,0 +1,453 @@
+//! A client's side of one connection, without I/O: time and bytes are handed in, bytes and the next deadline come
+//! out.
+
+use super::plan::{Job, Way};
+use super::traffic::{Traffic, function_of, write_data};
+use super::{End, Frames, News, Refusal, Terms};
+use crate::Fault;
+use crate::item::{self, Code, Data};
+use crate::pdu::{Draft, Kind, LONGEST, Pdu, SHORTEST, error, function};
+use crate::szl::{self, Identity};
+use crate::transport::{self, Connect, Tpdu};
+use tickbus_base::time::Nanos;
+
+/// This client's reference of every connection: there is one connection per socket.
+const REFERENCE: u16 = 1;
+
+/// The transport size that is asked for: 1024 bytes, which hold the longest unit.
+const TPDU: u8 = 10;
+
+/// The longest list that is fetched; an identity is shorter by far.
+const LIST_LIMIT: usize = 16_384;
+
+/// The lists that tell who a CPU is, and the one that tells whether it runs.
+const LISTS: [u16; 3] = [0x0011, 0x001C, szl::STATE];
+
+/// Where the last of them stands.
+const STATE: usize = 2;
+
+/// One connection with a CPU.
+///
+/// The owner of the socket hands what it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write) and says
+/// how much the system took by [`wrote`](Self::wrote), and asks [`check`](Self::check) whether the connection may go
+/// on. Once [`News::Met`] was heard, it begins a cycle by [`begin`](Self::begin), or asks whether the CPU runs by
+/// [`ask_state`](Self::ask_state), whenever the dialog [is idle](Self::is_idle); [`News::Done`] ends the cycle,
+/// [`News::State`] the question.
+#[derive(Debug)]
+pub struct Dialog {
+    terms: Terms,
+    phase: Phase,
+    /// Bytes that have come and are no whole packet yet.
+    inbox: Vec<u8>,
+    /// The pieces of a message whose last one has not come.
+    pieces: Vec<u8>,
+    outbox: Vec<u8>,
+    pdu: u16,
+    /// Power of two of the longest TPDU.
+    size: u8,
+    reference: u16,
+    /// Since when an answer is awaited.
+    asked: Option<Nanos>,
+    identity: Identity,
+    /// What has come of the list that is being fetched.
+    list: Vec<u8>,
+    traffic: Traffic,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// A transport connection is asked for.
+    Connecting,
+    /// The length of units is to be agreed.
+    Agreeing,
+    /// The CPU is asked for the list with this index.
+    Asking(usize),
+    /// There is nothing to do.
+    Idle,
+    /// The job with this index is under way.
+    Working(usize),
+}
+
+impl Dialog {
+    /// A dialog that begins at `now` and carries these frames.
+    pub(super) fn new(terms: Terms, now: Nanos, frames: Frames) -> Self {
+        let mut dialog = Self {
+            phase: Phase::Connecting,
+            inbox: Vec::new(),
+            pieces: Vec::new(),
+            outbox: Vec::new(),
+            pdu: LONGEST,
+            size: TPDU,
+            reference: 0,
+            asked: Some(now),
+            identity: Identity::default(),
+            list: Vec::new(),
+            traffic: Traffic::new(frames),
+            terms,
+        };
+        let connect = Connect {
+            source: REFERENCE,
+            destination: 0,
+            size: Some(TPDU),
+            calling: dialog.terms.calling.as_bytes(),
+            called: dialog.terms.called.as_bytes(),
+        };
+        transport::write_request(&connect, &mut dialog.outbox);
+        dialog
+    }
+
+    /// Lets frames be written from now on, or not. The dialog has to be idle.
+    pub fn allow(&mut self, may_write: bool) {
+        self.traffic.may_write = may_write;
+        self.traffic.plan(usize::from(self.pdu));
+    }
+
+    /// Leaves a station out of the cycles, or takes it in again. The dialog has to be idle.
+    pub fn suspend(&mut self, station: usize, is_out: bool) {
+        if std::mem::replace(&mut self.traffic.suspended[station], is_out) != is_out {
+            self.traffic.plan(usize::from(self.pdu));
+        }
+    }
+
+    /// Whether the CPU is being asked who it is.
+    pub fn asks_who(&self) -> bool {
+        matches!(self.phase, Phase::Asking(list) if list < STATE)
+    }
+
+    /// Whether the CPU is being asked if it runs.
+    pub fn asks_state(&self) -> bool {
+        self.phase == Phase::Asking(STATE)
+    }
+
+    /// Whether a cycle may begin.
+    pub fn is_idle(&self) -> bool {
+        self.phase == Phase::Idle
+    }
+
+    /// Where the frame of a station goes that the next cycle writes.
+    pub fn frame_to_write(&mut self, station: usize) -> &mut [u8] {
+        &mut self.traffic.out[station]
+    }
+
+    /// The frame of a station that the last cycle read: the bits of its signals.
+    pub fn frame_read(&self, station: usize) -> &[u8] {
+        &self.traffic.into[station]
+    }
+
+    /// What the CPU refused to a station in the last cycle: all else of it was done.
+    pub fn refusal(&self, station: usize) -> Option<&Refusal> {
+        self.traffic.refused[station].as_ref()
+    }
+
+    /// Begins a cycle at `now`; news when there is nothing to be done in one.
+    ///
+    /// # Panics
+    ///
+    /// When the dialog is not idle.
+    pub fn begin(&mut self, now: Nanos) -> Option<News> {
+        assert!(self.is_idle(), "one cycle at a time");
+        self.traffic.refused.fill(None);
+        self.work(now, 0)
+    }
+
+    /// Asks at `now` whether the CPU runs.
+    ///
+    /// # Panics
+    ///
+    /// When the dialog is not idle.
+    pub fn ask_state(&mut self, now: Nanos) {
+        assert!(self.is_idle(), "one question at a time");
+        self.ask_list(now, STATE);
+    }
+
+    /// What is to be written; empty when there is nothing to send.
+    pub fn to_write(&self) -> &[u8] {
+        &self.outbox
+    }
+
+    /// The system took so many bytes of [`to_write`](Self::to_write).
+    pub fn wrote(&mut self, count: usize) {
+        self.outbox.drain(..count);
+    }
+
+    /// When an answer has taken too long.
+    pub fn deadline(&self) -> Nanos {
+        self.asked
+            .map_or(Nanos::MAX, |asked| asked + self.terms.patience + Nanos(1))
+    }
+
+    /// Whether the connection may go on at `now`.
+    ///
+    /// # Errors
+    ///
+    /// An answer has taken too long.
+    pub fn check(&self, now: Nanos) -> Result<(), End> {
+        match self.asked {
+            Some(asked) if now - asked > self.terms.patience => {
+                Err(End::Silent(self.terms.patience))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes in what has come, up to the next news; more of it may be waiting, so this is to be called with no bytes
+    /// until it gives none.
+    ///
+    /// # Errors
+    ///
+    /// Why the connection ends.
+    pub fn hear(&mut self, now: Nanos, bytes: &[u8]) -> Result<Option<News>, End> {
+        let mut inbox = std::mem::take(&mut self.inbox);
+        inbox.extend_from_slice(bytes);
+        let mut taken = 0;
+        let mut news = Ok(None);
+        while let Ok(None) = news {
+            match transport::read(&inbox[taken..]) {
+                Ok(None) => break,
+                Ok(Some((length, tpdu))) => {
+                    taken += length;
+                    news = self.packet(now, tpdu);
+                }
+                Err(fault) => news = Err(fault.into()),
+            }
+        }
+        inbox.drain(..taken);
+        self.inbox = inbox;
+        news
+    }
+
+    fn packet(&mut self, now: Nanos, tpdu: Tpdu<'_>) -> Result<Option<News>, End> {
+        match (tpdu, self.phase) {
+            (Tpdu::ConnectConfirm(confirm), Phase::Connecting) => {
+                self.size = confirm.size.unwrap_or(TPDU).min(TPDU);
+                self.agree(now);
+                Ok(None)
+            }
+            (Tpdu::Disconnect(reason), Phase::Connecting) => {
+                Err(End::Refused(Refusal::Connection(reason)))
+            }
+            (Tpdu::Disconnect(reason), _) => Err(Fault::Disconnected(reason).into()),
+            (Tpdu::Error(cause), _) => Err(Fault::Rejected(cause).into()),
+            (Tpdu::Data { .. }, Phase::Connecting) => Err(Fault::NotConnected.into()),
+            (Tpdu::Data { last, bytes }, _) => self.piece(now, last, bytes),
+            (Tpdu::ConnectRequest(_) | Tpdu::ConnectConfirm(_), _) => {
+                Err(Fault::ConnectedTwice.into())
+            }
+        }
+    }
+
+    fn piece(&mut self, now: Nanos, last: bool, bytes: &[u8]) -> Result<Option<News>, End> {
+        if self.pieces.len() + bytes.len() > usize::from(self.pdu) || (bytes.is_empty() && !last) {
+            return Err(Fault::Pieces(self.pdu).into());
+        }
+        if last && self.pieces.is_empty() {
+            // An empty message is a sign of life.
+            return if bytes.is_empty() {
+                Ok(None)
+            } else {
+                self.message(now, bytes)
+            };
+        }
+        self.pieces.extend_from_slice(bytes);
+        if !last {
+            return Ok(None);
+        }
+        let whole = std::mem::take(&mut self.pieces);
+        let news = self.message(now, &whole);
+        self.pieces = whole;
+        self.pieces.clear();
+        news
+    }
+
+    fn message(&mut self, now: Nanos, message: &[u8]) -> Result<Option<News>, End> {
+        let answer = Pdu::read(message)?;
+        if answer.kind == Kind::Job {
+            return Err(Fault::Asks.into());
+        }
+        if self.asked.is_none() || answer.reference != self.reference {
+            return Err(Fault::NotAsked.into());
+        }
+        self.asked = None;
+        match self.phase {
+            Phase::Agreeing => self.agreed(now, &answer),
+            Phase::Asking(index) => self.told(now, index, &answer),
+            Phase::Working(job) => self.done(now, job, &answer),
+            Phase::Connecting | Phase::Idle => Err(Fault::NotAsked.into()),
+        }
+    }
+
+    /// Appends a unit of `kind` that `fill` makes, and awaits its answer.
+    fn ask(&mut self, now: Nanos, kind: Kind, fill: impl FnOnce(&mut Draft, &mut Vec<u8>)) {
+        self.reference = self.reference.wrapping_add(1);
+        self.asked = Some(now);
+        let out = &mut self.outbox;
+        let begin = transport::begin_data(out);
+        let mut draft = Draft::begin(kind, self.reference, error::NONE, out);
+        fill(&mut draft, out);
+        draft.end(out);
+        transport::end_data(begin, self.size, out);
+    }
+
+    fn agree(&mut self, now: Nanos) {
+        self.phase = Phase::Agreeing;
+        let [high, low] = self.terms.pdu.to_be_bytes();
+        self.ask(now, Kind::Job, |_, out| {
+            out.extend_from_slice(&[function::SETUP, 0, 0, 1, 0, 1, high, low]);
+        });
+    }
+
+    fn agreed(&mut self, now: Nanos, answer: &Pdu<'_>) -> Result<Option<News>, End> {
+        whole(answer)?;
+        let [function::SETUP, _, _, _, _, _, high, low] = *answer.parameters else {
+            return Err(Fault::Answer("no agreement on the length of units").into());
+        };
+        let length = u16::from_be_bytes([high, low]);
+        if !(SHORTEST..=LONGEST).contains(&length) {
+            return Err(Fault::Agreed(length).into());
+        }
+        self.pdu = length;
+        if self.terms.asks_who {
+            self.ask_list(now, 0);
+            return Ok(None);
+        }
+        Ok(Some(self.meet(None)))
+    }
+
+    fn meet(&mut self, identity: Option<Identity>) -> News {
+        self.phase = Phase::Idle;
+        self.allow(false);
+        News::Met(self.pdu, identity)
+    }
+
+    /// Asks for the list with this index.
+    fn ask_list(&mut self, now: Nanos, index: usize) {
+        self.phase = Phase::Asking(index);
+        self.list.clear();
+        let [high, low] = LISTS[index].to_be_bytes();
+        self.ask(now, Kind::UserData, |draft, out| {
+            out.extend_from_slice(&[0, 1, 0x12, 4, 0x11, 0x44, 1, 0]);
+            draft.data(out);
+            out.extend_from_slice(&[0xFF, 9, 0, 4, high, low, 0, 0]);
+        });
+    }
+
+    /// A piece of a list has come, or none.
+    fn told(&mut self, now: Nanos, index: usize, answer: &Pdu<'_>) -> Result<Option<News>, End> {
+        const WRONG: Fault = Fault::Answer("no system status list");
+        // A peer that knows no such questions answers as if they were jobs.
+        let mut more = None;
+        if answer.kind == Kind::UserData {
+            let [_, _, 0x12, 8, _, 0x84, 1, sequence, _, last, e0, e1] = *answer.parameters else {
+                return Err(WRONG.into());
+            };
+            let datum = Data::new(1, answer.data).and_then(|mut data| data.next());
+            match datum {
+                Some(datum) if datum.code == Code::OK && [e0, e1] == [0, 0] => {
+                    if datum.bytes.is_empty() && last != 0 {
+                        return Err(WRONG.into());
+                    }
+                    self.list.extend_from_slice(datum.bytes);
+                    more = (last != 0).then_some(sequence);
+                }
+                // It has no such list.
+                _ => self.list.clear(),
+            }
+        }
+        if self.list.len() > LIST_LIMIT {
+            return Err(Fault::Answer("a system status list without end").into());
+        }
+        if let Some(sequence) = more {
+            self.ask(now, Kind::UserData, |draft, out| {
+                out.extend_from_slice(&[0, 1, 0x12, 8, 0x12, 0x44, 1, sequence, 0, 0, 0, 0]);
+                draft.data(out);
+                item::write_refusal(Code::MISSING, out);
+            });
+            return Ok(None);
+        }
+        if index == STATE {
+            self.phase = Phase::Idle;
+            return Ok(Some(News::State(szl::state(&self.list))));
+        }
+        szl::learn(&mut self.identity, &self.list);
+        if index + 1 < STATE {
+            self.ask_list(now, index + 1);
+            return Ok(None);
+        }
+        let identity = std::mem::take(&mut self.identity);
+        Ok(Some(self.meet(Some(identity))))
+    }
+
+    /// Asks for the job with this index to be done; news when there is none.
+    fn work(&mut self, now: Nanos, index: usize) -> Option<News> {
+        if index == self.traffic.jobs.len() {
+            self.phase = Phase::Idle;
+            return Some(News::Done);
+        }
+        self.phase = Phase::Working(index);
+        let jobs = std::mem::take(&mut self.traffic.jobs);
+        let frames = std::mem::take(&mut self.traffic.out);
+        let Job { way, pieces } = &jobs[index];
+        let [code, count] = function_of(*way, pieces);
+        self.ask(now, Kind::Job, |draft, out| {
+            out.extend_from_slice(&[code, count]);
+            for piece in pieces {
+                piece.item.write(out);
+            }
+            draft.data(out);
+            if *way == Way::Write {
+                write_data(pieces, &frames, out);
+            }
+        });
+        self.traffic.jobs = jobs;
+        self.traffic.out = frames;
+        None
+    }
+
+    /// A job was done.
+    fn done(&mut self, now: Nanos, index: usize, answer: &Pdu<'_>) -> Result<Option<News>, End> {
+        whole(answer)?;
+        let Job { way, pieces } = &self.traffic.jobs[index];
+        let asked = function_of(*way, pieces);
+        if answer.parameters != asked {
+            return Err(Fault::Answer("another function, or another number of items").into());
+        }
+        match way {
+            Way::Write => {
+                if answer.data.len() != pieces.len() {
+                    return Err(Fault::Answer("another number of codes").into());
+                }
+                for (piece, code) in answer.data.iter().enumerate() {
+                    self.traffic.judge(index, piece, Code(*code));
+                }
+            }
+            Way::Read => {
+                let data = Data::new(asked[1], answer.data);
+                let data = data.ok_or(Fault::Answer("data that do not add up"))?;
+                for (piece, datum) in data.enumerate() {
+                    if !self.traffic.judge(index, piece, datum.code) {
+                        continue;
+                    }
+                    let Traffic { jobs, into, .. } = &mut self.traffic;
+                    let piece = &jobs[index].pieces[piece];
+                    if datum.bytes.len() != piece.item.range().len() {
+                        return Err(Fault::Answer("another number of bytes").into());
+                    }
+                    piece.scatter(datum.bytes, &mut into[piece.station]);
+                }
+            }
+        }
+        Ok(self.work(now, index + 1))
+    }
+}
+
+/// An answer to a job that was done as a whole.
+fn whole(answer: &Pdu<'_>) -> Result<(), End> {
+    match (answer.kind, answer.error) {
+        (Kind::Ack | Kind::AckData, error::NONE) => Ok(()),
+        (Kind::Ack | Kind::AckData, code) => Err(End::Refused(Refusal::Job(code))),
+        _ => Err(Fault::Answer("a system function").into()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,90 @@
+//! The frames of all stations, and the jobs that carry them.
+
+use super::plan::{self, Field, Job, Piece, Way};
+use super::{Frames, Refusal};
+use crate::item::{self, Code};
+use crate::pdu::function;
+
+/// The frames of all stations, and the jobs that carry them.
+#[derive(Debug)]
+pub(super) struct Traffic {
+    fields: Frames,
+    pub(super) jobs: Vec<Job>,
+    /// The frames of this cycle, by station: those to be written, and those read.
+    pub(super) out: Vec<Box<[u8]>>,
+    pub(super) into: Vec<Box<[u8]>>,
+    /// What the CPU refused in this cycle, by station.
+    pub(super) refused: Vec<Option<Refusal>>,
+    /// Stations that the cycles leave out.
+    pub(super) suspended: Vec<bool>,
+    pub(super) may_write: bool,
+}
+
+impl Traffic {
+    pub(super) fn new(fields: Frames) -> Self {
+        let frames = |side: usize| {
+            let lengths = fields.lengths.iter();
+            lengths.map(|length| vec![0; length[side]].into()).collect()
+        };
+        let stations = fields.lengths.len();
+        Self {
+            out: frames(0),
+            into: frames(1),
+            refused: vec![None; stations],
+            suspended: vec![false; stations],
+            jobs: Vec::new(),
+            may_write: false,
+            fields,
+        }
+    }
+
+    /// Divides what is to be carried into jobs with units of at most `limit` bytes.
+    pub(super) fn plan(&mut self, limit: usize) {
+        let active = |fields: &[Field]| -> Vec<Field> {
+            let fields = fields.iter();
+            let fields = fields.filter(|field| !self.suspended[field.station]);
+            fields.copied().collect()
+        };
+        let mut jobs = Vec::new();
+        if self.may_write {
+            jobs = plan::jobs(Way::Write, &active(&self.fields.written), limit);
+        }
+        jobs.extend(plan::jobs(Way::Read, &active(&self.fields.read), limit));
+        self.jobs = jobs;
+    }
+
+    /// Takes down that the CPU refused a piece, unless it did not.
+    pub(super) fn judge(&mut self, job: usize, piece: usize, code: Code) -> bool {
+        let Job { way, pieces } = &self.jobs[job];
+        let piece = &pieces[piece];
+        if code != Code::OK {
+            let refusal = Refusal::item(*way, piece.item, code);
+            self.refused[piece.station].get_or_insert(refusal);
+        }
+        code == Code::OK
+    }
+}
+
+/// The function of a job, and the number of its items.
+pub(super) fn function_of(way: Way, pieces: &[Piece]) -> [u8; 2] {
+    let code = match way {
+        Way::Write => function::WRITE,
+        Way::Read => function::READ,
+    };
+    [code, u8::try_from(pieces.len()).expect("20 at most")]
+}
+
+/// Appends the data of these items, from the frames.
+pub(super) fn write_data(pieces: &[Piece], frames: &[Box<[u8]>], out: &mut Vec<u8>) {
+    let begin = out.len();
+    for piece in pieces {
+        if (out.len() - begin) % 2 == 1 {
+            out.push(0);
+        }
+        let length = piece.item.range().len();
+        item::write_header(Code(0), piece.item.element, length, out);
+        let data = out.len();
+        out.resize(data + length, 0);
+        piece.gather(&frames[piece.station], &mut out[data..]);
+    }
+}

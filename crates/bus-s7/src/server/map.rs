@@ -1,0 +1,111 @@
+//! From the objects of a CPU to the frames of stations.
+
+use tickbus_image::signal::{Area, SignalTable};
+
+use super::ServerOptions;
+use crate::Tsap;
+use crate::item::{Code, Object};
+
+/// A piece of a station's area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) station: usize,
+    pub(super) area: Area,
+    pub(super) offset: usize,
+    pub(super) length: usize,
+}
+
+/// Where the objects of a server lie.
+#[derive(Debug)]
+pub(super) struct Map {
+    /// The data blocks in order of their numbers, and their lengths for those who ask.
+    blocks: Vec<(u16, Place)>,
+    lengths: Vec<(u16, usize)>,
+    stations: Vec<Cpu>,
+}
+
+/// A station as a CPU in a rack.
+#[derive(Debug)]
+struct Cpu {
+    inputs: usize,
+    outputs: usize,
+    /// Rack and slot that it is in.
+    slot: Option<(u8, u8)>,
+}
+
+impl Map {
+    /// The map that `options` describe, which [fit](ServerOptions::fit) the table.
+    pub(super) fn new(options: &ServerOptions, table: &SignalTable) -> Self {
+        let stations = table
+            .stations
+            .iter()
+            .enumerate()
+            .map(|(index, station)| Cpu {
+                inputs: station.input_bytes,
+                outputs: station.output_bytes,
+                slot: options.slots.get(index).copied().flatten(),
+            });
+        let blocks = options.blocks.iter().filter_map(|block| {
+            let station = block.station_in(table)?;
+            let size = table.stations[station].bytes(block.area);
+            let place = Place {
+                station,
+                area: block.area,
+                offset: block.offset,
+                length: block.length.unwrap_or(size.saturating_sub(block.offset)),
+            };
+            Some((block.number, place))
+        });
+        let mut blocks: Vec<_> = blocks.collect();
+        blocks.sort_by_key(|(number, _)| *number);
+        let lengths = blocks.iter().map(|(number, place)| (*number, place.length));
+        Self {
+            lengths: lengths.collect(),
+            blocks,
+            stations: stations.collect(),
+        }
+    }
+
+    /// The station whose inputs and outputs a client means that asked for this end.
+    pub(super) fn station_of(&self, called: Tsap) -> Option<usize> {
+        if self.stations.len() == 1 {
+            return Some(0);
+        }
+        let slot = called.slot()?;
+        self.stations
+            .iter()
+            .position(|station| station.slot == Some(slot))
+    }
+
+    /// Where an object lies, for a client that means `station`.
+    pub(super) fn place(&self, object: Object, station: Option<usize>) -> Result<Place, Code> {
+        let area = match object {
+            Object::Inputs => Area::Input,
+            Object::Outputs => Area::Output,
+            Object::Flags => return Err(Code::MISSING),
+            Object::Block(number) => {
+                let found = self.blocks.binary_search_by_key(&number, |block| block.0);
+                return found
+                    .map(|index| self.blocks[index].1)
+                    .map_err(|_| Code::MISSING);
+            }
+        };
+        let station = station.ok_or(Code::MISSING)?;
+        let Cpu {
+            inputs, outputs, ..
+        } = self.stations[station];
+        Ok(Place {
+            station,
+            area,
+            offset: 0,
+            length: match area {
+                Area::Input => inputs,
+                Area::Output => outputs,
+            },
+        })
+    }
+
+    pub(super) fn blocks(&self) -> &[(u16, usize)] {
+        &self.lengths
+    }
+}

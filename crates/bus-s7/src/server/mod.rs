@@ -1,0 +1,325 @@
+//! The bus of kind `s7-server`: this end is a CPU, whose memory clients read and write.
+
+mod map;
+mod options;
+
+use std::ops::Range;
+
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::tcp::{self, Address, Limits};
+use tickbus_fieldbus::{BusError, Free, Port, Role};
+use tickbus_image::signal::{SignalTable, fail_safe_frame};
+
+use super::item::{Code, Object};
+use super::szl::{Facts, Identity};
+use super::{Conversation, Fault, Memory, transport};
+
+use map::{Map, Place};
+pub use options::{Block, ServerOptions};
+
+/// How long a client may take for a packet that it has begun, or to read an answer.
+const PATIENCE: Nanos = Nanos::from_secs(5);
+
+/// The bus of kind `s7-server`.
+#[derive(Debug)]
+pub struct S7Server {
+    address: Address,
+    service: Service,
+}
+
+impl S7Server {
+    /// The bus that `options` describe, for the end with `role` of the driver called `name`.
+    pub fn new(options: &ServerOptions, table: &SignalTable, role: Role, name: &str) -> Self {
+        let (sends, receives) = role.areas();
+        let stations = (0..table.stations.len()).map(|station| Station {
+            written: fail_safe_frame(table, station, receives),
+            outgoing: fail_safe_frame(table, station, sends),
+            taken: false,
+            changed: Vec::new(),
+            addressed: false,
+            has_writer: false,
+        });
+        let facts = Facts {
+            identity: Identity::of_driver(name),
+            pdu: options.pdu,
+            clients: u16::try_from(options.clients).unwrap_or(u16::MAX),
+            epoch: Facts::NEVER_SET,
+        };
+        Self {
+            address: options.address.clone(),
+            service: Service {
+                facts,
+                clients: options.clients,
+                memory: Shared {
+                    map: Map::new(options, table),
+                    role,
+                    stations: stations.collect(),
+                    flags: vec![0; options.flags].into(),
+                    every_write: options.every_write,
+                    batch: None,
+                },
+                welcomed: 0,
+            },
+        }
+    }
+}
+
+impl Free for S7Server {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        if let Some(epoch) = port.clock().epoch() {
+            self.service.facts.epoch = epoch;
+        }
+        tcp::serve(&self.address, &mut self.service, port, stop)
+    }
+}
+
+/// The protocol, over the image.
+#[derive(Debug)]
+struct Service {
+    facts: Facts,
+    clients: usize,
+    memory: Shared,
+    /// How many clients there were.
+    welcomed: u64,
+}
+
+/// What all clients see.
+#[derive(Debug)]
+struct Shared {
+    map: Map,
+    role: Role,
+    stations: Box<[Station]>,
+    flags: Box<[u8]>,
+    /// Whether a write is an event even where it changes nothing.
+    every_write: bool,
+    /// The client and the time of the jobs for which the frames that go out were taken: jobs that come together
+    /// see the same.
+    batch: Option<(u64, Nanos)>,
+}
+
+#[derive(Debug)]
+struct Station {
+    /// What clients have written; at first the fail-safe values.
+    written: Box<[u8]>,
+    /// What they read of the other area, in this batch.
+    outgoing: Box<[u8]>,
+    taken: bool,
+    /// The bits that this job has written.
+    changed: Vec<Range<usize>>,
+    /// Whether this job reads or writes anything here.
+    addressed: bool,
+    /// Whether anybody has ever written.
+    has_writer: bool,
+}
+
+/// One client.
+#[derive(Debug)]
+struct Client {
+    conversation: Conversation,
+    number: u64,
+    /// The stations that it has written to.
+    writes: Box<[bool]>,
+    /// What goes out to it in answers: station and bits.
+    carried: Vec<(usize, Range<usize>)>,
+}
+
+impl tcp::Service for Service {
+    type Client = Client;
+
+    fn limits(&self) -> Limits {
+        Limits {
+            telegram: transport::LONGEST_PACKET,
+            clients: self.clients,
+            patience: PATIENCE,
+        }
+    }
+
+    fn welcome(&mut self, _now: Nanos) -> Client {
+        self.welcomed += 1;
+        Client {
+            conversation: Conversation::default(),
+            number: self.welcomed,
+            writes: vec![false; self.memory.stations.len()].into(),
+            carried: Vec::new(),
+        }
+    }
+
+    fn telegram(
+        &mut self,
+        client: &mut Client,
+        now: Nanos,
+        bytes: &[u8],
+        reply: &mut Vec<u8>,
+        port: &mut Port,
+    ) -> Result<usize, BusError> {
+        self.memory.begin(client, now);
+        let begin = reply.len();
+        let mut jobs = Jobs {
+            station: self.memory.map.station_of(client.conversation.called()),
+            shared: &mut self.memory,
+            writes: &mut client.writes,
+            carried: &mut client.carried,
+            port,
+            now,
+            lost: false,
+        };
+        let taken = client
+            .conversation
+            .packet(now, bytes, &self.facts, &mut jobs, reply)
+            .map_err(Fault::into_error)?;
+        if jobs.lost {
+            reply.truncate(begin);
+        }
+        Ok(taken)
+    }
+
+    fn replied(&mut self, client: &mut Client, port: &mut Port) {
+        for (station, bits) in client.carried.drain(..) {
+            port.sent_bits(station, bits);
+        }
+        self.memory.batch = None;
+    }
+}
+
+impl Shared {
+    /// Jobs of a client that came at `now`.
+    fn begin(&mut self, client: &mut Client, now: Nanos) {
+        let batch = Some((client.number, now));
+        if self.batch != batch {
+            self.batch = batch;
+            self.stations
+                .iter_mut()
+                .for_each(|station| station.taken = false);
+            client.carried.clear();
+        }
+    }
+}
+
+/// The memory as one client's job sees it.
+struct Jobs<'a> {
+    shared: &'a mut Shared,
+    /// Whose inputs and outputs the client means.
+    station: Option<usize>,
+    writes: &'a mut [bool],
+    carried: &'a mut Vec<(usize, Range<usize>)>,
+    port: &'a mut Port,
+    now: Nanos,
+    /// An injected fault swallows the answer.
+    lost: bool,
+}
+
+impl Jobs<'_> {
+    fn place(
+        &mut self,
+        object: Object,
+        range: &Range<usize>,
+    ) -> Result<(Place, Range<usize>), Code> {
+        let place = self.shared.map.place(object, self.station)?;
+        if range.end > place.length {
+            return Err(Code::ADDRESS);
+        }
+        self.shared.stations[place.station].addressed = true;
+        let begin = place.offset + range.start;
+        Ok((place, begin..begin + range.len()))
+    }
+
+    /// The bytes that a job writes; of them, these bits.
+    fn change(
+        &mut self,
+        object: Object,
+        range: Range<usize>,
+        bits: Range<usize>,
+    ) -> Result<&mut [u8], Code> {
+        if object == Object::Flags {
+            return self.shared.flags.get_mut(range).ok_or(Code::ADDRESS);
+        }
+        let (place, range) = self.place(object, &range)?;
+        let (sends, _) = self.shared.role.areas();
+        if place.area == sends {
+            return Err(Code::ACCESS);
+        }
+        let station = &mut self.shared.stations[place.station];
+        let first = range.start * 8;
+        station.changed.push(first + bits.start..first + bits.end);
+        Ok(&mut station.written[range])
+    }
+
+    /// The bytes that a job reads; of them, these bits go out.
+    fn look(
+        &mut self,
+        object: Object,
+        range: Range<usize>,
+        bits: Range<usize>,
+    ) -> Result<&[u8], Code> {
+        if object == Object::Flags {
+            return self.shared.flags.get(range).ok_or(Code::ADDRESS);
+        }
+        let (place, range) = self.place(object, &range)?;
+        let (sends, _) = self.shared.role.areas();
+        let station = &mut self.shared.stations[place.station];
+        if place.area != sends {
+            return Ok(&station.written[range]);
+        }
+        if !station.taken {
+            station.taken = true;
+            let only = place.station..place.station + 1;
+            self.lost |= !self.port.sends_of(only, self.now);
+            let frame = self.port.outgoing(place.station, self.now);
+            station.outgoing.copy_from_slice(frame);
+        }
+        let first = range.start * 8;
+        let carried = first + bits.start..first + bits.end;
+        self.carried.push((place.station, carried));
+        Ok(&station.outgoing[range])
+    }
+}
+
+impl Memory for Jobs<'_> {
+    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+        let bits = 0..range.len() * 8;
+        self.look(object, range, bits)
+    }
+
+    fn read_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<u8, Code> {
+        let bit = usize::from(bit);
+        let bytes = self.look(object, byte..byte + 1, bit..bit + 1)?;
+        Ok(bytes[0])
+    }
+
+    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], Code> {
+        let bits = 0..range.len() * 8;
+        self.change(object, range, bits)
+    }
+
+    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, Code> {
+        let bit = usize::from(bit);
+        let bytes = self.change(object, byte..byte + 1, bit..bit + 1)?;
+        Ok(&mut bytes[0])
+    }
+
+    fn done(&mut self) {
+        let alone = self.shared.stations.len() == 1;
+        for (index, station) in self.shared.stations.iter_mut().enumerate() {
+            let addressed = std::mem::take(&mut station.addressed);
+            if !station.changed.is_empty() {
+                station.has_writer = true;
+                self.writes[index] = true;
+                let written = station.changed.drain(..);
+                if self.shared.every_write {
+                    self.port
+                        .received_parts(index, self.now, &station.written, written);
+                } else {
+                    drop(written);
+                    self.port.received(index, self.now, &station.written);
+                }
+            } else if (addressed || alone) && (self.writes[index] || !station.has_writer) {
+                // Whoever only looks does not make the values of another one younger.
+                self.port.touch(index, self.now);
+            }
+        }
+    }
+
+    fn blocks(&self) -> &[(u16, usize)] {
+        self.shared.map.blocks()
+    }
+}

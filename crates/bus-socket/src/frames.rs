@@ -1,0 +1,128 @@
+//! How the frames of a connection's stations become records, and records frames.
+
+use std::ops::Range;
+
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::{DeadBands, Port, Role};
+use tickbus_image::signal::SignalTable;
+
+use super::parts::{Messages, Parts};
+
+/// The frames of the stations that one connection serves.
+#[derive(Debug)]
+pub(super) struct Frames {
+    stations: Range<usize>,
+    /// Sizes of the frames that go out, and how each of them is compared.
+    sent: Box<[(usize, DeadBands)]>,
+    /// Where a message has one axis and not the whole image.
+    messages: Option<Messages>,
+}
+
+impl Frames {
+    /// Whole images of `stations`, one behind the other.
+    pub(super) fn new(table: &SignalTable, role: Role, stations: Range<usize>) -> Self {
+        let (area, _) = role.areas();
+        let sent = stations.clone().map(|index| {
+            let bands = DeadBands::new(table, index, area);
+            (table.stations[index].bytes(area), bands)
+        });
+        Self {
+            sent: sent.collect(),
+            stations,
+            messages: None,
+        }
+    }
+
+    /// The parts of the one station, each in a message of its own: what goes out, and what comes in.
+    pub(super) fn in_parts(self, sent: Parts, received: Parts) -> Self {
+        Self {
+            messages: Some(Messages::new(sent, received)),
+            ..self
+        }
+    }
+
+    /// The stations.
+    pub(super) fn stations(&self) -> Range<usize> {
+        self.stations.clone()
+    }
+
+    /// Sizes of the records that go out and come in, in bytes.
+    pub(super) fn sizes(&self, port: &Port) -> (usize, usize) {
+        if let Some(messages) = &self.messages {
+            return messages.sizes();
+        }
+        let sizes = self.stations().map(|station| port.sizes(station));
+        sizes.fold((0, 0), |all, one| (all.0 + one.0, all.1 + one.1))
+    }
+
+    /// A connection begins: nothing was sent and nothing was received on it.
+    pub(super) fn begin(&mut self) {
+        if let Some(messages) = &mut self.messages {
+            messages.begin();
+        }
+    }
+
+    /// Hands a record in that came at `now`.
+    ///
+    /// # Errors
+    ///
+    /// The record is about a part that there is not; what is wrong with it.
+    pub(super) fn received(
+        &mut self,
+        now: Nanos,
+        mut record: &[u8],
+        port: &mut Port,
+    ) -> Result<(), String> {
+        if let Some(messages) = &mut self.messages {
+            let frame = messages.received(record)?;
+            port.received(self.stations.start, now, frame);
+            return Ok(());
+        }
+        for station in self.stations() {
+            let (frame, rest) = record.split_at(port.sizes(station).1);
+            port.received(station, now, frame);
+            record = rest;
+        }
+        Ok(())
+    }
+
+    /// Makes the record of `now`.
+    pub(super) fn fill(&mut self, now: Nanos, mut space: &mut [u8], port: &mut Port) {
+        if let Some(messages) = &mut self.messages {
+            messages.fill(port.outgoing(self.stations.start, now), space);
+            return;
+        }
+        for station in self.stations() {
+            let frame = port.outgoing(station, now);
+            let (place, rest) = space.split_at_mut(frame.len());
+            place.copy_from_slice(frame);
+            space = rest;
+        }
+    }
+
+    /// Whether what was filled in last differs enough to be sent from what was sent `before`.
+    pub(super) fn differ(&mut self, mut before: &[u8], mut now: &[u8]) -> bool {
+        if let Some(messages) = &self.messages {
+            return messages.is_news();
+        }
+        for (size, bands) in &mut self.sent {
+            let (frames, rests) = (before.split_at(*size), now.split_at(*size));
+            if bands.differ(frames.0, rests.0) {
+                return true;
+            }
+            (before, now) = (frames.1, rests.1);
+        }
+        false
+    }
+
+    /// The peer has the record, or will.
+    pub(super) fn sent(&mut self, port: &mut Port) {
+        if let Some(messages) = &mut self.messages {
+            for bytes in messages.sent() {
+                port.sent_part(self.stations.start, bytes.clone());
+            }
+            return;
+        }
+        self.stations().for_each(|station| port.sent(station));
+    }
+}

@@ -1,0 +1,139 @@
+//! Records of fixed size over TCP.
+//!
+//! A record is the frames of all stations of one direction, one after another, in the order of the
+//! driver.cfg: nothing before them, nothing behind them. So whoever can open a TCP connection can be
+//! the other end. An end that listens may do so at an address for each station; then a record is the frame of that
+//! station. And one whose image is axes may send them one by one, each in a message with its number.
+//!
+//! [`Session`] is the whole of the protocol, without I/O; the rest carries its bytes.
+
+mod connect;
+mod connection;
+mod fault;
+mod frames;
+mod lines;
+mod listen;
+mod options;
+mod parts;
+mod record;
+mod session;
+
+use tickbus_axis::{Axis, COMMAND_BYTES};
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_image::signal::{Area, SignalTable};
+
+use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
+
+pub use fault::Fault;
+use frames::Frames;
+pub use options::{Message, Options, TcpRole};
+pub use parts::Parts;
+pub use record::{Partial, Records};
+pub use session::{Sending, Session, Terms};
+
+/// The bus of kind `socket`: TCP connections, made by this end or by the other. There is one, or one for each station.
+#[derive(Debug)]
+pub struct Socket {
+    options: Options,
+    cycle: Nanos,
+    /// What goes over each connection, and the name of its station if it has one of its own.
+    lines: Vec<(String, Frames)>,
+}
+
+impl Socket {
+    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if one is
+    /// stated. `axes` are those of the table, in case that each has a message of its own.
+    pub fn new(
+        options: &Options,
+        table: &SignalTable,
+        role: Role,
+        cycle: Option<Nanos>,
+        axes: &[Axis],
+    ) -> Self {
+        let stations = table.stations.len();
+        let lines = if options.stations.is_empty() {
+            let frames = Frames::new(table, role, 0..stations);
+            let frames = match options.message {
+                Message::Image => frames,
+                Message::Axis { .. } => {
+                    let (tx, rx) = role.areas();
+                    let parts = |area| divide(table, area, axes);
+                    frames.in_parts(parts(tx), parts(rx))
+                }
+            };
+            vec![(String::new(), frames)]
+        } else {
+            let line = |station: usize| {
+                let name = table.stations[station].name.clone();
+                (name, Frames::new(table, role, station..station + 1))
+            };
+            (0..stations).map(line).collect()
+        };
+        Self {
+            options: options.clone(),
+            cycle: cycle.unwrap_or(CYCLE),
+            lines,
+        }
+    }
+
+    fn terms(&self, (sends, receives): (usize, usize), port: &Port) -> Result<Terms, BusError> {
+        if self.options.sending == Sending::Reply && receives == 0 {
+            return Err(BusError::Refused(
+                "send = \"reply\" answers the peer's records, but by its signals this end receives \
+                 none; use send = \"cyclic\" or \"on-change\""
+                    .to_owned(),
+            ));
+        }
+        Ok(Terms {
+            sending: self.options.sending,
+            cycle: self.cycle,
+            min_interval: self.options.min_interval,
+            max_age: port.max_age(),
+            receives,
+            sends,
+        })
+    }
+}
+
+/// Divides an area into its axes.
+fn divide(table: &SignalTable, area: Area, axes: &[Axis]) -> Parts {
+    let structure = |axis: &Axis| match area {
+        Area::Output => axis.command..axis.command + COMMAND_BYTES,
+        Area::Input => axis.feedback..axis.feedback + axis.feedback_bytes,
+    };
+    Parts::new(table.stations[0].bytes(area), axes.iter().map(structure))
+}
+
+impl Free for Socket {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let terms: Result<Vec<Terms>, BusError> = self
+            .lines
+            .iter()
+            .map(|(_, frames)| self.terms(frames.sizes(port), port))
+            .collect();
+        let mut terms = terms?.into_iter();
+        let Options {
+            address, stations, ..
+        } = &self.options;
+        match self.options.tcp {
+            TcpRole::Listen => {
+                let addresses = stations.iter().chain([address]);
+                let places = self.lines.iter_mut().zip(addresses).zip(&mut terms);
+                let places = places.map(|(((name, frames), address), terms)| listen::Place {
+                    address,
+                    name: name.clone(),
+                    terms,
+                    frames,
+                });
+                listen::listen(places.collect(), port, stop)
+            }
+            TcpRole::Connect => {
+                let [(_, frames)] = &mut self.lines[..] else {
+                    unreachable!("only an end that listens has several connections");
+                };
+                let terms = terms.next().expect("one for each line");
+                connect::connect(address, terms, frames, port, stop)
+            }
+        }
+    }
+}

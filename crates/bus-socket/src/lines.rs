@@ -1,0 +1,76 @@
+//! Several connections of one driver: what the driver's one line tells of them.
+
+use std::fmt::Write as _;
+
+use tickbus_fieldbus::{BusError, Port};
+
+/// How each connection is doing, and what the line tells: it runs when all of them do.
+#[derive(Debug)]
+pub(super) struct Lines(Vec<Line>);
+
+#[derive(Debug)]
+struct Line {
+    /// The name of the station; empty where there is one connection.
+    name: String,
+    running: bool,
+    reason: String,
+}
+
+impl Lines {
+    pub(super) fn new(names: impl Iterator<Item = String>) -> Self {
+        let line = |name| Line {
+            name,
+            running: false,
+            reason: String::new(),
+        };
+        Self(names.map(line).collect())
+    }
+
+    /// The name of a station, as the beginning of what is told of it.
+    fn labelled(&self, line: usize, text: &str) -> String {
+        let Line { name, .. } = &self.0[line];
+        if name.is_empty() {
+            text.to_owned()
+        } else {
+            format!("\"{name}\": {text}")
+        }
+    }
+
+    /// All reasons, one behind the other.
+    fn reason(&self) -> String {
+        let mut text = String::new();
+        for (line, Line { reason, .. }) in self.0.iter().enumerate() {
+            if line > 0 {
+                text.push_str("; ");
+            }
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{}", self.labelled(line, reason));
+        }
+        text
+    }
+
+    fn note(&mut self, line: usize, running: bool, reason: &str) {
+        let line = &mut self.0[line];
+        line.running = running;
+        reason.clone_into(&mut line.reason);
+    }
+
+    pub(super) fn opening(&mut self, line: usize, reason: &str, port: &mut Port) {
+        self.note(line, false, reason);
+        port.opening(&self.reason());
+    }
+
+    pub(super) fn lost(&mut self, line: usize, error: &BusError, next: &str, port: &mut Port) {
+        self.note(line, false, next);
+        port.lost(error, &self.reason());
+    }
+
+    pub(super) fn running(&mut self, line: usize, reason: &str, port: &mut Port) {
+        self.note(line, true, reason);
+        if self.0.iter().all(|line| line.running) {
+            port.running(&self.reason());
+        } else {
+            port.opening(&self.reason());
+        }
+    }
+}

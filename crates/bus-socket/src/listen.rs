@@ -1,0 +1,245 @@
+//! The end that waits for connections: one peer at a time for each address that it listens on.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+
+use tickbus_base::os::{Interest, PollSet};
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::tcp::{self, Address, bow_out, is_of_the_client, no_wait, not_accepted};
+use tickbus_fieldbus::{BusError, Port};
+
+use super::connection::Connection;
+use super::lines::Lines;
+use super::{Frames, Terms};
+
+/// For how long nobody is accepted after the system gave no socket.
+const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// What is served at one address.
+#[derive(Debug)]
+pub(super) struct Place<'a> {
+    pub(super) address: &'a Address,
+    /// The name of its station; empty where one address serves all.
+    pub(super) name: String,
+    pub(super) terms: Terms,
+    pub(super) frames: &'a mut Frames,
+}
+
+/// Serves one client after the other at each of the `places` until `stop`. The listeners stay while clients come
+/// and go.
+///
+/// # Errors
+///
+/// An address cannot be listened on, or the system cannot wait.
+pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+    let mut lines = Lines::new(places.iter().map(|place| place.name.clone()));
+    let mut servers = Vec::new();
+    for (line, place) in places.into_iter().enumerate() {
+        let Some((listener, bound)) = tcp::listen(place.address, port, stop)? else {
+            return Ok(());
+        };
+        servers.push(Server {
+            line,
+            listener,
+            bound,
+            waiting: format!("listening on {bound}"),
+            terms: place.terms,
+            frames: place.frames,
+            served: None,
+            watched: None,
+            hears: false,
+            deaf_until: Nanos(i64::MIN),
+        });
+    }
+    let bound: Vec<String> = servers
+        .iter()
+        .map(|server| server.bound.to_string())
+        .collect();
+    port.tell("address", &bound.join(" "));
+    for server in &servers {
+        lines.opening(server.line, &server.waiting, port);
+    }
+    let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+    while !stop.is_stopped() {
+        turn(&mut servers, &mut lines, &mut set, port)?;
+    }
+    Ok(())
+}
+
+/// Waits for all servers, and lets each do what there is to do.
+fn turn(
+    servers: &mut [Server<'_>],
+    lines: &mut Lines,
+    set: &mut PollSet,
+    port: &mut Port,
+) -> Result<(), BusError> {
+    let now = port.clock().now();
+    // Frames that are held back are handed in on time, whether or not somebody is served.
+    let mut deadline = port.due();
+    for server in &mut *servers {
+        server.watch(now, set).map_err(|error| no_wait(&error))?;
+        if let Some(served) = &server.served {
+            deadline = deadline.min(served.deadline());
+        }
+        if server.is_deaf(now) {
+            deadline = deadline.min(server.deaf_until);
+        }
+    }
+    set.wait(&**port.clock(), deadline)
+        .map_err(|error| no_wait(&error))?;
+    for server in servers {
+        let ready = |key| set.ready().iter().find(|ready| ready.key == key);
+        let served = ready(server.key()).map(|ready| (ready.is_readable, ready.is_writable));
+        let knocked = ready(server.key() + 1).is_some();
+        server.serve(served.unwrap_or_default(), knocked, lines, set, port);
+        if knocked {
+            server.accept(lines, set, port);
+        }
+    }
+    port.observe(port.clock().now());
+    Ok(())
+}
+
+struct Server<'a> {
+    /// Its number among the lines.
+    line: usize,
+    listener: TcpListener,
+    bound: SocketAddr,
+    waiting: String,
+    terms: Terms,
+    frames: &'a mut Frames,
+    served: Option<Connection>,
+    /// What the served connection is waited for, once it is; and whether the listener is.
+    watched: Option<Interest>,
+    hears: bool,
+    /// Until when nobody is accepted, after the system could not.
+    deaf_until: Nanos,
+}
+
+impl Server<'_> {
+    /// Its connection in the poll set; the next is its listener.
+    fn key(&self) -> usize {
+        2 * self.line
+    }
+
+    /// Lets `set` wait for what there is to wait for.
+    fn watch(&mut self, now: Nanos, set: &mut PollSet) -> io::Result<()> {
+        let key = self.key();
+        if let Some(served) = &self.served {
+            let interest = Some(served.interest());
+            if self.watched.is_none() {
+                set.add(key, served.stream(), served.interest())?;
+            } else if self.watched != interest {
+                set.change(key, served.stream(), served.interest())?;
+            }
+            self.watched = interest;
+        }
+        let hears = !self.is_deaf(now);
+        if hears != self.hears {
+            if hears {
+                set.add(key + 1, &self.listener, Interest::Read)?;
+            } else {
+                set.remove(key + 1, &self.listener);
+            }
+            self.hears = hears;
+        }
+        Ok(())
+    }
+
+    /// Ends the served connection.
+    fn part(&mut self, set: &mut PollSet) {
+        if let Some(served) = self.served.take()
+            && self.watched.take().is_some()
+        {
+            set.remove(self.key(), served.stream());
+        }
+    }
+
+    fn is_deaf(&self, now: Nanos) -> bool {
+        now < self.deaf_until
+    }
+
+    /// Lets the connection do what there is to do.
+    fn serve(
+        &mut self,
+        ready: (bool, bool),
+        knocked: bool,
+        lines: &mut Lines,
+        set: &mut PollSet,
+        port: &mut Port,
+    ) {
+        let Some(served) = &mut self.served else {
+            return;
+        };
+        let mut turned = served.turn(ready, port, self.frames);
+        if turned.is_ok()
+            && let Some(news) = served.news()
+        {
+            lines.running(self.line, &news, port);
+        }
+        if turned.is_ok() && knocked {
+            // Whoever knocks may be the served one, back again: all of its farewell has to be
+            // read before the newcomer is judged.
+            turned = served.read_all(port, self.frames);
+        }
+        if let Err(error) = turned {
+            self.part(set);
+            lines.lost(self.line, &error, &self.waiting, port);
+        }
+    }
+
+    /// Takes the next client from the queue: serves it, or turns it away.
+    fn accept(&mut self, lines: &mut Lines, set: &mut PollSet, port: &mut Port) {
+        let now = port.clock().now();
+        let (stream, peer) = match self.listener.accept() {
+            Ok(accepted) => accepted,
+            Err(error) if is_of_the_client(&error) => return,
+            Err(error) => {
+                // Peers at other addresses are served on.
+                not_accepted(&error, port);
+                self.deaf_until = now + PAUSE;
+                return;
+            }
+        };
+        if let Some(served) = &self.served {
+            let Some(silence) = served.stale_for(now) else {
+                let served = served.peer();
+                if stream.set_nonblocking(true).is_ok() {
+                    bow_out(&stream);
+                }
+                turn_away(peer, served, port);
+                return;
+            };
+            let error = BusError::Link(format!(
+                "{} has been silent for {}",
+                served.peer(),
+                silence.rounded()
+            ));
+            self.part(set);
+            lines.lost(self.line, &error, &format!("{peer} takes its place"), port);
+        }
+        match Connection::new(stream, peer, self.terms, port) {
+            Ok(connection) => {
+                let reason = format!("{peer} has connected; waiting for its first record");
+                lines.opening(self.line, &reason, port);
+                self.frames.begin();
+                self.served = Some(connection);
+            }
+            // Gone again before it was there.
+            Err(error) => log::debug!("{error}"),
+        }
+    }
+}
+
+/// Tells that `peer`, whose connection is closed, was not served.
+fn turn_away(peer: SocketAddr, served: SocketAddr, port: &Port) {
+    port.count("socket.turned_away");
+    port.log(
+        log::Level::Warn,
+        "turned away",
+        format_args!(
+            "{peer} was turned away, since one client is served at a time, and that is {served}; end \
+             that one first"
+        ),
+    );
+}

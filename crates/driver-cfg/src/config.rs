@@ -1,0 +1,632 @@
+//! The driver.cfg of one driver, read whole.
+
+use std::path::{Path, PathBuf};
+
+use super::layout;
+use super::timing::{Spans, Timing};
+use crate::Options;
+use tickbus_axis as axis;
+use tickbus_axis::Axis;
+use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
+use tickbus_fieldbus::faults::{self, Fault};
+use tickbus_fieldbus::{At, LifeSigns, Role, Written};
+use tickbus_image::signal::{Addressing, SignalTable, Station};
+use tickbus_record as record;
+
+/// The longest name of a driver, in characters.
+const NAME_LIMIT: usize = 120;
+
+/// The longest path of a file, in characters.
+const PATH_LIMIT: usize = 1000;
+
+/// All that a driver.cfg says, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// The file that it came from.
+    pub path: PathBuf,
+    /// The driver's id, unique among the drivers of a folder; positive.
+    pub id: i32,
+    /// The driver's name, for people.
+    pub name: String,
+    /// Which end of the bus it is.
+    pub role: Role,
+    /// What the numbers of the addresses in the file count; those in `table` count bytes.
+    pub addressing: Addressing,
+    /// Its stations and signals.
+    pub table: SignalTable,
+    /// Its axes, whose signals are in `table` with all others.
+    pub axes: Vec<Axis>,
+    /// Cycle times and time-outs.
+    pub timing: Timing,
+    /// What the bus itself needs to know.
+    pub bus: Options,
+    /// Signals by which each end sees that the other one lives.
+    pub life_signs: LifeSigns,
+    /// Faults to inject at this end.
+    pub faults: Vec<Fault>,
+    /// The file that has more of them; [`load`](Self::load) reads it.
+    pub fault_file: Option<PathBuf>,
+    /// What is recorded, if anything is.
+    pub record: Option<record::Options>,
+}
+
+/// What a command line says about the end that its process is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    /// Which end it is. A file that states no role serves both.
+    pub role: Role,
+    /// Whether another address will take the place of the file's; see
+    /// [`Options::set_address`].
+    pub moved: bool,
+}
+
+impl Config {
+    /// The folder that relative paths in the driver.cfg begin at.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Reads the driver.cfg at `path`.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read or is no text, or with every mistake that it has.
+    pub fn load(path: &Path) -> Result<Self, Mistakes> {
+        Self::load_as(path, None)
+    }
+
+    /// Reads the driver.cfg at `path` for a process of its own, with what its command line `asked` for.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`](Self::load); the file states the other role; or its bus never leaves the process.
+    pub fn load_as(path: &Path, asked: Option<Asked>) -> Result<Self, Mistakes> {
+        let text = load_text(path)?;
+        let mut config = Self::parse_at(path, &path.display().to_string(), &text, asked)?;
+        if let Some(file) = config.fault_file.take() {
+            config.add_faults(&file)?;
+        }
+        Ok(config)
+    }
+
+    /// Adds the faults that the file at `path` describes.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be read, or with every mistake that it has.
+    pub fn add_faults(&mut self, path: &Path) -> Result<(), Mistakes> {
+        let text = load_text(path)?;
+        let file = path.display().to_string();
+        let more = faults::read_file(&file, &text, &self.table)?;
+        if self.faults.len() + more.len() > faults::LIMIT {
+            let what = format!("there are {} faults", self.faults.len() + more.len());
+            let right = format!("a driver has at most {}", faults::LIMIT);
+            return Err(Mistakes::of_file(&file, what, right));
+        }
+        self.faults.extend(more);
+        Ok(())
+    }
+
+    /// Reads the text of a driver.cfg; `file_name` is what its mistakes call it.
+    ///
+    /// # Errors
+    ///
+    /// With every mistake in the text.
+    pub fn parse(file_name: &str, text: &str) -> Result<Self, Mistakes> {
+        Self::parse_as(file_name, text, None)
+    }
+
+    /// The same with what a command line `asked` for; see [`load_as`](Self::load_as).
+    ///
+    /// # Errors
+    ///
+    /// With every mistake in the text.
+    pub fn parse_as(file_name: &str, text: &str, asked: Option<Asked>) -> Result<Self, Mistakes> {
+        Self::parse_at(Path::new(file_name), file_name, text, asked)
+    }
+
+    /// The same for a file at `path`, which need not be a text: `shown` is what mistakes call it.
+    fn parse_at(
+        path: &Path,
+        shown: &str,
+        text: &str,
+        asked: Option<Asked>,
+    ) -> Result<Self, Mistakes> {
+        let mut collector = Collector::new(shown, text);
+        let config = read_text(&mut collector, text, |root| read(path, root, asked));
+        match collector.finish() {
+            Some(mistakes) => Err(mistakes),
+            None => Ok(config.expect("what is not read has a mistake")),
+        }
+    }
+}
+
+#[expect(
+    clippy::too_many_lines,
+    reason = "the tables of a file, one after the other"
+)]
+fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config> {
+    let driver = root.require("driver", "write a [driver] table with id and name");
+    let fieldbus = root.require("fieldbus", "write a [fieldbus] table with the kind of bus");
+    let stations = root.take("station");
+    let signals = root.take("signal");
+    let axes = root.take("axis");
+    let faults = root.take("fault");
+    let record = root.take("record");
+
+    let driver = driver
+        .and_then(|value| value.table("[driver]", "write a [driver] table"))
+        .map(read_driver);
+    let addressing = driver
+        .as_ref()
+        .map_or(Addressing::Bytes, |driver| driver.addressing);
+    let mut fieldbus = fieldbus
+        .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
+        .map(|table| read_fieldbus(table, asked));
+    let replayed = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
+    let replayed = replayed.and_then(Options::replayed);
+    let record = record.map(|value| {
+        let table = value.table("[record]", "write a [record] table")?;
+        record::Options::read(table, replayed)
+    });
+    let declared = stations.map(|value| value.tables("[[station]]"));
+    let signals = signals
+        .map(|value| value.tables("[[signal]]"))
+        .unwrap_or_default();
+    let axes = axes
+        .map(|value| value.tables("[[axis]]"))
+        .unwrap_or_default();
+    for (tables, limit, what) in [
+        (&signals, layout::SIGNAL_LIMIT, "signals"),
+        (&axes, layout::AXIS_LIMIT, "axes"),
+    ] {
+        if let Some(table) = tables.get(limit) {
+            table.wrong(
+                format!("there are {} {what}", tables.len()),
+                format!("a driver has at most {limit}"),
+            );
+            root.finish();
+            return None;
+        }
+    }
+    layout::check_twins(&signals, "signal");
+    layout::check_twins(&axes, "axis");
+    let (mut axes, sections) = layout::read_signals(signals, axes, addressing);
+    let sizes = fieldbus
+        .as_ref()
+        .map(|fieldbus| fieldbus.sizes.clone())
+        .unwrap_or_default();
+    let bus = fieldbus.as_mut().and_then(|fieldbus| fieldbus.bus.as_mut());
+    let table = layout::lay_out(sections, declared, sizes, bus);
+    if let Some(fieldbus) = &mut fieldbus
+        && let (Some(at), Some(bus), Some(table)) = (&fieldbus.at, &mut fieldbus.bus, &table)
+    {
+        bus.place_signals(&At::read(at, table), table);
+    }
+    let life_signs = match (&fieldbus, &table) {
+        (Some(fieldbus), Some(table)) => fieldbus.read_life_signs(table),
+        _ => LifeSigns::default(),
+    };
+    let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
+    if let (Some(bus), Some(table)) = (bus, &table) {
+        bus.fit(table, &axes, root.collector());
+    }
+    let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
+    if table
+        .as_ref()
+        .is_some_and(|table| table.stations.iter().all(empty))
+    {
+        root.require_one_of(
+            &["signal"],
+            "write a [[signal]] section with name and address for each signal",
+        );
+    }
+    root.finish();
+    if let Some(table) = &table {
+        axis::resolve(&mut axes, table);
+    }
+    let faults = faults
+        .map(|value| faults::read_sections(value.tables("[[fault]]"), table.as_ref()))
+        .unwrap_or_default();
+
+    let (driver, fieldbus) = (driver?, fieldbus?);
+    // A file that serves both ends has the faults of the machine's end: injected at both, they would
+    // happen twice.
+    let (faults, fault_file) = if fieldbus.is_for_both && fieldbus.role == Role::Controller {
+        (Vec::new(), None)
+    } else {
+        let beside = path.parent().unwrap_or(Path::new(""));
+        (faults, driver.faults.map(|file| beside.join(file)))
+    };
+    Some(Config {
+        path: path.to_owned(),
+        id: driver.id?,
+        name: driver.name?,
+        role: fieldbus.role,
+        addressing,
+        table: table?,
+        axes,
+        timing: fieldbus.timing?,
+        bus: fieldbus.bus?,
+        life_signs,
+        faults,
+        fault_file,
+        record: match record {
+            Some(record) => Some(record?),
+            None => None,
+        },
+    })
+}
+
+struct DriverTable {
+    id: Option<i32>,
+    name: Option<String>,
+    addressing: Addressing,
+    faults: Option<String>,
+}
+
+fn read_driver(mut table: Table<'_>) -> DriverTable {
+    let id = table.require(
+        "id",
+        "write a number that no other driver has, such as id = 4711",
+    );
+    let name = table.require("name", "give the driver a name for people");
+    let addressing = table.take("addressing");
+    let faults = table.take("faults");
+    table.finish();
+    let choices = [("bytes", Addressing::Bytes), ("iec", Addressing::Elements)];
+    DriverTable {
+        id: id
+            .and_then(|value| value.whole(1..=i32::MAX.into()))
+            .and_then(|id| i32::try_from(id).ok()),
+        name: name
+            .and_then(|value| value.label(NAME_LIMIT, "give the driver a name for people"))
+            .map(str::to_owned),
+        addressing: addressing
+            .and_then(|value| value.choice("ways of addressing", &choices))
+            .unwrap_or_default(),
+        faults: faults
+            .and_then(|value| {
+                let right = "name a file that has [[fault]] sections, such as \"faults.toml\"";
+                value.label(PATH_LIMIT, right)
+            })
+            .map(str::to_owned),
+    }
+}
+
+struct FieldbusTable<'a> {
+    role: Role,
+    /// Whether the file states no role and serves both ends.
+    is_for_both: bool,
+    /// The end that the file describes.
+    own_role: Role,
+    life_signs: Written<'a>,
+    timing: Option<Timing>,
+    sizes: layout::Sizes<'a>,
+    /// `[fieldbus.at]`, to be read when the signals are.
+    at: Option<Value<'a>>,
+    bus: Option<Options>,
+}
+
+impl FieldbusTable<'_> {
+    fn read_life_signs(&self, table: &SignalTable) -> LifeSigns {
+        let of_bus = self.bus.as_ref().and_then(Options::cycle);
+        let cycle = self.timing.as_ref().and_then(|timing| timing.cycle);
+        let mut signs = LifeSigns::default();
+        self.life_signs
+            .read(table, self.own_role, cycle.or(of_bus), &mut signs);
+        signs
+    }
+}
+
+fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_> {
+    let kind = table.require("kind", "write the kind of bus, such as kind = \"loopback\"");
+    let role = table.take("role");
+    let life_signs = Written::take(&mut table);
+    let spans = Spans::take(&mut table);
+    let sizes = layout::Sizes::take(&mut table);
+    let at = table.take("at");
+    let roles = Role::ALL.map(|role| (role.name(), role));
+    let stated = role
+        .as_ref()
+        .and_then(|value| value.choice("roles", &roles));
+    if let (Some(value), Some(stated), Some(asked)) = (&role, stated, asked)
+        && stated != asked.role
+    {
+        value.wrong(
+            format!("this command is the {} of the line", asked.role.name()),
+            "remove \"role\", so that the file serves both ends, or give the command a file of its own",
+        );
+    }
+    let role = stated.or(asked.map(|asked| asked.role)).unwrap_or_default();
+    let bus = if let Some(kind) = kind {
+        let moved = asked.is_some_and(|asked| asked.moved);
+        let bus = Options::read(&kind, role, moved, table);
+        if let (Some(bus), Some(_)) = (&bus, asked)
+            && bus.is_in_process()
+        {
+            kind.wrong(
+                format!(
+                    "both ends of the bus \"{}\" live in one process",
+                    bus.kind()
+                ),
+                "use a bus between processes, such as kind = \"socket\"",
+            );
+        }
+        bus
+    } else {
+        // Which keys are right cannot be told without the bus kind.
+        table.finish_open();
+        None
+    };
+    FieldbusTable {
+        role,
+        is_for_both: stated.is_none(),
+        own_role: stated.unwrap_or_default(),
+        life_signs,
+        timing: spans.read(bus.as_ref().and_then(Options::cycle)),
+        sizes,
+        at,
+        bus,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loopback::{self, Peer};
+    use crate::timing::{LEAST_MAX_AGE, RECONNECT};
+    use tickbus_base::time::Nanos;
+    use tickbus_bus_socket::TcpRole;
+    use tickbus_image::signal::{Area, ByteOrder, DataType, Latch, Signal, Slot};
+
+    const HEAD: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\n\
+                        link = \"cell\"\n";
+
+    /// Reads one signal from the keys of its section.
+    #[track_caller]
+    fn signal(keys: &str) -> Signal {
+        let text = format!("{HEAD}[[signal]]\nname = \"A\"\n{keys}\n");
+        match Config::parse("test.cfg", &text) {
+            Ok(mut config) => config.table.signals.remove(0),
+            Err(mistakes) => panic!("{mistakes}"),
+        }
+    }
+
+    fn rig() -> Config {
+        rig_as(Role::Device)
+    }
+
+    fn rig_as(role: Role) -> Config {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("driver.cfg");
+        let asked = Asked { role, moved: false };
+        Config::load_as(&path, Some(asked)).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    }
+
+    /// The rig's words as its builders counted them: each bit of the WORD, and its signal.
+    const COMMAND_WORD: [(usize, &str); 13] = [
+        (0, "IM1 index"),
+        (1, "IM1 jog"),
+        (2, "LA1 run"),
+        (3, "LA1 code low"),
+        (4, "LA1 code high"),
+        (5, "SC1"),
+        (7, "IM2 index"),
+        (8, "IM2 jog"),
+        (10, "LA2 run"),
+        (11, "LA2 up"),
+        (12, "SC2"),
+        (13, "Lamp"),
+        (15, "Acknowledge"),
+    ];
+    const STATUS_WORD: [(usize, &str); 11] = [
+        (0, "Step 1 complete"),
+        (1, "Step 2 complete"),
+        (2, "Step 3 complete"),
+        (3, "Step 4 complete"),
+        (4, "Step 5 complete"),
+        (5, "Step 6 complete"),
+        (11, "Package sensor 1"),
+        (12, "Package sensor 2"),
+        (13, "Homing sensor 1"),
+        (14, "Homing sensor 2"),
+        (15, "Not OK"),
+    ];
+
+    #[test]
+    fn both_rig_words_lie_bit_by_bit_as_their_builders_counted() {
+        let table = rig().table;
+        for (area, word) in [
+            (Area::Output, &COMMAND_WORD[..]),
+            (Area::Input, &STATUS_WORD[..]),
+        ] {
+            for (bit, name) in word {
+                let signal = &table.signals[table.position(name).expect(name)];
+                assert_eq!(
+                    (signal.area, signal.data_type),
+                    (area, DataType::Bool),
+                    "{name}"
+                );
+                // Big-endian: bit n of the WORD at byte k is byte k + 1 - n/8, bit n mod 8.
+                let place = (signal.byte, usize::from(signal.bit));
+                assert_eq!(place, (1 - bit / 8, bit % 8), "{name}");
+                assert_eq!(place, ByteOrder::Abcd.bit_position(2, *bit), "{name}");
+                // The word itself with this bit set, as a big-endian PLC sends it.
+                let frame = (1u16 << bit).to_be_bytes();
+                assert_eq!(usize::from(frame[signal.byte]), 1 << signal.bit, "{name}");
+                // With the bytes swapped the bit moves into the other byte.
+                let swapped = ByteOrder::Dcba.bit_position(2, *bit);
+                assert_eq!(swapped, (bit / 8, bit % 8), "{name}");
+                assert_eq!(
+                    usize::from((1u16 << bit).to_le_bytes()[swapped.0]),
+                    1 << swapped.1
+                );
+                assert_eq!(ByteOrder::Badc.bit_position(2, *bit), swapped, "{name}");
+            }
+            let in_word = table
+                .signals
+                .iter()
+                .filter(|signal| signal.area == area && signal.byte < 2);
+            assert_eq!(in_word.count(), word.len());
+        }
+    }
+
+    #[test]
+    fn the_rig_reads_whole() {
+        let config = rig();
+        assert_eq!(
+            (config.id, config.name.as_str(), config.role),
+            (4711, "Test rig", Role::Device)
+        );
+        let bytes = |area| config.table.stations[0].bytes(area);
+        assert_eq!((bytes(Area::Input), bytes(Area::Output)), (8, 8));
+        assert_eq!(config.timing.cycle, Some(Nanos::from_millis(2)));
+        assert_eq!(config.timing.max_age, Nanos::from_millis(250));
+        assert_eq!(config.timing.watchdog, None);
+        let Options::Socket(bus) = &config.bus else {
+            panic!("a socket");
+        };
+        assert_eq!(bus.address.to_string(), "127.0.0.1:20030");
+        assert_eq!(bus.tcp, TcpRole::Listen);
+        for cup in ["SC1", "SC2"] {
+            let signal = &config.table.signals[config.table.position(cup).expect(cup)];
+            assert_eq!(
+                signal.fail_safe,
+                Slot::from_real(1.0),
+                "{cup} must not let go"
+            );
+        }
+        let position = &config.table.signals[config.table.position("LA1 position").unwrap()];
+        let scale = position.scale.expect("a scale");
+        assert!((scale.value(27_648.0) - 250.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_rig_s_file_serves_its_plc_as_well() {
+        let (device, controller) = (rig(), rig_as(Role::Controller));
+        assert_eq!(controller.table, device.table);
+        let Options::Socket(bus) = &controller.bus else {
+            panic!("a socket");
+        };
+        assert_eq!(bus.address.to_string(), "127.0.0.1:20030");
+        assert_eq!(bus.tcp, TcpRole::Connect);
+    }
+
+    #[test]
+    fn the_type_follows_from_the_address_unless_it_is_stated() {
+        for (keys, data_type) in [
+            ("address = \"%I0.0\"", DataType::Bool),
+            ("address = \"%IB0\"", DataType::Byte),
+            ("address = \"%IW0\"", DataType::Word),
+            ("address = \"%ID0\"", DataType::Dword),
+            ("address = \"%IL0\"", DataType::Lword),
+            ("address = \"%ID0\"\ntype = \"real\"", DataType::Real),
+        ] {
+            assert_eq!(signal(keys).data_type, data_type, "{keys}");
+        }
+    }
+
+    #[test]
+    fn fail_safe_values_are_exact_and_of_the_slot_s_own_kind() {
+        for (keys, slot) in [
+            (
+                "address = \"%QX0.0\"\nfail_safe = true",
+                Slot::from_real(1.0),
+            ),
+            ("address = \"%QX0.0\"\nfail_safe = 1", Slot::from_real(1.0)),
+            (
+                "address = \"%QW0\"\nfail_safe = 0xFFFF",
+                Slot::from_real(65_535.0),
+            ),
+            ("address = \"%QW0\"\nfail_safe = 7.0", Slot::from_real(7.0)),
+            (
+                "address = \"%QL0\"\nfail_safe = 18446744073709551615",
+                Slot::from_unsigned(u64::MAX),
+            ),
+            (
+                "address = \"%QL0\"\ntype = \"LINT\"\nfail_safe = -9223372036854775807",
+                Slot::from_signed(-i64::MAX),
+            ),
+            (
+                "address = \"%QL0\"\ntype = \"LREAL\"\nfail_safe = -0.5",
+                Slot::from_real(-0.5),
+            ),
+            // All bits zero, where nothing is stated: 4 mA, not an impossible 0.
+            (
+                "address = \"%QW0\"\nscale = { raw = [0, 27648], value = [4, 20] }",
+                Slot::from_real(4.0),
+            ),
+            (
+                "address = \"%QL0\"\nscale = { raw = [0, 10], value = [0, 1] }\nfail_safe = 0.5",
+                Slot::from_real(0.5),
+            ),
+        ] {
+            assert_eq!(signal(keys).fail_safe, slot, "{keys}");
+        }
+    }
+
+    #[test]
+    fn every_hosted_program_can_be_named_with_its_options() {
+        let option = "program_options = { la1_code = \"lsb-first\" }";
+        let with_options = tickbus_programs::PROGRAMS.map(|name| (name, ""));
+        for (name, option) in with_options.into_iter().chain([("rig", option)]) {
+            let head = HEAD.replace(
+                "link = \"cell\"",
+                &format!("program = \"{name}\"\n{option}"),
+            );
+            let config = Config::parse("test.cfg", &format!("{head}input_bytes = 1\n"))
+                .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+            let Options::Loopback(loopback::Options {
+                peer: Peer::Program { name, options, .. },
+                ..
+            }) = config.bus
+            else {
+                panic!("a hosted program");
+            };
+            assert_eq!(
+                tickbus_programs::program(&name, &options)
+                    .expect("a program")
+                    .name(),
+                name
+            );
+        }
+    }
+
+    #[test]
+    fn latches_hold() {
+        let signal = signal("address = \"%IX0.0\"\nlatch = \"falling\"\nhold = \"20ms\"");
+        assert_eq!(
+            (signal.latch, signal.hold),
+            (Some(Latch::Falling), Nanos::from_millis(20))
+        );
+    }
+
+    #[test]
+    fn times_have_their_defaults() {
+        let timing = |keys: &str| {
+            let text = format!("{HEAD}{keys}\ninput_bytes = 1\n");
+            Config::parse("test.cfg", &text)
+                .unwrap_or_else(|m| panic!("{m}"))
+                .timing
+        };
+        assert_eq!(timing("").reconnect, RECONNECT);
+        assert_eq!(timing("").max_age, LEAST_MAX_AGE);
+        assert_eq!(timing("cycle = \"50ms\"").max_age, Nanos::from_millis(500));
+        assert_eq!(timing("cycle = \"1ms\"").max_age, LEAST_MAX_AGE);
+        assert_eq!(
+            timing("cycle = \"50ms\"\nmax_age = \"60ms\"").max_age,
+            Nanos::from_millis(60)
+        );
+    }
+
+    #[test]
+    fn a_thousand_mistakes_are_told_in_no_time() {
+        let section = |number: i32| {
+            format!("[[signal]]\nname = \"S{number}\"\naddress = \"%QX0.0\"\nhold = x\n")
+        };
+        let sections = (0..1000).map(section);
+        let text: String = std::iter::once(HEAD.to_owned()).chain(sections).collect();
+        let mistakes = Config::parse("test.cfg", &text).expect_err("mistakes");
+        assert_eq!(mistakes.len(), 1000);
+    }
+}

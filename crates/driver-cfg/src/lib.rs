@@ -1,0 +1,14 @@
+//! driver.cfg as a whole: one driver's signals, stations and timing, and what its bus needs to know.
+//!
+//! [`Config`] is what a file says, checked; [`Options`] lists the bus kinds.
+
+mod config;
+mod layout;
+pub mod loopback;
+mod options;
+mod overlay;
+mod timing;
+
+pub use config::{Asked, Config};
+pub use options::{KINDS, Options};
+pub use timing::Timing;

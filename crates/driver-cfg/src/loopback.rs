@@ -1,0 +1,231 @@
+//! What a driver.cfg says to the loopback bus.
+
+use std::path::{Path, PathBuf};
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_fieldbus::Role;
+use tickbus_plc::{Hosted, INTERVAL};
+use tickbus_programs::{self as programs, PROGRAMS};
+use tickbus_record as record;
+
+/// The longest name of a link, in characters.
+const LINK_LIMIT: usize = 120;
+
+/// When the bus runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Mode {
+    /// On a thread and a clock of its own.
+    #[default]
+    Free,
+    /// On the tick's thread, in simulation time.
+    Stepped,
+}
+
+impl Mode {
+    /// Each mode by its name in a driver.cfg.
+    pub const NAMES: [(&str, Self); 2] = [("free", Self::Free), ("stepped", Self::Stepped)];
+}
+
+/// Who is at the other end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Peer {
+    /// The driver that names the same link, in the other role.
+    Link(String),
+    /// A PLC program hosted in this process.
+    Program {
+        /// Its name, or its path, which counts from the folder of the driver.cfg.
+        name: String,
+        /// Its options, as pairs of key and value.
+        options: Vec<(String, String)>,
+        /// Its scan interval; none leaves it to the program. Positive.
+        scan: Option<Nanos>,
+    },
+    /// The recording in this file, relative to the folder of the driver.cfg: what its peer sent drives this
+    /// end.
+    Replay(PathBuf),
+}
+
+/// What a driver.cfg says to the loopback bus.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// When the bus runs.
+    pub mode: Mode,
+    /// Who is at the other end.
+    pub peer: Peer,
+    /// Whether every change that the peer makes is reported as an event, beside the image.
+    pub events: bool,
+}
+
+impl Options {
+    /// Reads `mode`, `events`, and `link`, `replay`, or `program` with `program_options` and `scan`.
+    pub fn read(role: Role, mut table: Table<'_>) -> Option<Self> {
+        let mode = table.take("mode");
+        let events = table.take("events");
+        let link = table.take("link");
+        let program = table.take("program");
+        let replay = table.take("replay");
+        let program_options = table.take("program_options");
+        let scan = table.take("scan");
+        table.require_one_of(
+            &["program", "link", "replay"],
+            "add program = \"rig\" to host a PLC program at the other end, link = \"name\" to \
+             meet the driver that names the same link, or replay = \"run.vcd\" to replay a recording",
+        );
+        let whole = table.is_whole();
+        table.finish();
+
+        let stated = mode
+            .as_ref()
+            .map(|value| value.choice("modes", &Mode::NAMES));
+        if let (Some(mode), Some(Some(Mode::Free)), true) = (&mode, stated, replay.is_some()) {
+            mode.wrong(
+                "a recording is replayed tick by tick, on simulation time",
+                "write mode = \"stepped\", or leave \"mode\" out",
+            );
+        }
+        // A recording knows no other mode.
+        let mode = stated.unwrap_or(Some(if replay.is_some() {
+            Mode::Stepped
+        } else {
+            Mode::Free
+        }));
+        let events = events.map_or(Some(false), |value| value.boolean());
+        if program.is_none() {
+            for (key, value) in [("program_options", &program_options), ("scan", &scan)] {
+                if let (Some(value), true) = (value, whole) {
+                    value.wrong(
+                        format!("\"{key}\" stands without \"program\""),
+                        "remove it, or add program = \"rig\"",
+                    );
+                }
+            }
+        }
+        let peers = [("link", &link), ("program", &program), ("replay", &replay)];
+        let peers: Vec<_> = peers
+            .into_iter()
+            .filter_map(|(key, value)| Some((key, value.as_ref()?)))
+            .collect();
+        let peer = match peers[..] {
+            [(first, value), (second, _), ..] => {
+                value.wrong(
+                    format!(
+                        "the loopback has both a \"{first}\" and a \"{second}\" at its other end"
+                    ),
+                    "keep one of them",
+                );
+                None
+            }
+            [("program", program)] => read_program(program, program_options, scan.as_ref(), role),
+            [("replay", replay)] => record::file_of(replay).map(|(file, _)| Peer::Replay(file)),
+            [(_, link)] => {
+                let name = "name the link; the driver at the other end names the same";
+                link.label(LINK_LIMIT, name)
+                    .map(|link| Peer::Link(link.to_owned()))
+            }
+            [] => None,
+        };
+        Some(Self {
+            mode: mode?,
+            peer: peer?,
+            events: events?,
+        })
+    }
+}
+
+impl Peer {
+    /// Reads a hosted program with its options and its scan interval, for a machine at this end.
+    pub fn hosted(
+        program: &Value<'_>,
+        options: Option<Value<'_>>,
+        scan: Option<&Value<'_>>,
+    ) -> Option<Self> {
+        read_program(program, options, scan, Role::Device)
+    }
+
+    /// The same for whoever wrote it down in `folder`, and not in that of the driver.cfg: the path of a
+    /// program of the user's own counts from there.
+    #[must_use]
+    pub fn seen_from(mut self, folder: &Path) -> Self {
+        if let Self::Program { name, .. } = &mut self
+            && Hosted::is_path(name)
+            && let Ok(path) = std::path::absolute(folder.join(&*name))
+        {
+            *name = path.to_string_lossy().into_owned();
+        }
+        self
+    }
+}
+
+fn read_program(
+    program: &Value<'_>,
+    options: Option<Value<'_>>,
+    scan: Option<&Value<'_>>,
+    role: Role,
+) -> Option<Peer> {
+    if role == Role::Controller {
+        program.wrong(
+            "a hosted PLC program is the controller, and so is this driver",
+            "remove role = \"controller\", or use \"link\"",
+        );
+    }
+    let text = program.text("write the name of a program in quotes, such as \"rig\"");
+    let known = text.filter(|name| PROGRAMS.contains(name) || Hosted::is_path(name));
+    let scan = match scan {
+        Some(scan) => scan.duration().map(Some),
+        // A program of the user's own has it compiled in.
+        None if known.is_some_and(Hosted::is_path) => Some(None),
+        None => Some(Some(INTERVAL)),
+    };
+    if let (Some(name), None) = (text, known) {
+        program.wrong(
+            format!("there is no program \"{}\"", shown(name)),
+            did_you_mean(name, "programs", &PROGRAMS),
+        );
+    }
+    let options = match options {
+        None => Some(Vec::new()),
+        Some(value) => value
+            .table("program_options", "write them as { option = \"value\" }")
+            .and_then(|table| read_options(&table, known?)),
+    };
+    Some(Peer::Program {
+        name: known?.to_owned(),
+        options: options?,
+        scan: scan?,
+    })
+}
+
+/// The options of the program called `name`, each tried on the program itself.
+fn read_options(table: &Table<'_>, name: &str) -> Option<Vec<(String, String)>> {
+    let mut read = Some(Vec::new());
+    for (key, value) in table.all() {
+        // Numbers need no quotes.
+        let text = value
+            .as_text()
+            .map_or_else(|| value.written(), str::to_owned);
+        let text = if text.is_empty() {
+            value
+                .text("write the option's value in quotes")
+                .map(str::to_owned)
+        } else {
+            Some(text)
+        };
+        let option = text.map(|text| (key.to_owned(), text));
+        let made = option
+            .as_ref()
+            .map(|option| programs::check(name, std::slice::from_ref(option)));
+        if let Some(Err(error)) = &made {
+            let error = error.to_string();
+            let (what, right) = error
+                .split_once("; ")
+                .unwrap_or((&error, "see the program's options"));
+            value.wrong(what, right);
+        }
+        match (option, made, &mut read) {
+            (Some(option), Some(Ok(())), Some(read)) => read.push(option),
+            _ => read = None,
+        }
+    }
+    read
+}

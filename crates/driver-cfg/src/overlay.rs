@@ -1,0 +1,285 @@
+//! Tables that stand instead of those of a driver.cfg: the same device, on another line.
+
+use super::Config;
+use crate::{Options, loopback};
+use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, did_you_mean, read_text, shown};
+use tickbus_fieldbus::{At, Role};
+use tickbus_image::signal::SignalTable;
+use tickbus_record as record;
+
+impl Config {
+    /// The same driver with other tables: `text` is TOML as in a driver.cfg, and `origin` is what its
+    /// mistakes call it. So a test runs on the plant's own signal table, but on simulation time.
+    ///
+    /// A `[fieldbus]` with a `kind` stands instead of the file's own, but for what belongs to the device and
+    /// not to the bus: sizes, cycle times, time-outs and signs of life stay. `[[station]]` tables bring what that bus
+    /// has to know of the file's stations, by their names. One without a `kind` changes only the `mode` of the
+    /// file's own loopback. A `[record]` stands instead of the file's own; a bus that replays a recording takes the
+    /// file's own away, which is that of the plant.
+    ///
+    /// # Errors
+    ///
+    /// With every mistake in the text.
+    pub fn overlaid(self, origin: &str, text: &str) -> Result<Self, Mistakes> {
+        let mut collector = Collector::new(origin, text);
+        let config = read_text(&mut collector, text, |root| read(self, root));
+        match collector.finish() {
+            Some(mistakes) => Err(mistakes),
+            None => Ok(config.expect("what is not read has a mistake")),
+        }
+    }
+}
+
+fn read(mut config: Config, mut root: Table<'_>) -> Option<Config> {
+    let fieldbus = root.take("fieldbus");
+    let stations = root.take("station");
+    let record = root.take("record");
+    root.finish();
+    let stations = stations.map(|value| value.tables("[[station]]"));
+    if let Some(value) = fieldbus {
+        let table = value.table("[fieldbus]", "write a [fieldbus] table")?;
+        read_fieldbus(&mut config, table, stations.unwrap_or_default())?;
+    } else if let Some(table) = stations.unwrap_or_default().first() {
+        table.wrong(
+            "[[station]] says what another bus has to know, and there is no [fieldbus]",
+            "write a [fieldbus] with its kind, or leave the stations as they are",
+        );
+        return None;
+    }
+    if let Some(value) = record {
+        let table = value.table("[record]", "write a [record] table")?;
+        config.record = Some(record::Options::read(table, config.bus.replayed())?);
+    }
+    Some(config)
+}
+
+fn read_fieldbus(
+    config: &mut Config,
+    mut table: Table<'_>,
+    stations: Vec<Table<'_>>,
+) -> Option<()> {
+    if let Some(kind) = table.take("kind") {
+        let collector = table.collector();
+        let at = table.take("at");
+        let roles = Role::ALL.map(|role| (role.name(), role));
+        let role = match table.take("role") {
+            None => config.role,
+            Some(value) => value.choice("roles", &roles)?,
+        };
+        let mut bus = Options::read(&kind, role, false, table)?;
+        read_stations(&mut bus, &config.table, stations, &kind, collector);
+        if let Some(at) = &at {
+            bus.place_signals(&At::read(at, &config.table), &config.table);
+        }
+        bus.fit(&config.table, &config.axes, collector);
+        if bus.replayed().is_some() {
+            config.record = None;
+        }
+        config.bus = bus;
+        config.role = role;
+        return Some(());
+    }
+    for table in stations {
+        table.wrong(
+            "[[station]] says what another bus has to know, and [fieldbus] has no \"kind\"",
+            "name the kind of bus, or leave the stations as they are",
+        );
+    }
+    let mode = table.require("mode", "write the mode of the file's own bus, or a kind");
+    table.finish();
+    let mode = mode?;
+    let chosen = mode.choice("modes", &loopback::Mode::NAMES)?;
+    let kind = config.bus.kind();
+    if let Options::Loopback(options) = &mut config.bus {
+        options.mode = chosen;
+        return Some(());
+    }
+    mode.wrong(
+        format!("the bus \"{kind}\" of the driver.cfg has no mode"),
+        "name a PLC program to be at the other end instead",
+    );
+    None
+}
+
+/// Lets `bus` read what it has to know of each station of the driver, in their order.
+fn read_stations(
+    bus: &mut Options,
+    table: &SignalTable,
+    stations: Vec<Table<'_>>,
+    kind: &Value<'_>,
+    collector: &Collector<'_>,
+) {
+    let names: Vec<&str> = table.stations.iter().map(|s| s.name.as_str()).collect();
+    // A file without [[station]] tables has one station, which has no name.
+    let declared = names.iter().any(|name| !name.is_empty());
+    let mut named: Vec<Option<Table<'_>>> = names.iter().map(|_| None).collect();
+    for mut station in stations {
+        let right = "write the name of a station of the driver.cfg";
+        let Some(value) = station.require("name", right) else {
+            station.finish_open();
+            continue;
+        };
+        let name = value.text(right).unwrap_or_default();
+        let place = names.iter().position(|known| declared && *known == name);
+        match place.map(|place| &mut named[place]) {
+            Some(place @ None) => *place = Some(station),
+            Some(Some(_)) => {
+                value.wrong(
+                    format!("the station \"{}\" is there twice", shown(name)),
+                    "name it once",
+                );
+            }
+            None if declared => {
+                let what = format!("the driver.cfg has no station \"{}\"", shown(name));
+                value.wrong(what, did_you_mean(name, "stations", &names));
+            }
+            None => value.wrong("the driver.cfg declares no stations", "remove the table"),
+        }
+    }
+    if !declared {
+        return;
+    }
+    for (name, station) in names.iter().zip(named) {
+        if let Some(mut station) = station {
+            bus.read_station(names.len(), &mut station);
+            station.finish();
+        } else {
+            let title = format!("[[station]] \"{}\"", shown(name));
+            Table::absent(collector, &title, kind.at(), |mut station| {
+                bus.read_station(names.len(), &mut station);
+                station.finish();
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loopback::{Mode, Peer};
+    use tickbus_base::time::Nanos;
+
+    fn plant(fieldbus: &str) -> Config {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nmax_age = \"3s\"\ninput_bytes = 8\n{fieldbus}\n\
+             [[signal]]\nname = \"A\"\naddress = \"%IX0.0\"\n"
+        );
+        Config::parse("plant.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    }
+
+    fn refusal(text: &str) -> String {
+        let plant = plant("kind = \"loopback\"\nlink = \"cell\"");
+        let mistakes = plant.overlaid("other tables", text).expect_err("a mistake");
+        mistakes.to_string()
+    }
+
+    #[test]
+    fn another_bus_leaves_signals_sizes_and_times_as_they_are() {
+        let plant = plant("kind = \"loopback\"\nlink = \"cell\"");
+        let other = "[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nprogram = \"mirror\"\nscan = \"5ms\"\n";
+        let test = plant.clone().overlaid("test", other).expect("right");
+        let Options::Loopback(options) = &test.bus else {
+            panic!("{:?}", test.bus)
+        };
+        assert_eq!(options.mode, Mode::Stepped);
+        assert!(
+            matches!(&options.peer, Peer::Program { name, scan, .. } if name == "mirror" && *scan == Some(Nanos::from_millis(5)))
+        );
+        assert_eq!(test.table, plant.table);
+        assert_eq!(test.timing, plant.timing);
+        assert_eq!(plant.clone().overlaid("test", ""), Ok(plant.clone()));
+        let recorded = plant.overlaid("test", "[record]\nfile = \"test.vcd\"\n");
+        let record = recorded.expect("right").record.expect("it is recorded");
+        assert_eq!(record.file, std::path::Path::new("test.vcd"));
+    }
+
+    #[test]
+    fn a_table_without_a_kind_changes_the_mode_of_the_file_s_own_bus() {
+        let plant = plant("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"7ms\"");
+        let test = plant.overlaid("test", "[fieldbus]\nmode = \"stepped\"\n");
+        let Options::Loopback(options) = test.expect("right").bus else {
+            panic!("a loopback")
+        };
+        assert_eq!(options.mode, Mode::Stepped);
+        assert!(
+            matches!(options.peer, Peer::Program { scan, .. } if scan == Some(Nanos::from_millis(7)))
+        );
+    }
+
+    #[test]
+    fn mistakes_are_told_where_they_stand() {
+        assert_eq!(
+            refusal("[fieldbus]\nkind = \"loopback\"\nprogram = \"rigg\"\n[recrod]\n"),
+            "other tables:3:11: there is no program \"rigg\"; did you mean \"rig\"?\n\
+             other tables:4:2: unknown key \"recrod\" in the file; did you mean \"record\"?"
+        );
+        assert_eq!(
+            refusal("[fieldbus]\nscan = \"1ms\"\n"),
+            "other tables:1:1: [fieldbus] has no \"mode\"; write the mode of the file's own bus, or a kind\n\
+             other tables:2:1: unknown key \"scan\" in [fieldbus]; keys here are kind, mode"
+        );
+    }
+
+    const TWO_PLCS: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                            [[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n\
+                            [[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\nstation = \"A\"\n\
+                            [[signal]]\nname = \"b\"\naddress = \"%QX0.0\"\nstation = \"B\"\n";
+
+    fn with_two_plcs(tables: &str) -> Result<Config, String> {
+        let plant = Config::parse("plant.cfg", TWO_PLCS).unwrap_or_else(|wrong| panic!("{wrong}"));
+        let overlaid = plant.overlaid("other tables", tables);
+        overlaid.map_err(|mistakes| mistakes.to_string())
+    }
+
+    #[test]
+    fn another_bus_is_told_of_the_stations_and_what_it_lacks_of_them_is_a_mistake() {
+        let told =
+            with_two_plcs("[fieldbus]\nkind = \"modbus-client\"\naddress = \"10.0.0.1:502\"\n");
+        let told = told.expect_err("stations have units");
+        for name in ["A", "B"] {
+            let lacks = format!("other tables:2:8: [[station]] \"{name}\" has no \"unit\"");
+            assert!(told.contains(&lacks), "{told}");
+        }
+        let units = "[[station]]\nname = \"B\"\nunit = 2\n[[station]]\nname = \"A\"\nunit = 1\n";
+        let table = "[fieldbus]\nkind = \"modbus-server\"\n";
+        let right = with_two_plcs(&format!("{table}{units}")).expect("right");
+        let told = format!("{:?}", right.bus);
+        let place = |unit: &str| {
+            told.find(unit)
+                .unwrap_or_else(|| panic!("no {unit} in {told}"))
+        };
+        assert!(
+            place("unit: Some(1)") < place("unit: Some(2)"),
+            "A is the first"
+        );
+        let told = with_two_plcs(&format!("{table}{}", units.replace("\"B\"", "\"C\"")));
+        assert!(
+            told.expect_err("no C")
+                .contains("the driver.cfg has no station \"C\"")
+        );
+    }
+
+    #[test]
+    fn another_bus_has_to_fit_the_signals() {
+        let told = with_two_plcs("[fieldbus]\nkind = \"socket\"\nmessage = \"axis\"\n");
+        assert!(told.expect_err("no axes").starts_with("other tables:"));
+    }
+
+    #[test]
+    fn a_replay_takes_the_recording_of_the_plant_away_and_may_not_record_over_what_it_replays() {
+        let plant = || {
+            let mut plant = plant("kind = \"loopback\"\nlink = \"cell\"");
+            let file = std::path::Path::new("run.csv");
+            plant.record = Some(record::Options::to(file).expect("a format"));
+            plant
+        };
+        let replay = "[fieldbus]\nkind = \"loopback\"\nreplay = \"run.csv\"\n";
+        let test = plant().overlaid("test", replay).expect("right");
+        assert_eq!(test.record, None);
+        let over = format!("{replay}[record]\nfile = \"./run.csv\"\n");
+        let told = plant()
+            .overlaid("test", &over)
+            .expect_err("it would be lost");
+        assert!(told.to_string().contains("would be overwritten"), "{told}");
+    }
+}

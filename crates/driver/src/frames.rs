@@ -1,0 +1,26 @@
+//! The frames of each end: which area it writes and reads, and what stands there at rest.
+
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::{Area, SignalTable, fail_safe_frame};
+use tickbus_image::{Directions, latched_bits};
+
+/// Size in bytes of a station's area.
+pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
+    match area {
+        Area::Input => table.stations[station].input_bytes,
+        Area::Output => table.stations[station].output_bytes,
+    }
+}
+
+/// What the image of the end with `role` is made of, per station.
+pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<Directions> {
+    let (tx, rx) = role.areas();
+    (0..table.stations.len())
+        .map(|station| Directions {
+            tx_fail_safe: fail_safe_frame(table, station, tx),
+            tx_latched: latched_bits(table, station, tx),
+            rx_fail_safe: fail_safe_frame(table, station, rx),
+            rx_latched: latched_bits(table, station, rx),
+        })
+        .collect()
+}

@@ -1,0 +1,116 @@
+//! A program that is scanned by the tick, on simulation time.
+
+use std::sync::Arc;
+
+use tickbus_base::time::{Manual, Nanos};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::{BusError, LinkStatus, Port, Role, Stepped};
+use tickbus_plc::Program;
+
+use super::Tally;
+use super::cpu::{Cpu, half};
+
+/// The most scans that one exchange makes up for: 1,000 s of scans every 10 ms. A longer step is a wrong
+/// time, and would keep the tick for as long as it takes to scan through it.
+const MOST_SCANS: i64 = 100_000;
+
+/// A hosted program that is scanned by the tick, on simulation time.
+pub(crate) struct SteppedHost {
+    cpu: Cpu,
+    port: Port,
+    interval: Nanos,
+    /// When the next scan is due; `None` before the first exchange.
+    due: Option<Nanos>,
+    /// Whether the program was sent what the machine wrote last.
+    carried: bool,
+    /// One frame on its way from one port to the other.
+    wire: Box<[u8]>,
+}
+
+impl SteppedHost {
+    pub(crate) fn new(
+        program: Box<dyn Program>,
+        config: &Config,
+        interval: Nanos,
+    ) -> (Self, Arc<Tally>) {
+        let max_age = config.timing.max_age;
+        let (cpu, bus) = half(program, config, Role::Controller);
+        let tally = Arc::clone(&cpu.tally);
+        let status = LinkStatus::new(cpu.program.name(), max_age);
+        let mut port = Port::new(bus, Manual::new(), Role::Controller, None, status);
+        let watches = config
+            .life_signs
+            .watches(&config.table, Role::Controller, max_age);
+        port.watch_life(watches);
+        let sizes = (0..port.stations()).map(|station| port.sizes(station));
+        let longest = sizes.map(|(tx, rx)| tx.max(rx)).max();
+        let wire = vec![0; longest.unwrap_or_default()].into();
+        (
+            Self {
+                cpu,
+                port,
+                interval,
+                due: None,
+                carried: false,
+                wire,
+            },
+            tally,
+        )
+    }
+}
+
+/// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
+fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) -> bool {
+    if !from.sends(now) {
+        return false;
+    }
+    for station in 0..from.stations() {
+        let frame = from.outgoing(station, now);
+        let wire = &mut wire[..frame.len()];
+        wire.copy_from_slice(frame);
+        to.received(station, now, wire);
+        from.sent(station);
+    }
+    true
+}
+
+impl Stepped for SteppedHost {
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        port.running("the hosted program is there");
+        self.carried = !port.is_down(now) && carry(port, &mut self.port, now, &mut self.wire);
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+        port.running("the hosted program is there");
+        let mut due = self.due.unwrap_or(now);
+        let late = now - due;
+        if late > self.interval.times(MOST_SCANS) {
+            self.due = Some(now);
+            return Err(BusError::Refused(format!(
+                "simulation time jumped from {due} to {now}, over more than {MOST_SCANS} scans of the \
+                 hosted program; hand in the nanoseconds since the simulation began, tick by tick",
+            )));
+        }
+        // Counted, since at the end of all time the next scan is due at the same time as the last.
+        let scans = if late < Nanos::ZERO {
+            0
+        } else {
+            late.0 / self.interval.0 + 1
+        };
+        for _ in 0..scans {
+            if self.carried {
+                // Between two ticks simulation time passes and nothing else: the machine is there all along,
+                // however large the steps are.
+                (0..self.port.stations()).for_each(|station| self.port.touch(station, due));
+            }
+            self.cpu.scan(due, true);
+            due += self.interval;
+        }
+        self.due = Some(due);
+        if !port.is_down(now) {
+            carry(&mut self.port, port, now, &mut self.wire);
+        }
+        Ok(due)
+    }
+}

@@ -1,0 +1,223 @@
+//! A program that is scanned on its interval, by a thread of its own.
+
+use std::fmt::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use crate::faults::FrameFaults;
+use crate::supervise::{BusThread, panic_text};
+use crate::tape::Tape;
+use tickbus_base::time::{Clock, Nanos, Pace, Stop};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::Board;
+use tickbus_fieldbus::{Free, LinkStatus, Port, Role};
+use tickbus_plc::{Program, Report};
+use tickbus_record as record;
+
+use super::Tally;
+use super::cpu::{Cpu, half};
+
+/// The longest time that a scan is waited for. A PLC's own watchdog stops it far earlier.
+const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
+
+/// Since when the program has been in a scan.
+#[derive(Debug)]
+struct Scanning(AtomicI64);
+
+impl Scanning {
+    /// No time at all.
+    const NONE: i64 = i64::MIN;
+
+    fn set(&self, since: Option<Nanos>) {
+        let since = since.map_or(Self::NONE, |since| since.0);
+        self.0.store(since, Ordering::Relaxed);
+    }
+
+    /// How long the present scan has taken, once that is too long.
+    fn too_long(&self, now: Nanos) -> Option<Nanos> {
+        let since = self.0.load(Ordering::Relaxed);
+        let span = now - Nanos(since);
+        (since != Self::NONE && span > LONGEST_SCAN).then_some(span)
+    }
+}
+
+/// A program, and how it is scanned.
+pub(crate) struct Hosted {
+    pub(crate) program: Box<dyn Program>,
+    pub(crate) interval: Nanos,
+    /// Where its scans are recorded.
+    pub(crate) tape: Option<Tape>,
+}
+
+/// What a program on a thread of its own tells of itself, to any thread.
+#[derive(Clone, Debug)]
+pub(crate) struct HostTally {
+    pub(super) tally: Arc<Tally>,
+    fault: Arc<Mutex<Option<String>>>,
+    scanning: Arc<Scanning>,
+    report: Option<Arc<dyn Report>>,
+    record: Option<Arc<record::Tally>>,
+    pub(super) clock: Arc<dyn Clock>,
+}
+
+/// A program on a thread of its own, with the bus thread of its end of the line; dropping it stops both.
+#[derive(Debug)]
+pub(crate) struct HostThread {
+    pub(crate) told: HostTally,
+    /// Disconnected when the thread ends.
+    ended: Receiver<()>,
+    pub(super) status: LinkStatus,
+    pub(super) board: Arc<Board>,
+    stop: Stop,
+    thread: Option<JoinHandle<()>>,
+    #[expect(dead_code, reason = "kept for its drop")]
+    bus: BusThread,
+}
+
+impl HostThread {
+    /// Starts scanning the `hosted` program as the end with `role`, with `bus` between it and its peer.
+    /// `name` is the thread's.
+    pub(crate) fn start(
+        hosted: Hosted,
+        name: String,
+        config: &Config,
+        role: Role,
+        bus: Box<dyn Free>,
+        clock: Arc<dyn Clock>,
+    ) -> std::io::Result<Self> {
+        let max_age = config.timing.max_age;
+        let interval = hosted.interval;
+        let report = hosted.program.report();
+        let (mut cpu, bus_end) = half(hosted.program, config, role);
+        cpu.tape = hosted.tape;
+        let record = cpu.tape.as_ref().map(Tape::tally);
+        let status = LinkStatus::new(&name, max_age);
+        // A CPU whose program has died must not keep its last outputs on the bus.
+        let watchdog = (interval + interval).max(max_age);
+        let (now, limit) = (Arc::clone(&clock), Some(watchdog));
+        let mut port = Port::new(bus_end, now, role, limit, status.clone());
+        let board = Arc::<Board>::default();
+        // A program behind the bus of a driver is not the end whose faults these are.
+        if role == config.role {
+            let (faults, board) = (&config.faults, Arc::clone(&board));
+            let inputs = &cpu.inputs.bytes;
+            cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
+        }
+        port.suffer_from(Arc::clone(&board));
+        port.watch_life(config.life_signs.watches(&config.table, role, max_age));
+        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
+        let reconnect = config.timing.reconnect.clone();
+        let bus = BusThread::start(bus, port, reconnect, status.clone(), &name)?;
+        let (tally, stop) = (Arc::clone(&cpu.tally), Stop::new());
+        let fault = Arc::new(Mutex::new(None));
+        let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
+        let (end, ended) = mpsc::channel();
+        let thread = std::thread::Builder::new().name(name).spawn({
+            let (stop, fault, clock) = (stop.clone(), Arc::clone(&fault), Arc::clone(&clock));
+            let scanning = Arc::clone(&scanning);
+            move || {
+                let _end: Sender<()> = end;
+                let times = (interval, watchdog);
+                let scans = || scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
+                let result = catch_unwind(AssertUnwindSafe(scans));
+                scanning.set(None);
+                if let Err(panic) = result {
+                    let text = format!("the PLC program panicked: {}", panic_text(&*panic));
+                    log::error!("{text}");
+                    *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
+                }
+            }
+        })?;
+        Ok(Self {
+            told: HostTally {
+                tally,
+                fault,
+                scanning,
+                report,
+                record,
+                clock,
+            },
+            ended,
+            status,
+            board,
+            stop,
+            thread: Some(thread),
+            bus,
+        })
+    }
+}
+
+impl HostTally {
+    /// Appends what the program has counted, and its fault.
+    pub(crate) fn write(&self, text: &mut String) {
+        self.tally.write(text);
+        if let Some(report) = &self.report {
+            report.write(text);
+        }
+        if let Some(fault) = self.fault() {
+            let fault = fault.split_whitespace().collect::<Vec<_>>().join(" ");
+            let _ = writeln!(text, "plc.fault={fault}");
+        }
+        if let Some(record) = &self.record {
+            record.write(text);
+        }
+    }
+
+    pub(super) fn fault(&self) -> Option<String> {
+        if let Some(span) = self.scanning.too_long(self.clock.now()) {
+            let span = span.rounded();
+            return Some(format!("the PLC program has been in one scan for {span}"));
+        }
+        self.fault
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+}
+
+impl HostThread {
+    /// Stops scanning. Why the program did not end, if it did not: its thread is then left behind.
+    pub(super) fn end(&mut self) -> Option<String> {
+        let thread = self.thread.take()?;
+        self.stop.stop();
+        if self.ended.recv_timeout(LONGEST_SCAN.to_duration()) == Err(Timeout) {
+            let why = format!("the PLC program's scan did not end within {LONGEST_SCAN}");
+            log::error!("{why}, and its thread is left behind");
+            return Some(why);
+        }
+        // Its panics are caught and recorded on the thread itself.
+        let _ = thread.join();
+        None
+    }
+}
+
+impl Drop for HostThread {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+fn scan_until_stopped(
+    cpu: &mut Cpu,
+    (interval, watchdog): (Nanos, Nanos),
+    clock: &dyn Clock,
+    stop: &Stop,
+    scanning: &Scanning,
+) {
+    // Like a PLC: a scan that comes late is late, and none is made up for.
+    let mut pace = Pace::new(clock.now(), interval);
+    let mut last = None;
+    while !stop.is_stopped() {
+        let now = clock.now();
+        if pace.take(now) {
+            scanning.set(Some(now));
+            cpu.scan(now, last.is_none_or(|last| now - last <= watchdog));
+            last = Some(now);
+            scanning.set(None);
+        }
+        clock.wait_until(pace.due(), stop);
+    }
+}

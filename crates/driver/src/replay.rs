@@ -1,0 +1,364 @@
+//! A recording as the other end of the line: what its peer sent drives this end, and what this end sends is
+//! compared with what it sent then.
+
+mod differences;
+mod station;
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use self::differences::Differences;
+use self::station::Station;
+use super::DriverError;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::did_you_mean;
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::{BusError, Port, Stepped};
+use tickbus_image::signal::{Signal, Slot};
+use tickbus_record::{Columns, Kind, Place, Recording, RecordingError, Tick};
+
+/// How many signals of another table are named in a message.
+const NAMED: usize = 5;
+
+/// What a replay has found so far; readable from any thread.
+#[derive(Debug, Default)]
+pub(super) struct ReplayTally {
+    file: String,
+    /// Recorded ticks that were replayed.
+    ticks: AtomicU64,
+    /// Recorded ticks that were compared: all, unless several fell on one tick of today.
+    compared: AtomicU64,
+    differences: AtomicU64,
+    /// Signals of this end that the recording does not have.
+    unknown: u64,
+    ended: AtomicBool,
+}
+
+impl ReplayTally {
+    /// Appends what was found, one `key=value` a line.
+    pub(super) fn write(&self, text: &mut String) {
+        let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "replay.file={}", self.file);
+        let _ = writeln!(text, "replay.ticks={}", count(&self.ticks));
+        let _ = writeln!(text, "replay.compared={}", count(&self.compared));
+        let _ = writeln!(text, "replay.differences={}", count(&self.differences));
+        let _ = writeln!(text, "replay.not_compared_signals={}", self.unknown);
+        let ended = self.ended.load(Ordering::Relaxed);
+        let _ = writeln!(text, "replay.ended={}", u8::from(ended));
+    }
+}
+
+/// Which column of the recording each signal is.
+struct Map {
+    /// Per signal of this driver.
+    signals: Vec<Option<usize>>,
+    edges: Vec<Option<usize>>,
+    /// Per station of this driver, where the recording has several.
+    stations: Vec<Option<usize>>,
+}
+
+/// A recording as the other end of a stepped bus.
+pub(super) struct Replay {
+    recording: Recording,
+    map: Map,
+    stations: Vec<Station>,
+    /// The tick that comes next, if there is one.
+    next: Tick,
+    more: bool,
+    /// Why there is none, if the recording is damaged.
+    broken: Option<RecordingError>,
+    /// The one that was replayed last.
+    present: Tick,
+    /// The slots of this driver as the recording has them.
+    slots: Vec<Slot>,
+    /// When this end sent last.
+    sent: Option<Nanos>,
+    /// The present tick is yet to be compared.
+    uncompared: bool,
+    /// Simulation time when the replay began, less that of the recording.
+    offset: Option<Nanos>,
+    max_age: Nanos,
+    differences: Differences,
+    tally: Arc<ReplayTally>,
+    /// No recorder of this process gets the file meanwhile.
+    _place: Place,
+}
+
+impl Replay {
+    /// Opens the recording at `path`, which must have the signals of the driver's table.
+    ///
+    /// # Errors
+    ///
+    /// The recording cannot be read, or is of another signal table.
+    pub(super) fn open(
+        config: &Config,
+        path: &Path,
+    ) -> Result<(Self, Arc<ReplayTally>), DriverError> {
+        let refused = |error: RecordingError| DriverError::Config(error.to_string());
+        let place = Place::to_replay(path).map_err(DriverError::Config)?;
+        let mut recording = Recording::open(path, Some(&config.table)).map_err(refused)?;
+        let map = Map::new(config, recording.columns()).map_err(|what| {
+            DriverError::Config(format!(
+                "{}: this recording is of another signal table: {what}; record again, or use the signals that \
+                 it was recorded with",
+                path.display()
+            ))
+        })?;
+        let (tx, _) = config.role.areas();
+        let signals = config.table.signals.iter().zip(&map.signals);
+        let unknown: Vec<&str> = signals
+            .filter(|(signal, column)| signal.area == tx && column.is_none())
+            .map(|(signal, _)| signal.name.as_str())
+            .collect();
+        if !unknown.is_empty() {
+            log::warn!(
+                "{}: {} signals are not in this recording and are not compared: {}",
+                path.display(),
+                unknown.len(),
+                unknown.join(", ")
+            );
+        }
+        let mut next = Tick::new(recording.columns());
+        let more = recording.next(&mut next).map_err(refused)?;
+        let tally = Arc::new(ReplayTally {
+            file: path.display().to_string(),
+            unknown: unknown.len() as u64,
+            ..ReplayTally::default()
+        });
+        let mut slots = vec![Slot::default(); config.table.signals.len()];
+        for (slot, signal) in slots.iter_mut().zip(&config.table.signals) {
+            *slot = signal.fail_safe;
+        }
+        let stations = Station::all(config, &map.edges);
+        let replay = Self {
+            stations,
+            present: next.clone(),
+            next,
+            more,
+            broken: None,
+            slots,
+            sent: None,
+            uncompared: false,
+            offset: None,
+            max_age: config.timing.max_age,
+            differences: Differences::new(path),
+            tally: Arc::clone(&tally),
+            recording,
+            map,
+            _place: place,
+        };
+        Ok((replay, tally))
+    }
+
+    /// When the next recorded tick is due, if there is one.
+    fn due(&self, now: Nanos) -> Option<Nanos> {
+        let offset = self.offset.unwrap_or(now - self.next.time);
+        self.more.then(|| self.next.time + offset)
+    }
+
+    /// Takes over one recorded tick, and reads the one after it.
+    fn advance(&mut self) {
+        self.present.clone_from(&self.next);
+        self.more = self.recording.next(&mut self.next).unwrap_or_else(|error| {
+            // The ticks before the damage are good.
+            self.broken = Some(error);
+            false
+        });
+        for (slot, column) in self.slots.iter_mut().zip(&self.map.signals) {
+            if let Some(column) = column {
+                *slot = self.present.values[*column];
+            }
+        }
+        self.tally.ticks.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Hands the frames of the present tick in, as the driver received them then.
+    fn deliver(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let next = self.more.then_some(&self.next);
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            let status = |tick: &Tick| match self.map.stations[index] {
+                Some(column) => tick.stations[column],
+                None => tick.status,
+            };
+            let after = next.map(|next| (status(next), next));
+            match status(&self.present) {
+                status @ (FRESH | UNCHANGED) => {
+                    let (slots, columns) = (&self.slots, &self.map.signals);
+                    let present = (status, &self.present);
+                    let fed = station.feed(slots, present, after, columns, |frame| {
+                        port.received(index, now, frame);
+                    });
+                    fed.map_err(BusError::Protocol)?;
+                    port.touch(index, now);
+                }
+                // Older than it may be, so that this driver shows what that one showed.
+                STALE => port.touch(index, now - self.max_age - Nanos(1)),
+                // An exchange that failed brought nothing.
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares what this end sends with what it sent then, once the present tick has both: a simulation that
+    /// exchanges has sent before it receives, one that answers within its tick sends afterwards.
+    fn compare(&mut self, now: Nanos) {
+        if !self.uncompared || self.sent != Some(now) {
+            return;
+        }
+        self.uncompared = false;
+        self.tally.compared.fetch_add(1, Ordering::Relaxed);
+        let (map, tick, list) = (&self.map.signals, &self.present, &mut self.differences);
+        let mut found = 0;
+        for station in &mut self.stations {
+            station.compare(now, &self.slots, |signal, kind, name, expected, seen| {
+                if map[signal].is_some() {
+                    found += 1;
+                    list.add(tick, name, kind, expected, seen);
+                }
+            });
+        }
+        if found > 0 {
+            self.tally.differences.fetch_add(found, Ordering::Relaxed);
+            list.flush();
+        }
+    }
+}
+
+/// The statuses of a recorded tick; below 0 it failed.
+const FRESH: i32 = 0;
+const UNCHANGED: i32 = 1;
+const STALE: i32 = 2;
+
+impl Stepped for Replay {
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            station.sees(port.outgoing(index, now));
+            port.sent(index);
+        }
+        self.sent = Some(now);
+        self.compare(now);
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+        let mut taken = false;
+        while let Some(due) = self.due(now).filter(|due| *due <= now) {
+            self.offset.get_or_insert(due - self.next.time);
+            self.advance();
+            self.deliver(now, port)?;
+            taken = true;
+        }
+        if taken {
+            port.running("the recording is replayed");
+            self.uncompared = true;
+            self.compare(now);
+            if self.present.status < 0 {
+                return Err(BusError::Link(format!(
+                    "tick {} failed when it was recorded, too",
+                    self.present.number
+                )));
+            }
+        } else if self.more && self.present.status != STALE {
+            // Between two recorded ticks the peer was there, too.
+            (0..self.stations.len()).for_each(|station| port.touch(station, now));
+        }
+        if let Some(due) = self.due(now) {
+            return Ok(due.max(now));
+        }
+        match &self.broken {
+            Some(_) if taken => return Ok(now),
+            Some(broken) => return Err(BusError::Protocol(broken.to_string())),
+            None => {}
+        }
+        if !self.tally.ended.swap(true, Ordering::Relaxed) {
+            let last = self.present.number;
+            let why = format!("tick {last} was its last, {}", self.recording.ending());
+            port.lost(&BusError::Left(why), "nothing follows");
+        }
+        Ok(now)
+    }
+}
+
+impl Drop for Replay {
+    fn drop(&mut self) {
+        self.differences.end(
+            self.tally.compared.load(Ordering::Relaxed),
+            self.tally.differences.load(Ordering::Relaxed),
+        );
+    }
+}
+
+impl Map {
+    /// Finds the driver's signals in the recording.
+    ///
+    /// # Errors
+    ///
+    /// The recording lacks signals that this end reads, or has them otherwise.
+    fn new(config: &Config, columns: &Columns) -> Result<Self, String> {
+        let (_, rx) = config.role.areas();
+        let all = columns.columns.iter().enumerate();
+        let known: HashMap<(&str, bool), usize> = all
+            .map(|(index, column)| ((column.name.as_str(), column.is_edges), index))
+            .collect();
+        let find = |signal: &Signal, edges| known.get(&(signal.name.as_str(), edges)).copied();
+        let signals = &config.table.signals;
+        let mut wrong = Vec::new();
+        for signal in signals {
+            let shown = format!("\"{}\" ({})", signal.name, signal.address());
+            let Some(index) = find(signal, false) else {
+                if signal.area == rx {
+                    let names = columns.columns.iter().filter(|column| !column.is_edges);
+                    let names: Vec<&str> = names.map(|column| column.name.as_str()).collect();
+                    let near = did_you_mean(&signal.name, "signals", &names);
+                    wrong.push(format!("it has no {shown}{}", meant(&near)));
+                }
+                continue;
+            };
+            let column = &columns.columns[index];
+            let kind = Kind::of(signal.data_type, signal.scale.is_some());
+            let was = match (column.address, column.data_type) {
+                (Some(address), Some(data_type)) => format!("{address} {data_type}"),
+                _ => "of another type".to_owned(),
+            };
+            let moved = column
+                .address
+                .is_some_and(|address| address.area != signal.area);
+            if column.kind != kind || moved {
+                wrong.push(format!("{shown} {} was {was}", signal.data_type));
+            }
+        }
+        if !wrong.is_empty() {
+            let more = wrong.len().saturating_sub(NAMED);
+            wrong.truncate(NAMED);
+            if more > 0 {
+                wrong.push(format!("and {more} more"));
+            }
+            return Err(wrong.join(", "));
+        }
+        let stations = config.table.stations.iter();
+        Ok(Self {
+            signals: signals.iter().map(|signal| find(signal, false)).collect(),
+            edges: signals.iter().map(|signal| find(signal, true)).collect(),
+            stations: stations
+                .map(|station| {
+                    columns
+                        .stations
+                        .iter()
+                        .position(|name| *name == station.name)
+                })
+                .collect(),
+        })
+    }
+}
+
+/// "did you mean" in the midst of a sentence; a list of all names would be too long for one.
+fn meant(near: &str) -> String {
+    near.strip_prefix("did you mean ")
+        .map(|name| format!(" (it has {})", name.trim_end_matches('?')))
+        .unwrap_or_default()
+}

@@ -1,0 +1,125 @@
+//! The list of what differed in a replay: a file beside the recording.
+
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use tickbus_image::signal::Slot;
+use tickbus_record::{Kind, Tick};
+
+/// The most differences that are listed; the others are counted.
+const MOST_LISTED: u64 = 100_000;
+
+/// How many of them go to the log, too.
+const MOST_LOGGED: u64 = 10;
+
+/// Up to how many the file gets each at once, for those who watch.
+const FLUSHED: u64 = 1_000;
+
+/// The list of what differed.
+pub(super) struct Differences {
+    recording: PathBuf,
+    path: PathBuf,
+    file: Option<BufWriter<File>>,
+    listed: u64,
+}
+
+impl Differences {
+    /// Begins the list for the recording at `path`, in `<path>.diff`.
+    pub(super) fn new(recording: &Path) -> Self {
+        let mut path = recording.to_owned().into_os_string();
+        path.push(".diff");
+        let path = PathBuf::from(path);
+        let begun = File::create(&path).and_then(|file| {
+            let mut file = BufWriter::new(file);
+            writeln!(file, "tick,time_ns,signal,expected,seen")?;
+            file.flush()?;
+            Ok(file)
+        });
+        let file = begun
+            .inspect_err(|error| {
+                log::warn!(
+                    "{}: differences cannot be listed here: {error}; the first {MOST_LOGGED} go to the log",
+                    path.display()
+                );
+            })
+            .ok();
+        Self {
+            recording: recording.to_owned(),
+            path,
+            file,
+            listed: 0,
+        }
+    }
+
+    /// Lists one difference.
+    pub(super) fn add(&mut self, tick: &Tick, name: &str, kind: Kind, expected: Slot, seen: Slot) {
+        self.listed += 1;
+        if self.listed > MOST_LISTED {
+            return;
+        }
+        let (number, time) = (tick.number, tick.time);
+        let (expected, seen) = (shown(kind, expected), shown(kind, seen));
+        if self.listed <= MOST_LOGGED {
+            log::warn!(
+                "{}: tick {number} at {time}: \"{name}\" was {expected}, and is {seen}",
+                self.recording.display()
+            );
+        }
+        let name = if name.contains([',', '"']) {
+            &format!("\"{}\"", name.replace('"', "\"\""))
+        } else {
+            name
+        };
+        self.write(&format!("{number},{},{name},{expected},{seen}\n", time.0));
+        if self.listed == MOST_LISTED {
+            self.write("# no more are listed\n");
+        }
+    }
+
+    fn write(&mut self, text: &str) {
+        if let Some(file) = &mut self.file
+            && let Err(error) = file.write_all(text.as_bytes())
+        {
+            log::error!(
+                "{}: the list of differences ends here: {error}",
+                self.path.display()
+            );
+            self.file = None;
+        }
+    }
+
+    /// Makes what is listed so far visible, as long as it is little.
+    pub(super) fn flush(&mut self) {
+        if let Some(file) = &mut self.file
+            && self.listed <= FLUSHED
+        {
+            // What fails here fails again, and is told, at the next write.
+            let _ = file.flush();
+        }
+    }
+
+    /// Ends the list with what was counted.
+    pub(super) fn end(&mut self, compared: u64, differences: u64) {
+        self.write(&format!("# ticks={compared} differences={differences}\n"));
+        if let Some(file) = &mut self.file {
+            let _ = file.flush();
+        }
+        let (recording, list) = (self.recording.display(), self.path.display());
+        if differences == 0 {
+            log::info!("{recording}: replayed, {compared} ticks compared, no difference");
+        } else {
+            log::warn!(
+                "{recording}: replayed, {compared} ticks compared, {differences} differences, listed in {list}"
+            );
+        }
+    }
+}
+
+fn shown(kind: Kind, slot: Slot) -> String {
+    match kind {
+        Kind::Signed => slot.signed().to_string(),
+        Kind::Unsigned => slot.unsigned().to_string(),
+        Kind::Bit | Kind::Real | Kind::Count => slot.real().to_string(),
+    }
+}

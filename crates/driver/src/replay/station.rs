@@ -1,0 +1,244 @@
+//! One station of a replay: the frames that it receives again, and those that it should send.
+
+use crate::frames::{area_bytes, directions};
+use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::{Area, Latch, Plan, Slot};
+use tickbus_image::{BusStation, LatchedBit, TickStation, latched_bits, station};
+use tickbus_record::{Kind, Tick};
+
+use super::UNCHANGED;
+
+/// The most edges of one signal in one tick: more than any bus brings.
+const MOST_EDGES: f64 = 10_000.0;
+
+/// A latched bit that this end receives.
+struct Latched {
+    bit: LatchedBit,
+    /// The column that counts its edges.
+    edges: Option<usize>,
+}
+
+/// A signal that this end sends.
+struct Sent {
+    signal: usize,
+    name: String,
+    kind: Kind,
+}
+
+pub(super) struct Station {
+    receive: Plan,
+    send: Plan,
+    latched: Vec<Latched>,
+    sent: Vec<Sent>,
+    /// The frame that was received last, and the one that is made.
+    fed: Box<[u8]>,
+    frame: Box<[u8]>,
+    /// The frame that this end sends now.
+    seen: Box<[u8]>,
+    /// What this end made of the recorded values, pulses, holding and all: an image of its own.
+    expected: (TickStation, BusStation),
+    /// Bits with edges in the present tick: byte, mask, how often it toggles, its level before.
+    toggling: Vec<(usize, u8, usize, bool)>,
+    /// Slots for the comparison.
+    slots: [Vec<Slot>; 2],
+}
+
+impl Station {
+    /// The stations of the driver that `config` describes; `edges` has, per signal, the column that counts
+    /// its edges.
+    pub(super) fn all(config: &Config, edges: &[Option<usize>]) -> Vec<Self> {
+        let (tx, rx) = config.role.areas();
+        let directions = directions(&config.table, config.role);
+        let stations = directions.into_iter().enumerate();
+        stations
+            .map(|(index, directions)| {
+                let table = &config.table;
+                let latched = latched_bits(table, index, rx).into_iter();
+                let signals = table.signals.iter().enumerate();
+                let frame = |area: Area| vec![0; area_bytes(table, index, area)].into();
+                Self {
+                    receive: Plan::new(table, index, rx),
+                    send: Plan::new(table, index, tx),
+                    latched: latched
+                        .map(|bit| Latched {
+                            bit,
+                            edges: edges[bit.signal],
+                        })
+                        .collect(),
+                    sent: signals
+                        .filter(|(_, signal)| signal.station == index && signal.area == tx)
+                        .map(|(number, signal)| Sent {
+                            signal: number,
+                            name: signal.name.clone(),
+                            kind: Kind::of(signal.data_type, signal.scale.is_some()),
+                        })
+                        .collect(),
+                    fed: directions.rx_fail_safe.clone(),
+                    frame: frame(rx),
+                    seen: frame(tx),
+                    expected: station(directions),
+                    toggling: Vec::new(),
+                    slots: [(); 2].map(|()| vec![Slot::default(); table.signals.len()]),
+                }
+            })
+            .collect()
+    }
+
+    /// Hands to `receive` the frames that make this driver show what is in `slots`, and count the edges that
+    /// `present` counts: its own status is `status`, and `after` is the tick behind it, with its status. An
+    /// exchange that found nothing new gets no frame, unless it shows something new all the same.
+    ///
+    /// # Errors
+    ///
+    /// There are more edges than any bus brings.
+    pub(super) fn feed(
+        &mut self,
+        slots: &[Slot],
+        (status, present): (i32, &Tick),
+        after: Option<(i32, &Tick)>,
+        columns: &[Option<usize>],
+        mut receive: impl FnMut(&[u8]),
+    ) -> Result<(), String> {
+        self.receive.encode(slots, &mut self.frame);
+        // What a latched bit shows was shaped: a pulse that was over is shown for one tick. The frames to
+        // hand in are those that make the driver shape it again.
+        self.toggling.clear();
+        let mut frames = 1;
+        for latched in &self.latched {
+            let (byte, mask) = (latched.bit.byte, latched.bit.mask);
+            let count = latched
+                .edges
+                .map_or(0.0, |column| present.values[column].real());
+            if count > MOST_EDGES {
+                return Err(format!(
+                    "tick {} of the recording has {count} edges of one signal",
+                    present.number
+                ));
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "checked above; a cast saturates at 0"
+            )]
+            let count = count as usize;
+            if count == 0 {
+                continue;
+            }
+            let was = self.fed[byte] & mask != 0;
+            let shown = self.frame[byte] & mask != 0;
+            // A pulse that was over falls back in a tick for which no frame came.
+            let falls_back = after.is_some_and(|(status, tick)| {
+                let column = columns[latched.bit.signal];
+                let next = column.map(|column| tick.values[column].real() != 0.0);
+                status == UNCHANGED && next == Some(!shown)
+            });
+            let (level, toggles) = latched.way(was, shown, count, falls_back);
+            set(&mut self.frame, byte, mask, level);
+            frames = frames.max(toggles);
+            self.toggling.push((byte, mask, toggles, was));
+        }
+        if status == UNCHANGED && frames == 1 && self.frame == self.fed {
+            return Ok(());
+        }
+        for left in (0..frames).rev() {
+            // All bits end together, so that some begin later.
+            for (byte, mask, toggles, was) in &self.toggling {
+                let done = toggles.saturating_sub(left);
+                set(&mut self.frame, *byte, *mask, *was != (done % 2 == 1));
+            }
+            receive(&self.frame);
+        }
+        self.fed.copy_from_slice(&self.frame);
+        Ok(())
+    }
+
+    /// Takes note of what this end sends.
+    pub(super) fn sees(&mut self, frame: &[u8]) {
+        self.seen.copy_from_slice(frame);
+    }
+
+    /// Compares what this end sends with what it should, which follows from the recorded `slots`, and tells
+    /// every signal that differs.
+    pub(super) fn compare(
+        &mut self,
+        now: Nanos,
+        slots: &[Slot],
+        mut differs: impl FnMut(usize, Kind, &str, Slot, Slot),
+    ) {
+        let (tick, bus) = &mut self.expected;
+        tick.write(now, |frame| self.send.encode(slots, frame));
+        let frame = bus.outgoing(now, None);
+        if *frame != *self.seen {
+            let [expected, seen] = &mut self.slots;
+            self.send.decode(frame, expected);
+            self.send.decode(&self.seen, seen);
+            for Sent { signal, name, kind } in &self.sent {
+                if expected[*signal] != seen[*signal] {
+                    differs(*signal, *kind, name, expected[*signal], seen[*signal]);
+                }
+            }
+        }
+        bus.sent();
+    }
+}
+
+impl Latched {
+    /// The level at the end of a tick with `count` edges that matter, at least one, and how often the level
+    /// changed on its way there from `was`. The tick showed `shown`.
+    fn way(&self, was: bool, shown: bool, count: usize, falls_back: bool) -> (bool, usize) {
+        let counted = match self.bit.latch {
+            Latch::Both => return (was != (count % 2 == 1), count),
+            Latch::Rising => true,
+            Latch::Falling => false,
+        };
+        let level = counted != (shown == counted && falls_back);
+        // Before each edge that counts there is one that does not, but for the first if it begins there.
+        let toggles = 2 * count - usize::from(was != counted) + usize::from(level != counted);
+        (level, toggles)
+    }
+}
+
+fn set(frame: &mut [u8], byte: usize, mask: u8, level: bool) {
+    if level {
+        frame[byte] |= mask;
+    } else {
+        frame[byte] &= !mask;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Walks the way, and counts.
+    #[test]
+    fn ways_have_the_edges_that_they_should() {
+        for latch in [Latch::Rising, Latch::Falling, Latch::Both] {
+            let bit = LatchedBit {
+                signal: 0,
+                byte: 0,
+                mask: 1,
+                latch,
+                hold: Nanos::ZERO,
+            };
+            let latched = Latched { bit, edges: None };
+            for case in 0..8 {
+                let [was, shown, falls_back] = [1, 2, 4].map(|bit| case & bit != 0);
+                for count in 1..5 {
+                    let (end, toggles) = latched.way(was, shown, count, falls_back);
+                    let (mut level, mut counted) = (was, 0);
+                    for _ in 0..toggles {
+                        level = !level;
+                        counted += usize::from(match latch {
+                            Latch::Rising => level,
+                            Latch::Falling => !level,
+                            Latch::Both => true,
+                        });
+                    }
+                    assert_eq!((level, counted), (end, count), "{latch:?} {case} {count}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Where values stand among the slots of an exchange.
+
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::SignalTable;
+
+/// Where each value stands among the slots that an exchange works on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SlotMap {
+    /// Slots in all: one per signal in the order of the table, then one per latched signal that
+    /// this end reads.
+    pub count: usize,
+    /// Per signal, the slot that counts its edges since the last exchange, as a double.
+    pub edges: Vec<Option<usize>>,
+}
+
+impl SlotMap {
+    pub(super) fn new(table: &SignalTable, role: Role) -> Self {
+        let (_, rx) = role.areas();
+        let mut count = table.signals.len();
+        let edges = table
+            .signals
+            .iter()
+            .map(|signal| {
+                (signal.area == rx && signal.latch.is_some()).then(|| {
+                    count += 1;
+                    count - 1
+                })
+            })
+            .collect();
+        Self { count, edges }
+    }
+}

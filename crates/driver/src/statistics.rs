@@ -1,0 +1,173 @@
+//! What a driver counts.
+
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
+
+use super::Code;
+use super::bus::ProgramTally;
+use tickbus_base::os::dropped_log_lines;
+use tickbus_base::time::{Nanos, Spans};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::LinkStatus;
+use tickbus_fieldbus::faults::Board;
+use tickbus_record::Tally;
+
+/// Counters of the tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Exchanges.
+    pub ticks: u64,
+    /// Exchanges that found a new bus cycle.
+    pub fresh: u64,
+    /// Exchanges that found the link alive, but no new cycle.
+    pub unchanged: u64,
+    /// Exchanges that found nothing newer than the limit of age.
+    pub stale: u64,
+    /// Exchanges that failed.
+    pub failed: u64,
+    /// Values beyond the range of their type, sent as the nearest end of it.
+    pub saturated: u64,
+    /// NaN values, sent as the fail-safe value.
+    pub not_a_number: u64,
+}
+
+impl Counters {
+    pub(super) fn count(&mut self, code: Code) {
+        let counter = match code {
+            Code::Fresh => &mut self.fresh,
+            Code::Unchanged => &mut self.unchanged,
+            Code::Stale => &mut self.stale,
+            _ => &mut self.failed,
+        };
+        *counter += 1;
+    }
+}
+
+/// One `key=value` per line.
+impl fmt::Display for Counters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            ticks,
+            fresh,
+            unchanged,
+            stale,
+            failed,
+            saturated,
+            not_a_number,
+        } = self;
+        writeln!(
+            f,
+            "ticks={ticks}\nfresh={fresh}\nunchanged={unchanged}\nstale={stale}"
+        )?;
+        writeln!(
+            f,
+            "failed={failed}\nsaturated={saturated}\nnot_a_number={not_a_number}"
+        )
+    }
+}
+
+/// One tick in so many is timed: a second look at the clock takes half as long as a small exchange.
+const SAMPLED: u64 = 32;
+
+/// Distributions over the ticks, from samples.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Samples {
+    /// How long an exchange takes.
+    exchange: Spans,
+    /// How old the data are that it delivers.
+    age: Spans,
+}
+
+impl Samples {
+    /// Whether this tick is one of the sample.
+    #[inline]
+    pub(super) const fn takes(tick: u64) -> bool {
+        tick.is_multiple_of(SAMPLED)
+    }
+
+    /// Takes the sample of a tick whose calls took `span`, and delivered data of `age`; `Nanos::MAX` where there
+    /// never were any.
+    pub(super) fn add(&mut self, span: Nanos, age: Nanos) {
+        self.exchange.record(span);
+        if age != Nanos::MAX {
+            self.age.record(age);
+        }
+    }
+
+    /// Appends both, one `key=value` a line.
+    pub(super) fn write(&self, text: &mut String) {
+        self.exchange.write("exchange", text);
+        self.age.write("age", text);
+    }
+}
+
+/// What the statistics of a driver are made of, at one moment.
+///
+/// To copy it takes a microsecond or two, to write it as text may take a hundred times as long: whoever has the driver to
+/// himself for the one gives it back before the other.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    pub(super) config: Arc<Config>,
+    pub(super) counters: Counters,
+    /// Per station, how long ago its peer was heard of, whether its data count, and its bus cycles.
+    pub(super) stations: Vec<(Nanos, bool, u64)>,
+    pub(super) events_lost: u64,
+    pub(super) now: Nanos,
+    pub(super) samples: Samples,
+    pub(super) status: LinkStatus,
+    pub(super) board: Arc<Board>,
+    pub(super) program: Option<ProgramTally>,
+    pub(super) record: Option<Arc<Tally>>,
+}
+
+impl Snapshot {
+    /// Appends how old each station's data are and how many bus cycles it has sent; nothing where there is one.
+    fn write_stations(&self, text: &mut String) {
+        if self.stations.len() < 2 {
+            return;
+        }
+        let sections = &self.config.table.stations;
+        for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
+            let name = &section.name;
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "station.{name}.stale={}",
+                *age > self.config.timing.max_age || !is_valid
+            );
+            if *age != Nanos::MAX {
+                let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
+            }
+            let _ = writeln!(text, "station.{name}.bus_cycles={cycles}");
+        }
+    }
+}
+
+/// One `key=value` per line.
+impl fmt::Display for Snapshot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ages = self.stations.iter().map(|(age, _, _)| *age);
+        self.status.observe(self.now, ages);
+        self.status.observe_call(self.now);
+        let mut text = self.counters.to_string();
+        let cycles: u64 = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
+        writeln!(
+            text,
+            "bus_cycles={cycles}\nevents_lost={}",
+            self.events_lost
+        )?;
+        self.status.write(self.now, &mut text);
+        self.write_stations(&mut text);
+        self.samples.write(&mut text);
+        self.board.tell(self.status.driver());
+        self.board.write(&mut text);
+        if let Some(program) = &self.program {
+            program.write(&mut text);
+        }
+        if let Some(record) = &self.record {
+            record.write(&mut text);
+        }
+        writeln!(text, "log.dropped={}", dropped_log_lines())?;
+        f.write_str(&text)
+    }
+}

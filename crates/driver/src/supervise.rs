@@ -1,0 +1,132 @@
+//! The thread of a free bus: runs it, and runs it again when its line broke.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
+use std::thread::JoinHandle;
+
+use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_fieldbus::{BusError, Cause, Free, LinkState, LinkStatus, Port};
+
+/// A bus thread; dropping it stops the bus and waits for its end.
+///
+/// A bus that does not end within its `close_timeout` is in a call that never returns. Its thread is left
+/// behind with all that it uses, since nothing could free that under it.
+#[derive(Debug)]
+pub(super) struct BusThread {
+    stop: Stop,
+    name: String,
+    status: LinkStatus,
+    close_timeout: Nanos,
+    /// Disconnected when the thread ends.
+    ended: Receiver<()>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl BusThread {
+    /// Starts a thread that serves `bus`, with the pauses of `reconnect` between attempts (the last
+    /// one again and again).
+    pub(super) fn start(
+        bus: Box<dyn Free>,
+        port: Port,
+        reconnect: Vec<Nanos>,
+        status: LinkStatus,
+        name: &str,
+    ) -> std::io::Result<Self> {
+        let stop = Stop::new();
+        let close_timeout = bus.close_timeout();
+        let (end, ended) = mpsc::channel();
+        let thread = std::thread::Builder::new()
+            .name(format!("bus {name}"))
+            .spawn({
+                let (stop, status) = (stop.clone(), status.clone());
+                move || {
+                    let _end: Sender<()> = end;
+                    // Dropped before that: a bus may take its time to free what it holds, such as a library
+                    // that is unloaded, and whoever closes it waits for `_end` with a limit.
+                    let (mut bus, mut port) = (bus, port);
+                    let clock = Arc::clone(port.clock());
+                    serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
+                }
+            })?;
+        Ok(Self {
+            stop,
+            name: name.to_owned(),
+            status,
+            close_timeout,
+            ended,
+            thread: Some(thread),
+        })
+    }
+}
+
+impl Drop for BusThread {
+    fn drop(&mut self) {
+        self.stop.stop();
+        if self.ended.recv_timeout(self.close_timeout.to_duration()) == Err(Timeout) {
+            log::error!(
+                "driver \"{}\": the bus did not end within {}, and its thread is left behind ({})",
+                self.name,
+                self.close_timeout,
+                self.status.link().reason
+            );
+            return;
+        }
+        if let Some(thread) = self.thread.take() {
+            // Its panics are caught and recorded on the thread itself.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn serve(
+    bus: &mut dyn Free,
+    port: &mut Port,
+    clock: &dyn Clock,
+    reconnect: &[Nanos],
+    status: &LinkStatus,
+    stop: &Stop,
+) {
+    let mut attempt = 0;
+    while !stop.is_stopped() {
+        port.opening("opening the line");
+        let runs = status.runs();
+        let ended = match catch_unwind(AssertUnwindSafe(|| bus.run(port, stop))) {
+            Ok(Ok(())) if stop.is_stopped() => break,
+            Ok(Ok(())) => BusError::Link("the bus ended by itself".to_owned()),
+            Ok(Err(error)) => error,
+            Err(panic) => {
+                let reason = format!(
+                    "the bus thread panicked ({}); close the driver and open it again",
+                    panic_text(&*panic)
+                );
+                status.enter(clock.now(), LinkState::Failed, Cause::Defect, &reason);
+                return;
+            }
+        };
+        if status.runs() > runs {
+            attempt = 0;
+        }
+        let pause = reconnect[attempt.min(reconnect.len() - 1)];
+        attempt += 1;
+        let now = clock.now();
+        let reason = format!("{ended}; next attempt in {pause}");
+        status.enter(now, LinkState::Failed, (&ended).into(), &reason);
+        let next = now + pause;
+        while clock.now() < next && !stop.is_stopped() {
+            // May end early, by a wake that was meant for the attempt before.
+            clock.wait_until(next, stop);
+        }
+    }
+    status.enter(clock.now(), LinkState::Closed, Cause::Closed, "closed");
+}
+
+/// What a panic said.
+pub fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&'static str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no text")
+}

@@ -1,0 +1,289 @@
+//! The block that talks to the simulation: one body for each bus.
+
+use super::members::Path;
+use super::{Image, Plan, line, modbus, s7comm, socket, source};
+use crate::record::Place;
+use crate::siemens::spelling;
+use tickbus_bus_s7::Variable;
+use tickbus_bus_socket::Message;
+use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::Options;
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::{DataType, Width};
+
+/// A body: what it declares and what it does.
+#[derive(Default)]
+pub(super) struct Body {
+    /// What it is, for the head.
+    pub(super) what: String,
+    /// Lines between `VAR` and `END_VAR`.
+    pub(super) variables: Vec<String>,
+    /// Lines between `VAR_TEMP` and `END_VAR`.
+    pub(super) temporary: Vec<String>,
+    pub(super) code: Vec<String>,
+    /// It counts images that came, in `Received`.
+    pub(super) receives: bool,
+    /// It counts images that went, in `Sent`.
+    pub(super) sends: bool,
+    /// What is TRUE in each call in which the simulation was heard of; empty where nothing here can know.
+    pub(super) heard: String,
+    /// The driver counts signals up by which the PLC sees that the simulation ticks.
+    pub(super) has_heartbeat: bool,
+}
+
+impl Body {
+    /// Declarations of the members that the control block has beside `Simulated`: those that something sets.
+    pub(super) fn status(&self) -> Vec<&'static str> {
+        let members = [
+            (
+                self.has_heartbeat,
+                "Alive : Bool;   // the simulation ticks: its heartbeat changes",
+            ),
+            (
+                !self.has_heartbeat && !self.heard.is_empty(),
+                "Alive : Bool;   // the simulation was heard of not longer ago than the driver's max_age",
+            ),
+            (
+                self.receives,
+                "Received : UDInt;   // images that have come since Simulated was set",
+            ),
+            (
+                self.sends,
+                "Sent : UDInt;   // images that have gone since then",
+            ),
+            (
+                self.receives || self.sends,
+                "Errors : UDInt;   // jobs that failed",
+            ),
+            (
+                self.receives || self.sends,
+                "Last_error : Word;   // STATUS of the last of them",
+            ),
+        ];
+        let members = members.into_iter().filter(|(is_set, _)| *is_set);
+        members.map(|(_, member)| member).collect()
+    }
+}
+
+/// The body for the bus of the driver.cfg.
+pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
+    let mut body = match &plan.config.bus {
+        Options::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
+            by_hand("socket with message = \"axis\"", notes)
+        }
+        Options::Socket(options) => socket::body(plan, options, notes),
+        Options::ModbusServer(options) => modbus::client(plan, options, notes),
+        Options::ModbusClient(options) => modbus::server(plan, options, notes),
+        Options::S7Server(options) => s7comm::puts_and_gets(plan, options, notes),
+        Options::S7Client(options) => s7comm::nothing(plan, options),
+        Options::OpcuaClient(_) => opcua_server(plan),
+        Options::OpcuaServer(options) => opcua_client(plan, &options.address.to_string()),
+        bus @ (Options::Loopback(_) | Options::Plugin(_)) => by_hand(bus.kind(), notes),
+    };
+    watch(plan, &mut body);
+    body
+}
+
+/// Declares and sets `Alive`: by the heartbeats of the driver.cfg if it has some, else by what the bus has heard.
+fn watch(plan: &Plan<'_>, body: &mut Body) {
+    let Config {
+        life_signs,
+        table,
+        timing,
+        ..
+    } = plan.config;
+    let prefix = &plan.prefix;
+    let mut watched = Vec::new();
+    for beat in life_signs.beats(table, Role::Device) {
+        let places = &plan.inputs.record.places;
+        let signal = &table.signals[beat.signal];
+        let Some(place) = places
+            .iter()
+            .find(|place| std::ptr::eq(place.signal, signal))
+        else {
+            continue;
+        };
+        let number = watched.len() + 1;
+        let (value, kind) = counting(plan, &plan.inputs, place);
+        body.variables.push(format!("Last_beat_{number} : {kind};"));
+        // A beat may come late, and a few be missed.
+        let within = timing.max_age.max(beat.every.times(5));
+        let last = format!("#Last_beat_{number}");
+        watched.push((
+            format!("{value} <> {last}"),
+            within,
+            Some(format!("{last} := {value};")),
+        ));
+    }
+    body.has_heartbeat = !watched.is_empty();
+    if watched.is_empty() && !body.heard.is_empty() {
+        watched.push((body.heard.clone(), timing.max_age, None));
+    }
+    let mut all = Vec::new();
+    for (number, (heard, within, then)) in watched.iter().enumerate() {
+        let number = number + 1;
+        body.variables.extend([
+            format!("Silence_{number} : TON_TIME;"),
+            format!("Is_heard_{number} : Bool;"),
+        ]);
+        body.code.extend([
+            String::new(),
+            format!("IF {heard} THEN"),
+            format!("   #Is_heard_{number} := TRUE;"),
+            "END_IF;".to_owned(),
+            format!(
+                "#Silence_{number}(IN := \"{prefix}\".Simulated AND NOT ({heard}), PT := {});",
+                time(*within)
+            ),
+            format!("IF #Silence_{number}.Q OR NOT \"{prefix}\".Simulated THEN"),
+            format!("   #Is_heard_{number} := FALSE;"),
+            "END_IF;".to_owned(),
+        ]);
+        body.code.extend(then.clone());
+        all.push(format!("#Is_heard_{number}"));
+    }
+    if !all.is_empty() {
+        body.code
+            .push(format!("\"{prefix}\".Alive := {};", all.join(" AND ")));
+    }
+}
+
+/// What changes of a signal with every count, and its type: the signal itself or its least significant byte, where the
+/// simulation reads or writes it.
+pub(super) fn counting(
+    plan: &Plan<'_>,
+    image: &Image<'_>,
+    place: &Place<'_>,
+) -> (String, &'static str) {
+    let least = place.signal.order.byte_position(place.size(), 0);
+    if let Some(variable) = s7comm::direct(plan, place) {
+        if place.data_type() == DataType::Bool {
+            return (variable.to_string(), spelling(DataType::Bool));
+        }
+        let byte = Variable {
+            byte: variable.byte + least,
+            width: Width::Byte,
+            data_type: None,
+            ..variable
+        };
+        return (byte.to_string(), spelling(DataType::Byte));
+    }
+    match Path::of(place, plan.cpu) {
+        Path::Value(name) => (image.member(&name), spelling(place.data_type())),
+        Path::Bytes(names) => (image.member(&names[least]), spelling(DataType::Byte)),
+    }
+}
+
+/// The second source.
+pub(super) fn text(plan: &Plan<'_>, body: &Body) -> String {
+    let mut text = source(plan, &body.what);
+    let name = format!("{}_link", plan.prefix);
+    line(&mut text, &format!("FUNCTION_BLOCK \"{name}\""));
+    // Standard access: what the communication blocks send and receive lies as it is declared.
+    line(&mut text, "{ S7_Optimized_Access := 'FALSE' }");
+    line(&mut text, "VERSION : 0.1");
+    for (kind, lines) in [("VAR", &body.variables), ("VAR_TEMP", &body.temporary)] {
+        if !lines.is_empty() {
+            line(&mut text, &format!("   {kind}"));
+            for content in lines {
+                line(&mut text, &format!("      {content}"));
+            }
+            line(&mut text, "   END_VAR");
+        }
+    }
+    line(&mut text, "");
+    line(&mut text, "BEGIN");
+    let mut code = Vec::new();
+    if body.receives || body.sends {
+        code.push(format!("IF NOT \"{}\".Simulated THEN", plan.prefix));
+        for (counts, member) in [(body.receives, "Received"), (body.sends, "Sent")] {
+            if counts {
+                code.push(format!("   \"{}\".{member} := 0;", plan.prefix));
+            }
+        }
+        code.push("END_IF;".to_owned());
+    }
+    for content in code.iter().chain(&body.code) {
+        line(&mut text, format!("   {content}").trim_end());
+    }
+    line(&mut text, "END_FUNCTION_BLOCK");
+    line(&mut text, "");
+    line(&mut text, &format!("DATA_BLOCK \"{name}_DB\""));
+    line(&mut text, "{ S7_Optimized_Access := 'FALSE' }");
+    line(&mut text, "VERSION : 0.1");
+    line(&mut text, "NON_RETAIN");
+    line(&mut text, &format!("\"{name}\""));
+    line(&mut text, "BEGIN");
+    line(&mut text, "END_DATA_BLOCK");
+    text
+}
+
+/// What is to be set in the project beside the sources.
+pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
+    match &plan.config.bus {
+        Options::Socket(options) => socket::steps(plan, options),
+        Options::S7Server(_) => s7comm::steps_for_puts_and_gets(),
+        Options::S7Client(options) => s7comm::steps_for_nothing(plan, options),
+        Options::OpcuaClient(_) => vec![format!(
+            "In the CPU's properties activate the OPC UA server and its licence. Share \"{}\" and \"{}\": accessible from OPC UA, \
+             and the inputs writable. In driver.cfg let node_pattern name their members.",
+            plan.outputs.block, plan.inputs.block
+        )],
+        _ => Vec::new(),
+    }
+}
+
+/// A bus for which there is no block: the user's own goes here.
+pub(super) fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
+    notes.push(format!(
+        "the bus \"{kind}\" has no block of its own for S7: what brings the images is to be written by hand"
+    ));
+    Body {
+        what: format!("The bus \"{kind}\" needs no call here, or one that only you can write."),
+        code: vec![
+            ";   // Put here what receives \"…_in\".Image and sends \"…_out\".Image.".to_owned(),
+        ],
+        ..Body::default()
+    }
+}
+
+/// The CPU is the OPC UA server, which carries single variables by name: those of both images.
+fn opcua_server(plan: &Plan<'_>) -> Body {
+    Body {
+        what: "OPC UA carries the members of both images by themselves; no call is needed here."
+            .to_owned(),
+        code: vec![
+            format!(
+                ";   // In the CPU's properties activate the OPC UA server and its licence; \"{}\" and \"{}\" are then",
+                plan.outputs.block, plan.inputs.block
+            ),
+            "    // accessible (and, the inputs, writable) from OPC UA, member by member."
+                .to_owned(),
+        ],
+        ..Body::default()
+    }
+}
+
+/// The CPU is the OPC UA client: TIA Portal makes the calls from what the simulation's server shows.
+fn opcua_client(plan: &Plan<'_>, address: &str) -> Body {
+    Body {
+        what: "The PLC is the OPC UA client: its calls are made in TIA Portal.".to_owned(),
+        code: vec![
+            format!(
+                ";   // OPC UA communication > Client interfaces: add one for the simulation's server (driver.cfg: {address}),"
+            ),
+            "    // with a read list of the inputs and a write list of the outputs; the nodes are ns=2;s=<signal>."
+                .to_owned(),
+            format!(
+                "    // Here call OPC_UA_ReadList into \"{}\".Image and OPC_UA_WriteList from \"{}\".Image.",
+                plan.inputs.block, plan.outputs.block
+            ),
+        ],
+        ..Body::default()
+    }
+}
+
+/// A duration for a timer, in whole milliseconds, at least one.
+pub(super) fn time(span: tickbus_base::time::Nanos) -> String {
+    format!("T#{}ms", span.0.div_euclid(1_000_000).max(1))
+}

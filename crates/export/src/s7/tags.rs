@@ -1,0 +1,64 @@
+//! The tags in the format SDF, as TIA Portal exports and imports a tag table.
+//!
+//! A line has nine cells, all in quotes: name, address, type, three flags (visible in an HMI, accessible from it,
+//! retentive), comment, supervision, writable from an HMI.
+
+use std::fmt::Write as _;
+
+use super::Plan;
+use crate::File;
+use crate::record::Place;
+use crate::siemens::{address, spelling};
+use crate::symbols::comment;
+use tickbus_driver_cfg::Options;
+use tickbus_image::signal::{Area, DataType, Signal, Width};
+
+/// Whether a signal lies where `[fieldbus.at]` says, and not at its address.
+pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
+    match &plan.config.bus {
+        Options::S7Client(options) => options.variables.contains_key(&signal.name),
+        Options::ModbusClient(options) => options.at.contains_key(&signal.name),
+        _ => false,
+    }
+}
+
+/// The file. Signals that lie elsewhere have their tags in the PLC's program already.
+pub(super) fn file(plan: &Plan<'_>) -> File {
+    let mut text = String::new();
+    for (image, area) in [(&plan.inputs, Area::Input), (&plan.outputs, Area::Output)] {
+        let places = image.record.places.iter();
+        for place in places.filter(|place| !is_elsewhere(plan, place.signal)) {
+            let comment = comment(place, area);
+            let name = &place.signal.name;
+            if place.data_type().width() != Width::Long {
+                let kind = spelling(place.data_type());
+                tag(&mut text, name, &address(place), kind, &comment);
+            } else if plan.cpu.has_long() {
+                let bit = format!("{area}{}.0", place.byte);
+                tag(&mut text, name, &bit, spelling(place.data_type()), &comment);
+            } else {
+                halves(&mut text, place, area, &comment);
+            }
+        }
+    }
+    let name = format!("{}_tags.sdf", plan.prefix);
+    File { name, text }
+}
+
+/// A value of 64 bits where no type has them: two tags of 32 bits each, in the order in which they lie.
+fn halves(text: &mut String, place: &Place<'_>, area: Area, comment: &str) {
+    let kind = spelling(DataType::Dword);
+    for (half, byte) in [("first half", place.byte), ("second half", place.byte + 4)] {
+        let name = format!("{} ({half})", place.signal.name);
+        let comment = format!("{comment}, {half} of a {}", place.data_type());
+        tag(text, &name, &format!("{area}D{byte}"), kind, &comment);
+    }
+}
+
+fn tag(text: &mut String, name: &str, address: &str, kind: &str, comment: &str) {
+    let cells = [
+        name, address, kind, "True", "True", "False", comment, "", "True",
+    ];
+    let cells = cells.map(|cell| format!("\"{}\"", cell.replace('"', "\"\"")));
+    write!(text, "{}\r\n", cells.join(",")).expect("a String takes all");
+}

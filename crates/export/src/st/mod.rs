@@ -1,0 +1,121 @@
+//! Structured Text: for CODESYS and TwinCAT, and for `OpenPLC` and others that compile with `iec2c`.
+//!
+//! Both get the records as 16-bit registers, as Modbus carries them, and copy between these and one variable for each
+//! signal.
+
+pub(super) mod codesys;
+mod life;
+pub(super) mod openplc;
+mod registers;
+mod telegrams;
+
+use std::fmt::Write as _;
+
+use super::head;
+use super::names::Names;
+use super::record::{Place, Record};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::{Area, DataType, Width};
+
+/// Names that the sources use for themselves.
+const TAKEN: [&str; 6] = ["Simulated", "In", "Out", "bits_32", "bits_64", "Hardware"];
+
+/// The names that a source declares beside its signals: those of all, and `more`.
+fn taken(more: impl IntoIterator<Item = String>) -> Names {
+    let mut names = Names::default();
+    for name in TAKEN {
+        names.give(name);
+    }
+    for name in more {
+        names.give(&name);
+    }
+    names
+}
+
+/// Both records, each station from a multiple of `aligned` bytes on; no two signals have one name, whatever their
+/// direction.
+fn records<'a>(config: &'a Config, aligned: usize, names: &mut Names) -> [Record<'a>; 2] {
+    [Area::Input, Area::Output].map(|area| Record::aligned(&config.table, area, aligned, names))
+}
+
+/// Adds a line.
+fn add(text: &mut String, content: &str) {
+    writeln!(text, "{content}").expect("a String takes all");
+}
+
+/// The variables that the statements for a record of outputs need: name and type.
+fn temporaries(outputs: &Record<'_>) -> Vec<(&'static str, &'static str)> {
+    let has = |width| {
+        let mut places = outputs.places.iter();
+        places.any(|place| place.data_type().width() == width)
+    };
+    let all = [
+        (Width::Double, ("bits_32", "DWORD")),
+        (Width::Long, ("bits_64", "LWORD")),
+    ];
+    let needed = all.into_iter().filter(|(width, _)| has(*width));
+    needed.map(|(_, variable)| variable).collect()
+}
+
+/// A comment of IEC 61131-3.
+fn comment(text: &str) -> String {
+    // Comments do not nest everywhere.
+    let text = text.replace("(*", "( *").replace("*)", "* )");
+    format!("(* {text} *)")
+}
+
+/// The head of a source; each station begins at a multiple of `aligned` bytes.
+fn source(config: &Config, aligned: usize, what: &str, editor: &str, compiled: &str) -> String {
+    let mut lines = head(config, what, editor, compiled);
+    lines.extend(Record::stations_aligned(&config.table, aligned));
+    let mut text = String::new();
+    for line in lines {
+        text.push_str(&comment(&line));
+        text.push('\n');
+    }
+    text.push('\n');
+    text
+}
+
+/// What is to be known about a signal's variable.
+fn remark(place: &Place<'_>) -> String {
+    let mut text = place.remark();
+    if place.data_type() == DataType::Lreal {
+        text.push_str(", the bits of an LREAL");
+    }
+    text
+}
+
+/// The statements that bring the inputs, and those that take the outputs, with these ways to write registers.
+fn copies(
+    [inputs, outputs]: &[Record<'_>; 2],
+    variable: &dyn Fn(&str) -> String,
+    incoming: registers::Register<'_>,
+    outgoing: registers::Register<'_>,
+) -> [Vec<String>; 2] {
+    let bring = inputs
+        .places
+        .iter()
+        .map(|place| {
+            format!(
+                "{} := {};",
+                variable(&place.name),
+                registers::value(place, incoming)
+            )
+        })
+        .collect();
+    let mut used: Vec<usize> = outputs
+        .places
+        .iter()
+        .flat_map(|place| place.byte / 2..=(place.end() - 1) / 2)
+        .collect();
+    used.dedup();
+    let mut take: Vec<String> = used
+        .iter()
+        .map(|register| format!("{} := WORD#16#0000;", outgoing(*register)))
+        .collect();
+    for place in &outputs.places {
+        take.extend(registers::put(place, &variable(&place.name), outgoing));
+    }
+    [bring, take]
+}

@@ -1,0 +1,56 @@
+//! The symbol table as CSV: what a spreadsheet opens, and `tickbus import` reads again.
+
+use std::fmt::Write as _;
+
+use super::File;
+use super::names::Names;
+use super::record::{Place, Record, block_prefix, facts};
+use super::siemens::{address, spelling};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::Area;
+
+/// The file. It begins with the mark of UTF-8 that spreadsheets look for.
+pub(super) fn file(config: &Config) -> File {
+    let mut text = String::from("\u{feff}name;address;type;comment\r\n");
+    let mut names = Names::default();
+    for area in [Area::Input, Area::Output] {
+        for place in &Record::of(&config.table, area, &mut names).places {
+            let cells = [
+                place.signal.name.clone(),
+                address(place),
+                spelling(place.data_type()).to_owned(),
+                comment(place, area),
+            ];
+            let cells = cells.map(|cell| quoted(&cell));
+            write!(text, "{}\r\n", cells.join(";")).expect("a String takes all");
+        }
+    }
+    let name = format!("{}_tags.csv", block_prefix(&config.name));
+    File { name, text }
+}
+
+/// Direction, station, unit and scale of a signal.
+pub(super) fn comment(place: &Place<'_>, area: Area) -> String {
+    let mut parts = vec![
+        match area {
+            Area::Input => "simulation to PLC",
+            Area::Output => "PLC to simulation",
+        }
+        .to_owned(),
+    ];
+    if !place.station.is_empty() {
+        parts.push(format!("station {}", place.station));
+    }
+    parts.extend(facts(place.signal));
+    parts.join(", ")
+}
+
+/// A cell, in quotes where it has to be.
+fn quoted(cell: &str) -> String {
+    // What begins like a formula would be one in a spreadsheet.
+    if cell.contains([';', '"', ',', '\t']) || cell.starts_with(['=', '+', '-', '@', '#', ' ']) {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.to_owned()
+    }
+}

@@ -1,0 +1,240 @@
+//! `alive` and `heartbeat` of `[fieldbus]`: signals by which each end sees that the other one lives.
+
+use std::ops::Range;
+
+use super::Role;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
+
+/// The shortest time in which a signal can be asked to change: shorter ones are within the jitter of an operating
+/// system.
+const LEAST_WITHIN: Nanos = Nanos::from_millis(10);
+
+/// The shortest interval of a heartbeat.
+const LEAST_EVERY: Nanos = Nanos::from_millis(1);
+
+/// How many beats of a heartbeat may be missed by the end that watches it.
+const MISSED: i64 = 5;
+
+/// A signal that has to change, or the data of its station do not count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Alive {
+    /// Its place in the signal table; the end that the driver.cfg describes reads it.
+    pub signal: usize,
+    /// For how long it may stand still; positive.
+    pub within: Nanos,
+}
+
+/// A signal that the driver counts up while the simulation ticks; a BOOL toggles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heartbeat {
+    /// Its place in the signal table: an unscaled BOOL or integer, which the end that the driver.cfg describes
+    /// writes.
+    pub signal: usize,
+    /// Time from one beat to the next; positive.
+    pub every: Nanos,
+}
+
+/// All that a driver.cfg says of signs of life.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LifeSigns {
+    /// `alive`.
+    pub alive: Vec<Alive>,
+    /// `heartbeat`.
+    pub heartbeat: Vec<Heartbeat>,
+}
+
+/// A signal that is watched for changes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Watch {
+    /// What messages call it.
+    pub name: String,
+    /// Its station.
+    pub station: usize,
+    /// Its bytes in the frame that is received.
+    pub bytes: Range<usize>,
+    /// Its bits in each of these.
+    pub mask: u8,
+    /// For how long it may stand still.
+    pub within: Nanos,
+}
+
+impl LifeSigns {
+    /// The heartbeats that the end with `role` gives.
+    pub fn beats<'a>(
+        &'a self,
+        table: &'a SignalTable,
+        role: Role,
+    ) -> impl Iterator<Item = Heartbeat> + 'a {
+        let (writes, _) = role.areas();
+        let beats = self.heartbeat.iter().copied();
+        beats.filter(move |beat| table.signals[beat.signal].area == writes)
+    }
+
+    /// The signals that the end with `role` watches: those that have to change, and at the other end than the one
+    /// that the driver.cfg describes the heartbeats of that one, which may miss five beats and `max_age`.
+    pub fn watches(&self, table: &SignalTable, role: Role, max_age: Nanos) -> Vec<Watch> {
+        let (_, reads) = role.areas();
+        let beats = self.heartbeat.iter();
+        let beats = beats.map(|beat| (beat.signal, max_age.max(beat.every.times(MISSED))));
+        let alive = self.alive.iter().map(|alive| (alive.signal, alive.within));
+        let watched = alive.chain(beats);
+        let watched = watched.map(|(signal, within)| (&table.signals[signal], within));
+        let watched = watched.filter(|(signal, _)| signal.area == reads);
+        watched
+            .map(|(signal, within)| Watch::new(signal, within))
+            .collect()
+    }
+}
+
+impl Watch {
+    fn new(signal: &Signal, within: Nanos) -> Self {
+        Self {
+            name: signal.name.clone(),
+            station: signal.station,
+            bytes: signal.byte..signal.byte + signal.data_type.size_bytes(),
+            mask: match signal.data_type {
+                DataType::Bool => 1 << signal.bit,
+                _ => u8::MAX,
+            },
+            within,
+        }
+    }
+}
+
+/// `alive` and `heartbeat` as they stand in the file, to be read when the signals are.
+#[derive(Debug, Default)]
+pub struct Written<'a> {
+    alive: Option<Value<'a>>,
+    heartbeat: Option<Value<'a>>,
+}
+
+impl<'a> Written<'a> {
+    /// Takes the keys out of `[fieldbus]`.
+    pub fn take(table: &mut Table<'a>) -> Self {
+        Self {
+            alive: table.take("alive"),
+            heartbeat: table.take("heartbeat"),
+        }
+    }
+
+    /// Reads them for the end that the file describes, which has `role`; `cycle` is that of its bus, if it has one
+    /// of its own. Reports signals that are not there or that the wrong end writes.
+    pub fn read(
+        &self,
+        signals: &SignalTable,
+        role: Role,
+        cycle: Option<Nanos>,
+        signs: &mut LifeSigns,
+    ) {
+        let (writes, reads) = role.areas();
+        if let Some(value) = &self.alive {
+            const RIGHT: &str = "write alive = { signal = \"<name>\", within = \"500ms\" }, or a list of such tables";
+            let read = |mut table: Table<'a>, taken: &mut Vec<usize>| {
+                let signal = table.require("signal", RIGHT);
+                let within = table.require("within", RIGHT);
+                table.finish();
+                let within = within.and_then(|value| {
+                    let least = cycle.unwrap_or_default().max(LEAST_WITHIN);
+                    value.duration_from(least, "a PLC needs some cycles to change a signal")
+                });
+                let signal = find(&signal?, signals, reads, "reads", taken)?;
+                Some(Alive {
+                    signal,
+                    within: within?,
+                })
+            };
+            signs.alive = each(value, "alive", RIGHT, read);
+        }
+        if let Some(value) = &self.heartbeat {
+            const RIGHT: &str = "write heartbeat = { signal = \"<name>\", every = \"100ms\" }, or a list of such tables";
+            let read = |mut table: Table<'a>, taken: &mut Vec<usize>| {
+                let signal = table.require("signal", RIGHT);
+                let every = table.require("every", RIGHT);
+                table.finish();
+                let every = every.and_then(|value| {
+                    value.duration_from(LEAST_EVERY, "no PLC looks at it more often")
+                });
+                let value = signal?;
+                let signal = find(&value, signals, writes, "writes", taken)?;
+                let found = &signals.signals[signal];
+                if found.scale.is_some()
+                    || matches!(found.data_type, DataType::Real | DataType::Lreal)
+                {
+                    let what = if found.scale.is_some() {
+                        "has a scale"
+                    } else {
+                        "is a number with a fraction"
+                    };
+                    value.wrong(
+                        format!(
+                            "the signal \"{}\" {what}, and a heartbeat counts",
+                            shown(&found.name)
+                        ),
+                        "name a BOOL, which toggles, or an integer without a scale",
+                    );
+                    return None;
+                }
+                Some(Heartbeat {
+                    signal,
+                    every: every?,
+                })
+            };
+            signs.heartbeat = each(value, "heartbeat", RIGHT, read);
+        }
+    }
+}
+
+/// Reads the one table that `value` is, or each table of the list.
+fn each<'a, T>(
+    value: &Value<'a>,
+    key: &str,
+    right: &str,
+    mut read: impl FnMut(Table<'a>, &mut Vec<usize>) -> Option<T>,
+) -> Vec<T> {
+    let tables = if value.is_table() {
+        vec![value.clone()]
+    } else {
+        value.list(right).unwrap_or_default()
+    };
+    let mut taken = Vec::new();
+    let tables = tables.iter().filter_map(|value| value.table(key, right));
+    tables.filter_map(|table| read(table, &mut taken)).collect()
+}
+
+/// The signal that `value` names, in `area` and named once.
+fn find(
+    value: &Value<'_>,
+    table: &SignalTable,
+    area: Area,
+    does: &str,
+    taken: &mut Vec<usize>,
+) -> Option<usize> {
+    let name = value.text("write the name of a signal in quotes")?;
+    let Some(found) = table.position(name) else {
+        let names: Vec<&str> = table.signals.iter().map(|s| s.name.as_str()).collect();
+        value.wrong(
+            format!("there is no signal \"{}\"", shown(name)),
+            did_you_mean(name, "signals", &names),
+        );
+        return None;
+    };
+    let its = table.signals[found].area;
+    if its != area {
+        value.wrong(
+            format!("the signal \"{}\" is in {its}", shown(name)),
+            format!("name one in {area}, which this end {does}"),
+        );
+        return None;
+    }
+    if taken.contains(&found) {
+        value.wrong(
+            format!("the signal \"{}\" is named twice", shown(name)),
+            "name each signal once",
+        );
+        return None;
+    }
+    taken.push(found);
+    Some(found)
+}

@@ -1,0 +1,218 @@
+//! What a fault is: its effect, its beginning and its end.
+
+use std::fmt;
+
+use super::Condition;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::short_number;
+use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
+
+/// One fault, as a `[[fault]]` section describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// Its name, for people.
+    pub name: String,
+    /// What it does.
+    pub effect: Effect,
+    /// When it begins.
+    pub begin: Begin,
+    /// When it ends by itself.
+    pub lasts: Lasts,
+    /// How often it may begin; more than once only with [`Begin::When`]. Positive.
+    pub times: u64,
+    /// Where its chance comes from.
+    pub seed: u64,
+}
+
+/// What a fault does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Effect {
+    /// It changes the value of the signal with this index in the signal table.
+    Signal(usize, Change),
+    /// It troubles the line.
+    Line(Trouble),
+}
+
+/// How the value of a signal is changed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// It stays at a value; `None`: at the one that it has when the fault begins.
+    Stuck(Option<Slot>),
+    /// The opposite: of a BOOL, or of each bit of a bit string.
+    Invert,
+    /// So much is added, in the signal's unit.
+    Offset(f64),
+    /// Something between minus and plus so much is added, anew at every tick.
+    Noise(f64),
+    /// A BOOL is inverted with this chance, anew at every tick.
+    Flicker(f64),
+}
+
+/// What a fault does to the frames of the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trouble {
+    /// What comes in is held back for so long.
+    Delay(Nanos),
+    /// What goes out is held back for so long.
+    SlowAnswers(Nanos),
+    /// A cycle's frames are lost with this chance.
+    Drop(f64, Direction),
+    /// A cycle's frames come once more with this chance.
+    Duplicate(f64, Direction),
+    /// Nothing goes out, and nothing comes in.
+    LinkDown,
+    /// The station with this index is gone.
+    StationDown(usize),
+}
+
+/// Which frames are meant, as seen from this end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Direction {
+    /// Those that this end receives.
+    In,
+    /// Those that this end sends.
+    Out,
+    /// Both.
+    #[default]
+    Both,
+}
+
+impl Direction {
+    /// Whether received frames are meant.
+    pub const fn comes_in(self) -> bool {
+        matches!(self, Self::In | Self::Both)
+    }
+
+    /// Whether sent frames are meant.
+    pub const fn goes_out(self) -> bool {
+        matches!(self, Self::Out | Self::Both)
+    }
+}
+
+/// When a fault begins.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Begin {
+    /// At the next tick.
+    AtOnce,
+    /// So long after the first tick.
+    At(Nanos),
+    /// At the tick with this number; the first is 1.
+    Tick(u64),
+    /// When the condition becomes true.
+    When(Condition),
+    /// When the condition becomes true; and it ends when the condition becomes false.
+    While(Condition),
+}
+
+/// How long a fault lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lasts {
+    /// Until it is ended, or its condition ends it.
+    UntilEnded,
+    /// So long.
+    For(Nanos),
+    /// So many ticks.
+    Ticks(u64),
+}
+
+impl Fault {
+    /// Its kind, as a driver.cfg names it.
+    pub const fn kind(&self) -> &'static str {
+        match self.effect {
+            Effect::Signal(_, Change::Stuck(_)) => "stuck",
+            Effect::Signal(_, Change::Invert) => "invert",
+            Effect::Signal(_, Change::Offset(_)) => "offset",
+            Effect::Signal(_, Change::Noise(_) | Change::Flicker(_)) => "noise",
+            Effect::Line(Trouble::Delay(_)) => "delay",
+            Effect::Line(Trouble::SlowAnswers(_)) => "slow-answers",
+            Effect::Line(Trouble::Drop(..)) => "drop",
+            Effect::Line(Trouble::Duplicate(..)) => "duplicate",
+            Effect::Line(Trouble::LinkDown) => "link-down",
+            Effect::Line(Trouble::StationDown(_)) => "station-down",
+        }
+    }
+
+    /// What it does, in words: `"LA1 bottom" is stuck at 1`.
+    pub fn what(&self, table: &SignalTable) -> String {
+        match self.effect {
+            Effect::Signal(index, change) => {
+                let signal = &table.signals[index];
+                format!("\"{}\" {}", signal.name, changed(change, signal))
+            }
+            Effect::Line(trouble) => troubled(trouble, table),
+        }
+    }
+}
+
+fn changed(change: Change, signal: &Signal) -> String {
+    let unit = signal.unit.as_deref().unwrap_or_default();
+    let measured = |number: f64| {
+        format!("{} {unit}", short_number(number))
+            .trim_end()
+            .to_owned()
+    };
+    match change {
+        Change::Stuck(None) => "is stuck where it is".to_owned(),
+        Change::Stuck(Some(slot)) if signal.is_integer_slot() => {
+            let signed = signal.data_type == DataType::Lint;
+            let number = if signed {
+                slot.signed().to_string()
+            } else {
+                slot.unsigned().to_string()
+            };
+            format!("is stuck at {number} {unit}").trim_end().to_owned()
+        }
+        Change::Stuck(Some(slot)) => format!("is stuck at {}", measured(slot.real())),
+        Change::Invert => "is inverted".to_owned(),
+        Change::Offset(by) => format!("is off by {}", measured(by)),
+        Change::Noise(amplitude) => format!("is off by up to {} at random", measured(amplitude)),
+        Change::Flicker(chance) => format!("flickers with a chance of {}", short_number(chance)),
+    }
+}
+
+fn troubled(trouble: Trouble, table: &SignalTable) -> String {
+    let frames = |direction| match direction {
+        Direction::In => "received frames",
+        Direction::Out => "sent frames",
+        Direction::Both => "frames",
+    };
+    match trouble {
+        Trouble::Delay(by) => format!("what comes in is {by} late"),
+        Trouble::SlowAnswers(by) => format!("what goes out is {by} late"),
+        Trouble::Drop(chance, direction) => {
+            let chance = short_number(chance);
+            format!("{} are lost with a chance of {chance}", frames(direction))
+        }
+        Trouble::Duplicate(chance, direction) => {
+            let chance = short_number(chance);
+            format!("{} come twice with a chance of {chance}", frames(direction))
+        }
+        Trouble::LinkDown => "the link is down".to_owned(),
+        Trouble::StationDown(station) => {
+            format!("the station \"{}\" is gone", table.stations[station].name)
+        }
+    }
+}
+
+/// `at 1200ms for 300ms`.
+impl fmt::Display for Begin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AtOnce => f.write_str("from the first tick"),
+            Self::At(time) => write!(f, "at {time}"),
+            Self::Tick(tick) => write!(f, "at tick {tick}"),
+            Self::When(condition) => write!(f, "when {condition}"),
+            Self::While(condition) => write!(f, "while {condition}"),
+        }
+    }
+}
+
+impl fmt::Display for Lasts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UntilEnded => Ok(()),
+            Self::For(time) => write!(f, "for {time}"),
+            Self::Ticks(ticks) => write!(f, "for {ticks} ticks"),
+        }
+    }
+}

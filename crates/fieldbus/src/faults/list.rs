@@ -1,0 +1,195 @@
+//! All faults of one end, tick by tick.
+
+use std::sync::Arc;
+
+use super::bend::Bend;
+use super::board::Cell;
+use super::random::Random;
+use super::schedule::{Schedule, Step};
+use super::{Board, Effect, Fault, LIMIT, LineFault, Phase};
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::{Area, SignalTable, Slot};
+
+/// Which tick it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Moment {
+    /// Time since the first tick.
+    pub time: Nanos,
+    /// Number of the tick; the first is 1.
+    pub tick: u64,
+}
+
+/// Where the values of an end stand: slots in the order of the signal table, then some that count edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Slots<'a> {
+    /// The signals.
+    pub table: &'a SignalTable,
+    /// The area that this end writes.
+    pub writes: Area,
+    /// Per signal, the slot that counts its edges, if there is one. May be shorter than the table.
+    pub edges: &'a [Option<usize>],
+}
+
+/// The faults of one end. Its tick calls [`begin_tick`](Self::begin_tick), [`sending`](Self::sending), sends,
+/// calls [`sent`](Self::sent), receives, and calls [`received`](Self::received). One that answers within itself
+/// receives first.
+#[derive(Debug)]
+pub struct Faults {
+    entries: Vec<Entry>,
+    board: Arc<Board>,
+    next: u32,
+    time: Nanos,
+}
+
+#[derive(Debug)]
+struct Entry {
+    id: u32,
+    schedule: Schedule,
+    cell: Arc<Cell>,
+    kind: Kind,
+}
+
+#[derive(Debug)]
+enum Kind {
+    /// Bends what this end writes.
+    Written(Bend),
+    /// Bends what it reads.
+    Read(Bend),
+    /// Is done elsewhere, by whoever looks at the board.
+    Line,
+}
+
+impl Faults {
+    /// No faults yet; `board` is where it will tell of them.
+    pub fn new(board: Arc<Board>) -> Self {
+        Self {
+            entries: Vec::new(),
+            board,
+            next: 1,
+            time: Nanos::ZERO,
+        }
+    }
+
+    /// Adds a fault and gives its number; it can begin at the next tick.
+    ///
+    /// # Errors
+    ///
+    /// Too many faults wait or are active.
+    pub fn add(&mut self, fault: &Fault, slots: Slots<'_>) -> Result<u32, String> {
+        while self.entries.len() >= LIMIT {
+            let Some(over) = self.board.forget_one() else {
+                return Err(format!(
+                    "{LIMIT} faults wait or are active, and that is the most; end some of them"
+                ));
+            };
+            self.entries.retain(|entry| entry.id != over);
+        }
+        let id = self.next;
+        self.next += 1;
+        let random = Random::new(fault.seed, id);
+        let what = fault.what(slots.table);
+        let cell = Arc::new(Cell::new(id, fault.name.clone(), fault.kind(), what));
+        let (kind, line) = match fault.effect {
+            Effect::Signal(index, change) => {
+                let signal = &slots.table.signals[index];
+                let edges = slots.edges.get(index).copied().flatten();
+                let bend = Bend::new(signal, (index, edges), change, random);
+                if signal.area == slots.writes {
+                    (Kind::Written(bend), None)
+                } else {
+                    (Kind::Read(bend), None)
+                }
+            }
+            Effect::Line(trouble) => {
+                let line = LineFault::new(trouble, Arc::clone(&cell), random);
+                (Kind::Line, Some(line))
+            }
+        };
+        self.board.add(Arc::clone(&cell), line);
+        self.entries.push(Entry {
+            id,
+            schedule: Schedule::new(fault),
+            cell,
+            kind,
+        });
+        Ok(id)
+    }
+
+    /// Ends a fault at the next tick; false if there is none with this number.
+    pub fn end(&mut self, id: u32) -> bool {
+        let found = self.entries.iter_mut().find(|entry| entry.id == id);
+        found.map(|entry| entry.schedule.end()).is_some()
+    }
+
+    /// A tick begins: what was bent is true again, and faults begin and end.
+    ///
+    /// Conditions are judged on true values: of what this end writes, those of this tick (of the tick before where
+    /// the tick receives first); of what it reads, those of the tick before.
+    pub fn begin_tick(&mut self, moment: Moment, slots: &mut [Slot]) {
+        // Time that jumps back would begin nothing and end nothing.
+        self.time = self.time.max(moment.time);
+        let moment = Moment {
+            time: self.time,
+            ..moment
+        };
+        for entry in self.entries.iter_mut().rev() {
+            if let Kind::Read(bend) = &mut entry.kind {
+                bend.straighten(slots);
+            }
+        }
+        for entry in &mut self.entries {
+            let phase = match entry.schedule.step(moment, slots) {
+                Step::Nothing => continue,
+                Step::Begins => Phase::Active,
+                Step::Pauses => Phase::Waiting,
+                Step::Ends => Phase::Over,
+            };
+            if let (Phase::Active, Kind::Written(bend) | Kind::Read(bend)) =
+                (phase, &mut entry.kind)
+            {
+                bend.begin(slots);
+            }
+            self.board.enter(&entry.cell, phase, moment);
+        }
+    }
+
+    /// What is about to be sent stands in the slots: it is bent.
+    pub fn sending(&mut self, slots: &mut [Slot]) {
+        for entry in &mut self.entries {
+            if let (true, Kind::Written(bend)) = (entry.schedule.is_active(), &mut entry.kind) {
+                bend.bend(slots);
+            }
+        }
+    }
+
+    /// The signals that are bent at this moment, by their index; those that this end writes or reads.
+    pub fn active(&self, written: bool) -> impl Iterator<Item = usize> {
+        let active = self
+            .entries
+            .iter()
+            .filter(|entry| entry.schedule.is_active());
+        active.filter_map(move |entry| match &entry.kind {
+            Kind::Written(bend) if written => Some(bend.signal()),
+            Kind::Read(bend) if !written => Some(bend.signal()),
+            _ => None,
+        })
+    }
+
+    /// What was to be sent is sent: the simulation finds its own values again.
+    pub fn sent(&mut self, slots: &mut [Slot]) {
+        for entry in self.entries.iter_mut().rev() {
+            if let Kind::Written(bend) = &mut entry.kind {
+                bend.straighten(slots);
+            }
+        }
+    }
+
+    /// What came in stands in the slots: it is bent.
+    pub fn received(&mut self, slots: &mut [Slot]) {
+        for entry in &mut self.entries {
+            if let (true, Kind::Read(bend)) = (entry.schedule.is_active(), &mut entry.kind) {
+                bend.bend(slots);
+            }
+        }
+    }
+}

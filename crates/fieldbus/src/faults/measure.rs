@@ -1,0 +1,88 @@
+//! Numbers with the unit of their signal.
+
+use tickbus_base::toml_text::{Value, shown};
+use tickbus_image::signal::Signal;
+
+/// A number and what follows it: `12.5 mm` is 12.5 and `mm`.
+pub(super) fn split(text: &str) -> Option<(f64, &str)> {
+    const LONGEST: usize = 64;
+    let text = text.trim();
+    // The longest beginning that is a number: `2e3 mm` has an `e` in its number, `2 mm` none.
+    let ends = text.char_indices().map(|(at, c)| at + c.len_utf8());
+    let ends: Vec<usize> = ends.take(LONGEST).collect();
+    let begins = |end: &usize| {
+        let (number, rest) = text.split_at(*end);
+        // Rust's words for numbers that are none.
+        let digits = number.ends_with(|c: char| c.is_ascii_digit() || c == '.');
+        let number = number.parse::<f64>().ok();
+        number
+            .filter(|number| digits && number.is_finite())
+            .map(|number| (number, rest.trim()))
+    };
+    ends.iter().rev().find_map(begins)
+}
+
+/// Whether `unit` is the signal's; else what is wrong, and what would be right.
+pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), (String, String)> {
+    match signal.unit.as_deref() {
+        _ if unit.is_empty() => Ok(()),
+        Some(own) if own == unit => Ok(()),
+        Some(own) => Err((
+            format!(
+                "\"{}\" is in {}, not in {}",
+                shown(&signal.name),
+                shown(own),
+                shown(unit)
+            ),
+            format!("write the number in {}", shown(own)),
+        )),
+        None => Err((
+            format!("\"{}\" has no unit", shown(&signal.name)),
+            "write the number alone".to_owned(),
+        )),
+    }
+}
+
+/// A number in the unit of `signal`: `5`, or `"5 mm"`.
+pub(super) fn of_value(value: &Value<'_>, signal: &Signal) -> Option<f64> {
+    let right = match signal.unit.as_deref() {
+        Some(unit) => format!("write a number, such as 2.5 or \"2.5 {}\"", shown(unit)),
+        None => "write a number, such as 2.5".to_owned(),
+    };
+    let Some(text) = value.as_text() else {
+        return value.number(&right);
+    };
+    let Some((number, unit)) = split(text) else {
+        value.wrong(format!("\"{}\" is no number", shown(text)), right);
+        return None;
+    };
+    match check_unit(unit, signal) {
+        Ok(()) => Some(number),
+        Err((what, right)) => {
+            value.wrong(what, right);
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_ends_where_its_unit_begins() {
+        for (text, expected) in [
+            ("5 mm", Some((5.0, "mm"))),
+            ("5mm", Some((5.0, "mm"))),
+            (" -2.5e3 °C ", Some((-2500.0, "°C"))),
+            ("7", Some((7.0, ""))),
+            ("1e", Some((1.0, "e"))),
+            ("mm", None),
+            ("inf", None),
+            ("NaN mm", None),
+            ("", None),
+        ] {
+            assert_eq!(split(text), expected, "{text}");
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! The `[[fault]]` sections: of a driver.cfg, of a file of their own, or handed in one by one.
+
+mod effect;
+
+use self::effect::read_effect;
+use super::{Begin, Condition, Effect, Fault, Lasts};
+use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, read_text, shown};
+use tickbus_image::signal::SignalTable;
+use tickbus_image::signal::section::NAME_LIMIT;
+
+/// The most faults of one driver that wait or are active.
+pub const LIMIT: usize = 64;
+
+/// The kinds of faults, and the keys that belong to each.
+const KINDS: [(&str, &[&str]); 10] = [
+    ("stuck", &["signal", "value"]),
+    ("invert", &["signal"]),
+    ("offset", &["signal", "by"]),
+    ("noise", &["signal", "amplitude", "chance", "seed"]),
+    ("delay", &["by"]),
+    ("slow-answers", &["by"]),
+    ("drop", &["chance", "direction", "seed"]),
+    ("duplicate", &["chance", "direction", "seed"]),
+    ("link-down", &[]),
+    ("station-down", &["station"]),
+];
+
+const KIND: &str = "write the kind of fault, such as kind = \"stuck\"";
+/// What is right where a signal is named.
+const SIGNAL: &str = "name the signal that is wrong, such as signal = \"LA1 bottom\"";
+
+/// Reads the faults of a file of their own.
+///
+/// # Errors
+///
+/// With every mistake in the text.
+pub fn read_file(file: &str, text: &str, table: &SignalTable) -> Result<Vec<Fault>, Mistakes> {
+    let mut collector = Collector::new(file, text);
+    let faults = read_text(&mut collector, text, |mut root| {
+        let sections = root.require("fault", "write [[fault]] sections");
+        root.finish();
+        let sections = sections.map(|value| value.tables("[[fault]]"));
+        Some(read_sections(sections.unwrap_or_default(), Some(table)))
+    });
+    match collector.finish() {
+        Some(mistakes) => Err(mistakes),
+        None => Ok(faults.unwrap_or_default()),
+    }
+}
+
+/// Reads one fault, with or without the header of its section: `kind = "link-down"`.
+///
+/// # Errors
+///
+/// With every mistake in the text, which they call `fault`.
+pub fn read_one(text: &str, table: &SignalTable) -> Result<Fault, Mistakes> {
+    let mut collector = Collector::new("fault", text);
+    let fault = read_text(&mut collector, text, |root| {
+        let has_sections = root.all().any(|(key, _)| key == "fault");
+        if !has_sections {
+            return read(root, Some(table));
+        }
+        let mut root = root;
+        let sections = root.take("fault")?.tables("[[fault]]");
+        root.finish();
+        if let Some(second) = sections.get(1) {
+            second.wrong("this is a second fault", "inject each one by itself");
+        }
+        sections
+            .into_iter()
+            .find_map(|section| read(section, Some(table)))
+    });
+    match collector.finish() {
+        Some(mistakes) => Err(mistakes),
+        None => Ok(fault.expect("what is not read has a mistake")),
+    }
+}
+
+/// Reads `[[fault]]` sections and reports their mistakes. Without a table, as far as it goes.
+pub fn read_sections(sections: Vec<Table<'_>>, table: Option<&SignalTable>) -> Vec<Fault> {
+    if let Some(first) = sections.get(LIMIT) {
+        first.wrong(
+            format!("there are {} faults", sections.len()),
+            format!("a driver has at most {LIMIT}"),
+        );
+        return Vec::new();
+    }
+    let mut faults: Vec<Fault> = Vec::new();
+    for mut section in sections {
+        let name = section.take("name");
+        let Some(fault) = read(section, table) else {
+            continue;
+        };
+        let twin = faults.iter().any(|other| other.name == fault.name);
+        match (twin, name) {
+            (true, Some(name)) => name.wrong(
+                format!("there is a fault \"{}\" already", shown(&fault.name)),
+                "give each a name of its own",
+            ),
+            (true, None) => {
+                let free = (2..).map(|number| format!("{} {number}", fault.name));
+                let mut free = free.filter(|name| faults.iter().all(|fault| fault.name != *name));
+                let name = free.next().unwrap_or_default();
+                faults.push(Fault { name, ..fault });
+            }
+            (false, _) => faults.push(fault),
+        }
+    }
+    faults
+}
+
+/// The keys of a section.
+struct Keys<'a> {
+    name: Option<Value<'a>>,
+    signal: Option<Value<'a>>,
+    value: Option<Value<'a>>,
+    by: Option<Value<'a>>,
+    amplitude: Option<Value<'a>>,
+    chance: Option<Value<'a>>,
+    direction: Option<Value<'a>>,
+    station: Option<Value<'a>>,
+    seed: Option<Value<'a>>,
+    at: Option<Value<'a>>,
+    tick: Option<Value<'a>>,
+    when: Option<Value<'a>>,
+    while_: Option<Value<'a>>,
+    for_: Option<Value<'a>>,
+    ticks: Option<Value<'a>>,
+    times: Option<Value<'a>>,
+}
+
+impl<'a> Keys<'a> {
+    fn take(table: &mut Table<'a>) -> Self {
+        Self {
+            name: table.take("name"),
+            signal: table.take("signal"),
+            value: table.take("value"),
+            by: table.take("by"),
+            amplitude: table.take("amplitude"),
+            chance: table.take("chance"),
+            direction: table.take("direction"),
+            station: table.take("station"),
+            seed: table.take("seed"),
+            at: table.take("at"),
+            tick: table.take("tick"),
+            when: table.take("when"),
+            while_: table.take("while"),
+            for_: table.take("for"),
+            ticks: table.take("ticks"),
+            times: table.take("times"),
+        }
+    }
+
+    /// The keys that belong to some kinds only.
+    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 8] {
+        [
+            ("signal", self.signal.as_ref()),
+            ("value", self.value.as_ref()),
+            ("by", self.by.as_ref()),
+            ("amplitude", self.amplitude.as_ref()),
+            ("chance", self.chance.as_ref()),
+            ("direction", self.direction.as_ref()),
+            ("station", self.station.as_ref()),
+            ("seed", self.seed.as_ref()),
+        ]
+    }
+}
+
+/// Reads one section.
+fn read(mut section: Table<'_>, table: Option<&SignalTable>) -> Option<Fault> {
+    let kind = section.require("kind", KIND);
+    let keys = Keys::take(&mut section);
+    let known = kind.as_ref().and_then(kind_of);
+    if let Some(kind) = known {
+        match kind {
+            "offset" => drop(section.require("by", "say by how much, such as by = 2.5")),
+            "delay" | "slow-answers" => {
+                drop(section.require("by", "say by how much, such as by = \"20ms\""));
+            }
+            "drop" => drop(section.require("chance", "say how likely it is, such as chance = 0.1")),
+            "station-down" => drop(section.require("station", "name the station that is gone")),
+            _ => {}
+        }
+        if matches!(kind, "stuck" | "invert" | "offset" | "noise") {
+            section.require("signal", SIGNAL);
+        }
+    }
+    let whole = section.is_whole();
+    section.finish();
+
+    if let Some(kind) = known {
+        check_keys(kind, &keys);
+    }
+    let begin = read_begin(&keys, table);
+    let lasts = read_lasts(&keys);
+    let name = match &keys.name {
+        None => Some(None),
+        Some(value) => name_of(value).map(Some),
+    };
+    let seed = match &keys.seed {
+        None => Some(1),
+        Some(value) => value
+            .whole(0..=u64::MAX.into())
+            .and_then(|seed| u64::try_from(seed).ok()),
+    };
+    let effect = known.and_then(|kind| read_effect(kind, &keys, table, whole));
+    let (begin, lasts) = (begin?, lasts?);
+    let times = read_times(&keys, &begin, lasts)?;
+    let (effect, name) = (effect?, name?);
+    let mut fault = Fault {
+        name: String::new(),
+        effect,
+        begin,
+        lasts,
+        times,
+        seed: seed?,
+    };
+    fault.name = match (name, effect) {
+        (Some(name), _) => name,
+        (None, Effect::Signal(index, _)) => {
+            format!("{} {}", fault.kind(), table?.signals[index].name)
+        }
+        (None, Effect::Line(_)) => fault.kind().to_owned(),
+    };
+    Some(fault)
+}
+
+fn kind_of(value: &Value<'_>) -> Option<&'static str> {
+    let kinds = KINDS.map(|(kind, _)| (kind, kind));
+    value.choice("kinds of faults", &kinds)
+}
+
+/// Reports keys that stand at a fault of another kind.
+fn check_keys(kind: &str, keys: &Keys<'_>) {
+    for (key, value) in keys.of_kinds() {
+        let belongs = |(_, keys): &&(&str, &[&str])| keys.contains(&key);
+        let Some(value) = value else { continue };
+        let owners: Vec<&str> = KINDS
+            .iter()
+            .filter(belongs)
+            .map(|(kind, _)| *kind)
+            .collect();
+        if !owners.contains(&kind) {
+            value.wrong(
+                format!("a fault of kind \"{kind}\" has no \"{key}\""),
+                format!("remove it; it is for {}", owners.join(", ")),
+            );
+        }
+    }
+}
+
+fn name_of(value: &Value<'_>) -> Option<String> {
+    let name = value.label(
+        NAME_LIMIT,
+        "give the fault a name of its own, or leave it out",
+    )?;
+    Some(name.to_owned())
+}
+
+fn read_begin(keys: &Keys<'_>, table: Option<&SignalTable>) -> Option<Begin> {
+    let triggers = [
+        ("at", &keys.at),
+        ("tick", &keys.tick),
+        ("when", &keys.when),
+        ("while", &keys.while_),
+    ];
+    let stated: Vec<_> = triggers
+        .iter()
+        .filter_map(|(key, value)| value.as_ref().map(|value| (*key, value)))
+        .collect();
+    if let [(first, _), (second, value), ..] = &stated[..] {
+        value.wrong(
+            format!("a fault has both \"{first}\" and \"{second}\""),
+            "keep one of them, or write two faults",
+        );
+    }
+    let read = |(key, value): &(&str, &Value<'_>)| {
+        Some(match *key {
+            "at" => Begin::At(value.duration()?),
+            "tick" => Begin::Tick(
+                value
+                    .whole(1..=i64::MAX.into())
+                    .and_then(|tick| u64::try_from(tick).ok())?,
+            ),
+            "when" => Begin::When(read_condition(value, table)?),
+            _ => Begin::While(read_condition(value, table)?),
+        })
+    };
+    let read: Vec<Option<Begin>> = stated.iter().map(read).collect();
+    match <[_; 1]>::try_from(read) {
+        Ok([begin]) => begin,
+        Err(read) if read.is_empty() => Some(Begin::AtOnce),
+        Err(_) => None,
+    }
+}
+
+fn read_condition(value: &Value<'_>, table: Option<&SignalTable>) -> Option<Condition> {
+    let text = value.text("write a condition in quotes, such as \"LA1 run == 1\"")?;
+    Condition::parse(text, table?)
+        .map_err(|(what, right)| value.wrong(what, right))
+        .ok()
+}
+
+fn read_lasts(keys: &Keys<'_>) -> Option<Lasts> {
+    let span = keys.for_.as_ref().map(Value::duration);
+    let ticks = keys.ticks.as_ref().map(|value| {
+        value
+            .whole(1..=i64::MAX.into())
+            .and_then(|ticks| u64::try_from(ticks).ok())
+    });
+    let both = [&keys.for_, &keys.ticks];
+    let stated = both.into_iter().flatten().max_by_key(|value| value.at());
+    if let (Some(_), Some(value)) = (&keys.while_, stated) {
+        value.wrong(
+            "a fault with \"while\" ends with its condition",
+            "remove this key, or write \"when\" instead of \"while\"",
+        );
+        return None;
+    }
+    match (span, ticks) {
+        (None, None) => Some(Lasts::UntilEnded),
+        (Some(span), None) => span.map(Lasts::For),
+        (None, Some(ticks)) => ticks.map(Lasts::Ticks),
+        (Some(_), Some(_)) => {
+            if let Some(value) = &keys.ticks {
+                value.wrong("a fault has both \"for\" and \"ticks\"", "keep one of them");
+            }
+            None
+        }
+    }
+}
+
+fn read_times(keys: &Keys<'_>, begin: &Begin, lasts: Lasts) -> Option<u64> {
+    let usual = if matches!(begin, Begin::While(_)) {
+        u64::MAX
+    } else {
+        1
+    };
+    let Some(value) = &keys.times else {
+        return Some(usual);
+    };
+    let times = value.whole(1..=i64::MAX.into())?;
+    if !matches!(begin, Begin::When(_)) {
+        value.wrong(
+            "\"times\" stands without \"when\"",
+            "remove it; only a condition comes true more than once",
+        );
+        return None;
+    }
+    if times > 1 && lasts == Lasts::UntilEnded {
+        value.wrong(
+            "a fault that does not end by itself cannot begin again",
+            "add for = \"300ms\" or ticks = 20, or remove \"times\"",
+        );
+        return None;
+    }
+    u64::try_from(times).ok()
+}

@@ -1,0 +1,254 @@
+//! What a fault does: the keys that belong to its kind.
+
+use super::{Keys, SIGNAL};
+use crate::faults::condition::unknown;
+use crate::faults::{Change, Direction, Effect, Trouble, measure};
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
+use tickbus_image::signal::section::{slot_of, value_limits, value_range};
+use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
+
+/// The longest that frames may be held back.
+const LONGEST: Nanos = Nanos::from_secs(60);
+
+/// Reads the effect of a fault of `kind`, and reports its mistakes; `whole` tells whether a key that is not
+/// there was not written either.
+pub(super) fn read_effect(
+    kind: &str,
+    keys: &Keys<'_>,
+    table: Option<&SignalTable>,
+    whole: bool,
+) -> Option<Effect> {
+    let line = |trouble| Some(Effect::Line(trouble));
+    match kind {
+        "delay" => line(Trouble::Delay(read_hold(keys)?)),
+        "slow-answers" => line(Trouble::SlowAnswers(read_hold(keys)?)),
+        "drop" => {
+            let (chance, direction) = (read_chance(keys, None), read_direction(keys));
+            line(Trouble::Drop(chance?, direction?))
+        }
+        "duplicate" => {
+            let (chance, direction) = (read_chance(keys, Some(1.0)), read_direction(keys));
+            line(Trouble::Duplicate(chance?, direction?))
+        }
+        "link-down" => line(Trouble::LinkDown),
+        "station-down" => line(Trouble::StationDown(read_station(
+            keys.station.as_ref()?,
+            table?,
+        )?)),
+        _ => read_change(kind, keys, table, whole),
+    }
+}
+
+fn read_hold(keys: &Keys<'_>) -> Option<Nanos> {
+    let value = keys.by.as_ref()?;
+    let by = value.duration()?;
+    if by > LONGEST {
+        value.wrong(
+            format!("frames cannot be held back for {by}"),
+            format!("write at most \"{LONGEST}\", or use kind = \"link-down\""),
+        );
+        return None;
+    }
+    Some(by)
+}
+
+/// The chance, or the usual one where none is stated; `None` when it is wrong, too.
+fn read_chance(keys: &Keys<'_>, usual: Option<f64>) -> Option<f64> {
+    const RIGHT: &str = "write a chance above 0 and up to 1, such as 0.1 for one in ten";
+    let Some(value) = &keys.chance else {
+        return usual;
+    };
+    let chance = value.number(RIGHT)?;
+    if chance > 0.0 && chance <= 1.0 {
+        return Some(chance);
+    }
+    value.wrong(format!("a chance of {} is none", value.written()), RIGHT);
+    None
+}
+
+fn read_direction(keys: &Keys<'_>) -> Option<Direction> {
+    let choices = [
+        ("in", Direction::In),
+        ("out", Direction::Out),
+        ("both", Direction::Both),
+    ];
+    let choose = |value: &Value<'_>| value.choice("directions", &choices);
+    keys.direction
+        .as_ref()
+        .map_or(Some(Direction::Both), choose)
+}
+
+fn read_station(value: &Value<'_>, table: &SignalTable) -> Option<usize> {
+    let name = value.text("write the name of a [[station]] in quotes")?;
+    if let [_] = &table.stations[..] {
+        value.wrong(
+            "this driver has one station only",
+            "write kind = \"link-down\"",
+        );
+        return None;
+    }
+    let names: Vec<&str> = table.stations.iter().map(|s| s.name.as_str()).collect();
+    let found = names.iter().position(|known| *known == name);
+    if found.is_none() {
+        value.wrong(
+            format!("there is no station \"{}\"", shown(name)),
+            did_you_mean(name, "stations", &names),
+        );
+    }
+    found
+}
+
+fn read_change(
+    kind: &str,
+    keys: &Keys<'_>,
+    table: Option<&SignalTable>,
+    whole: bool,
+) -> Option<Effect> {
+    let (value, table) = (keys.signal.as_ref()?, table?);
+    let name = value.text(SIGNAL)?;
+    let Some(index) = table.position(name) else {
+        let (what, right) = unknown(name, table);
+        value.wrong(what, right);
+        return None;
+    };
+    let signal = &table.signals[index];
+    let change = match kind {
+        "stuck" => Change::Stuck(match &keys.value {
+            None => None,
+            Some(value) => Some(read_value(value, signal)?),
+        }),
+        "invert" => read_invert(value, signal)?,
+        "offset" => read_offset(value, keys.by.as_ref()?, signal)?,
+        _ => read_noise(value, keys, signal, whole)?,
+    };
+    Some(Effect::Signal(index, change))
+}
+
+/// A value of the signal, with or without its unit.
+fn read_value(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
+    if value.as_text().is_none() || signal.data_type == DataType::Bool || signal.is_integer_slot() {
+        return slot_of(value, signal, "value");
+    }
+    let number = measure::of_value(value, signal)?;
+    let (low, high) = value_limits(signal);
+    if (low..=high).contains(&number) {
+        return Some(Slot::from_real(number));
+    }
+    value.wrong(
+        format!("value {} does not fit", short_number(number)),
+        value_range(signal),
+    );
+    None
+}
+
+fn read_invert(value: &Value<'_>, signal: &Signal) -> Option<Change> {
+    use DataType::{Bool, Byte, Dword, Lword, Word};
+
+    let bits = matches!(signal.data_type, Bool | Byte | Word | Dword | Lword);
+    if bits && signal.scale.is_none() {
+        return Some(Change::Invert);
+    }
+    value.wrong(
+        format!(
+            "\"{}\" is a number ({}), and has no opposite",
+            shown(&signal.name),
+            signal.data_type
+        ),
+        "invert a BOOL or a bit string, or write kind = \"offset\" or \"stuck\"",
+    );
+    None
+}
+
+fn read_offset(place: &Value<'_>, value: &Value<'_>, signal: &Signal) -> Option<Change> {
+    if signal.data_type == DataType::Bool {
+        place.wrong(
+            format!("\"{}\" is a BOOL, and has no offset", shown(&signal.name)),
+            "write kind = \"invert\" or kind = \"stuck\"",
+        );
+        return None;
+    }
+    let by = measure::of_value(value, signal)?;
+    if by == 0.0 {
+        value.wrong("an offset of 0 changes nothing", "write another number");
+        return None;
+    }
+    check_step(value, by, signal)?;
+    Some(Change::Offset(by))
+}
+
+fn read_noise(place: &Value<'_>, keys: &Keys<'_>, signal: &Signal, whole: bool) -> Option<Change> {
+    let is_bool = signal.data_type == DataType::Bool;
+    let (wanted, other, example) = if is_bool {
+        (&keys.chance, &keys.amplitude, "chance = 0.05")
+    } else {
+        (&keys.amplitude, &keys.chance, "amplitude = 2.5")
+    };
+    if let Some(other) = other {
+        let name = shown(&signal.name);
+        let (what, right) = if is_bool {
+            (
+                format!("\"{name}\" is a BOOL, and has no amplitude"),
+                "say how likely it flickers at a tick, such as chance = 0.05",
+            )
+        } else {
+            (
+                format!("\"{name}\" is a number, and its noise has no chance"),
+                "say how far it goes to either side, such as amplitude = 2.5",
+            )
+        };
+        other.wrong(what, right);
+        return None;
+    }
+    let Some(value) = wanted else {
+        if whole {
+            place.wrong(
+                format!("the noise of \"{}\" has no strength", shown(&signal.name)),
+                format!("add {example}"),
+            );
+        }
+        return None;
+    };
+    if is_bool {
+        return read_chance(keys, None).map(Change::Flicker);
+    }
+    let amplitude = measure::of_value(value, signal)?;
+    if amplitude <= 0.0 {
+        value.wrong(
+            format!("an amplitude of {} is none", short_number(amplitude)),
+            "write a number above 0",
+        );
+        return None;
+    }
+    check_step(value, amplitude, signal)?;
+    Some(Change::Noise(amplitude))
+}
+
+/// Refuses a step that is wider than all that the signal can show, or too small to be seen in it.
+fn check_step(value: &Value<'_>, step: f64, signal: &Signal) -> Option<()> {
+    let (low, high) = value_limits(signal);
+    let least = match signal.scale {
+        _ if !signal.data_type.is_integer() => 0.0,
+        Some(scale) => scale.gain.abs() / 2.0,
+        None => 0.5,
+    };
+    if step.abs() > high - low {
+        value.wrong(
+            format!("{} is beyond the range of the signal", short_number(step)),
+            value_range(signal),
+        );
+        None
+    } else if step.abs() < least {
+        value.wrong(
+            format!("{} is too little to be seen", short_number(step)),
+            format!(
+                "one step of \"{}\" is {}",
+                shown(&signal.name),
+                short_number(least * 2.0)
+            ),
+        );
+        None
+    } else {
+        Some(())
+    }
+}

@@ -1,0 +1,338 @@
+//! Faults of signals, tick by tick.
+#![allow(clippy::float_cmp, reason = "the values are small whole numbers")]
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+
+use super::*;
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::{
+    Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Slot, Station,
+};
+
+/// `run` and `level` are written by a machine, the others read.
+pub(super) fn table() -> SignalTable {
+    let signal = |name: &str, area, byte, data_type| Signal {
+        name: name.to_owned(),
+        station: 0,
+        area,
+        byte,
+        bit: 0,
+        data_type,
+        order: ByteOrder::Abcd,
+        scale: None,
+        unit: None,
+        latch: None,
+        hold: Nanos::ZERO,
+        fail_safe: Slot::default(),
+        dead_band: 0.0,
+        range: None,
+    };
+    SignalTable {
+        stations: vec![Station {
+            name: String::new(),
+            input_bytes: 4,
+            output_bytes: 16,
+        }],
+        signals: vec![
+            signal("run", Area::Input, 0, DataType::Bool),
+            Signal {
+                scale: Scale::through([0.0, 27_648.0], [0.0, 250.0]),
+                unit: Some("mm".to_owned()),
+                ..signal("level", Area::Input, 2, DataType::Int)
+            },
+            Signal {
+                latch: Some(Latch::Rising),
+                ..signal("a = b > c", Area::Output, 0, DataType::Bool)
+            },
+            signal("whole", Area::Output, 8, DataType::Lint),
+            signal("word", Area::Output, 2, DataType::Word),
+        ],
+    }
+}
+
+const SIGNALS: usize = 5;
+
+/// A machine's end, whose peer sends what it is told.
+struct End {
+    table: SignalTable,
+    faults: Faults,
+    board: Arc<Board>,
+    tick: u64,
+    /// Signals, and the edges of the latched one.
+    slots: [Slot; SIGNALS + 1],
+}
+
+impl End {
+    fn new() -> Self {
+        let board = Arc::<Board>::default();
+        Self {
+            table: table(),
+            faults: Faults::new(Arc::clone(&board)),
+            board,
+            tick: 0,
+            slots: [Slot::default(); SIGNALS + 1],
+        }
+    }
+
+    #[track_caller]
+    fn inject(&mut self, text: &str) -> u32 {
+        let fault = read_one(text, &self.table).unwrap_or_else(|why| panic!("{why}"));
+        let edges = [None, None, Some(SIGNALS), None, None];
+        let slots = Slots {
+            table: &self.table,
+            writes: Area::Input,
+            edges: &edges,
+        };
+        self.faults.add(&fault, slots).expect("there is room")
+    }
+
+    /// One tick of 10 ms: what was sent of the signals that this end writes; `arrives` puts into the slots what
+    /// comes in, if anything does.
+    fn tick(&mut self, arrives: impl FnOnce(&mut [Slot])) -> [f64; 2] {
+        self.tick += 1;
+        let moment = Moment {
+            time: Nanos::from_millis(10 * i64::try_from(self.tick - 1).expect("few")),
+            tick: self.tick,
+        };
+        self.faults.begin_tick(moment, &mut self.slots);
+        let own = [self.slots[0], self.slots[1]];
+        self.faults.sending(&mut self.slots);
+        let sent = [self.slots[0].real(), self.slots[1].real()];
+        self.faults.sent(&mut self.slots);
+        assert_eq!(own, [self.slots[0], self.slots[1]], "its own again");
+        arrives(&mut self.slots);
+        self.faults.received(&mut self.slots);
+        sent
+    }
+
+    fn set(&mut self, index: usize, value: f64) {
+        self.slots[index] = Slot::from_real(value);
+    }
+}
+
+fn nothing(_: &mut [Slot]) {}
+
+#[test]
+fn what_is_written_is_bent_on_its_way_out_only() {
+    for (text, sent) in [
+        ("kind = \"stuck\"\nsignal = \"level\"\nvalue = 7.5", 7.5),
+        (
+            "kind = \"stuck\"\nsignal = \"level\"\nvalue = \"7.5 mm\"",
+            7.5,
+        ),
+        ("kind = \"stuck\"\nsignal = \"level\"", 100.0),
+        ("kind = \"offset\"\nsignal = \"level\"\nby = -10", 90.0),
+        (
+            "kind = \"offset\"\nsignal = \"level\"\nby = \"2.5 mm\"",
+            102.5,
+        ),
+    ] {
+        let mut end = End::new();
+        end.set(1, 100.0);
+        assert_eq!(end.tick(nothing), [0.0, 100.0]);
+        let id = end.inject(text);
+        for _ in 0..3 {
+            assert_eq!(end.tick(nothing), [0.0, sent], "{text}");
+        }
+        end.set(1, 200.0);
+        let moved = if text.contains("offset") {
+            sent + 100.0
+        } else {
+            sent
+        };
+        assert_eq!(end.tick(nothing), [0.0, moved], "{text}");
+        assert!(end.faults.end(id));
+        assert_eq!(end.tick(nothing), [0.0, 200.0], "{text}");
+    }
+}
+
+#[test]
+fn what_is_read_is_bent_for_the_reader_and_true_again_at_once() {
+    let mut end = End::new();
+    end.tick(|slots| {
+        slots[2] = Slot::from_real(1.0);
+        slots[3] = Slot::from_signed(40);
+        slots[4] = Slot::from_real(3.0);
+    });
+    let ids = [
+        end.inject("kind = \"invert\"\nsignal = \"a = b > c\""),
+        end.inject("kind = \"offset\"\nsignal = \"whole\"\nby = 2"),
+        end.inject("kind = \"invert\"\nsignal = \"word\""),
+    ];
+    // Nothing new arrives, and yet offsets do not add up.
+    for _ in 0..3 {
+        end.tick(nothing);
+        assert_eq!(end.slots[2].real(), 0.0);
+        assert_eq!(end.slots[3].signed(), 42);
+        assert_eq!(end.slots[4].real(), f64::from(0xFFFC));
+    }
+    end.tick(|slots| slots[3] = Slot::from_signed(i64::MAX));
+    assert_eq!(end.slots[3].signed(), i64::MAX, "saturates");
+    for id in ids {
+        assert!(end.faults.end(id));
+    }
+    end.tick(nothing);
+    assert_eq!(end.slots[2].real(), 1.0);
+    assert_eq!(end.slots[3].signed(), i64::MAX);
+    assert_eq!(end.slots[4].real(), 3.0);
+}
+
+#[test]
+fn edges_are_counted_as_they_are_seen() {
+    let mut end = End::new();
+    let id = end.inject("kind = \"stuck\"\nsignal = \"a = b > c\"\nvalue = false");
+    let pulse = |slots: &mut [Slot]| {
+        slots[2] = Slot::from_real(1.0);
+        slots[SIGNALS] = Slot::from_real(3.0);
+    };
+    end.tick(pulse);
+    assert_eq!((end.slots[2].real(), end.slots[SIGNALS].real()), (0.0, 0.0));
+    assert!(end.faults.end(id));
+    end.tick(nothing);
+    assert_eq!(
+        (end.slots[2].real(), end.slots[SIGNALS].real()),
+        (1.0, 3.0),
+        "the truth"
+    );
+    end.inject("kind = \"invert\"\nsignal = \"a = b > c\"");
+    end.tick(nothing);
+    assert_eq!((end.slots[2].real(), end.slots[SIGNALS].real()), (0.0, 0.0));
+    end.tick(|slots| slots[2] = Slot::from_real(0.0));
+    assert_eq!((end.slots[2].real(), end.slots[SIGNALS].real()), (1.0, 1.0));
+}
+
+#[test]
+fn faults_of_one_signal_follow_each_other() {
+    let mut end = End::new();
+    end.inject("kind = \"stuck\"\nsignal = \"level\"\nvalue = 10");
+    end.inject("kind = \"offset\"\nsignal = \"level\"\nby = 5");
+    assert_eq!(end.tick(nothing), [0.0, 15.0]);
+    assert_eq!(end.slots[1].real(), 0.0);
+}
+
+#[test]
+fn a_condition_sees_the_truth() {
+    let mut end = End::new();
+    end.inject("kind = \"stuck\"\nsignal = \"run\"\nvalue = true");
+    end.inject("kind = \"offset\"\nsignal = \"level\"\nby = 5\nwhile = \"run\"");
+    assert_eq!(end.tick(nothing), [1.0, 0.0], "it only looks as if it ran");
+    end.set(0, 1.0);
+    assert_eq!(end.tick(nothing), [1.0, 5.0]);
+    end.set(0, 0.0);
+    assert_eq!(end.tick(nothing), [1.0, 0.0]);
+}
+
+#[test]
+fn the_board_tells_what_is_active_and_how_often_it_began() {
+    let mut end = End::new();
+    let mut text = String::new();
+    end.board.write(&mut text);
+    assert_eq!(text, "", "no fault, no word");
+    end.inject(
+        "kind = \"invert\"\nname = \"jam\"\nsignal = \"run\"\nwhen = \"run\"\nticks = 2\ntimes = 2",
+    );
+    end.inject("kind = \"link-down\"\ntick = 2");
+    for level in [1.0, 1.0, 0.0, 1.0, 0.0] {
+        end.set(0, level);
+        end.tick(nothing);
+    }
+    end.board.write(&mut text);
+    assert_eq!(
+        text,
+        "fault.active=jam, link-down\nfault.begun=3\nfault.dropped=0\nfault.duplicated=0\n\
+         fault.hurried=0\nfault.1.name=jam\nfault.1.kind=invert\nfault.1.what=\"run\" is inverted\n\
+         fault.1.state=active\nfault.1.begun=2\nfault.1.since=30ms\nfault.1.tick=4\n\
+         fault.2.name=link-down\nfault.2.kind=link-down\nfault.2.what=the link is down\n\
+         fault.2.state=active\nfault.2.begun=1\nfault.2.since=10ms\nfault.2.tick=2\n"
+    );
+}
+
+#[test]
+fn those_that_are_over_make_room_and_those_that_wait_do_not() {
+    let mut end = End::new();
+    for _ in 0..LIMIT {
+        end.inject("kind = \"invert\"\nsignal = \"run\"\nticks = 1");
+    }
+    let fault = read_one("kind = \"link-down\"", &end.table).expect("right");
+    let table = end.table.clone();
+    let slots = Slots {
+        table: &table,
+        writes: Area::Input,
+        edges: &[],
+    };
+    let refused = end.faults.add(&fault, slots).expect_err("no room");
+    assert!(
+        refused.contains("64 faults wait or are active"),
+        "{refused}"
+    );
+    end.tick(nothing);
+    end.tick(nothing);
+    assert_eq!(end.faults.add(&fault, slots), Ok(65));
+    assert_eq!(end.board.list().len(), LIMIT);
+    assert!(!end.faults.end(1), "forgotten");
+}
+
+proptest! {
+    #[test]
+    fn noise_stays_within_its_amplitude_and_the_same_seed_makes_the_same(
+        seed in any::<u64>(), amplitude in 0.1..200.0_f64, chance in 0.05..0.95_f64,
+    ) {
+        let run = || {
+            let mut end = End::new();
+            end.inject(&format!(
+                "kind = \"noise\"\nsignal = \"level\"\namplitude = {amplitude}\nseed = {}", seed >> 1
+            ));
+            end.inject(&format!(
+                "kind = \"noise\"\nsignal = \"run\"\nchance = {chance}\nseed = {}", seed >> 1
+            ));
+            end.set(1, 50.0);
+            (0..400).map(|_| end.tick(nothing)).collect::<Vec<_>>()
+        };
+        let first = run();
+        prop_assert_eq!(&first, &run());
+        prop_assert!(first.iter().all(|sent| (sent[1] - 50.0).abs() <= amplitude));
+        prop_assert!(first.iter().any(|sent| (sent[1] - 50.0).abs() > amplitude / 2.0));
+        prop_assert!(first.iter().any(|sent| sent[0] == 1.0));
+        prop_assert!(first.iter().any(|sent| sent[0] == 0.0));
+    }
+
+    /// Whatever faults come and go, the simulation's own values stay its own, and what is read is true as soon
+    /// as all faults are over.
+    #[test]
+    fn nothing_is_left_behind(
+        steps in prop::collection::vec((0..8_usize, -100.0..100.0_f64, any::<bool>()), 1..80),
+    ) {
+        const TEXTS: [&str; 6] = [
+            "kind = \"invert\"\nsignal = \"a = b > c\"\nticks = 3",
+            "kind = \"stuck\"\nsignal = \"word\"\nvalue = 9\nticks = 5",
+            "kind = \"offset\"\nsignal = \"word\"\nby = 3\nticks = 4",
+            "kind = \"noise\"\nsignal = \"level\"\namplitude = 9\nticks = 2",
+            "kind = \"noise\"\nsignal = \"a = b > c\"\nchance = 0.5\nticks = 2",
+            "kind = \"stuck\"\nsignal = \"a = b > c\"\nwhen = \"run\"\nticks = 2",
+        ];
+        let mut end = End::new();
+        let mut truth = [Slot::default(); SIGNALS + 1];
+        for (what, value, arrives) in steps {
+            if let Some(text) = TEXTS.get(what) {
+                end.inject(text);
+            }
+            end.set(0, f64::from(u8::from(value > 0.0)));
+            end.set(1, value);
+            end.tick(|slots| {
+                if arrives {
+                    slots[2] = Slot::from_real(f64::from(u8::from(value < 0.0)));
+                    slots[4] = Slot::from_real(value.abs().round());
+                }
+                truth.copy_from_slice(slots);
+            });
+        }
+        let ids: Vec<u32> = end.board.list().iter().map(|fault| fault.id).collect();
+        for id in ids {
+            end.faults.end(id);
+        }
+        end.tick(nothing);
+        prop_assert_eq!(end.slots, truth);
+    }
+}

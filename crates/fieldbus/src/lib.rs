@@ -1,0 +1,32 @@
+//! The bus traits, and one room per bus.
+
+mod alive;
+mod at;
+mod bus;
+mod changes;
+mod dead_band;
+mod events;
+mod identity;
+mod link;
+mod port;
+mod rarely;
+mod role;
+mod troubles;
+mod vitals;
+
+pub mod faults;
+pub mod loopback;
+pub mod tcp;
+
+pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
+pub use at::At;
+pub use bus::{Bus, BusError, CYCLE, Free, Stepped};
+pub use changes::ChangeEvents;
+pub use dead_band::DeadBands;
+pub use events::read_events;
+pub use identity::Guard;
+pub use link::{Cause, Link, LinkState, LinkStatus};
+pub use port::{CallWatch, Port};
+pub use rarely::{Rarely, Times, Topic};
+pub use role::Role;
+pub use vitals::PlcState;

@@ -1,0 +1,607 @@
+//! How a line is doing: its state, the cause of that, and the reason in words.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt::{Arguments, Write as _};
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tickbus_base::os::one_line;
+use tickbus_base::time::{Nanos, Spans};
+
+use super::BusError;
+use super::rarely::Rarely;
+
+/// How a line is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LinkState {
+    /// Not open.
+    Closed,
+    /// Trying to reach the peer, or waiting for it.
+    Opening,
+    /// The peer is there.
+    Running,
+    /// The peer was there, and nothing that counts has come from it for longer than `max_age`.
+    Stale,
+    /// The line broke; it is tried again after a pause.
+    Failed,
+}
+
+impl LinkState {
+    /// All of them; each one's code is its place here.
+    pub const ALL: [Self; 5] = [
+        Self::Closed,
+        Self::Opening,
+        Self::Running,
+        Self::Stale,
+        Self::Failed,
+    ];
+
+    /// The state's name, in lower case.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Closed => "closed",
+            Self::Opening => "opening",
+            Self::Running => "running",
+            Self::Stale => "stale",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// Why a line is in its state, for programs; the reason in words is for people.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Cause {
+    /// It was not opened yet.
+    NotOpened,
+    /// It is on its way, or waits for its peer.
+    Waiting,
+    /// All is well.
+    Running,
+    /// The peer is silent.
+    Silent,
+    /// The peer left in good order.
+    Left,
+    /// The line is broken, or was never there.
+    Link,
+    /// The peer broke the protocol.
+    Protocol,
+    /// The peer refused.
+    Refused,
+    /// A defect of tickbus itself.
+    Defect,
+    /// A call into a library does not return.
+    Hung,
+    /// It was closed.
+    Closed,
+    /// A fault was injected, and holds the line down.
+    Injected,
+    /// The PLC does not run its program.
+    Stopped,
+    /// A signal that has to change does not.
+    Frozen,
+}
+
+impl Cause {
+    /// All of them; each one's code is its place here.
+    pub const ALL: [Self; 14] = [
+        Self::NotOpened,
+        Self::Waiting,
+        Self::Running,
+        Self::Silent,
+        Self::Left,
+        Self::Link,
+        Self::Protocol,
+        Self::Refused,
+        Self::Defect,
+        Self::Hung,
+        Self::Closed,
+        Self::Injected,
+        Self::Stopped,
+        Self::Frozen,
+    ];
+
+    /// The cause's name, in lower case.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NotOpened => "not-opened",
+            Self::Waiting => "waiting",
+            Self::Running => "running",
+            Self::Silent => "silent",
+            Self::Left => "left",
+            Self::Link => "link",
+            Self::Protocol => "protocol",
+            Self::Refused => "refused",
+            Self::Defect => "defect",
+            Self::Hung => "hung",
+            Self::Closed => "closed",
+            Self::Injected => "injected",
+            Self::Stopped => "stopped",
+            Self::Frozen => "frozen",
+        }
+    }
+}
+
+impl From<&BusError> for Cause {
+    fn from(error: &BusError) -> Self {
+        match error {
+            BusError::Link(_) => Self::Link,
+            BusError::Left(_) => Self::Left,
+            BusError::Protocol(_) => Self::Protocol,
+            BusError::Refused(_) => Self::Refused,
+        }
+    }
+}
+
+/// State, cause and reason at one moment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// How the line is doing.
+    pub state: LinkState,
+    /// Why, for programs.
+    pub cause: Cause,
+    /// Why, for people; one line.
+    pub reason: String,
+    /// When it came into this state.
+    pub since: Nanos,
+}
+
+/// The state of a line as bus and driver share it.
+#[derive(Clone, Debug)]
+pub struct LinkStatus(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    driver: String,
+    max_age: Nanos,
+    /// The names of the stations where there are several.
+    stations: Vec<String>,
+    /// The record's state once more, to be read without its lock.
+    state: AtomicU8,
+    /// How many stations were stale when the reason was made.
+    stale: AtomicUsize,
+    record: Mutex<Record>,
+}
+
+#[derive(Debug)]
+struct Record {
+    link: Link,
+    /// Why the line was running, for when it does so again.
+    running: String,
+    call: Option<Call>,
+    /// The injected faults of the line that are active, in words.
+    injected: String,
+    /// Why data that arrive do not count; `None` while they do.
+    doubt: Option<(Cause, String)>,
+    /// What a call that hangs interrupted.
+    before_hang: Option<Link>,
+    /// How often each state was entered, and each cause given.
+    entered: [u64; LinkState::ALL.len()],
+    caused: [u64; Cause::ALL.len()],
+    facts: BTreeMap<Cow<'static, str>, String>,
+    counts: BTreeMap<&'static str, u64>,
+    /// What the log was told.
+    log: Rarely,
+    cycle: Spans,
+}
+
+/// A call into a library that is under way.
+#[derive(Clone, Debug)]
+struct Call {
+    what: Arc<str>,
+    since: Nanos,
+    limit: Nanos,
+}
+
+impl Record {
+    /// Whether a call lasts longer than it may.
+    fn is_hung(&self, now: Nanos) -> bool {
+        self.call
+            .as_ref()
+            .is_some_and(|call| now - call.since > call.limit)
+    }
+}
+
+impl LinkStatus {
+    /// The state of the line of the driver called `driver`, which is closed so far. Data older than
+    /// `max_age` make it stale.
+    pub fn new(driver: &str, max_age: Nanos) -> Self {
+        Self::of_stations(driver, max_age, Vec::new())
+    }
+
+    /// The same for a driver with `stations` of these names: the one that is silent is told by its name, if there
+    /// are several.
+    pub fn of_stations(driver: &str, max_age: Nanos, stations: Vec<String>) -> Self {
+        let link = Link {
+            state: LinkState::Closed,
+            cause: Cause::NotOpened,
+            reason: "not opened yet".to_owned(),
+            since: Nanos::ZERO,
+        };
+        Self(Arc::new(Shared {
+            driver: driver.to_owned(),
+            max_age,
+            stations,
+            state: AtomicU8::new(0),
+            stale: AtomicUsize::new(0),
+            record: Mutex::new(Record {
+                link,
+                running: String::new(),
+                call: None,
+                injected: String::new(),
+                doubt: None,
+                before_hang: None,
+                entered: [0; LinkState::ALL.len()],
+                caused: [0; Cause::ALL.len()],
+                facts: BTreeMap::new(),
+                counts: BTreeMap::new(),
+                log: Rarely::default(),
+                cycle: Spans::new(),
+            }),
+        }))
+    }
+
+    /// The driver whose line it is.
+    pub fn driver(&self) -> &str {
+        &self.0.driver
+    }
+
+    /// The injected faults of the line that are active, in words; empty for none. A reason of silence tells
+    /// of them.
+    pub fn injected(&self, faults: &str) {
+        let injected = &mut self.lock().injected;
+        injected.clear();
+        injected.push_str(faults);
+    }
+
+    /// The limit of age.
+    pub fn max_age(&self) -> Nanos {
+        self.0.max_age
+    }
+
+    /// The state as it was entered last, without a lock.
+    pub fn state(&self) -> LinkState {
+        LinkState::ALL[usize::from(self.0.state.load(Ordering::Relaxed)) % LinkState::ALL.len()]
+    }
+
+    /// What a running line says of itself; empty before it ran for the first time.
+    pub fn running_reason(&self) -> String {
+        self.lock().running.clone()
+    }
+
+    /// How often the line came up.
+    pub fn runs(&self) -> u64 {
+        self.lock().entered[LinkState::Running as usize]
+    }
+
+    /// State, cause and reason as they were entered last.
+    pub fn link(&self) -> Link {
+        self.lock().link.clone()
+    }
+
+    /// Enters a state at `now`; entering the present one with the same reason does nothing.
+    pub fn enter(&self, now: Nanos, state: LinkState, cause: Cause, reason: &str) {
+        self.0.enter(self.lock(), now, state, cause, reason);
+    }
+
+    /// The peer is there. A line that is running or stale stays so.
+    pub fn running(&self, now: Nanos, reason: &str) {
+        if matches!(self.state(), LinkState::Running | LinkState::Stale) {
+            return;
+        }
+        let mut record = self.lock();
+        reason.clone_into(&mut record.running);
+        let (state, cause) = (LinkState::Running, Cause::Running);
+        let up = self.0.change(&mut record, now, state, cause, reason);
+        let doubt = record.doubt.clone();
+        let doubt = doubt.and_then(|(cause, reason)| {
+            let state = LinkState::Stale;
+            self.0.change(&mut record, now, state, cause, &reason)
+        });
+        drop(record);
+        up.into_iter().chain(doubt).for_each(Message::write);
+    }
+
+    /// Data that arrive do not count, for a cause and a reason in words, or they do again (`None`). A line that is
+    /// running is stale meanwhile; one that is not will be when it comes up. These are the `ages` of the stations'
+    /// data: silence is told before a signal that stands still, as nothing can change without data.
+    pub fn doubt(
+        &self,
+        now: Nanos,
+        doubt: Option<(Cause, String)>,
+        ages: impl Iterator<Item = Nanos> + Clone,
+    ) {
+        let mut record = self.lock();
+        let before = std::mem::replace(&mut record.doubt, doubt);
+        if !matches!(record.link.state, LinkState::Running | LinkState::Stale) {
+            return;
+        }
+        let limit = self.0.max_age;
+        let stale = ages.clone().filter(|age| *age > limit).count();
+        let (state, cause, reason) = match (record.doubt.clone(), before) {
+            (Some((Cause::Frozen, _)), _) if record.link.cause == Cause::Silent => return,
+            (Some((cause, reason)), _) => (LinkState::Stale, cause, reason),
+            (None, Some((cause, _))) if record.link.cause == cause => {
+                if stale > 0 {
+                    let reason = self.0.silence(&record, Nanos::MAX, ages);
+                    self.0.silent(record, now, stale, &reason);
+                    return;
+                }
+                (LinkState::Running, Cause::Running, record.running.clone())
+            }
+            (None, _) => return,
+        };
+        self.0.enter(record, now, state, cause, &reason);
+    }
+
+    /// Looks at the clock: a running line becomes stale when the newest data of a station, whose `ages` these are,
+    /// are too old, and running again when all are young and none is in doubt. Lock-free unless something changes.
+    pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
+        let limit = self.0.max_age;
+        let stale = ages.clone().filter(|age| *age > limit).count();
+        match self.state() {
+            LinkState::Running if stale > 0 => {}
+            LinkState::Stale if stale == 0 || stale != self.0.stale.load(Ordering::Relaxed) => {}
+            _ => return,
+        }
+        let mut record = self.lock();
+        let shown = now - record.link.since;
+        match record.link.state {
+            // A line that has only just come up may still have the old data.
+            LinkState::Running if shown > limit && stale > 0 => {
+                let reason = self.0.silence(&record, shown, ages);
+                self.0.silent(record, now, stale, &reason);
+            }
+            // What stands still and is then too old is silent.
+            LinkState::Stale
+                if stale > 0 && record.link.cause == Cause::Frozen && shown > limit =>
+            {
+                let reason = self.0.silence(&record, Nanos::MAX, ages);
+                self.0.silent(record, now, stale, &reason);
+            }
+            LinkState::Stale if stale > 0 && record.link.cause == Cause::Frozen => {}
+            LinkState::Stale if stale > 0 => {
+                self.0.stale.store(stale, Ordering::Relaxed);
+                if record.link.cause == Cause::Silent {
+                    record.link.reason = self.0.silence(&record, Nanos::MAX, ages);
+                }
+            }
+            LinkState::Stale if stale == 0 && !record.is_hung(now) => {
+                let (state, cause, reason) = match record.doubt.clone() {
+                    Some((cause, reason)) => (LinkState::Stale, cause, reason),
+                    None => (LinkState::Running, Cause::Running, record.running.clone()),
+                };
+                self.0.enter(record, now, state, cause, &reason);
+            }
+            _ => {}
+        }
+    }
+
+    /// Looks whether a call into a library lasts longer than it may. For those who ask from outside: the
+    /// bus itself cannot, while it is in the call.
+    pub fn observe_call(&self, now: Nanos) {
+        let mut record = self.lock();
+        if let Some(call) = &record.call
+            && record.is_hung(now)
+        {
+            let reason = format!(
+                "{} has not returned for {}; it may take {}",
+                call.what,
+                (now - call.since).rounded(),
+                call.limit
+            );
+            if record.link.cause != Cause::Hung {
+                record.before_hang = Some(record.link.clone());
+            }
+            let (state, cause) = (LinkState::Stale, Cause::Hung);
+            self.0.enter(record, now, state, cause, &reason);
+        }
+    }
+
+    /// A call into a library begins, and may last for `limit`.
+    pub fn call_begins(&self, now: Nanos, what: &Arc<str>, limit: Nanos) {
+        self.lock().call = Some(Call {
+            what: Arc::clone(what),
+            since: now,
+            limit,
+        });
+    }
+
+    /// The call has returned. A line that was waiting for its peer when the call hung waits on; one that was
+    /// running stays stale until the peer is heard of.
+    pub fn call_ends(&self, now: Nanos) {
+        let mut record = self.lock();
+        let call = record.call.take();
+        if record.link.cause != Cause::Hung {
+            return;
+        }
+        let before = record.before_hang.take();
+        if let Some(link) = before.filter(|link| link.state == LinkState::Opening) {
+            self.0
+                .enter(record, now, link.state, link.cause, &link.reason);
+        } else if let Some(call) = call {
+            let reason = format!(
+                "{} returned after {}, and nothing has come from the peer since",
+                call.what,
+                (now - call.since).rounded()
+            );
+            let (state, cause) = (LinkState::Stale, Cause::Silent);
+            self.0.enter(record, now, state, cause, &reason);
+        }
+    }
+
+    /// Notes a fact for the statistics, such as the address that was bound.
+    pub fn tell(&self, key: impl Into<Cow<'static, str>>, fact: &str) {
+        self.lock().facts.insert(key.into(), one_line(fact));
+    }
+
+    /// Counts something for the statistics.
+    pub fn count(&self, key: &'static str) {
+        *self.lock().counts.entry(key).or_default() += 1;
+    }
+
+    /// Writes a message of which a peer can cause as many as it likes, with the name of the driver. `kind` names what it
+    /// is about: the log has the first 20 of a kind, and then those whose number is a power of two.
+    pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
+        let told = self.lock().log.count(("", kind));
+        if let Some(times) = told {
+            log::log!(level, "driver \"{}\": {message}{times}", self.driver());
+        }
+    }
+
+    /// A bus cycle was `span` long.
+    pub fn cycle(&self, span: Nanos) {
+        self.lock().cycle.record(span);
+    }
+
+    /// Appends what is known of the line, one `key=value` a line.
+    pub fn write(&self, now: Nanos, text: &mut String) {
+        let record = self.lock();
+        let link = &record.link;
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "state={}", link.state.name());
+        let _ = writeln!(text, "state.code={}", link.state as u8);
+        let _ = writeln!(text, "cause={}", link.cause.name());
+        let _ = writeln!(text, "cause.code={}", link.cause as u8);
+        let _ = writeln!(text, "reason={}", link.reason);
+        let _ = writeln!(
+            text,
+            "state.for_s={:.3}",
+            (now - link.since).as_micros() / 1e6
+        );
+        let _ = writeln!(text, "max_age={}", self.0.max_age);
+        for (key, fact) in &record.facts {
+            let _ = writeln!(text, "{key}={fact}");
+        }
+        for (state, count) in LinkState::ALL.iter().zip(record.entered) {
+            let _ = writeln!(text, "link.{}={count}", state.name());
+        }
+        for (cause, count) in Cause::ALL.iter().zip(record.caused) {
+            if count > 0 {
+                let _ = writeln!(text, "cause.{}={count}", cause.name());
+            }
+        }
+        for (key, count) in &record.counts {
+            let _ = writeln!(text, "{key}={count}");
+        }
+        let _ = writeln!(text, "log.untold={}", record.log.untold());
+        record.cycle.write("bus_cycle", text);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Record> {
+        // Every change leaves a record that can be read.
+        self.0.record.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A message for the log, made while the record was locked and written when it no longer is.
+#[must_use]
+struct Message(log::Level, String);
+
+impl Message {
+    fn write(self) {
+        log::log!(self.0, "{}", self.1);
+    }
+}
+
+impl Shared {
+    /// Enters a state. The log is told when others have the record again: nobody waits for whoever reads the log.
+    fn enter(
+        &self,
+        mut record: MutexGuard<'_, Record>,
+        now: Nanos,
+        state: LinkState,
+        cause: Cause,
+        reason: &str,
+    ) {
+        let message = self.change(&mut record, now, state, cause, reason);
+        drop(record);
+        if let Some(message) = message {
+            message.write();
+        }
+    }
+
+    /// The line is stale as the data of so many stations are too old.
+    fn silent(&self, record: MutexGuard<'_, Record>, now: Nanos, stale: usize, reason: &str) {
+        self.enter(record, now, LinkState::Stale, Cause::Silent, reason);
+        self.stale.store(stale, Ordering::Relaxed);
+    }
+
+    /// Changes the state, and gives what the log is to know of that.
+    fn change(
+        &self,
+        record: &mut Record,
+        now: Nanos,
+        state: LinkState,
+        cause: Cause,
+        reason: &str,
+    ) -> Option<Message> {
+        let reason = one_line(reason);
+        if (record.link.state, record.link.cause) == (state, cause) {
+            // A state that only tells it in other words, such as how long it has lasted, goes on.
+            record.link.reason = reason;
+            return None;
+        }
+        record.entered[state as usize] += 1;
+        record.caused[cause as usize] += 1;
+        self.state.store(state as u8, Ordering::Relaxed);
+        // What was counted for an earlier silence says nothing of the next one.
+        self.stale.store(0, Ordering::Relaxed);
+        let trouble = matches!(state, LinkState::Stale | LinkState::Failed)
+            || (state == LinkState::Opening && cause != Cause::Waiting);
+        let level = if trouble {
+            log::Level::Warn
+        } else {
+            log::Level::Info
+        };
+        let told = record.log.count((state.name(), cause.name()));
+        let message = told.filter(|_| log::log_enabled!(level)).map(|times| {
+            let (driver, state) = (&self.driver, state.name());
+            Message(
+                level,
+                format!("driver \"{driver}\" is {state}: {reason}{times}"),
+            )
+        });
+        record.link = Link {
+            state,
+            cause,
+            reason,
+            since: now,
+        };
+        message
+    }
+
+    /// The reason of a silence: whose data are too old, though the line has been up for `shown`.
+    fn silence(
+        &self,
+        record: &Record,
+        shown: Nanos,
+        ages: impl Iterator<Item = Nanos> + Clone,
+    ) -> String {
+        let mut reason = "nothing has come from ".to_owned();
+        // Writing to a string cannot fail.
+        if self.stations.len() < 2 {
+            let age = ages.max().unwrap_or_default().min(shown);
+            let _ = write!(reason, "the peer for {}", age.rounded());
+        } else {
+            let silent = ages.zip(&self.stations);
+            let silent = silent.filter(|(age, _)| *age > self.max_age);
+            for (index, (age, name)) in silent.enumerate() {
+                let comma = if index > 0 { ", " } else { "" };
+                let _ = write!(reason, "{comma}station \"{name}\" ");
+                let _ = match age {
+                    Nanos::MAX => write!(reason, "at all"),
+                    age => write!(reason, "for {}", age.rounded()),
+                };
+            }
+        }
+        let _ = write!(reason, "; the limit is max_age = {}", self.max_age);
+        if !record.injected.is_empty() {
+            let _ = write!(reason, "; injected fault: {}", record.injected);
+        }
+        reason
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,65 @@
+//! The loopback as a bus with a thread and a cycle of its own.
+
+use crate::{BusError, Free, Port};
+use tickbus_base::time::{Nanos, Pace, Stop};
+
+use super::link::End;
+
+/// A free-running loopback.
+#[derive(Debug)]
+pub struct FreeLoopback {
+    place: Place,
+    cycle: Nanos,
+}
+
+/// Where the end comes from.
+#[derive(Debug)]
+enum Place {
+    /// A link to join by its name.
+    Named(String),
+    /// An end that was handed in.
+    Given(End),
+}
+
+impl FreeLoopback {
+    /// A loopback over the link called `name`, with a bus cycle of `cycle`.
+    pub fn named(name: &str, cycle: Nanos) -> Self {
+        Self {
+            place: Place::Named(name.to_owned()),
+            cycle,
+        }
+    }
+
+    /// A loopback over an end that exists already.
+    pub fn over(end: End, cycle: Nanos) -> Self {
+        Self {
+            place: Place::Given(end),
+            cycle,
+        }
+    }
+}
+
+impl Free for FreeLoopback {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        match &mut self.place {
+            Place::Given(end) => serve(end, self.cycle, port, stop),
+            Place::Named(name) => serve(&mut End::join(name, port)?, self.cycle, port, stop),
+        }
+        Ok(())
+    }
+}
+
+/// Exchanges frames every `cycle`, on deadlines that do not drift.
+fn serve(end: &mut End, cycle: Nanos, port: &mut Port, stop: &Stop) {
+    port.opening("waiting for the other end of the link");
+    let mut pace = Pace::new(port.clock().now(), cycle);
+    while !stop.is_stopped() {
+        let now = port.clock().now();
+        if pace.take(now) {
+            end.cycle(now, port);
+        } else {
+            port.observe(now);
+        }
+        port.clock().wait_until(pace.due().min(port.due()), stop);
+    }
+}

@@ -1,0 +1,204 @@
+//! The line of a loopback: two ends in one process that meet by a name.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+use crate::{BusError, Port, Role};
+use tickbus_base::time::Nanos;
+
+/// The links that have a name, for as long as one of their ends lives.
+static LINKS: Mutex<Option<HashMap<String, Weak<Mutex<Line>>>>> = Mutex::new(None);
+
+#[derive(Debug, Default)]
+struct Line {
+    /// One for each role, in the order of [`lane`].
+    lanes: [Lane; 2],
+}
+
+/// What one end sends.
+#[derive(Debug, Default)]
+struct Lane {
+    attached: bool,
+    /// Sizes of the frames that the end sends and receives, per station.
+    sizes: Vec<(usize, usize)>,
+    /// The frames sent last, of all stations.
+    frames: Vec<Vec<u8>>,
+    /// The other end has not taken the frames yet.
+    waiting: bool,
+}
+
+fn lane(role: Role) -> usize {
+    match role {
+        Role::Device => 0,
+        Role::Controller => 1,
+    }
+}
+
+fn other(role: Role) -> Role {
+    match role {
+        Role::Device => Role::Controller,
+        Role::Controller => Role::Device,
+    }
+}
+
+/// One end of a link; dropping it frees the place.
+#[derive(Debug)]
+pub struct End {
+    line: Arc<Mutex<Line>>,
+    role: Role,
+    /// Whether this end has sent anything that the other end may have taken.
+    sent: bool,
+    /// Whether the other end has been there.
+    met: bool,
+}
+
+/// Makes a link that has no name, and both its ends: that of the Device and that of the Controller.
+///
+/// `sizes` are the bytes that the Device sends and receives, per station.
+pub fn private_link(sizes: &[(usize, usize)]) -> (End, End) {
+    let line = Arc::default();
+    let attach =
+        |role, sizes| End::attach(&line, role, sizes, "").expect("a new line has two free places");
+    (
+        attach(Role::Device, sizes.to_vec()),
+        attach(Role::Controller, swapped(sizes)),
+    )
+}
+
+fn swapped(sizes: &[(usize, usize)]) -> Vec<(usize, usize)> {
+    sizes.iter().map(|(tx, rx)| (*rx, *tx)).collect()
+}
+
+impl End {
+    /// Attaches to the link called `name`, as the end that `port` serves.
+    ///
+    /// # Errors
+    ///
+    /// [`BusError::Refused`] when that end is taken, or when the other end has frames of other sizes.
+    pub fn join(name: &str, port: &Port) -> Result<Self, BusError> {
+        let sizes = (0..port.stations())
+            .map(|station| port.sizes(station))
+            .collect();
+        let mut links = LINKS.lock().unwrap_or_else(PoisonError::into_inner);
+        let links = links.get_or_insert_with(HashMap::new);
+        links.retain(|_, line| line.strong_count() > 0);
+        let line = links.get(name).and_then(Weak::upgrade).unwrap_or_default();
+        links.insert(name.to_owned(), Arc::downgrade(&line));
+        Self::attach(&line, port.role(), sizes, name)
+    }
+
+    fn attach(
+        line: &Arc<Mutex<Line>>,
+        role: Role,
+        sizes: Vec<(usize, usize)>,
+        name: &str,
+    ) -> Result<Self, BusError> {
+        let mut locked = lock(line);
+        let peer = &locked.lanes[lane(other(role))];
+        if peer.attached && swapped(&peer.sizes) != sizes {
+            return Err(BusError::Refused(format!(
+                "the ends of loopback link \"{name}\" differ: this end sends and receives {sizes:?} \
+                 bytes per station, the other end expects {:?}; give both the same signal table",
+                swapped(&peer.sizes),
+            )));
+        }
+        if locked.lanes[lane(role)].attached {
+            return Err(BusError::Refused(format!(
+                "loopback link \"{name}\" already has a {}; close that one, or give this driver \
+                 another link name or role",
+                role.name(),
+            )));
+        }
+        let frames = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
+        locked.lanes[lane(role)] = Lane {
+            attached: true,
+            sizes,
+            frames,
+            waiting: false,
+        };
+        drop(locked);
+        Ok(Self {
+            line: Arc::clone(line),
+            role,
+            sent: false,
+            met: false,
+        })
+    }
+
+    /// One bus cycle at `now`: takes what the other end sent, offers what the port has.
+    pub fn cycle(&mut self, now: Nanos, port: &mut Port) {
+        self.take(now, port);
+        self.offer(now, port);
+    }
+
+    /// Takes what the other end sent.
+    pub fn take(&mut self, now: Nanos, port: &mut Port) {
+        if !self.meets(now, port) {
+            return;
+        }
+        let mut line = lock(&self.line);
+        let theirs = &mut line.lanes[lane(other(self.role))];
+        if std::mem::take(&mut theirs.waiting) {
+            for (station, frame) in theirs.frames.iter().enumerate() {
+                port.received(station, now, frame);
+            }
+        }
+        drop(line);
+        port.running("the other end is there");
+    }
+
+    /// Offers what the port has.
+    ///
+    /// Frames that the other end has not taken yet are overwritten, since the newest counts; their
+    /// pulses are not confirmed before it has taken a frame that shows them.
+    pub fn offer(&mut self, now: Nanos, port: &mut Port) {
+        if !self.meets(now, port) {
+            return;
+        }
+        let mut line = lock(&self.line);
+        let mine = &mut line.lanes[lane(self.role)];
+        if self.sent && !mine.waiting {
+            (0..mine.frames.len()).for_each(|station| port.sent(station));
+            self.sent = false;
+        }
+        if port.sends(now) {
+            for (station, frame) in mine.frames.iter_mut().enumerate() {
+                frame.copy_from_slice(port.outgoing(station, now));
+            }
+            mine.waiting = true;
+            self.sent = true;
+        }
+    }
+
+    /// Whether the line is up and the other end is there.
+    fn meets(&mut self, now: Nanos, port: &mut Port) -> bool {
+        if port.is_down(now) {
+            return false;
+        }
+        let mut line = lock(&self.line);
+        if line.lanes[lane(other(self.role))].attached {
+            self.met = true;
+            return true;
+        }
+        // What the former other end did not take is old news to the next one.
+        line.lanes[lane(self.role)].waiting = false;
+        self.sent = false;
+        drop(line);
+        if std::mem::take(&mut self.met) {
+            let left = BusError::Left("the other end of the link was closed".to_owned());
+            port.lost(&left, "waiting for the next");
+        }
+        false
+    }
+}
+
+impl Drop for End {
+    fn drop(&mut self) {
+        lock(&self.line).lanes[lane(self.role)] = Lane::default();
+    }
+}
+
+fn lock(line: &Mutex<Line>) -> MutexGuard<'_, Line> {
+    // Frames are copied whole under the lock; a panic of the other end leaves them readable.
+    line.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,72 @@
+//! Messages of the log that a peer can cause: counted, and told more and more rarely.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use tickbus_base::os::{is_told, is_told_rarely};
+
+/// What a message is about; a line's state and cause, or a name of its own.
+pub type Topic = (&'static str, &'static str);
+
+/// How often each topic came.
+#[derive(Debug, Default)]
+pub struct Rarely {
+    times: BTreeMap<Topic, u64>,
+    untold: u64,
+}
+
+/// The number of a message among those of its topic, as the end of its text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Times(u64);
+
+impl Rarely {
+    /// Counts a message; `None` if the log is not to have it.
+    pub fn count(&mut self, topic: Topic) -> Option<Times> {
+        let times = self.times.entry(topic).or_default();
+        *times += 1;
+        if is_told(*times) {
+            return Some(Times(*times));
+        }
+        self.untold += 1;
+        None
+    }
+
+    /// How many messages the log did not have.
+    pub fn untold(&self) -> u64 {
+        self.untold
+    }
+}
+
+impl fmt::Display for Times {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !is_told_rarely(self.0) {
+            return Ok(());
+        }
+        write!(
+            f,
+            " ({} times so far; told more rarely from now on)",
+            self.0
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_topic_is_told_twenty_times_and_then_at_powers_of_two() {
+        let mut rarely = Rarely::default();
+        let mut told = Vec::new();
+        for _ in 0..20_000 {
+            told.extend(rarely.count(("opening", "left")).map(|times| times.0));
+        }
+        assert_eq!(told.len(), 30);
+        assert_eq!(told[18..22], [19, 20, 32, 64]);
+        assert_eq!(rarely.untold(), 20_000 - 30);
+        assert_eq!(rarely.count(("opening", "protocol")), Some(Times(1)));
+        assert_eq!(Times(19).to_string(), "");
+        let last = Times(32).to_string();
+        assert_eq!(last, " (32 times so far; told more rarely from now on)");
+    }
+}

@@ -1,0 +1,216 @@
+//! Hosts and ports, as a driver.cfg and a command line write them.
+
+use std::fmt;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+use std::str::FromStr;
+
+use tickbus_base::toml_text::{Value, shown};
+
+/// The longest name of a host, as DNS has it.
+const HOST_LIMIT: usize = 253;
+
+/// A host and a port of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// The host.
+    pub host: Host,
+    /// The port; 0 lets the system choose one, where somebody listens.
+    pub port: u16,
+}
+
+/// A host, by number or by name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Host {
+    /// By number.
+    Ip(IpAddr),
+    /// By a name that has to be looked up.
+    Name(String),
+}
+
+impl Address {
+    /// A port of this machine, for this machine alone.
+    pub const fn local(port: u16) -> Self {
+        Self {
+            host: Host::Ip(IpAddr::V4(Ipv4Addr::LOCALHOST)),
+            port,
+        }
+    }
+
+    /// Reads the value of the key `address`, and reports what is wrong with it.
+    pub fn read(value: &Value<'_>) -> Option<Self> {
+        let text = value.text("write a host and a port in quotes, such as \"127.0.0.1:20030\"")?;
+        text.parse()
+            .map_err(|error: AddressError| value.wrong(error.what, error.right))
+            .ok()
+    }
+
+    /// Checks that an end that makes the connection can use it.
+    ///
+    /// # Errors
+    ///
+    /// Port 0 is no port that somebody listens on.
+    pub fn check_dialled(&self) -> Result<(), AddressError> {
+        if self.port == 0 {
+            return Err(AddressError {
+                what: "port 0 cannot be connected to".to_owned(),
+                right: "write the port on which the other end listens, or give its address on the \
+                        command line with --address; 0 is for an end that listens, and lets the system \
+                        choose",
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Why a text is no address.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}; {right}")]
+pub struct AddressError {
+    /// What is wrong.
+    pub what: String,
+    /// What would be right.
+    pub right: &'static str,
+}
+
+/// Reads `HOST:PORT`: `127.0.0.1:20030`, `[::1]:20030`, `plc.example.com:20030`.
+impl FromStr for Address {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        const SHAPE: &str = "write a host and a port, such as \"127.0.0.1:20030\"";
+        let refuse = |what: String, right| Err(AddressError { what, right });
+        let Some((host, digits)) = text.rsplit_once(':') else {
+            return refuse(
+                format!("the address \"{}\" has no port", shown(text)),
+                SHAPE,
+            );
+        };
+        if host.contains(':') && !host.starts_with('[') {
+            let what = format!("the address \"{}\" has colons in its host", shown(text));
+            return refuse(
+                what,
+                "write an IPv6 address in brackets, such as \"[::1]:20030\"",
+            );
+        }
+        // A sign is none of the digits that `parse` alone would let through.
+        let port = digits.parse().ok().filter(|_| !digits.starts_with('+'));
+        let Some(port) = port else {
+            let what = format!("\"{}\" is no port", shown(digits));
+            return refuse(what, "write a number from 1 to 65535 behind the colon");
+        };
+        Ok(Self {
+            host: host.parse()?,
+            port,
+        })
+    }
+}
+
+impl FromStr for Host {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Self, AddressError> {
+        let refuse = |what: String, right| Err(AddressError { what, right });
+        if text.is_empty() {
+            let right = "write the host before the colon: 127.0.0.1 is this machine alone, 0.0.0.0 \
+                         all of its networks";
+            return refuse("the address has no host".to_owned(), right);
+        }
+        let bare = text
+            .strip_prefix('[')
+            .and_then(|rest| rest.strip_suffix(']'));
+        if let Some(bare) = bare {
+            return match bare.parse::<Ipv6Addr>() {
+                Ok(ip) => Ok(Self::Ip(ip.into())),
+                Err(_) => refuse(
+                    format!("\"{}\" is no IPv6 address", shown(bare)),
+                    "write one such as [::1], or an IPv4 address or a name without brackets",
+                ),
+            };
+        }
+        if let Ok(ip) = text.parse::<Ipv4Addr>() {
+            return Ok(Self::Ip(ip.into()));
+        }
+        // The name that every machine has for itself needs no look-up, and is one address, not two.
+        if text.eq_ignore_ascii_case("localhost") {
+            return Ok(Self::Ip(Ipv4Addr::LOCALHOST.into()));
+        }
+        if text
+            .bytes()
+            .all(|byte| byte.is_ascii_digit() || byte == b'.')
+        {
+            return refuse(
+                format!("\"{}\" is no IPv4 address", shown(text)),
+                "write four numbers from 0 to 255, such as 192.168.0.10",
+            );
+        }
+        let letter = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if text.len() > HOST_LIMIT || !text.chars().all(letter) {
+            return refuse(
+                format!("\"{}\" is no name of a host", shown(text)),
+                "write an IP address, or a name of letters, digits, dots and hyphens",
+            );
+        }
+        Ok(Self::Name(text.to_owned()))
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.host, self.port)
+    }
+}
+
+impl fmt::Display for Host {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ip(IpAddr::V6(ip)) => write!(f, "[{ip}]"),
+            Self::Ip(ip) => ip.fmt(f),
+            Self::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_read_and_write_themselves() {
+        for text in [
+            "127.0.0.1:20030",
+            "0.0.0.0:0",
+            "[::1]:1",
+            "[fe80::1]:65535",
+            "plc-7.hall_2.example.com:502",
+        ] {
+            let address: Address = text.parse().unwrap_or_else(|why| panic!("{why}"));
+            assert_eq!(address.to_string(), text);
+        }
+        let localhost: Address = "LocalHost:7".parse().expect("this machine");
+        assert_eq!(localhost.to_string(), "127.0.0.1:7");
+    }
+
+    #[test]
+    fn what_is_no_address_is_told_why() {
+        for (text, part) in [
+            ("", "has no port"),
+            ("127.0.0.1", "has no port"),
+            ("::1", "colons in its host"),
+            (":20030", "has no host"),
+            ("127.0.0.1:", "no port"),
+            ("127.0.0.1:65536", "no port"),
+            ("127.0.0.1:+7", "no port"),
+            ("127.0.0.1: 7", "no port"),
+            ("127.0.0.256:7", "no IPv4 address"),
+            ("127.1:7", "no IPv4 address"),
+            ("::1:20030", "colons in its host"),
+            ("[::x]:7", "no IPv6 address"),
+            ("[127.0.0.1]:7", "no IPv6 address"),
+            ("tcp://host:7", "colons in its host"),
+            ("a host:7", "no name of a host"),
+        ] {
+            let told = text.parse::<Address>().expect_err(text).to_string();
+            assert!(told.contains(part), "\"{part}\" in {told}");
+        }
+    }
+}

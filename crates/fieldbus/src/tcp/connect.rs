@@ -1,0 +1,116 @@
+//! Making a connection.
+
+use std::io::{self, ErrorKind};
+use std::net::{SocketAddr, TcpStream};
+
+use rustix::io::Errno;
+use socket2::{Domain, Protocol, Socket, Type};
+
+use crate::{BusError, Port};
+use tickbus_base::os::{Interest, Poller, Source};
+use tickbus_base::time::{Nanos, Stop};
+
+use super::resolve::resolve;
+use super::{Address, no_wait};
+
+/// How long an address has to answer. The system itself would try for minutes.
+const PATIENCE: Nanos = Nanos::from_secs(5);
+
+/// Connects, without waiting for more than some seconds, and without blocking; `None` when `stop` came first.
+///
+/// The stream is as the system gives it, but that it never waits; see [`prepare`](super::prepare).
+///
+/// # Errors
+///
+/// The host is not known, or nobody answers there.
+pub fn connect(
+    address: &Address,
+    poller: &mut Poller,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<Option<(TcpStream, SocketAddr)>, BusError> {
+    port.opening(&format!("connecting to {address}"));
+    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
+        return Ok(None);
+    };
+    let Some(stream) = reach_any(&addresses, poller, port, stop)? else {
+        return Ok(None);
+    };
+    let peer = stream.peer_addr().map_err(|error| no_wait(&error))?;
+    port.tell("address", &peer.to_string());
+    Ok(Some((stream, peer)))
+}
+
+/// Tries one address of a host after the other; `None` when `stop` came first.
+fn reach_any(
+    addresses: &[SocketAddr],
+    poller: &mut Poller,
+    port: &Port,
+    stop: &Stop,
+) -> Result<Option<TcpStream>, BusError> {
+    let mut failed = None;
+    for address in addresses {
+        match reach(*address, poller, port, stop) {
+            Ok(reached) => return Ok(reached),
+            Err(error) => failed = Some((address, error)),
+        }
+    }
+    let (address, error) = failed.expect("a host has an address");
+    Err(BusError::Link(match error.kind() {
+        ErrorKind::TimedOut => format!(
+            "no answer from {address} within {PATIENCE}; check \"address\", the cable, and the firewalls \
+             on the way"
+        ),
+        _ => format!(
+            "cannot connect to {address} ({error}); start the program that listens there, or correct \
+             \"address\""
+        ),
+    }))
+}
+
+fn reach(
+    address: SocketAddr,
+    poller: &mut Poller,
+    port: &Port,
+    stop: &Stop,
+) -> io::Result<Option<TcpStream>> {
+    let stream = begin(address)?;
+    let limit = port.clock().now() + PATIENCE;
+    while !stop.is_stopped() {
+        let mut sources = [Source::new(&stream, Interest::Write)];
+        poller.wait(&**port.clock(), limit, &mut sources)?;
+        if sources[0].is_writable() {
+            if let Some(error) = stream.take_error()? {
+                return Err(error);
+            }
+            // A port that nobody listens on may connect to itself, if the system happens to choose it
+            // for this end.
+            if stream.local_addr()? == stream.peer_addr()? {
+                return Err(ErrorKind::ConnectionRefused.into());
+            }
+            return Ok(Some(stream));
+        }
+        if port.clock().now() >= limit {
+            return Err(ErrorKind::TimedOut.into());
+        }
+    }
+    Ok(None)
+}
+
+/// Begins to connect, and does not wait.
+fn begin(address: SocketAddr) -> io::Result<TcpStream> {
+    let socket = Socket::new(
+        Domain::for_address(address),
+        Type::STREAM,
+        Some(Protocol::TCP),
+    )?;
+    socket.set_nonblocking(true)?;
+    match socket.connect(&address.into()) {
+        Err(error) if !is_under_way(&error) => Err(error),
+        _ => Ok(socket.into()),
+    }
+}
+
+fn is_under_way(error: &io::Error) -> bool {
+    error.kind() == ErrorKind::WouldBlock || Errno::from_io_error(error) == Some(Errno::INPROGRESS)
+}

@@ -1,0 +1,71 @@
+//! Waiting for connections.
+
+use std::io::{self, ErrorKind};
+use std::net::{SocketAddr, TcpListener};
+
+use crate::{BusError, Port};
+use tickbus_base::time::Stop;
+
+use super::Address;
+use super::resolve::resolve;
+
+/// Listens on `address`, without blocking; gives what was bound; `None` when `stop` came first.
+///
+/// # Errors
+///
+/// The host is not known, or the address cannot be listened on.
+pub fn listen(
+    address: &Address,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<Option<(TcpListener, SocketAddr)>, BusError> {
+    port.opening(&format!("beginning to listen on {address}"));
+    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
+        return Ok(None);
+    };
+    let cannot = |error: io::Error| {
+        let right = match error.kind() {
+            ErrorKind::AddrNotAvailable => {
+                "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
+            }
+            ErrorKind::PermissionDenied => {
+                "write a port above 1023, or get the right to use this one: on Linux by sysctl \
+                 net.ipv4.ip_unprivileged_port_start, by setcap cap_net_bind_service=+ep, or with a redirect \
+                 by nft; docs/s7.md has the lines for port 102"
+            }
+            _ => "end the program that has this port, or write another \"address\"",
+        };
+        BusError::Link(format!("cannot listen on {address} ({error}); {right}"))
+    };
+    let listener = TcpListener::bind(&*addresses).map_err(cannot)?;
+    listener.set_nonblocking(true).map_err(cannot)?;
+    let bound = listener.local_addr().map_err(cannot)?;
+    port.tell("address", &bound.to_string());
+    if !bound.ip().is_loopback() {
+        log::info!("listening on {bound}: whoever reaches this machine there can be the peer");
+    }
+    Ok(Some((listener, bound)))
+}
+
+/// Counts a client for which the system gave no socket, and tells the log.
+pub fn not_accepted(error: &io::Error, port: &Port) {
+    port.count("clients.not_accepted");
+    port.log(
+        log::Level::Warn,
+        "not accepted",
+        format_args!(
+            "a client could not be accepted ({error}); close other programs or raise the limit of open files"
+        ),
+    );
+}
+
+/// Whether accepting failed for a reason that lies with the one client.
+pub fn is_of_the_client(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::WouldBlock
+            | ErrorKind::Interrupted
+            | ErrorKind::ConnectionAborted
+            | ErrorKind::ConnectionReset
+    )
+}

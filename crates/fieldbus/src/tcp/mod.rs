@@ -1,0 +1,26 @@
+//! TCP, for all buses that go over it: addresses, making and awaiting connections, and a server for many
+//! clients.
+
+mod address;
+mod connect;
+mod listen;
+mod resolve;
+mod server;
+mod stream;
+
+use super::BusError;
+
+pub use address::{Address, AddressError, Host};
+pub use connect::connect;
+pub use listen::{is_of_the_client, listen, not_accepted};
+pub use server::serve;
+pub use server::{Limits, Service};
+pub use stream::{bow_out, is_for_later, prepare};
+
+/// The system does not let this thread wait, or not for this socket.
+pub fn no_wait(error: &std::io::Error) -> BusError {
+    BusError::Link(format!(
+        "the system cannot wait for the socket ({error}); close other programs or raise the limit of \
+         open files"
+    ))
+}

@@ -1,0 +1,590 @@
+//! A server for many clients, over whatever protocol its [`Service`] speaks.
+
+use std::io::{self, Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+
+use crate::{BusError, Port};
+use tickbus_base::os::{Interest, PollSet, Ready};
+use tickbus_base::time::{Nanos, Stop};
+
+use super::{
+    Address, bow_out, is_for_later, is_of_the_client, listen, no_wait, not_accepted, prepare,
+};
+
+/// The key of the listener in the poll set; those of clients are their places.
+const LISTENER: usize = usize::MAX - 1;
+
+/// So many clients are accepted at most before others are looked at.
+const ACCEPTS: usize = 32;
+
+/// For how long nobody is accepted after the system gave no socket.
+const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// What a server allows its clients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// The longest telegram of the protocol, in bytes. A client that sends so many bytes which are none yet
+    /// breaks the protocol.
+    pub telegram: usize,
+    /// How many clients are served at once.
+    pub clients: usize,
+    /// How long a client may take for a telegram that it has begun, or to read an answer.
+    pub patience: Nanos,
+}
+
+/// A protocol, as a server speaks it with each of its clients: bytes in, bytes out, and the image behind the
+/// port. It does no I/O of its own.
+pub trait Service {
+    /// What is remembered of one client.
+    type Client;
+
+    /// What the server allows.
+    fn limits(&self) -> Limits;
+
+    /// A client has connected.
+    fn welcome(&mut self, now: Nanos) -> Self::Client;
+
+    /// Looks at the bytes of a client that have come and are not consumed.
+    ///
+    /// Gives how many of them the telegram at their beginning has, and appends the answer to `reply` if there
+    /// is one; 0 when the telegram is not whole yet. It is called again until it gives 0.
+    ///
+    /// # Errors
+    ///
+    /// The client does not keep to the protocol. It is dropped, and others are served on; what it was sent
+    /// in `reply` still goes out.
+    fn telegram(
+        &mut self,
+        client: &mut Self::Client,
+        now: Nanos,
+        bytes: &[u8],
+        reply: &mut Vec<u8>,
+        port: &mut Port,
+    ) -> Result<usize, BusError>;
+
+    /// The system has taken all answers that the last calls of [`telegram`](Self::telegram) for this client
+    /// made. It is not called for answers that had to wait for a slow client.
+    fn replied(&mut self, client: &mut Self::Client, port: &mut Port);
+}
+
+/// Serves all clients that come, until `stop`. What one of them does is no matter for the others.
+///
+/// # Errors
+///
+/// The address cannot be listened on, or the system cannot wait.
+pub fn serve<S: Service>(
+    address: &Address,
+    service: &mut S,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<(), BusError> {
+    let Some((listener, bound)) = listen(address, port, stop)? else {
+        return Ok(());
+    };
+    let set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+    let mut server = Server {
+        limits: service.limits(),
+        service,
+        waiting: format!("listening on {bound}"),
+        listener,
+        set,
+        clients: Clients::default(),
+        buffer: vec![0; BUFFER].into(),
+        reply: Vec::with_capacity(BUFFER),
+        ready: Vec::new(),
+        deaf_until: None,
+        gone: None,
+    };
+    let limit = server.limits.telegram;
+    assert!(limit <= BUFFER, "a telegram fits into one read");
+    port.opening(&server.waiting);
+    server.listen(true).map_err(|error| no_wait(&error))?;
+    while !stop.is_stopped() {
+        server.turn(port)?;
+    }
+    Ok(())
+}
+
+/// So many bytes are read from a client at most before others are looked at.
+const BUFFER: usize = 4096;
+
+struct Server<'a, S: Service> {
+    limits: Limits,
+    service: &'a mut S,
+    waiting: String,
+    listener: TcpListener,
+    set: PollSet,
+    clients: Clients<S::Client>,
+    /// What is read, from one client after the other.
+    buffer: Box<[u8]>,
+    /// What is answered, to one client after the other.
+    reply: Vec<u8>,
+    ready: Vec<Ready>,
+    /// Until when nobody is accepted, after the system could not.
+    deaf_until: Option<Nanos>,
+    /// When and why the last one that spoke took leave, while it may yet come back: many a client connects anew
+    /// for each request, and its line is no broken one.
+    gone: Option<(Nanos, BusError)>,
+}
+
+/// The clients, each at a place of its own; places are used again.
+struct Clients<C> {
+    places: Vec<Option<Client<C>>>,
+    free: Vec<usize>,
+    /// How many there are.
+    count: usize,
+    /// How many of them have said anything that made sense.
+    speakers: usize,
+    /// How many of them somebody waits for.
+    awaited: usize,
+}
+
+struct Client<C> {
+    stream: TcpStream,
+    peer: SocketAddr,
+    state: C,
+    /// When it was last heard of: a whole telegram, or its coming.
+    heard: Nanos,
+    speaks: bool,
+    /// Bytes of a telegram that is not whole yet.
+    begun: Vec<u8>,
+    /// Bytes of an answer that the system has not taken yet.
+    unsent: Vec<u8>,
+    /// Since when either of them has waited.
+    waits_since: Option<Nanos>,
+}
+
+impl<C> Default for Clients<C> {
+    fn default() -> Self {
+        Self {
+            places: Vec::new(),
+            free: Vec::new(),
+            count: 0,
+            speakers: 0,
+            awaited: 0,
+        }
+    }
+}
+
+impl<C> Clients<C> {
+    fn insert(&mut self, client: Client<C>) -> usize {
+        self.count += 1;
+        let place = self.free.pop().unwrap_or_else(|| {
+            self.places.push(None);
+            self.places.len() - 1
+        });
+        self.places[place] = Some(client);
+        place
+    }
+
+    fn remove(&mut self, place: usize) -> Option<Client<C>> {
+        let client = self.places.get_mut(place)?.take()?;
+        self.free.push(place);
+        self.count -= 1;
+        self.speakers -= usize::from(client.speaks);
+        self.awaited -= usize::from(client.waits_since.is_some());
+        Some(client)
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (usize, &Client<C>)> {
+        let places = self.places.iter().enumerate();
+        places.filter_map(|(place, client)| Some((place, client.as_ref()?)))
+    }
+
+    /// Whoever has been silent for longest.
+    fn most_silent(&self) -> Option<(usize, Nanos)> {
+        let times = self.iter().map(|(place, client)| (place, client.heard));
+        times.min_by_key(|(_, heard)| *heard)
+    }
+}
+
+impl<S: Service> Server<'_, S> {
+    fn listen(&mut self, hears: bool) -> io::Result<()> {
+        if hears {
+            self.deaf_until = None;
+            return self.set.add(LISTENER, &self.listener, Interest::Read);
+        }
+        self.set.remove(LISTENER, &self.listener);
+        Ok(())
+    }
+
+    fn turn(&mut self, port: &mut Port) -> Result<(), BusError> {
+        let deadline = self.deadline(port);
+        let waited = self.set.wait(&**port.clock(), deadline);
+        waited.map_err(|error| no_wait(&error))?;
+        let now = port.clock().now();
+        self.ready.clear();
+        self.ready.extend_from_slice(self.set.ready());
+        for index in 0..self.ready.len() {
+            let Ready {
+                key, is_writable, ..
+            } = self.ready[index];
+            if key == LISTENER {
+                self.accept(now, port);
+            } else if let Err(error) = self.attend(key, is_writable, now, port) {
+                self.drop_client(key, &error, port);
+            }
+        }
+        self.judge(now, port);
+        if self.deaf_until.is_some_and(|until| now >= until) {
+            self.listen(true).map_err(|error| no_wait(&error))?;
+        }
+        let max_age = port.max_age();
+        if let Some((_, error)) = self.gone.take_if(|(since, _)| now - *since >= max_age) {
+            port.lost(&error, &self.waiting);
+        }
+        port.observe(now);
+        Ok(())
+    }
+
+    /// When something is due even if nobody says anything.
+    fn deadline(&self, port: &Port) -> Nanos {
+        let mut deadline = port.due().min(self.deaf_until.unwrap_or(Nanos::MAX));
+        if self.clients.speakers > 0 {
+            deadline = deadline.min(port.stale_at(port.clock().now()));
+        }
+        if let Some((since, _)) = self.gone {
+            deadline = deadline.min(since + port.max_age());
+        }
+        if self.clients.awaited > 0 {
+            let waits = self.clients.iter();
+            let since = waits.filter_map(|(_, client)| client.waits_since).min();
+            deadline = deadline.min(since.map_or(Nanos::MAX, |since| since + self.limits.patience));
+        }
+        deadline
+    }
+
+    /// Reads from a client, answers it, or goes on with an answer that had to wait.
+    fn attend(
+        &mut self,
+        place: usize,
+        is_writable: bool,
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let Some(client) = self.clients.places.get_mut(place).and_then(Option::as_mut) else {
+            return Ok(());
+        };
+        if !client.unsent.is_empty() {
+            if is_writable && client.write_on()? {
+                // What it has begun has its time from now on, since nobody read the rest of it.
+                client.waits_since = (!client.begun.is_empty()).then_some(now);
+                self.clients.awaited -= usize::from(client.waits_since.is_none());
+                let client = &*client;
+                let heard = self.set.change(place, &client.stream, Interest::Read);
+                heard.map_err(|error| no_wait(&error))?;
+            }
+            // Who does not read is not read.
+            return Ok(());
+        }
+        let count = match client.stream.read(&mut self.buffer) {
+            Ok(0) => return Err(client.left()),
+            Ok(count) => count,
+            Err(error) if is_for_later(&error) => return Ok(()),
+            Err(error) => return Err(client.broke(&error)),
+        };
+        if port.is_down(now) {
+            // The cable is out: nothing arrives, and half of a telegram helps nobody.
+            client.begun.clear();
+            self.clients.awaited -= usize::from(client.waits_since.take().is_some());
+            return Ok(());
+        }
+        self.reply.clear();
+        let heard = client.hear(
+            &self.buffer[..count],
+            self.limits.telegram,
+            self.service,
+            now,
+            &mut self.reply,
+            port,
+        );
+        let (telegrams, error) = match heard {
+            Ok(telegrams) => (telegrams, None),
+            Err((telegrams, error)) => (telegrams, Some(error)),
+        };
+        if telegrams > 0 {
+            client.heard = now;
+            // What is begun now is another telegram, with a time of its own.
+            client.waits_since = client.waits_since.map(|_| now);
+            if !client.speaks {
+                client.speaks = true;
+                self.gone = None;
+                self.clients.speakers += 1;
+                let peer = client.peer;
+                port.running(&match self.clients.speakers {
+                    1 => format!("serving {peer}"),
+                    count => format!("serving {count} clients, {peer} among them"),
+                });
+            }
+        }
+        let sent = self.send(place, now, port);
+        match error {
+            Some(error) => Err(error),
+            None => sent,
+        }
+    }
+
+    /// Sends what was answered, and takes note of what the client owes now.
+    fn send(&mut self, place: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let Some(client) = self.clients.places[place].as_mut() else {
+            return Ok(());
+        };
+        if !self.reply.is_empty() {
+            let taken = match client.stream.write(&self.reply) {
+                Ok(count) => count,
+                Err(error) if is_for_later(&error) => 0,
+                Err(error) => return Err(client.broke(&error)),
+            };
+            if taken == self.reply.len() {
+                self.service.replied(&mut client.state, port);
+            } else {
+                client.unsent.extend_from_slice(&self.reply[taken..]);
+                let change = self.set.change(place, &client.stream, Interest::Write);
+                change.map_err(|error| no_wait(&error))?;
+            }
+        }
+        let waits = !client.begun.is_empty() || !client.unsent.is_empty();
+        if waits != client.waits_since.is_some() {
+            client.waits_since = waits.then_some(now);
+            self.clients.awaited = if waits {
+                self.clients.awaited + 1
+            } else {
+                self.clients.awaited - 1
+            };
+        }
+        Ok(())
+    }
+
+    /// Drops those who have been waited for too long.
+    fn judge(&mut self, now: Nanos, port: &mut Port) {
+        if self.clients.awaited == 0 {
+            return;
+        }
+        let patience = self.limits.patience;
+        loop {
+            let late = self.clients.iter().find_map(|(place, client)| {
+                let waited = now - client.waits_since?;
+                (waited >= patience).then(|| (place, client.too_slow(patience)))
+            });
+            let Some((place, error)) = late else { break };
+            self.drop_client(place, &error, port);
+        }
+    }
+
+    fn accept(&mut self, now: Nanos, port: &mut Port) {
+        for _ in 0..ACCEPTS {
+            let (stream, peer) = match self.listener.accept() {
+                Ok(accepted) => accepted,
+                Err(error) if is_for_later(&error) => return,
+                Err(error) if is_of_the_client(&error) => continue,
+                Err(error) => {
+                    not_accepted(&error, port);
+                    self.deaf_until = Some(now + PAUSE);
+                    // Removing cannot fail.
+                    let _ = self.listen(false);
+                    return;
+                }
+            };
+            if self.clients.count >= self.limits.clients && !self.make_room(now, port) {
+                port.count("clients.turned_away");
+                let most = self.limits.clients;
+                port.log(
+                    log::Level::Warn,
+                    "turned away",
+                    format_args!("{peer} was turned away: {most} clients are served, and no more"),
+                );
+                continue;
+            }
+            self.welcome(stream, peer, now, port);
+        }
+    }
+
+    fn welcome(&mut self, stream: TcpStream, peer: SocketAddr, now: Nanos, port: &mut Port) {
+        // Gone again before it was there, if it cannot be prepared.
+        if let Err(error) = prepare(&stream, self.limits.patience) {
+            log::debug!("the connection with {peer} broke at once: {error}");
+            return;
+        }
+        let place = self.clients.insert(Client {
+            stream,
+            peer,
+            state: self.service.welcome(now),
+            heard: now,
+            speaks: false,
+            begun: Vec::new(),
+            unsent: Vec::new(),
+            waits_since: None,
+        });
+        let client = self.clients.places[place]
+            .as_ref()
+            .expect("it was just put there");
+        if let Err(error) = self.set.add(place, &client.stream, Interest::Read) {
+            port.log(
+                log::Level::Warn,
+                "not served",
+                format_args!("{peer} cannot be served: {}", no_wait(&error)),
+            );
+            self.clients.remove(place);
+            return;
+        }
+        port.count("clients.accepted");
+        self.tell(port);
+        if self.clients.speakers == 0 && self.gone.is_none() {
+            port.opening(&format!(
+                "{peer} has connected; waiting for its first telegram"
+            ));
+        }
+        log::debug!("{peer} has connected");
+    }
+
+    /// Ends the client that has been silent for longest, if that is long enough.
+    fn make_room(&mut self, now: Nanos, port: &mut Port) -> bool {
+        let Some((place, heard)) = self.clients.most_silent() else {
+            return false;
+        };
+        let silence = now - heard;
+        if silence < self.limits.patience {
+            return false;
+        }
+        let error = BusError::Link(format!(
+            "it has been silent for {} and another client wants its place",
+            silence.rounded()
+        ));
+        self.drop_client(place, &error, port);
+        true
+    }
+
+    fn drop_client(&mut self, place: usize, error: &BusError, port: &mut Port) {
+        let speakers = self.clients.speakers;
+        let Some(client) = self.clients.remove(place) else {
+            return;
+        };
+        self.set.remove(place, &client.stream);
+        bow_out(&client.stream);
+        if !matches!(error, BusError::Left(_)) {
+            port.count("clients.dropped");
+        }
+        self.tell(port);
+        let is_left = matches!(error, BusError::Left(_));
+        let nobody = self.clients.speakers == 0;
+        if nobody && speakers > 0 && is_left {
+            self.gone = Some((port.clock().now(), error.clone()));
+        } else if nobody
+            && (speakers > 0 || self.clients.count == 0)
+            && !(is_left && self.gone.is_some())
+        {
+            self.gone = None;
+            port.lost(error, &self.waiting);
+        } else {
+            port.log(
+                log::Level::Info,
+                "dropped",
+                format_args!("{error}; {} clients are served on", self.clients.count),
+            );
+        }
+    }
+
+    fn tell(&self, port: &Port) {
+        port.tell("clients", &self.clients.count.to_string());
+    }
+}
+
+impl<C> Client<C> {
+    /// Takes in `bytes`, and answers the telegrams that they complete into `reply`. Gives how many there were.
+    fn hear<S: Service<Client = C>>(
+        &mut self,
+        bytes: &[u8],
+        longest: usize,
+        service: &mut S,
+        now: Nanos,
+        reply: &mut Vec<u8>,
+        port: &mut Port,
+    ) -> Result<usize, (usize, BusError)> {
+        // The usual client sends whole telegrams, which need not be copied.
+        let mut begun = std::mem::take(&mut self.begun);
+        let bytes = if begun.is_empty() {
+            bytes
+        } else {
+            begun.extend_from_slice(bytes);
+            &begun
+        };
+        let mut rest = bytes;
+        let mut telegrams = 0;
+        while !rest.is_empty() {
+            match service.telegram(&mut self.state, now, rest, reply, port) {
+                Ok(0) => break,
+                Ok(count) => rest = &rest[count..],
+                Err(error) => return Err((telegrams, of_peer(self.peer, &error))),
+            }
+            telegrams += 1;
+        }
+        if rest.len() > longest {
+            let error = BusError::Protocol(format!(
+                "{} sent {} bytes that are no telegram; the longest has {longest}",
+                self.peer,
+                rest.len()
+            ));
+            return Err((telegrams, error));
+        }
+        self.begun = rest.to_vec();
+        Ok(telegrams)
+    }
+
+    /// Goes on with an answer; whether that was all of it.
+    fn write_on(&mut self) -> Result<bool, BusError> {
+        match self.stream.write(&self.unsent) {
+            Ok(count) => {
+                self.unsent.drain(..count);
+                Ok(self.unsent.is_empty())
+            }
+            Err(error) if is_for_later(&error) => Ok(false),
+            Err(error) => Err(self.broke(&error)),
+        }
+    }
+
+    fn left(&self) -> BusError {
+        let peer = self.peer;
+        if self.begun.is_empty() {
+            return BusError::Left(format!("{peer} closed the connection"));
+        }
+        BusError::Protocol(format!(
+            "{peer} left in the middle of a telegram, after {} bytes of it",
+            self.begun.len()
+        ))
+    }
+
+    fn broke(&self, error: &io::Error) -> BusError {
+        let peer = self.peer;
+        BusError::Link(format!(
+            "the connection with {peer} broke ({error}); see whether the peer still runs"
+        ))
+    }
+
+    fn too_slow(&self, patience: Nanos) -> BusError {
+        let peer = self.peer;
+        if self.unsent.is_empty() {
+            return BusError::Protocol(format!(
+                "{peer} began a telegram and did not complete it within {patience}: {} bytes have come",
+                self.begun.len()
+            ));
+        }
+        BusError::Link(format!(
+            "{peer} does not read its answers: {} bytes have waited for {patience}",
+            self.unsent.len()
+        ))
+    }
+}
+
+/// The error of a service, with the name of the client.
+fn of_peer(peer: SocketAddr, error: &BusError) -> BusError {
+    let named = |text: &str| format!("{peer}: {text}");
+    match error {
+        BusError::Link(text) => BusError::Link(named(text)),
+        BusError::Left(text) => BusError::Left(named(text)),
+        BusError::Protocol(text) => BusError::Protocol(named(text)),
+        BusError::Refused(text) => BusError::Refused(named(text)),
+    }
+}
+
+#[cfg(test)]
+mod tests;

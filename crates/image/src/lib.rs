@@ -1,0 +1,78 @@
+//! The process image: wait-free hand-over, edge counters, age, event ring.
+//!
+//! Two clocks meet here: the simulation's tick and the bus's cycle. Each station has two streams of
+//! frames, one per direction, each through a [triple buffer](triple_buffer), so that neither side
+//! ever waits for the other and no frame is ever torn. The two sides are [`TickEnd`] and [`BusEnd`].
+//!
+//! ```text
+//!   tick thread                                          bus thread
+//!   TickStation::write ──── tx frames, edge counters ───▶ BusStation::outgoing … sent
+//!   TickStation::read  ◀─── rx frames, edge counters ──── BusStation::received, touch
+//!   TickEnd::events    ◀────────── event ring ─────────── BusEnd::event
+//! ```
+//!
+//! "tx" and "rx" are as seen from the tick. In a Device tx is `%I` and rx is `%Q`; in a Controller it
+//! is the other way round.
+
+mod edges;
+mod ring;
+mod station;
+mod sync;
+mod tick_ring;
+mod triple;
+
+pub mod signal;
+
+pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
+pub use ring::{Consumer, Event, Producer, event_ring};
+pub use station::{Arrival, BusStation, Directions, Receiver, TickStation, station};
+pub use tick_ring::{TickReader, TickWriter, tick_ring};
+pub use triple::{Reader, Writer, triple_buffer};
+
+/// One frame of the process image, with what travels beside its bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// The station's `%I` or `%Q`.
+    pub bytes: Box<[u8]>,
+    /// Cumulative, wrapping edge counters of the latched signals, in the order of [`latched_bits`].
+    pub edges: Box<[u32]>,
+    /// Counts the frames of this stream, from 1; 0 is the frame before the first.
+    pub sequence: u64,
+}
+
+/// Events that the ring of one driver holds.
+pub const EVENT_CAPACITY: usize = 4096;
+
+/// The tick's end of a driver's image.
+#[derive(Debug)]
+pub struct TickEnd {
+    /// In the order of the signal table.
+    pub stations: Vec<TickStation>,
+    /// What the peer wrote, where every write matters.
+    pub events: Consumer,
+}
+
+/// The bus's end of a driver's image.
+#[derive(Debug)]
+pub struct BusEnd {
+    /// In the order of the signal table.
+    pub stations: Vec<BusStation>,
+    /// Where a bus reports what the peer wrote.
+    pub events: Producer,
+}
+
+/// Makes the image of a driver, from the directions of each of its stations.
+pub fn image(stations: Vec<Directions>) -> (TickEnd, BusEnd) {
+    let (producer, consumer) = event_ring(EVENT_CAPACITY);
+    let (tick, bus) = stations.into_iter().map(station).unzip();
+    (
+        TickEnd {
+            stations: tick,
+            events: consumer,
+        },
+        BusEnd {
+            stations: bus,
+            events: producer,
+        },
+    )
+}

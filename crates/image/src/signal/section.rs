@@ -1,0 +1,584 @@
+//! The `[[signal]]` sections of a driver.cfg: the same on every bus.
+
+use super::{Address, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot, Width};
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value, did_you_mean, short_number, shown};
+
+/// The longest name of a signal or station, in characters.
+pub const NAME_LIMIT: usize = 120;
+
+/// The longest unit, in characters.
+const UNIT_LIMIT: usize = 40;
+
+/// What is right where a station is named.
+pub const STATION: &str = "write the name of a [[station]] in quotes";
+
+/// One `[[signal]]` section, read by itself.
+#[derive(Debug)]
+pub struct Section<'a> {
+    /// The signal. Its name is empty when the section has no good one, and its station is not yet
+    /// looked up.
+    pub signal: Signal,
+    /// Where the name stands, if it is good.
+    pub name: Option<Value<'a>>,
+    /// Where the address stands.
+    pub address: Value<'a>,
+    /// The station that it names.
+    pub station: Option<Value<'a>>,
+    /// The structure that it is one of many signals of.
+    pub structure: Option<Structure>,
+}
+
+/// A structure in the image that one table of the driver.cfg stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Structure {
+    /// Which table: the `[[axis]]` tables count from 0.
+    pub table: usize,
+    /// The first byte behind the structure, reserved ones included.
+    pub end: usize,
+}
+
+impl Section<'_> {
+    /// The first byte behind it, or behind the structure that it is a part of.
+    pub fn end(&self) -> usize {
+        let signal = &self.signal;
+        let own = signal.byte + signal.data_type.size_bytes();
+        self.structure.map_or(own, |structure| structure.end)
+    }
+
+    /// Whether its name stands in the file, and is not made of that of its table.
+    pub fn has_own_name(&self) -> bool {
+        let name = self.name.as_ref().and_then(Value::as_text);
+        name == Some(&self.signal.name)
+    }
+
+    /// What the whole of its table is called, where a message is about that.
+    pub fn title(&self) -> String {
+        let name = self.name.as_ref().and_then(Value::as_text);
+        match (name, self.structure) {
+            (Some(name), Some(_)) if !self.has_own_name() => {
+                format!("the axis \"{}\"", shown(name))
+            }
+            _ => self.label(),
+        }
+    }
+
+    /// The signal as a message names it.
+    pub fn label(&self) -> String {
+        let Signal { name, .. } = &self.signal;
+        if name.is_empty() {
+            self.signal.address().to_string()
+        } else {
+            format!("\"{}\" ({})", shown(name), self.signal.address())
+        }
+    }
+}
+
+/// Reads one section and reports its mistakes; `None` when it cannot be placed in the image.
+pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>> {
+    let name = table.require("name", "give the signal a name of its own");
+    let address = table.require("address", "write one such as \"%QX1.0\" or \"%IW4\"");
+    let type_ = table.take("type");
+    let order = table.take("order");
+    let scale = table.take("scale");
+    let unit = table.take("unit");
+    let latch = table.take("latch");
+    let hold = table.take("hold");
+    let fail_safe = table.take("fail_safe");
+    let dead_band = table.take("dead_band");
+    let station = table.take("station");
+    let whole = table.is_whole();
+    table.finish();
+
+    let name = name.and_then(|value| Some((name_of(&value)?, value)));
+    let place = address
+        .as_ref()
+        .and_then(|value| address_of(value, addressing));
+    let stated = type_.as_ref().map(type_of);
+    let unit =
+        unit.and_then(|unit| unit.label(UNIT_LIMIT, "leave it out if the signal has no unit"));
+    let latched = latch.as_ref().map(latch_of);
+    let held = hold.as_ref().map(Value::duration);
+    let ordered = order.as_ref().map(order_of);
+    let band = dead_band.as_ref().map(dead_band_of);
+    if place.is_none() || matches!(stated, Some(None)) {
+        check_shapes(scale.as_ref(), fail_safe.as_ref(), station.as_ref());
+    }
+    let (address, place) = (address?, place?);
+    // Without the address or the type the rules below would blame the wrong key, and without a line
+    // that is left out they cannot be told from broken ones.
+    let data_type = match stated {
+        None => place.width.data_type(),
+        Some(stated) => stated?,
+    };
+    if !whole {
+        return None;
+    }
+    if let Some(value) = &type_ {
+        check_width(value, data_type, place)?;
+    }
+    let signal = Signal {
+        name: name
+            .as_ref()
+            .map(|(name, _)| (*name).to_owned())
+            .unwrap_or_default(),
+        station: 0,
+        area: place.area,
+        byte: place.byte,
+        bit: place.bit,
+        data_type,
+        order: order
+            .and_then(|value| fitting_order(&value, ordered.flatten()?, data_type))
+            .unwrap_or_default(),
+        scale: None,
+        unit: unit.map(str::to_owned),
+        latch: latch.and_then(|value| fitting_latch(&value, latched.flatten()?, data_type)),
+        hold: Nanos::ZERO,
+        fail_safe: Slot::default(),
+        dead_band: dead_band
+            .and_then(|value| fitting_dead_band(&value, band.flatten()?, data_type))
+            .unwrap_or_default(),
+        range: None,
+    };
+    let hold =
+        hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched.is_some()));
+    let signal = Signal {
+        hold: hold.unwrap_or_default(),
+        ..signal
+    };
+    let scaled = scale.as_ref().map(|value| drawn(value, data_type));
+    let (scale, range) = scaled.flatten().unzip();
+    let signal = Signal {
+        scale,
+        range,
+        ..signal
+    };
+    let fail_safe = match (fail_safe, scaled) {
+        // A fail-safe value cannot be judged by a scale that is wrong.
+        (_, Some(None)) => None,
+        (Some(value), _) => slot_of(&value, &signal, "fail_safe"),
+        (None, _) => Some(at_rest(&signal)),
+    };
+    let signal = Signal {
+        fail_safe: fail_safe.unwrap_or_default(),
+        ..signal
+    };
+    Some(Section {
+        signal,
+        name: name.map(|(_, value)| value),
+        address,
+        station,
+        structure: None,
+    })
+}
+
+/// Checks as much as can be told of the values of a signal that has no type.
+fn check_shapes(
+    scale: Option<&Value<'_>>,
+    fail_safe: Option<&Value<'_>>,
+    station: Option<&Value<'_>>,
+) {
+    if let Some(scale) = scale {
+        scale_of(scale, DataType::Lreal);
+    }
+    if let Some(fail_safe) = fail_safe.filter(|value| !value.is_boolean()) {
+        fail_safe.number("write a number, or true or false for a BOOL");
+    }
+    if let Some(station) = station {
+        station.text(STATION);
+    }
+}
+
+/// A name: some printable characters, not one that tickbus keeps for itself.
+pub fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
+    let name = value.label(NAME_LIMIT, "give the signal a name of its own")?;
+    if name.starts_with("bus.") {
+        value.wrong(
+            format!("the name \"{}\" begins with \"bus.\"", shown(name)),
+            "choose another; that beginning is kept for bus.age, bus.sequence, bus.status",
+        );
+        return None;
+    }
+    Some(name)
+}
+
+/// An address, such as `%QX1.0`.
+pub fn address_of(value: &Value<'_>, addressing: Addressing) -> Option<Address> {
+    let text = value.text("write an address in quotes, such as \"%QX1.0\"")?;
+    Address::parse(text, addressing)
+        .map_err(|error| value.wrong(error.what, error.right))
+        .ok()
+}
+
+fn type_of(value: &Value<'_>) -> Option<DataType> {
+    let text = value.text("write a type in quotes, such as \"INT\"")?;
+    text.parse()
+        .map_err(|_| {
+            let right = match other_name(text) {
+                Some(known) => format!("did you mean \"{known}\"?"),
+                None => did_you_mean(text, "types", &DataType::ALL.map(DataType::name)),
+            };
+            value.wrong(
+                format!("\"{}\" is no type of IEC 61131-3", shown(text)),
+                right,
+            );
+        })
+        .ok()
+}
+
+/// What programming languages call the types.
+fn other_name(text: &str) -> Option<DataType> {
+    Some(match text.to_ascii_uppercase().as_str() {
+        "BIT" | "BOOLEAN" => DataType::Bool,
+        "INT8" | "I8" => DataType::Sint,
+        "UINT8" | "U8" | "CHAR" => DataType::Usint,
+        "INT16" | "I16" | "SHORT" => DataType::Int,
+        "UINT16" | "U16" | "USHORT" => DataType::Uint,
+        "INT32" | "I32" | "INTEGER" => DataType::Dint,
+        "UINT32" | "U32" => DataType::Udint,
+        "INT64" | "I64" | "LONG" => DataType::Lint,
+        "UINT64" | "U64" => DataType::Ulint,
+        "FLOAT" | "FLOAT32" | "F32" | "SINGLE" => DataType::Real,
+        "DOUBLE" | "FLOAT64" | "F64" => DataType::Lreal,
+        _ => return None,
+    })
+}
+
+fn check_width(value: &Value<'_>, data_type: DataType, place: Address) -> Option<()> {
+    if data_type.width() == place.width {
+        return Some(());
+    }
+    let fitting: Vec<&str> = DataType::ALL
+        .into_iter()
+        .filter(|candidate| candidate.width() == place.width)
+        .map(DataType::name)
+        .collect();
+    let moved = match data_type.width() {
+        Width::Bit => format!("{}X{}.0", place.area, place.byte),
+        width => format!("{}{}{}", place.area, width.letter(), place.byte),
+    };
+    let bits = |width: Width| match width.bits() {
+        1 => "1 bit".to_owned(),
+        bits => format!("{bits} bits"),
+    };
+    value.wrong(
+        format!(
+            "{data_type} has {}, but the address {place} has {}",
+            bits(data_type.width()),
+            bits(place.width)
+        ),
+        format!(
+            "{data_type} fits {moved}; {place} takes {}",
+            fitting.join(", ")
+        ),
+    );
+    None
+}
+
+fn order_of(value: &Value<'_>) -> Option<ByteOrder> {
+    value.choice(
+        "byte orders",
+        &ByteOrder::ALL.map(|order| (order.name(), order)),
+    )
+}
+
+fn fitting_order(value: &Value<'_>, order: ByteOrder, data_type: DataType) -> Option<ByteOrder> {
+    if data_type.size_bytes() == 1 {
+        value.wrong(
+            format!("a {data_type} has no byte order"),
+            "remove \"order\"; it is for values of two bytes and more",
+        );
+        return None;
+    }
+    Some(order)
+}
+
+fn latch_of(value: &Value<'_>) -> Option<Latch> {
+    let names = [
+        ("rising", Latch::Rising),
+        ("falling", Latch::Falling),
+        ("both", Latch::Both),
+    ];
+    value.choice("latches", &names)
+}
+
+fn fitting_latch(value: &Value<'_>, latch: Latch, data_type: DataType) -> Option<Latch> {
+    if data_type != DataType::Bool {
+        value.wrong(
+            format!("a {data_type} cannot be latched"),
+            "remove \"latch\"; only a BOOL has edges",
+        );
+        return None;
+    }
+    Some(latch)
+}
+
+fn fitting_hold(value: &Value<'_>, hold: Nanos, signal: &Signal, latched: bool) -> Option<Nanos> {
+    if signal.area == Area::Output {
+        value.wrong(
+            format!("\"hold\" stands at a {} signal", signal.area),
+            "remove it; it lengthens the pulses that the simulation sends, on %I",
+        );
+    } else if !latched {
+        value.wrong(
+            "\"hold\" stands without \"latch\"",
+            "add latch = \"rising\", or remove \"hold\"",
+        );
+    } else {
+        return Some(hold);
+    }
+    None
+}
+
+/// A dead band: a number that is not negative.
+pub fn dead_band_of(value: &Value<'_>) -> Option<f64> {
+    const RIGHT: &str = "write how far the value may move without being sent, such as 0.5";
+    let number = value.number(RIGHT)?;
+    if number < 0.0 {
+        value.wrong(
+            format!("\"dead_band\" is {}, less than nothing", value.written()),
+            RIGHT,
+        );
+        return None;
+    }
+    Some(number)
+}
+
+fn fitting_dead_band(value: &Value<'_>, band: f64, data_type: DataType) -> Option<f64> {
+    if data_type == DataType::Bool {
+        value.wrong(
+            "a BOOL has no dead band",
+            "remove \"dead_band\"; every change of a BOOL counts",
+        );
+        return None;
+    }
+    Some(band)
+}
+
+/// What is right where two numbers stand.
+const PAIR: &str = "write two numbers, such as [0, 27648]";
+
+/// A linear scale for raw values of `data_type`.
+pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
+    drawn(value, data_type).map(|(scale, _)| scale)
+}
+
+/// A linear scale for raw values of `data_type`, and the two values that it was drawn through, the lower one first.
+fn drawn(value: &Value<'_>, data_type: DataType) -> Option<(Scale, [f64; 2])> {
+    const SHAPE: &str = "write scale = { raw = [0, 27648], value = [0.0, 250.0] }";
+    if data_type == DataType::Bool {
+        value.wrong("a BOOL cannot be scaled", "remove \"scale\"");
+        return None;
+    }
+    let mut table = value.table("scale", SHAPE)?;
+    let raw = table.require("raw", SHAPE);
+    let engineering = table.require("value", SHAPE);
+    table.finish();
+    let (raw, engineering) = (raw?, engineering?);
+    let (raw_pair, pair) = (pair_of(&raw, PAIR), pair_of(&engineering, PAIR));
+    let raw_pair = raw_pair?;
+    for (number, element) in &raw_pair {
+        if !fits_raw(*number, data_type) {
+            element.wrong(
+                format!(
+                    "raw {} is beyond the range of {data_type}",
+                    element.written()
+                ),
+                raw_range(data_type),
+            );
+            return None;
+        }
+    }
+    let pair = pair?;
+    let (raw_numbers, numbers) = (
+        raw_pair.map(|(number, _)| number),
+        pair.map(|(number, _)| number),
+    );
+    #[expect(
+        clippy::float_cmp,
+        reason = "equal to the last bit is what divides by zero"
+    )]
+    let equal = |numbers: [f64; 2]| numbers[0] == numbers[1];
+    if equal(raw_numbers) {
+        raw.wrong(
+            format!("both raw values are {}", short_number(raw_numbers[0])),
+            "write two different ones, such as raw = [0, 27648]",
+        );
+    } else if equal(numbers) {
+        engineering.wrong(
+            format!("both scaled values are {}", short_number(numbers[0])),
+            "write two different ones, such as value = [0.0, 250.0]",
+        );
+    } else if let Some(scale) = Scale::through(raw_numbers, numbers) {
+        let [one, other] = numbers;
+        return Some((scale, [one.min(other), one.max(other)]));
+    } else {
+        value.wrong(
+            "the slope of this scale is beyond what a number can hold",
+            "write points that lie less far apart",
+        );
+    }
+    None
+}
+
+/// A list of two numbers, each with where it stands; `right` says what one looks like.
+pub fn pair_of<'a>(value: &Value<'a>, right: &str) -> Option<[(f64, Value<'a>); 2]> {
+    let list = value.list(right)?;
+    let length = list.len();
+    let Ok([first, second]) = <[Value<'a>; 2]>::try_from(list) else {
+        value.wrong(format!("this list has {length} elements"), right);
+        return None;
+    };
+    let numbers = (first.number(right), second.number(right));
+    Some([(numbers.0?, first), (numbers.1?, second)])
+}
+
+/// Whether a raw number is within the range of the type; it may have a fraction.
+fn fits_raw(number: f64, data_type: DataType) -> bool {
+    let (least, greatest) = raw_limits(data_type);
+    (least..=greatest).contains(&number)
+}
+
+/// The range of the type in doubles.
+fn raw_limits(data_type: DataType) -> (f64, f64) {
+    match (data_type.range(), data_type) {
+        #[expect(
+            clippy::cast_precision_loss,
+            reason = "the ends of 64-bit ranges, rounded outwards"
+        )]
+        (Some(range), _) => (*range.start() as f64, *range.end() as f64),
+        (None, DataType::Real) => (f64::from(f32::MIN), f64::from(f32::MAX)),
+        (None, _) => (f64::MIN, f64::MAX),
+    }
+}
+
+fn raw_range(data_type: DataType) -> String {
+    match data_type.range() {
+        Some(range) => format!("{data_type} goes from {} to {}", range.start(), range.end()),
+        None => format!(
+            "{data_type} goes up to {}",
+            short_number(raw_limits(data_type).1)
+        ),
+    }
+}
+
+/// What a signal shows when all its bits are zero: what a bus delivers of a device that is gone.
+fn at_rest(signal: &Signal) -> Slot {
+    signal
+        .scale
+        .map_or_else(Slot::default, |scale| Slot::from_real(scale.offset))
+}
+
+/// A value of `signal`, in its unit, as its slot holds it; messages call the value `key`.
+pub fn slot_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
+    if signal.data_type == DataType::Bool {
+        return bit_of(value, key);
+    }
+    if value.is_boolean() {
+        value.wrong(
+            format!("a boolean is no value of {}", signal.data_type),
+            "write a number, or make the signal a BOOL",
+        );
+        return None;
+    }
+    if signal.scale.is_none() && signal.data_type.is_integer() {
+        return integer_of(value, signal, key);
+    }
+    let (least, greatest) = raw_limits(signal.data_type);
+    let number = value.number("write a number")?;
+    let raw = signal.scale.map_or(number, |scale| scale.raw(number));
+    // Rounded as the codec rounds it.
+    let rounded = if signal.data_type.is_integer() {
+        raw.round()
+    } else {
+        raw
+    };
+    if (least..=greatest).contains(&rounded) {
+        return Some(Slot::from_real(number));
+    }
+    value.wrong(
+        format!("{key} {} does not fit", value.written()),
+        value_range(signal),
+    );
+    None
+}
+
+/// The least and the greatest value of `signal`, in its unit.
+pub fn value_limits(signal: &Signal) -> (f64, f64) {
+    let (least, greatest) = raw_limits(signal.data_type);
+    let Some(scale) = signal.scale else {
+        return (least, greatest);
+    };
+    let ends = [scale.value(least), scale.value(greatest)];
+    (ends[0].min(ends[1]), ends[0].max(ends[1]))
+}
+
+/// What values `signal` takes, in words.
+pub fn value_range(signal: &Signal) -> String {
+    if signal.scale.is_none() {
+        return raw_range(signal.data_type);
+    }
+    let (low, high) = value_limits(signal);
+    format!(
+        "{} with this scale goes from {} to {}",
+        signal.data_type,
+        short_number(low),
+        short_number(high)
+    )
+}
+
+fn bit_of(value: &Value<'_>, key: &str) -> Option<Slot> {
+    const RIGHT: &str = "a BOOL takes true or false";
+    if value.is_boolean() {
+        return value
+            .boolean()
+            .map(|on| Slot::from_real(f64::from(u8::from(on))));
+    }
+    let number = value.number(RIGHT)?;
+    let fitting = [0.0, 1.0]
+        .into_iter()
+        .find(|bit: &f64| bit.total_cmp(&number).is_eq());
+    if fitting.is_none() {
+        value.wrong(format!("{key} {} does not fit", value.written()), RIGHT);
+    }
+    fitting.map(Slot::from_real)
+}
+
+/// An unscaled integer, exact to the last bit.
+fn integer_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
+    let range = signal.data_type.range()?;
+    let number = if value.is_integer() {
+        value.whole(range)?
+    } else {
+        let number = value.number("write a whole number")?;
+        if number.fract() != 0.0 {
+            value.wrong(
+                format!("{key} {} has a fraction", value.written()),
+                format!("write a whole number; {}", raw_range(signal.data_type)),
+            );
+            return None;
+        }
+        // Saturates beyond the range of an i128, and is then out of every range.
+        #[expect(clippy::cast_possible_truncation, reason = "whole, and saturating")]
+        let whole = number as i128;
+        if !range.contains(&whole) {
+            value.wrong(
+                format!("{key} {} does not fit", value.written()),
+                raw_range(signal.data_type),
+            );
+            return None;
+        }
+        whole
+    };
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "at most 32 bits where the slot is a double"
+    )]
+    Some(if !signal.is_integer_slot() {
+        Slot::from_real(number as f64)
+    } else if signal.data_type.is_signed() {
+        i64::try_from(number).map(Slot::from_signed).ok()?
+    } else {
+        u64::try_from(number).map(Slot::from_unsigned).ok()?
+    })
+}

@@ -1,0 +1,110 @@
+//! The signal table of one driver.
+
+use super::{Address, Area, ByteOrder, DataType, Scale, Slot};
+use tickbus_base::time::Nanos;
+
+/// Which edges of a BOOL signal must not get lost between two exchanges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Latch {
+    /// From 0 to 1.
+    Rising,
+    /// From 1 to 0.
+    Falling,
+    /// Both.
+    Both,
+}
+
+/// One signal of the process image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signal {
+    /// Its name, unique in the table; `bus.` as a beginning is reserved.
+    pub name: String,
+    /// Index of its station in [`SignalTable::stations`].
+    pub station: usize,
+    /// `%I` or `%Q`.
+    pub area: Area,
+    /// Offset of its first byte in the station's area.
+    pub byte: usize,
+    /// Bit within that byte, 0 to 7; 0 unless the type is BOOL.
+    pub bit: u8,
+    /// How the bits are read.
+    pub data_type: DataType,
+    /// How the bytes lie; irrelevant for one byte and less.
+    pub order: ByteOrder,
+    /// Engineering units; `None` gives the raw value.
+    pub scale: Option<Scale>,
+    /// Name of the engineering unit, for people.
+    pub unit: Option<String>,
+    /// Edges that must not get lost; only on BOOL.
+    pub latch: Option<Latch>,
+    /// On a `%I`: how long a latched pulse is held at least, beyond the one completed exchange that
+    /// always carries it.
+    pub hold: Nanos,
+    /// What stands here when the data are stale (`%Q`) or the simulation has stopped (`%I`), in
+    /// engineering units; the same kind of slot as the signal's own.
+    pub fail_safe: Slot,
+    /// By how much the value may move, in engineering units, without being news to a bus that sends
+    /// on change; zero where every change is. Never negative, and zero on a BOOL.
+    pub dead_band: f64,
+    /// The lowest and the highest value of normal operation, in engineering units: the two values that its scale
+    /// names. What a display goes by; no value is kept within it.
+    pub range: Option<[f64; 2]>,
+}
+
+impl Signal {
+    /// Whether its slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.
+    pub const fn is_integer_slot(&self) -> bool {
+        self.scale.is_none()
+            && matches!(
+                self.data_type,
+                DataType::Lword | DataType::Lint | DataType::Ulint
+            )
+    }
+
+    /// Its place in the image of its station.
+    pub const fn address(&self) -> Address {
+        Address {
+            area: self.area,
+            width: self.data_type.width(),
+            byte: self.byte,
+            bit: self.bit,
+        }
+    }
+}
+
+/// One station (slave, unit, node) of a driver, with a frame of its own for either area.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Station {
+    /// Its name, unique in the table; empty where a driver.cfg declares no station.
+    pub name: String,
+    /// Size of `%I` in bytes.
+    pub input_bytes: usize,
+    /// Size of `%Q` in bytes.
+    pub output_bytes: usize,
+}
+
+/// All signals of a driver, in the order of its driver.cfg.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignalTable {
+    /// At least one.
+    pub stations: Vec<Station>,
+    /// In file order, which is slot order.
+    pub signals: Vec<Signal>,
+}
+
+impl Station {
+    /// Size of one of its areas in bytes.
+    pub const fn bytes(&self, area: Area) -> usize {
+        match area {
+            Area::Input => self.input_bytes,
+            Area::Output => self.output_bytes,
+        }
+    }
+}
+
+impl SignalTable {
+    /// Index of the signal with this name.
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.signals.iter().position(|signal| signal.name == name)
+    }
+}

@@ -1,0 +1,509 @@
+//! One station's two ends.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
+
+use super::{EdgeCounter, Frame, LatchedBit, PulseShaper, Reader, Writer, triple_buffer};
+use tickbus_base::time::Nanos;
+
+/// What one station's streams are made of, tx and rx as seen from the tick.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Directions {
+    /// The tx frame before the first tick, and again when the tick has stopped.
+    pub tx_fail_safe: Box<[u8]>,
+    /// The latched signals of the tx frames.
+    pub tx_latched: Box<[LatchedBit]>,
+    /// The rx frame before the first bus cycle.
+    pub rx_fail_safe: Box<[u8]>,
+    /// The latched signals of the rx frames.
+    pub rx_latched: Box<[LatchedBit]>,
+}
+
+/// Never: earlier than any time of a clock.
+const NEVER: i64 = i64::MIN;
+
+/// What both ends tell each other beside the frames.
+#[derive(Debug)]
+struct Beside {
+    /// When the peer was last heard of.
+    peer_alive: AtomicI64,
+    /// When the simulation ticked last.
+    tick_alive: AtomicI64,
+    /// Bus cycles received.
+    cycles: AtomicU64,
+    /// The peer says that its data do not count, or they do not change as they have to.
+    invalid: AtomicBool,
+}
+
+/// The tick's end of a station.
+#[derive(Debug)]
+pub struct TickStation {
+    tx: Writer<Frame>,
+    tx_edges: EdgeCounter,
+    tx_sequence: u64,
+    /// The bytes handed over last: most ticks change nothing, and need no hand-over.
+    published: Box<[u8]>,
+    rx: Reader<Frame>,
+    rx_shaper: PulseShaper,
+    shaped: Box<[u8]>,
+    /// Whether `shaped` holds what was shown last, rather than the frame itself.
+    forced: bool,
+    beside: Arc<Beside>,
+}
+
+/// Takes what [`TickStation::read`] has to show.
+pub trait Receiver {
+    /// The frame's bytes, with every edge made visible; called when they may have changed.
+    fn levels(&mut self, bytes: &[u8]);
+
+    /// How many edges of the latched signal with this index in the signal table have arrived since
+    /// the last read; called for every latched signal when any count may have changed.
+    fn edges(&mut self, signal: usize, count: u32);
+}
+
+/// What [`TickStation::read`] found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arrival {
+    /// A new whole bus cycle has arrived since the last read.
+    pub fresh: bool,
+    /// The bytes to show differ, or may differ, from those shown last.
+    pub changed: bool,
+    /// Time since the peer was last heard of; [`Nanos::MAX`] when it never was.
+    pub age: Nanos,
+    /// Sequence number of the frame shown.
+    pub sequence: u64,
+}
+
+/// The bus's end of a station.
+#[derive(Debug)]
+pub struct BusStation {
+    rx: Writer<Frame>,
+    rx_edges: EdgeCounter,
+    rx_sequence: u64,
+    rx_len: usize,
+    tx: Reader<Frame>,
+    tx_shaper: PulseShaper,
+    tx_fail_safe: Box<[u8]>,
+    outgoing: Box<[u8]>,
+    beside: Arc<Beside>,
+}
+
+/// Makes the two ends of one station.
+pub fn station(directions: Directions) -> (TickStation, BusStation) {
+    let Directions {
+        tx_fail_safe,
+        tx_latched,
+        rx_fail_safe,
+        rx_latched,
+    } = directions;
+    let frame = |bytes: &[u8], latched: &[LatchedBit]| Frame {
+        bytes: bytes.into(),
+        edges: vec![0; latched.len()].into(),
+        sequence: 0,
+    };
+    let (tx_writer, tx_reader) = triple_buffer(&frame(&tx_fail_safe, &tx_latched));
+    let (rx_writer, rx_reader) = triple_buffer(&frame(&rx_fail_safe, &rx_latched));
+    let beside = Arc::new(Beside {
+        peer_alive: AtomicI64::new(NEVER),
+        tick_alive: AtomicI64::new(NEVER),
+        cycles: AtomicU64::new(0),
+        invalid: AtomicBool::new(false),
+    });
+    let tick = TickStation {
+        tx: tx_writer,
+        tx_edges: EdgeCounter::new(tx_latched.clone(), &tx_fail_safe),
+        tx_sequence: 0,
+        published: tx_fail_safe.clone(),
+        rx: rx_reader,
+        rx_shaper: PulseShaper::new(rx_latched.clone(), &rx_fail_safe),
+        shaped: rx_fail_safe.clone(),
+        forced: false,
+        beside: Arc::clone(&beside),
+    };
+    let bus = BusStation {
+        rx: rx_writer,
+        rx_edges: EdgeCounter::new(rx_latched, &rx_fail_safe),
+        rx_sequence: 0,
+        rx_len: rx_fail_safe.len(),
+        tx: tx_reader,
+        tx_shaper: PulseShaper::new(tx_latched, &tx_fail_safe),
+        outgoing: tx_fail_safe.clone(),
+        tx_fail_safe,
+        beside,
+    };
+    (tick, bus)
+}
+
+/// `now - then`, for a `then` that may be [`NEVER`].
+fn age(now: Nanos, then: i64) -> Nanos {
+    if then == NEVER {
+        Nanos::MAX
+    } else {
+        (now - Nanos(then)).max(Nanos::ZERO)
+    }
+}
+
+impl TickStation {
+    /// Lets `encode` write the whole tx frame; if that changed it, counts its edges and hands it to the
+    /// bus.
+    #[inline]
+    pub fn write<R>(&mut self, now: Nanos, encode: impl FnOnce(&mut [u8]) -> R) -> R {
+        let (edges, sequence) = (&mut self.tx_edges, self.tx_sequence + 1);
+        let published = &mut self.published;
+        let (changed, result) = self.tx.with_buffer(|frame| {
+            let result = encode(&mut frame.bytes);
+            let changed = frame.bytes != *published;
+            if changed {
+                published.copy_from_slice(&frame.bytes);
+                edges.count(&frame.bytes, &mut frame.edges);
+                frame.sequence = sequence;
+            }
+            (changed, result)
+        });
+        if changed {
+            self.tx_sequence = sequence;
+            self.tx.publish();
+        }
+        self.beside.tick_alive.store(now.0, Ordering::Relaxed);
+        result
+    }
+
+    /// Takes over the newest rx frame and shows it to `receiver`, if there is anything new to see.
+    #[inline]
+    pub fn read(&mut self, now: Nanos, receiver: &mut impl Receiver) -> Arrival {
+        let fresh = self.rx.update();
+        let age = age(now, self.beside.peer_alive.load(Ordering::Relaxed));
+        let (shaper, shaped, forced) = (&mut self.rx_shaper, &mut self.shaped, &mut self.forced);
+        if !fresh && !*forced && !shaper.is_busy() {
+            // The most common tick: the simulation ticks faster than the bus.
+            let sequence = self.rx.with(|frame| frame.sequence);
+            return Arrival {
+                fresh,
+                changed: false,
+                age,
+                sequence,
+            };
+        }
+        self.rx.with(|frame| {
+            let shapes = shaper.needs_shaping(&frame.edges);
+            if shapes {
+                for (bit, count) in shaper.bits().iter().zip(shaper.new_edges(&frame.edges)) {
+                    receiver.edges(bit.signal, count);
+                }
+                shaped.copy_from_slice(&frame.bytes);
+                shaper.shape(&frame.edges, now, shaped);
+                shaper.confirm();
+                receiver.levels(shaped);
+            } else {
+                if *forced {
+                    // No edge now, but there were some at the last read.
+                    shaper
+                        .bits()
+                        .iter()
+                        .for_each(|bit| receiver.edges(bit.signal, 0));
+                }
+                shaper.pass(&frame.bytes);
+                shaper.confirm();
+                receiver.levels(&frame.bytes);
+            }
+            *forced = shapes;
+            Arrival {
+                fresh,
+                changed: true,
+                age,
+                sequence: frame.sequence,
+            }
+        })
+    }
+
+    /// Takes note that the simulation sees other levels (fail-safe values) than the frame's, so that
+    /// the next [`read`](Self::read) shows the frame again.
+    ///
+    /// The shaper goes on from what the peer showed last: a level that is on by its fail-safe value,
+    /// and that the peer switches on when it is back, must not drop in between to show that edge.
+    pub fn shown_instead(&mut self) {
+        self.forced = true;
+    }
+
+    /// Time since the peer was heard of last; [`Nanos::MAX`] before the first time.
+    pub fn peer_age(&self, now: Nanos) -> Nanos {
+        age(now, self.beside.peer_alive.load(Ordering::Relaxed))
+    }
+
+    /// Whether the data of the peer count. To be asked before [`read`](Self::read) and after it: if both times this
+    /// says yes, that has not given a frame from the time when they did not.
+    #[inline]
+    pub fn is_valid(&self) -> bool {
+        !self.beside.invalid.load(Ordering::Acquire)
+    }
+
+    /// Whole bus cycles received so far.
+    pub fn cycles(&self) -> u64 {
+        self.beside.cycles.load(Ordering::Relaxed)
+    }
+}
+
+impl BusStation {
+    /// The bytes to send in an exchange at `now`: the latest tx frame with its pulses shaped, or the
+    /// fail-safe bytes when the simulation has not ticked for longer than `watchdog`, or never.
+    ///
+    /// A pulse counts as sent only once [`sent`](Self::sent) is called.
+    pub fn outgoing(&mut self, now: Nanos, watchdog: Option<Nanos>) -> &[u8] {
+        self.tx.update();
+        if watchdog.is_some_and(|limit| self.tick_age(now) > limit) {
+            self.tx_shaper.pass_instead(&self.tx_fail_safe);
+            return &self.tx_fail_safe;
+        }
+        let (shaper, outgoing) = (&mut self.tx_shaper, &mut self.outgoing);
+        self.tx.with(|frame| {
+            outgoing.copy_from_slice(&frame.bytes);
+            if shaper.needs_shaping(&frame.edges) {
+                shaper.shape(&frame.edges, now, outgoing);
+            } else {
+                shaper.pass(outgoing);
+            }
+        });
+        &self.outgoing
+    }
+
+    /// The exchange that carried the bytes of [`outgoing`](Self::outgoing) was completed.
+    pub fn sent(&mut self) {
+        self.tx_shaper.confirm();
+    }
+
+    /// The exchange carried these bits of [`outgoing`](Self::outgoing) and was completed; bit n of byte k is 8k + n.
+    pub fn sent_bits(&mut self, bits: &Range<usize>) {
+        self.tx_shaper.confirm_bits(bits);
+    }
+
+    /// Time since the simulation ticked last; [`Nanos::MAX`] before the first tick.
+    pub fn tick_age(&self, now: Nanos) -> Nanos {
+        age(now, self.beside.tick_alive.load(Ordering::Relaxed))
+    }
+
+    /// Time since the peer was heard of last; [`Nanos::MAX`] before the first time.
+    pub fn peer_age(&self, now: Nanos) -> Nanos {
+        age(now, self.beside.peer_alive.load(Ordering::Relaxed))
+    }
+
+    /// A whole bus cycle has arrived: counts its edges and hands it to the tick.
+    ///
+    /// # Panics
+    ///
+    /// When `bytes` is not exactly as long as the station's rx frame: wire code checks lengths.
+    pub fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        assert_eq!(
+            bytes.len(),
+            self.rx_len,
+            "a received frame must have the station's size"
+        );
+        let (edges, sequence) = (&mut self.rx_edges, self.rx_sequence + 1);
+        self.rx.with_buffer(|frame| {
+            frame.bytes.copy_from_slice(bytes);
+            edges.count(bytes, &mut frame.edges);
+            frame.sequence = sequence;
+        });
+        self.rx_sequence = sequence;
+        // The time first: whoever sees the frame must not think it old.
+        self.touch(now);
+        self.rx.publish();
+        self.beside.cycles.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The peer is alive, though it sent no new data.
+    pub fn touch(&mut self, now: Nanos) {
+        self.beside.peer_alive.store(now.0, Ordering::Relaxed);
+    }
+
+    /// Says whether the data of the peer count. Data that count again are to be handed in before.
+    pub fn set_valid(&mut self, valid: bool) {
+        // Released after the frame: the tick that sees this sees that, too.
+        self.beside.invalid.store(!valid, Ordering::Release);
+    }
+
+    /// The bytes that went out, or were about to, last.
+    pub fn last_outgoing(&self) -> &[u8] {
+        &self.outgoing
+    }
+
+    /// The latched bits of the frames that go out from here.
+    pub fn tx_latched(&self) -> &[LatchedBit] {
+        self.tx_shaper.bits()
+    }
+
+    /// Size of the frames that arrive here, in bytes.
+    pub fn rx_len(&self) -> usize {
+        self.rx_len
+    }
+
+    /// Size of the frames that go out from here, in bytes.
+    pub fn tx_len(&self) -> usize {
+        self.outgoing.len()
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::signal::Latch;
+
+    fn one_latched_byte() -> (TickStation, BusStation) {
+        let latched: Box<[LatchedBit]> = Box::new([LatchedBit {
+            signal: 7,
+            byte: 0,
+            mask: 1,
+            latch: Latch::Rising,
+            hold: Nanos::ZERO,
+        }]);
+        station(Directions {
+            tx_fail_safe: Box::new([0x80]),
+            tx_latched: latched.clone(),
+            rx_fail_safe: Box::new([0]),
+            rx_latched: latched,
+        })
+    }
+
+    #[derive(Default)]
+    struct Seen {
+        level: Option<u8>,
+        edges: Vec<(usize, u32)>,
+    }
+
+    impl Receiver for Seen {
+        fn levels(&mut self, bytes: &[u8]) {
+            self.level = Some(bytes[0]);
+        }
+
+        fn edges(&mut self, signal: usize, count: u32) {
+            self.edges.push((signal, count));
+        }
+    }
+
+    fn read(tick: &mut TickStation, now: i64) -> (Arrival, Option<u8>, Vec<(usize, u32)>) {
+        let mut seen = Seen::default();
+        let arrival = tick.read(Nanos(now), &mut seen);
+        (arrival, seen.level, seen.edges)
+    }
+
+    #[test]
+    fn a_pulse_between_two_ticks_is_seen_for_one_tick_and_counted() {
+        let (mut tick, mut bus) = one_latched_byte();
+        assert_eq!(
+            read(&mut tick, 0),
+            (
+                Arrival {
+                    fresh: false,
+                    changed: false,
+                    age: Nanos::MAX,
+                    sequence: 0
+                },
+                None,
+                vec![],
+            )
+        );
+        for bytes in [[1], [0], [1], [0]] {
+            bus.received(Nanos(5), &bytes);
+        }
+        let (arrival, shown, edges) = read(&mut tick, 8);
+        assert!(arrival.fresh);
+        assert_eq!((arrival.age, arrival.sequence), (Nanos(3), 4));
+        assert_eq!((shown, edges), (Some(1), vec![(7, 2)]));
+        let (arrival, shown, edges) = read(&mut tick, 9);
+        assert!(!arrival.fresh && arrival.changed);
+        assert_eq!((shown, edges), (Some(0), vec![(7, 0)]));
+        read(&mut tick, 10);
+        assert_eq!(read(&mut tick, 11).1, None);
+    }
+
+    #[test]
+    fn a_pulse_between_two_exchanges_is_sent_until_one_was_completed() {
+        let (mut tick, mut bus) = one_latched_byte();
+        for level in [0, 1, 0] {
+            tick.write(Nanos(1), |bytes| bytes[0] = level);
+        }
+        assert_eq!(bus.outgoing(Nanos(2), None), [1]);
+        assert_eq!(bus.outgoing(Nanos(3), None), [1]);
+        bus.sent();
+        assert_eq!(bus.outgoing(Nanos(4), None), [0]);
+        bus.sent();
+        assert_eq!(bus.outgoing(Nanos(5), None), [0]);
+    }
+
+    #[test]
+    fn when_the_simulation_stops_the_peer_gets_the_fail_safe_bytes() {
+        let (mut tick, mut bus) = one_latched_byte();
+        let watchdog = Some(Nanos(10));
+        assert_eq!(
+            bus.outgoing(Nanos(0), watchdog),
+            [0x80],
+            "before the first tick"
+        );
+        tick.write(Nanos(0), |bytes| bytes[0] = 2);
+        assert_eq!(bus.outgoing(Nanos(10), watchdog), [2]);
+        assert_eq!(bus.outgoing(Nanos(11), watchdog), [0x80]);
+        tick.write(Nanos(12), |bytes| bytes[0] = 2);
+        assert_eq!(bus.outgoing(Nanos(13), watchdog), [2]);
+    }
+
+    #[test]
+    fn a_pulse_that_fail_safe_bytes_overtook_is_sent_after_them() {
+        let (mut tick, mut bus) = one_latched_byte();
+        let watchdog = Some(Nanos(10));
+        for level in [0, 1, 0] {
+            tick.write(Nanos(0), |bytes| bytes[0] = level);
+        }
+        assert_eq!(bus.outgoing(Nanos(1), watchdog), [1], "shown, not sent");
+        assert_eq!(bus.outgoing(Nanos(20), watchdog), [0x80]);
+        bus.sent();
+        tick.write(Nanos(21), |bytes| bytes[0] = 0);
+        assert_eq!(bus.outgoing(Nanos(22), watchdog), [1]);
+        bus.sent();
+        assert_eq!(bus.outgoing(Nanos(23), watchdog), [0]);
+    }
+
+    #[test]
+    fn a_pulse_is_sent_by_its_own_bit_and_not_by_another_one_of_its_byte() {
+        let (mut tick, mut bus) = one_latched_byte();
+        for level in [0, 1, 0] {
+            tick.write(Nanos(0), |bytes| bytes[0] = level);
+        }
+        for bits in [1..8, 8..16, 0..0] {
+            assert_eq!(bus.outgoing(Nanos(1), None), [1]);
+            bus.sent_bits(&bits);
+        }
+        assert_eq!(bus.outgoing(Nanos(2), None), [1]);
+        bus.sent_bits(&(0..1));
+        assert_eq!(bus.outgoing(Nanos(3), None), [0]);
+    }
+
+    #[test]
+    fn a_level_that_is_on_by_its_fail_safe_value_does_not_drop_when_the_peer_switches_it_on() {
+        let (mut tick, mut bus) = one_latched_byte();
+        bus.received(Nanos(0), &[0]);
+        read(&mut tick, 0);
+        // The peer is silent, and the simulation sees the bit on instead.
+        tick.shown_instead();
+        bus.received(Nanos(90), &[1]);
+        let (_, shown, edges) = read(&mut tick, 90);
+        assert_eq!((shown, edges), (Some(1), vec![(7, 1)]));
+        assert_eq!(read(&mut tick, 91).1, Some(1), "and stays");
+    }
+
+    #[test]
+    fn touch_keeps_the_age_down_without_new_data() {
+        let (mut tick, mut bus) = one_latched_byte();
+        bus.received(Nanos(0), &[0]);
+        read(&mut tick, 0);
+        bus.touch(Nanos(90));
+        let (arrival, _, _) = read(&mut tick, 100);
+        assert_eq!((arrival.fresh, arrival.age), (false, Nanos(10)));
+    }
+
+    #[test]
+    #[should_panic(expected = "must have the station's size")]
+    fn a_frame_of_the_wrong_size_never_gets_in() {
+        let (_tick, mut bus) = one_latched_byte();
+        bus.received(Nanos(0), &[0, 0]);
+    }
+}

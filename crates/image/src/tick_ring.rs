@@ -1,0 +1,194 @@
+//! The ring between the tick and the thread that records: whole ticks, without a lock or a wait.
+
+use crate::signal::Slot;
+use crate::sync::{Arc, AtomicU64, AtomicUsize, Ordering};
+
+#[derive(Debug)]
+struct Shared {
+    /// Places for ticks, one after another. Atomic words, written relaxed and ordered by the indices, keep
+    /// this free of unsafe code.
+    words: Box<[AtomicU64]>,
+    /// Ticks that fit, a power of two.
+    ticks: usize,
+    /// Words of one tick.
+    size: usize,
+    /// Ticks ever pushed; the place of tick n is n modulo the capacity.
+    pushed: AtomicUsize,
+    /// Ticks ever taken.
+    taken: AtomicUsize,
+}
+
+impl Shared {
+    fn place(&self, tick: usize) -> &[AtomicU64] {
+        let start = (tick & (self.ticks - 1)) * self.size;
+        &self.words[start..start + self.size]
+    }
+}
+
+/// The tick's side of the ring.
+#[derive(Debug)]
+pub struct TickWriter {
+    shared: Arc<Shared>,
+    pushed: usize,
+    /// Ticks taken as far as is known: looking again costs a cache line of the other thread's.
+    taken: usize,
+}
+
+/// The recording thread's side of the ring.
+#[derive(Debug)]
+pub struct TickReader {
+    shared: Arc<Shared>,
+}
+
+/// Makes a ring for `ticks` ticks (rounded up to a power of two) of `size` words each.
+pub fn tick_ring(ticks: usize, size: usize) -> (TickWriter, TickReader) {
+    let ticks = ticks.max(1).next_power_of_two();
+    let shared = Arc::new(Shared {
+        words: (0..ticks * size).map(|_| AtomicU64::new(0)).collect(),
+        ticks,
+        size,
+        pushed: AtomicUsize::new(0),
+        taken: AtomicUsize::new(0),
+    });
+    let writer = TickWriter {
+        shared: Arc::clone(&shared),
+        pushed: 0,
+        taken: 0,
+    };
+    (writer, TickReader { shared })
+}
+
+impl TickWriter {
+    /// Appends a tick, `head` and then `slots`, together one place long. Takes no lock, makes no system
+    /// call, allocates nothing. When the ring is full, nothing is appended, and the answer is false.
+    ///
+    /// # Panics
+    ///
+    /// When `head` is longer than a place.
+    #[inline]
+    pub fn push(&mut self, head: &[u64], slots: &[Slot]) -> bool {
+        if self.is_full() {
+            return false;
+        }
+        let place = self.shared.place(self.pushed);
+        let (place_head, place_slots) = place.split_at(head.len());
+        for (word, value) in place_head.iter().zip(head) {
+            word.store(*value, Ordering::Relaxed);
+        }
+        for (word, slot) in place_slots.iter().zip(slots) {
+            word.store(slot.0, Ordering::Relaxed);
+        }
+        self.pushed = self.pushed.wrapping_add(1);
+        self.shared.pushed.store(self.pushed, Ordering::Release);
+        true
+    }
+
+    /// Whether there is no room for another tick.
+    #[inline]
+    pub fn is_full(&mut self) -> bool {
+        let ticks = self.shared.ticks;
+        if self.pushed.wrapping_sub(self.taken) == ticks {
+            self.taken = self.shared.taken.load(Ordering::Acquire);
+        }
+        self.pushed.wrapping_sub(self.taken) == ticks
+    }
+
+    /// Whether more than half of the ring is in use.
+    #[inline]
+    pub fn is_half_full(&mut self) -> bool {
+        let half = self.shared.ticks / 2;
+        if self.pushed.wrapping_sub(self.taken) > half {
+            self.taken = self.shared.taken.load(Ordering::Acquire);
+        }
+        self.pushed.wrapping_sub(self.taken) > half
+    }
+}
+
+impl TickReader {
+    /// Copies the oldest tick into `words`, which must be one place long, and frees its place; false when
+    /// there is none.
+    pub fn take(&mut self, words: &mut [u64]) -> bool {
+        let shared = &*self.shared;
+        let taken = shared.taken.load(Ordering::Relaxed);
+        if taken == shared.pushed.load(Ordering::Acquire) {
+            return false;
+        }
+        for (word, place) in words.iter_mut().zip(shared.place(taken)) {
+            *word = place.load(Ordering::Relaxed);
+        }
+        shared.taken.store(taken.wrapping_add(1), Ordering::Release);
+        true
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_come_out_in_order_and_a_full_ring_takes_none() {
+        let (mut writer, mut reader) = tick_ring(4, 3);
+        for n in 0..4 {
+            assert!(writer.push(&[n], &[Slot(n + 1), Slot(n + 2)]));
+        }
+        assert!(!writer.push(&[9], &[Slot(9), Slot(9)]));
+        let mut words = [0; 3];
+        for n in 0..4 {
+            assert!(reader.take(&mut words));
+            assert_eq!(words, [n, n + 1, n + 2]);
+        }
+        assert!(!reader.take(&mut words));
+        assert!(writer.push(&[9], &[Slot(9), Slot(9)]));
+    }
+
+    #[test]
+    fn threads_never_tear_a_tick() {
+        const SENT: u64 = if cfg!(miri) { 300 } else { 100_000 };
+        let (mut writer, mut reader) = tick_ring(8, 5);
+        let pushing = std::thread::spawn(move || {
+            (0..SENT)
+                .filter(|n| writer.push(&[*n], &[Slot(*n); 4]))
+                .count()
+        });
+        let (mut words, mut seen, mut last) = ([0; 5], 0, None);
+        loop {
+            let ended = pushing.is_finished();
+            while reader.take(&mut words) {
+                assert_eq!(words, [words[0]; 5]);
+                assert!(last < Some(words[0]));
+                last = Some(words[0]);
+                seen += 1;
+            }
+            if ended {
+                break;
+            }
+        }
+        assert_eq!(pushing.join().expect("no panic"), seen);
+    }
+}
+
+#[cfg(all(test, loom))]
+mod loom_tests {
+    use super::*;
+
+    #[test]
+    fn loom_ticks_arrive_whole_and_in_order() {
+        loom::model(|| {
+            let (mut writer, mut reader) = tick_ring(2, 2);
+            let pushing = loom::thread::spawn(move || {
+                for n in 1..=3 {
+                    writer.push(&[n], &[Slot(n)]);
+                }
+            });
+            let (mut words, mut last) = ([0; 2], 0);
+            for _ in 0..3 {
+                if reader.take(&mut words) {
+                    assert_eq!(words[0], words[1]);
+                    assert!(words[0] > last);
+                    last = words[0];
+                }
+            }
+            pushing.join().unwrap();
+        });
+    }
+}

@@ -1,0 +1,128 @@
+//! Addresses as editors write them.
+
+use tickbus_image::signal::{Address, AddressError, Addressing};
+
+/// What a text in the address column is.
+#[derive(Debug)]
+pub(super) enum Place {
+    /// An address of an input or output.
+    Image(Address),
+    /// Something of the PLC that is no part of its process image: what it is.
+    Elsewhere(&'static str),
+    /// An input or output, but not as an address is written.
+    Wrong(AddressError),
+    /// No address at all.
+    Nothing,
+}
+
+/// Reads an address: `%I0.0`, `I      0.0`, `%IW4:P`, `EW 4`, `PIW 256`.
+pub(super) fn place(text: &str, addressing: Addressing) -> Place {
+    let mut plain: String = text
+        .chars()
+        .filter(|c| !c.is_whitespace())
+        .collect::<String>()
+        .to_ascii_uppercase();
+    if plain.starts_with('%') {
+        plain.remove(0);
+    }
+    // The peripheral half of an address is the same place.
+    if let Some(rest) = plain.strip_suffix(":P") {
+        plain.truncate(rest.len());
+    }
+    let peripheral = plain
+        .strip_prefix('P')
+        .filter(|rest| rest.starts_with(['I', 'Q', 'E', 'A']));
+    if let Some(rest) = peripheral {
+        plain = rest.to_owned();
+    }
+    let digits = plain.find(|c: char| c.is_ascii_digit());
+    let Some(digits) = digits else {
+        return Place::Nothing;
+    };
+    let (letters, numbers) = plain.split_at(digits);
+    if !numbers.chars().all(|c| c.is_ascii_digit() || c == '.') && !letters.starts_with("DB") {
+        return Place::Nothing;
+    }
+    let elsewhere = match letters {
+        "M" | "MX" | "MB" | "MW" | "MD" | "ML" => "a marker",
+        "T" => "a timer",
+        "C" | "Z" => "a counter",
+        "FB" | "FC" | "OB" | "SFB" | "SFC" | "UDT" | "VAT" => "a block",
+        "L" | "LB" | "LW" | "LD" => "local data of a block",
+        _ if letters.starts_with("DB") || letters.starts_with("DI") => "in a data block",
+        _ => "",
+    };
+    if !elsewhere.is_empty() {
+        return Place::Elsewhere(elsewhere);
+    }
+    // German mnemonics; an address without a size is one of a bit.
+    let international = match letters.chars().next() {
+        Some('E') => letters.replacen('E', "I", 1),
+        Some('A') => letters.replacen('A', "Q", 1),
+        Some('I' | 'Q') => letters.to_owned(),
+        _ => return Place::Nothing,
+    };
+    if !["", "X", "B", "W", "D", "L"].contains(&&international[1..]) {
+        return Place::Nothing;
+    }
+    match Address::parse(&format!("%{international}{numbers}"), addressing) {
+        Ok(address) => Place::Image(address),
+        Err(error) => Place::Wrong(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn editors_addresses_are_known() {
+        for (text, printed) in [
+            ("%I0.0", "%IX0.0"),
+            ("I      0.7", "%IX0.7"),
+            ("%QW4", "%QW4"),
+            ("%ID10", "%ID10"),
+            ("E 1.0", "%IX1.0"),
+            ("AB 5", "%QB5"),
+            ("PEW 256", "%IW256"),
+            ("PQW256", "%QW256"),
+            ("%IW64:P", "%IW64"),
+            ("%ix3.1", "%IX3.1"),
+        ] {
+            match place(text, Addressing::Bytes) {
+                Place::Image(address) => assert_eq!(address.to_string(), printed, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+        for text in [
+            "%M0.0",
+            "MW 20",
+            "T 5",
+            "Z 3",
+            "%DB1.DBX0.0",
+            "DB 10",
+            "FC 1",
+            "%MD100",
+        ] {
+            assert!(
+                matches!(place(text, Addressing::Bytes), Place::Elsewhere(_)),
+                "{text}"
+            );
+        }
+        for text in ["%I0.9", "%IX", "%QX70000.0", "E1"] {
+            assert!(
+                matches!(
+                    place(text, Addressing::Bytes),
+                    Place::Wrong(_) | Place::Nothing
+                ),
+                "{text}"
+            );
+        }
+        for text in ["", "Bool", "Start", "Motor 1", "5", "AUTO1", "IN5", "True"] {
+            assert!(
+                matches!(place(text, Addressing::Bytes), Place::Nothing),
+                "{text}"
+            );
+        }
+    }
+}

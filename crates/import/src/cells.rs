@@ -1,0 +1,206 @@
+//! Records and cells of a table, with their places.
+
+use tickbus_base::toml_text::Collector;
+
+/// One cell: its text without quotation marks and blanks around it, and where it begins.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Cell {
+    pub(super) text: String,
+    pub(super) at: usize,
+}
+
+/// One line, or several where a cell in quotes goes over their ends.
+pub(super) type Record = Vec<Cell>;
+
+/// What may stand between cells.
+const SEPARATORS: [char; 3] = [';', '\t', ','];
+
+/// All records that have anything in them; lines that begin with `#` are remarks.
+pub(super) fn records(text: &str, wrong: &Collector<'_>) -> Vec<Record> {
+    let mut at = 0;
+    let mut separator = None;
+    // How Excel says it.
+    if let Some(stated) = text.strip_prefix("sep=") {
+        separator = stated.chars().next().filter(|c| SEPARATORS.contains(c));
+        at = text.find('\n').map_or(text.len(), |end| end + 1);
+    }
+    let separator = separator.unwrap_or_else(|| usual(&text[at..]));
+    let mut records = Vec::new();
+    while at < text.len() {
+        if text[at..].starts_with('#') {
+            at = text[at..].find('\n').map_or(text.len(), |end| at + end + 1);
+            continue;
+        }
+        let (record, end) = record(text, at, separator, wrong);
+        at = end;
+        if record.iter().any(|cell| !cell.text.is_empty()) {
+            records.push(record);
+        }
+    }
+    records
+}
+
+/// The separator that the lines have most of outside of quotes; comments may have commas. In a list of properties
+/// (`Level = holding-register:21:UINT`) an equals sign comes before any of them.
+fn usual(text: &str) -> char {
+    let mut lines = text
+        .lines()
+        .take(1000)
+        .filter(|line| !line.trim().is_empty() && !line.starts_with('#'))
+        .peekable();
+    let is_property = |line: &str| {
+        let first = line.find(|c| c == '=' || c == '"' || SEPARATORS.contains(&c));
+        first.is_some_and(|at| line[at..].starts_with('='))
+    };
+    if lines.peek().is_some() && lines.all(is_property) {
+        return '=';
+    }
+    let mut counts = [0_usize; SEPARATORS.len()];
+    let mut quoted = false;
+    for character in text.chars().take(10_000) {
+        match character {
+            '"' => quoted = !quoted,
+            _ if quoted => {}
+            _ => {
+                if let Some(which) = SEPARATORS.iter().position(|s| *s == character) {
+                    counts[which] += 1;
+                }
+            }
+        }
+    }
+    let most = counts.iter().max().copied().unwrap_or(0);
+    // Semicolons and tabs stand in no text by chance: two a line are enough against any commas.
+    let lines = text
+        .lines()
+        .take(1000)
+        .filter(|line| !line.trim().is_empty())
+        .count();
+    SEPARATORS
+        .into_iter()
+        .zip(counts)
+        .find(|(separator, count)| {
+            *count > 0 && (*count == most || *separator != ',' && *count >= lines)
+        })
+        .map_or(';', |(separator, _)| separator)
+}
+
+/// The record that begins at `start`, and where the next one does.
+fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (Record, usize) {
+    let mut record = Vec::new();
+    let mut at = start;
+    loop {
+        let rest = &text[at..];
+        let blanks = rest.len()
+            - rest
+                .trim_start_matches(|c| c == ' ' || (c == '\t' && separator != '\t'))
+                .len();
+        let begin = at + blanks;
+        let (cell, end) = if text[begin..].starts_with('"') {
+            quoted(text, begin, separator, wrong)
+        } else {
+            let rest = &text[begin..];
+            let end = begin + rest.find([separator, '\n']).unwrap_or(rest.len());
+            (text[begin..end].trim().to_owned(), end)
+        };
+        record.push(Cell {
+            text: cell,
+            at: begin,
+        });
+        match text[end..].chars().next() {
+            Some(c) if c == separator => at = end + c.len_utf8(),
+            Some(_) => return (record, end + 1),
+            None => return (record, end),
+        }
+    }
+}
+
+/// The cell in quotes that begins at `start`, and where its separator or line end stands.
+fn quoted(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (String, usize) {
+    let mut cell = String::new();
+    let mut at = start + 1;
+    loop {
+        let Some(end) = text[at..].find('"') else {
+            wrong.report(
+                start,
+                "a cell in quotes has no end",
+                "close it with another \"",
+            );
+            // Without its end, the rest of its line is all that can be meant.
+            let line = text[start..]
+                .find('\n')
+                .map_or(text.len(), |end| start + end);
+            return (text[start + 1..line].trim().to_owned(), line);
+        };
+        cell.push_str(&text[at..at + end]);
+        at += end + 1;
+        if !text[at..].starts_with('"') {
+            break;
+        }
+        cell.push('"');
+        at += 1;
+    }
+    let rest = &text[at..];
+    let end = at + rest.find([separator, '\n']).unwrap_or(rest.len());
+    if !text[at..end].trim().is_empty() {
+        wrong.report(
+            at,
+            "something stands behind a cell in quotes",
+            "write quotation marks within a cell twice: \"\"",
+        );
+    }
+    // Spreadsheets break lines within cells; names and comments have one.
+    let cell = cell.split_whitespace().collect::<Vec<_>>().join(" ");
+    (cell, end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> (Vec<Vec<String>>, Option<String>) {
+        let wrong = Collector::new("t", text);
+        let records = records(text, &wrong);
+        let texts = |record: Record| record.into_iter().map(|cell| cell.text).collect();
+        (
+            records.into_iter().map(texts).collect(),
+            wrong.finish().map(|m| m.to_string()),
+        )
+    }
+
+    #[test]
+    fn separators_and_quotes_are_understood() {
+        for text in [
+            "a;%I0.0;\"x; \"\"y\"\"\"\r\n\r\n# no;line\r\n;;\r\nb ; %I0.1 ;z",
+            "a,%I0.0,\"x; \"\"y\"\"\"\nb, %I0.1 ,z\n",
+            "a\t%I0.0\t\"x; \"\"y\"\"\"\nb\t%I0.1\tz",
+            "sep=;\r\na;%I0.0;\"x;\n\"\"y\"\"\"\nb;%I0.1;z",
+        ] {
+            let expected = vec![vec!["a", "%I0.0", "x; \"y\""], vec!["b", "%I0.1", "z"]];
+            let (records, mistakes) = read(text);
+            assert_eq!(records, expected, "{text}");
+            assert_eq!(mistakes, None);
+        }
+    }
+
+    #[test]
+    fn commas_in_comments_separate_nothing() {
+        let (records, _) = read("a;%I0.0;Bool;one, two, three, four, five, six\n");
+        assert_eq!(records[0].len(), 4);
+    }
+
+    #[test]
+    fn quotes_without_end_are_told_and_cost_one_line() {
+        let (records, mistakes) = read("a;\"%I0.0;x\nb;%I0.1;y\n");
+        assert_eq!(
+            mistakes.as_deref(),
+            Some("t:1:3: a cell in quotes has no end; close it with another \"")
+        );
+        assert_eq!(records.len(), 2);
+        let (_, mistakes) = read("\"a\"b;%I0.0\n");
+        assert!(
+            mistakes
+                .unwrap()
+                .starts_with("t:1:4: something stands behind a cell in quotes")
+        );
+    }
+}

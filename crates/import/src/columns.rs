@@ -1,0 +1,141 @@
+//! Which column has what: by its heading, or by what stands in it.
+
+use super::address::{Place, place};
+use super::cells::Record;
+use super::device;
+use tickbus_image::signal::Addressing;
+
+/// The columns of a table, and its first record below the headings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Columns {
+    pub(super) name: usize,
+    pub(super) address: usize,
+    pub(super) kind: Option<usize>,
+    pub(super) comment: Option<usize>,
+    pub(super) unit: Option<usize>,
+    pub(super) order: Option<usize>,
+    /// Who writes it: a direction, or KEPServer's client access.
+    pub(super) direction: Option<usize>,
+    /// KEPServer's columns of a scale: its kind, two raw values, two scaled ones.
+    pub(super) scale: Option<[usize; 5]>,
+    pub(super) first: usize,
+}
+
+impl Columns {
+    /// Name, address, type, comment, and no headings.
+    pub(super) fn fixed() -> Self {
+        Self {
+            name: 0,
+            address: 1,
+            kind: Some(2),
+            comment: Some(3),
+            unit: None,
+            order: None,
+            direction: None,
+            scale: None,
+            first: 0,
+        }
+    }
+}
+
+/// What headings are called in English and German editors, in small letters.
+const NAMES: &[&str] = &[
+    "name",
+    "symbol",
+    "tag",
+    "tag name",
+    "tagname",
+    "signal",
+    "variable",
+    "symbolname",
+];
+const ADDRESSES: &[&str] = &[
+    "address",
+    "logical address",
+    "absolute address",
+    "adresse",
+    "logische adresse",
+    "operand",
+    "addr",
+];
+const TYPES: &[&str] = &["type", "data type", "datatype", "datentyp", "typ"];
+const COMMENTS: &[&str] = &[
+    "comment",
+    "description",
+    "kommentar",
+    "beschreibung",
+    "bemerkung",
+];
+const UNITS: &[&str] = &["unit", "einheit", "eng units", "eng. units"];
+const DIRECTIONS: &[&str] = &["direction", "richtung", "client access"];
+const SCALES: [&str; 5] = [
+    "scaling",
+    "raw low",
+    "raw high",
+    "scaled low",
+    "scaled high",
+];
+const ORDERS: &[&str] = &["order", "byte order"];
+
+/// How many records are looked at where there are no headings.
+const LOOK: usize = 50;
+
+/// The columns, if one of them has addresses.
+pub(super) fn find(records: &[Record]) -> Option<Columns> {
+    let head = records.first()?;
+    let called = |words: &[&str]| {
+        head.iter()
+            .position(|cell| words.contains(&cell.text.to_lowercase().as_str()))
+    };
+    if let Some(address) = called(ADDRESSES) {
+        return Some(Columns {
+            name: called(NAMES).unwrap_or(usize::from(address == 0)),
+            address,
+            kind: called(TYPES),
+            comment: called(COMMENTS),
+            unit: called(UNITS),
+            order: called(ORDERS),
+            direction: called(DIRECTIONS),
+            scale: {
+                let columns = SCALES.map(|heading| called(&[heading]));
+                let all: Option<Vec<usize>> = columns.into_iter().collect();
+                all.and_then(|all| all.try_into().ok())
+            },
+            first: 1,
+        });
+    }
+    // Without headings: name; address; type; comment, as ours and the SDF files of TIA Portal and STEP 7 begin; the
+    // comment of an SDF file stands behind some flags.
+    let looked = &records[..records.len().min(LOOK)];
+    let width = looked.iter().map(Vec::len).max().unwrap_or(0);
+    let is_address = |record: &Record, column: usize| {
+        let cell = record.get(column);
+        cell.is_some_and(|cell| {
+            !matches!(place(&cell.text, Addressing::Bytes), Place::Nothing)
+                || device::is_address(&cell.text)
+        })
+    };
+    let hits = |column: usize| {
+        looked
+            .iter()
+            .filter(|record| is_address(record, column))
+            .count()
+    };
+    let address = (0..width)
+        .rev()
+        .max_by_key(|column| hits(*column))
+        .filter(|column| hits(*column) > 0)?;
+    let is_flag = |text: &str| matches!(text.to_lowercase().as_str(), "" | "true" | "false");
+    let comment = (address + 2..width).find(|column| {
+        looked
+            .iter()
+            .any(|record| record.get(*column).is_some_and(|cell| !is_flag(&cell.text)))
+    });
+    Some(Columns {
+        name: usize::from(address == 0),
+        address,
+        kind: (address + 1 < width).then_some(address + 1),
+        comment,
+        ..Columns::fixed()
+    })
+}

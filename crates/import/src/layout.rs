@@ -1,0 +1,47 @@
+//! Addresses in %I and %Q for tags that have none of their own there.
+
+use super::rows::Tag;
+use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
+
+/// Gives each tag without an address one: the widest ones first, bits last, so that no byte lies idle.
+///
+/// # Errors
+///
+/// They do not fit: what is wrong, and what would be right.
+pub(super) fn lay(tags: &mut [Tag]) -> Result<(), (String, &'static str)> {
+    // The next free bit of %I and %Q.
+    let mut free = [0_usize; 2];
+    for width in [
+        Width::Long,
+        Width::Double,
+        Width::Word,
+        Width::Byte,
+        Width::Bit,
+    ] {
+        for tag in tags.iter_mut().filter(|tag| tag.data_type.width() == width) {
+            if tag.address.is_some() {
+                continue;
+            }
+            let free = &mut free[usize::from(tag.area == Area::Output)];
+            #[expect(clippy::cast_possible_truncation, reason = "below 8")]
+            let bit = (*free % 8) as u8;
+            tag.address = Some(Address {
+                area: tag.area,
+                width,
+                byte: *free / 8,
+                bit,
+            });
+            *free += width.bits();
+            if *free > AREA_LIMIT * 8 {
+                return Err((
+                    format!(
+                        "the tags fill more than the {AREA_LIMIT} bytes of {}",
+                        tag.area
+                    ),
+                    "split the list over several drivers",
+                ));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,253 @@
+//! Lists of PLC tags, made into a driver.cfg.
+//!
+//! [`import`] takes the bytes of a file as editors and spreadsheets save it: a workbook (XLSX), a table as text (CSV, SDF, a
+//! list of properties), PLCopen XML or L5X. Tags of the process image keep their addresses. The lists of clients (PLC4X,
+//! KEPServer) have addresses of the device's own world: those go to `[fieldbus.at]` as they stand, and the signals are
+//! laid out. Each line that cannot be used is told at its place.
+
+mod address;
+mod cells;
+mod columns;
+mod device;
+mod layout;
+mod plc_xml;
+mod rows;
+mod text;
+mod workbook;
+mod write;
+
+use std::path::Path;
+
+pub use device::Client;
+
+use cells::Record;
+use columns::Columns;
+use rows::{Taken, World};
+use text::Kind;
+use tickbus_base::toml_text::{Collector, Mistake, Mistakes};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::Addressing;
+
+/// Files longer than this are no lists of tags.
+const LONGEST: usize = 64 << 20;
+
+/// How a table is to be read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reading {
+    /// What the numbers of the addresses count.
+    pub addressing: Addressing,
+    /// Leave lines with mistakes out instead of refusing the table.
+    pub lenient: bool,
+    /// The bus whose addresses the list has; `None` to tell it by the list.
+    pub client: Option<Client>,
+}
+
+/// A table that was read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Imported {
+    /// The text of a driver.cfg that `tickbus check` finds nothing wrong with.
+    pub text: String,
+    /// How many signals it has.
+    pub signals: usize,
+    /// The lines that are not in it, in line order: tags outside of the process image, and those with mistakes if they
+    /// were to be left out.
+    pub skipped: Vec<Mistake>,
+}
+
+/// A table with the text that places in it are counted in.
+struct Sheet {
+    /// What a workbook calls it.
+    name: Option<String>,
+    text: String,
+    records: Vec<Record>,
+    /// Its columns, if they need not be found.
+    columns: Option<Columns>,
+}
+
+/// Mistakes and remarks of all sheets.
+#[derive(Default)]
+struct Told {
+    wrong: Vec<Mistake>,
+    skipped: Vec<Mistake>,
+}
+
+impl Told {
+    fn add(list: &mut Vec<Mistake>, sheet: Option<&str>, found: Collector<'_>) {
+        for mistake in found.finish().iter().flatten() {
+            let mut mistake = mistake.clone();
+            if let Some(sheet) = sheet {
+                mistake.what = format!("sheet \"{sheet}\": {}", mistake.what);
+            }
+            list.push(mistake);
+        }
+    }
+}
+
+/// Reads the `bytes` of a file; `file` is what its mistakes call it.
+///
+/// # Errors
+///
+/// With every mistake in the table, unless lines with mistakes are to be left out; or when nothing is left.
+pub fn import(file: &str, bytes: &[u8], reading: Reading) -> Result<Imported, Mistakes> {
+    let of_file = |what: String, right: &str| Err(Mistakes::of_file(file, what, right));
+    if bytes.len() > LONGEST {
+        return of_file(
+            format!("the file is {} MiB long", bytes.len() >> 20),
+            "a list of tags has at most 64 MiB; save one sheet or one tag table at a time",
+        );
+    }
+    let mut told = Told::default();
+    let mut is_logix = false;
+    let sheets = match text::kind(bytes) {
+        Kind::OldWorkbook => {
+            return of_file(
+                "this is a workbook of Excel before 2007, or one with a password".to_owned(),
+                "open it in Excel or LibreOffice, and save it as XLSX without a password, or as CSV",
+            );
+        }
+        Kind::Workbook => match workbook::sheets(bytes) {
+            Ok(sheets) => sheets,
+            Err((what, right)) => return of_file(what, right),
+        },
+        Kind::Xml => {
+            let text = text::decoded(bytes);
+            let skipped = Collector::new(file, &text);
+            let project = plc_xml::read(file, &text, &skipped)?;
+            Told::add(&mut told.skipped, None, skipped);
+            is_logix = project.is_logix;
+            vec![project.sheet]
+        }
+        Kind::Table => {
+            let text = text::decoded(bytes);
+            let wrong = Collector::new(file, &text);
+            let records = cells::records(&text, &wrong);
+            Told::add(&mut told.wrong, None, wrong);
+            vec![Sheet {
+                name: None,
+                text,
+                records,
+                columns: None,
+            }]
+        }
+    };
+    tags_of(file, &sheets, reading, is_logix, told)
+}
+
+/// The driver.cfg of all tags in `sheets`.
+fn tags_of(
+    file: &str,
+    sheets: &[Sheet],
+    reading: Reading,
+    is_logix: bool,
+    mut told: Told,
+) -> Result<Imported, Mistakes> {
+    let columns: Vec<Option<Columns>> = sheets
+        .iter()
+        .map(|sheet| {
+            sheet
+                .columns
+                .clone()
+                .or_else(|| columns::find(&sheet.records))
+        })
+        .collect();
+    let world = if is_logix {
+        World::Modules
+    } else {
+        let lists = sheets.iter().zip(&columns);
+        let addresses = lists.filter_map(|(sheet, columns)| {
+            let columns = columns.as_ref()?;
+            let records = sheet.records[columns.first..].iter();
+            Some(records.filter_map(|record| Some(record.get(columns.address)?.text.as_str())))
+        });
+        let client = reading.client.or_else(|| rows::client(addresses.flatten()));
+        client.map_or(World::Image(reading.addressing), World::Device)
+    };
+    let mut taken = Taken::default();
+    let mut tags = Vec::new();
+    for (sheet, columns) in sheets.iter().zip(&columns) {
+        let (wrong, skipped) = (
+            Collector::new(file, &sheet.text),
+            Collector::new(file, &sheet.text),
+        );
+        match columns {
+            Some(columns) => rows::read(
+                &sheet.records,
+                columns,
+                world,
+                &mut taken,
+                &mut tags,
+                &wrong,
+                &skipped,
+            ),
+            None => {
+                if let Some(cell) = sheet.records.first().and_then(|record| record.first())
+                    && sheets.len() > 1
+                {
+                    skipped.report(
+                        cell.at,
+                        "it has no column of addresses: skipped",
+                        "nothing, if it has no tags",
+                    );
+                }
+            }
+        }
+        Told::add(&mut told.wrong, sheet.name.as_deref(), wrong);
+        Told::add(&mut told.skipped, sheet.name.as_deref(), skipped);
+    }
+    let Told {
+        mut wrong,
+        mut skipped,
+    } = told;
+    if sheets.len() == 1 {
+        wrong.sort_by_key(|mistake| mistake.place);
+    }
+    if !wrong.is_empty() {
+        if !reading.lenient {
+            return Err(Mistakes::of_list(file, wrong));
+        }
+        skipped.extend(wrong);
+        skipped.sort_by_key(|mistake| mistake.place);
+    }
+    if tags.is_empty() {
+        return Err(nothing(
+            file,
+            columns.iter().any(Option::is_some),
+            skipped.len(),
+        ));
+    }
+    if let Err((what, right)) = layout::lay(&mut tags) {
+        return Err(Mistakes::of_file(file, what, right));
+    }
+    let text = write::driver_cfg(Path::new(file), &tags, world);
+    // What the bus itself finds wrong with the addresses is told before anybody writes the file.
+    if let Err(mistakes) = Config::parse("driver.cfg", &text) {
+        let list = mistakes.iter().map(|mistake| Mistake {
+            place: None,
+            what: mistake.what.clone(),
+            right: mistake.right.clone(),
+        });
+        return Err(Mistakes::of_list(file, list.collect()));
+    }
+    Ok(Imported {
+        text,
+        signals: tags.len(),
+        skipped,
+    })
+}
+
+fn nothing(file: &str, has_columns: bool, skipped: usize) -> Mistakes {
+    if has_columns {
+        Mistakes::of_file(
+            file,
+            format!("none of its lines has a tag in %I or %Q; {skipped} were skipped"),
+            "only inputs and outputs can be connected: %I0.0, %IW4, %QD8; markers and data blocks can by --bus s7-client or \
+             --bus modbus-client",
+        )
+    } else {
+        Mistakes::of_file(
+            file,
+            "no column of this table has addresses",
+            "save it with the columns name; address; type; comment",
+        )
+    }
+}

@@ -1,0 +1,385 @@
+//! PLC programs of the user's own: shared objects with the C interface of the open IEC 61131-3 compiler,
+//! iec2c, as `OpenPLC` and Beremiz use it, and tickbus' glue (`plc/glue`).
+//!
+//! The program's clock is the scan's `now`, its inputs and outputs are the variables that it has located in
+//! `%I` and `%Q`. A compiled program keeps all its state in global variables. So each [`Hosted`] loads a
+//! private copy of the file, and as many as one likes live side by side in a process.
+
+use std::fs::{self, OpenOptions};
+use std::io::{self, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use self::object::Machine;
+use self::plan::{Plan, Settings};
+use self::table::{Compiled, Declared, Refusal};
+use super::{Program, ProgramError, Scan, list};
+use tickbus_base::os::Library;
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::{Address, Addressing, Area, ByteOrder, SignalTable};
+
+mod object;
+mod plan;
+mod table;
+
+/// The largest file that is taken for a program, in bytes.
+const FILE_LIMIT: u64 = 256 << 20;
+
+/// A compiled PLC program in a shared object.
+///
+/// Its options, as text: `addressing` says what the numbers of its addresses count, `bytes` or `iec` (default:
+/// as the driver.cfg says, else bytes). `order` is the byte order of values for which the driver.cfg has no
+/// signal, `ABCD` (big-endian, the default) to `DCBA`. `alive` names a `%I` bit that is TRUE while the
+/// machine's data are not stale.
+#[derive(Debug)]
+pub struct Hosted {
+    name: String,
+    compiled: Compiled,
+    declared: Vec<Declared>,
+    settings: Settings,
+    plan: Plan,
+    tick: u64,
+    #[expect(dead_code, reason = "kept for its drop, after the library's")]
+    copy: PrivateCopy,
+}
+
+impl Hosted {
+    /// The options that it takes.
+    const OPTIONS: [&'static str; 3] = ["addressing", "alive", "order"];
+
+    /// Whether `name` names a file with a program, and not a built-in one.
+    pub fn is_path(name: &str) -> bool {
+        let extension = Path::new(name).extension();
+        let known = ["so", "dll", "dylib"];
+        name.contains(['/', std::path::MAIN_SEPARATOR])
+            || extension
+                .is_some_and(|own| known.iter().any(|known| own.eq_ignore_ascii_case(known)))
+    }
+
+    /// Whether the options are right, as far as they alone can tell; loads nothing.
+    ///
+    /// # Errors
+    ///
+    /// There is no such option, or it cannot have that value.
+    pub fn check_options(name: &str, options: &[(String, String)]) -> Result<(), ProgramError> {
+        settings(options)
+            .map(drop)
+            .map_err(|refusal| error(name, refusal))
+    }
+
+    /// Loads the program at `path` and initialises it.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, is none that can be loaded here, or has no program; or an option is wrong.
+    pub fn load(path: &Path, options: &[(String, String)]) -> Result<Self, ProgramError> {
+        let name = path.display().to_string();
+        Self::try_load(path, options).map_err(|refusal| error(&name, refusal))
+    }
+
+    fn try_load(path: &Path, options: &[(String, String)]) -> Result<Self, Refusal> {
+        let settings = settings(options)?;
+        let bytes = read(path)?;
+        object::check(&bytes, Machine::own())?;
+        let copy = PrivateCopy::new(&bytes, path).map_err(|(path, error)| {
+            let what = format!("cannot be copied to {}: {error}", path.display());
+            (what, TEMPORARY.to_owned())
+        })?;
+        let library = Library::load(copy.path()).map_err(|words| not_loaded(&words, &copy))?;
+        let (compiled, declared) = Compiled::begin(library)?;
+        // What its addresses count is not known before `fit`; one of the two ways must be possible.
+        let plan = |addressing| Plan::new(&declared, &settings, addressing, None);
+        let plan = plan(Addressing::Bytes)
+            .or_else(|refusal| plan(Addressing::Elements).map_err(|_| refusal))?;
+        Ok(Self {
+            name: path.display().to_string(),
+            compiled,
+            declared,
+            settings,
+            plan,
+            tick: 0,
+            copy: copy.loaded(),
+        })
+    }
+}
+
+impl Program for Hosted {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn interval(&self) -> Nanos {
+        self.compiled.tick_time().unwrap_or(super::INTERVAL)
+    }
+
+    fn fit(&mut self, table: &SignalTable, addressing: Addressing) -> Result<(), ProgramError> {
+        let plan = Plan::new(&self.declared, &self.settings, addressing, Some(table));
+        self.plan = plan.map_err(|refusal| error(&self.name, refusal))?;
+        Ok(())
+    }
+
+    fn input_bytes(&self) -> usize {
+        self.plan.bytes(Area::Input)
+    }
+
+    fn output_bytes(&self) -> usize {
+        self.plan.bytes(Area::Output)
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        for input in &self.plan.inputs {
+            let value = input.take(scan.inputs);
+            self.compiled.write(input.variable, value);
+        }
+        for variable in &self.plan.alive {
+            self.compiled.write(*variable, u64::from(scan.alive));
+        }
+        self.compiled.scan(scan.now, self.tick);
+        self.tick = self.compiled.next_tick(self.tick);
+        for output in &self.plan.outputs {
+            output.put(self.compiled.read(output.variable), scan.outputs);
+        }
+    }
+}
+
+fn error(name: &str, (what, right): Refusal) -> ProgramError {
+    ProgramError::Hosted {
+        program: name.to_owned(),
+        what,
+        right,
+    }
+}
+
+fn settings(options: &[(String, String)]) -> Result<Settings, Refusal> {
+    let mut settings = Settings::default();
+    let bad = |option: &str, value: &str, right: String| {
+        let what = format!("cannot have \"{value}\" as its option \"{option}\"");
+        Err((what, right))
+    };
+    for (option, value) in options {
+        match option.as_str() {
+            "addressing" => {
+                settings.addressing = Some(match value.as_str() {
+                    "bytes" => Addressing::Bytes,
+                    "iec" => Addressing::Elements,
+                    _ => return bad(option, value, "write \"bytes\" or \"iec\"".to_owned()),
+                });
+            }
+            "order" => {
+                let mut orders = ByteOrder::ALL.into_iter();
+                let Some(order) = orders.find(|order| order.name() == value) else {
+                    let names = ByteOrder::ALL.map(ByteOrder::name);
+                    return bad(option, value, format!("write {}", list(&names, "or")));
+                };
+                settings.order = order;
+            }
+            "alive" => {
+                match value.parse::<Address>() {
+                    Ok(Address {
+                        area: Area::Input,
+                        width: tickbus_image::signal::Width::Bit,
+                        ..
+                    }) => {}
+                    _ => {
+                        return bad(
+                            option,
+                            value,
+                            "write a bit in %I, such as %IX3.0".to_owned(),
+                        );
+                    }
+                }
+                settings.alive = Some(value.clone());
+            }
+            _ => {
+                return Err((
+                    format!("has no option \"{option}\""),
+                    format!("it takes {}", list(&Hosted::OPTIONS, "and")),
+                ));
+            }
+        }
+    }
+    Ok(settings)
+}
+
+/// The whole file.
+fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
+    let cannot = |error: &io::Error| match error.kind() {
+        ErrorKind::NotFound => (
+            "is not there".to_owned(),
+            "check the path; one in a driver.cfg counts from the folder of that file".to_owned(),
+        ),
+        ErrorKind::PermissionDenied => (
+            "may not be read".to_owned(),
+            "check its permissions".to_owned(),
+        ),
+        _ => (
+            format!("cannot be read: {error}"),
+            "check the path and the disk".to_owned(),
+        ),
+    };
+    let metadata = fs::metadata(path).map_err(|error| cannot(&error))?;
+    if !metadata.is_file() {
+        return Err((
+            "is no file".to_owned(),
+            "name the shared object, such as ./program.so".to_owned(),
+        ));
+    }
+    if metadata.len() > FILE_LIMIT {
+        return Err((
+            format!("has {} bytes", metadata.len()),
+            format!("a program has at most {FILE_LIMIT}; check the path"),
+        ));
+    }
+    fs::read(path).map_err(|error| cannot(&error))
+}
+
+/// What to do when the folder for temporary files is of no use.
+const TEMPORARY: &str = "tickbus loads a private copy of the program; set TMPDIR (on Windows TMP) to a folder \
+    with room, from which programs may be run";
+
+/// What to do about what the loader says.
+fn not_loaded(words: &str, copy: &PrivateCopy) -> Refusal {
+    let words = words.replace(&copy.path().display().to_string(), "it");
+    let right = if words.contains("undefined symbol") {
+        "compile in all C files that iec2c wrote, and the glue with the same LOCATED_VARIABLES.h; functions of \
+         other libraries need these to be linked"
+    } else if words.contains("failed to map") || words.contains("not permitted") {
+        TEMPORARY
+    } else {
+        "check that the libraries that it needs are there, and build it anew"
+    };
+    (format!("cannot be loaded ({words})"), right.to_owned())
+}
+
+/// A copy of the program's file that nobody else loads, so that its global variables are its own, and that
+/// stays as it is when the file is built anew.
+#[derive(Debug)]
+struct PrivateCopy(Option<PathBuf>);
+
+impl PrivateCopy {
+    fn new(bytes: &[u8], original: &Path) -> Result<Self, (PathBuf, io::Error)> {
+        static COPIES: AtomicU64 = AtomicU64::new(0);
+        let folder = std::env::temp_dir();
+        let name = original.file_name().unwrap_or_default().to_string_lossy();
+        // A file of that name may have been left by another process of the same number.
+        for _ in 0..1000 {
+            let number = COPIES.fetch_add(1, Ordering::Relaxed);
+            let path = folder.join(format!("tickbus-{}-{number}-{name}", std::process::id()));
+            let mut options = OpenOptions::new();
+            options.write(true).create_new(true);
+            #[cfg(unix)]
+            std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o700);
+            return match options.open(&path) {
+                Ok(mut file) => {
+                    let copy = Self(Some(path.clone()));
+                    file.write_all(bytes).map_err(|error| (path, error))?;
+                    Ok(copy)
+                }
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
+                Err(error) => Err((path, error)),
+            };
+        }
+        Err((folder, ErrorKind::AlreadyExists.into()))
+    }
+
+    fn path(&self) -> &Path {
+        self.0.as_deref().unwrap_or(Path::new(""))
+    }
+
+    /// Once it is loaded. Where a file may be removed while it is in use, that is done at once, so that not
+    /// even a killed process leaves it behind.
+    fn loaded(mut self) -> Self {
+        if cfg!(unix) {
+            self.remove();
+        }
+        self
+    }
+
+    fn remove(&mut self) {
+        if let Some(path) = self.0.take()
+            && let Err(error) = fs::remove_file(&path)
+        {
+            log::warn!("{} could not be removed: {error}", path.display());
+        }
+    }
+}
+
+impl Drop for PrivateCopy {
+    fn drop(&mut self) {
+        self.remove();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(path: &str, options: &[(&str, &str)]) -> String {
+        let options: Vec<_> = options
+            .iter()
+            .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+            .collect();
+        let error = Hosted::load(Path::new(path), &options);
+        error.expect_err("refused").to_string()
+    }
+
+    #[test]
+    fn paths_are_told_from_names() {
+        for path in [
+            "./program.so",
+            "plc/rig",
+            "/opt/p.so",
+            "program.so",
+            "P.DLL",
+            "p.dylib",
+        ] {
+            assert!(Hosted::is_path(path), "{path}");
+        }
+        for name in ["rig", "mirror", "my.program", "rig.cfg", ""] {
+            assert!(!Hosted::is_path(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn wrong_options_are_told_before_anything_is_loaded() {
+        for (option, value, says) in [
+            (
+                "adressing",
+                "iec",
+                "has no option \"adressing\"; it takes \"addressing\", \"alive\" and \"order\"",
+            ),
+            (
+                "addressing",
+                "words",
+                "cannot have \"words\" as its option \"addressing\"; write \"bytes\" or \"iec\"",
+            ),
+            (
+                "order",
+                "big",
+                "cannot have \"big\" as its option \"order\"; write \"ABCD\", \"CDAB\", \"BADC\" or \"DCBA\"",
+            ),
+            (
+                "alive",
+                "%QX0.0",
+                "cannot have \"%QX0.0\" as its option \"alive\"; write a bit in %I, such as %IX3.0",
+            ),
+        ] {
+            assert_eq!(
+                refusal("no/such/p.so", &[(option, value)]),
+                format!("the PLC program \"no/such/p.so\" {says}")
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_no_program_is_told() {
+        assert_eq!(
+            refusal("no/such/p.so", &[]),
+            "the PLC program \"no/such/p.so\" is not there; check the path; one in a driver.cfg counts from \
+             the folder of that file"
+        );
+        assert!(refusal("./src", &[]).contains("\"./src\" is no file; "));
+        let text = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+        assert!(refusal(text, &[]).contains("Cargo.toml\" is no shared object; build"));
+    }
+}

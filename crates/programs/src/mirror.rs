@@ -1,0 +1,82 @@
+//! The program "mirror": a loop plug in the shape of a PLC.
+
+use tickbus_plc::{Program, ProgramError, Scan};
+
+/// Brings every `%I` byte back on the `%Q` byte of the same offset, as far as both images reach.
+///
+/// It mirrors stale inputs too, as they stand: a loop plug has no opinion.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mirror;
+
+impl Mirror {
+    /// Its name in [`program`](super::program).
+    pub const NAME: &'static str = "mirror";
+
+    /// A mirror; it takes no options.
+    ///
+    /// # Errors
+    ///
+    /// Any option was given.
+    pub fn new(options: &[(String, String)]) -> Result<Self, ProgramError> {
+        match options.first() {
+            None => Ok(Self),
+            Some((option, _)) => Err(ProgramError::UnknownOption {
+                program: Self::NAME,
+                option: option.clone(),
+                known: &[],
+            }),
+        }
+    }
+}
+
+impl Program for Mirror {
+    fn name(&self) -> &str {
+        Self::NAME
+    }
+
+    fn input_bytes(&self) -> usize {
+        0
+    }
+
+    fn output_bytes(&self) -> usize {
+        0
+    }
+
+    fn for_another_station(&self) -> Option<Box<dyn Program>> {
+        Some(Box::new(*self))
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        let bytes = scan.inputs.len().min(scan.outputs.len());
+        scan.outputs[..bytes].copy_from_slice(&scan.inputs[..bytes]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tickbus_base::time::Nanos;
+
+    fn mirrored(inputs: &[u8], mut outputs: Vec<u8>) -> Vec<u8> {
+        Mirror.scan(&mut Scan {
+            now: Nanos::ZERO,
+            alive: true,
+            cycle: 0,
+            inputs,
+            outputs: &mut outputs,
+        });
+        outputs
+    }
+
+    #[test]
+    fn every_byte_comes_back_at_its_offset() {
+        assert_eq!(mirrored(&[1, 2, 3], vec![9; 3]), [1, 2, 3]);
+    }
+
+    #[test]
+    fn images_of_different_sizes_share_what_they_have() {
+        assert_eq!(mirrored(&[1, 2], vec![9; 4]), [1, 2, 9, 9]);
+        assert_eq!(mirrored(&[1, 2, 3], vec![9; 1]), [1]);
+        assert_eq!(mirrored(&[], vec![]), []);
+    }
+}

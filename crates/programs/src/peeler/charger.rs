@@ -1,0 +1,552 @@
+//! The program "charger": feeds blocks, centres them, and hands them to the lathe.
+//!
+//! Three chains run beside each other, and each waits for what the others leave behind:
+//!
+//! | chain | steps |
+//! |---|---|
+//! | feeding | the gate lets a block onto step 1; a stroke of the step feeder takes every block one step on |
+//! | centring | the linear feeder brings a block; its two ends are measured; the spindles rise to its axis, grip it, lift it and bring it to the transfer arm |
+//! | transfer | the clamps take it; the arm brings it to the lathe once that is ready, lets go when the lathe holds it, and comes back |
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+use super::io::{Axis, Io, Place, tally};
+use super::options::Options;
+use super::report::Tally;
+use tickbus_axis::{Kind, Mode, Motion};
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::{Addressing, SignalTable};
+use tickbus_plc::blocks::{AxisCommand, Simulation, SimulationTime, Ton};
+use tickbus_plc::{Program, ProgramError, Report, Scan};
+
+/// The axes, in the order in which the program counts them.
+const AXES: [(&str, Kind); 12] = [
+    ("step feeder", Kind::Position),
+    ("linear feeder", Kind::Position),
+    ("centring spindle left", Kind::Position),
+    ("centring spindle right", Kind::Position),
+    ("centring x left", Kind::Position),
+    ("centring y left", Kind::Position),
+    ("centring x right", Kind::Position),
+    ("centring y right", Kind::Position),
+    ("transfer arm", Kind::Position),
+    ("transfer clamp left", Kind::Torque),
+    ("transfer clamp right", Kind::Torque),
+    ("charger gate", Kind::Torque),
+];
+
+const STEP_FEEDER: usize = 0;
+const LINEAR_FEEDER: usize = 1;
+const SPINDLES: [usize; 2] = [2, 3];
+const X: [usize; 2] = [4, 6];
+const Y: [usize; 2] = [5, 7];
+const ARM: usize = 8;
+const CLAMPS: [usize; 2] = [9, 10];
+const GATE: usize = 11;
+
+/// Positions, in mm.
+const STROKE: f64 = 400.0;
+const PICK_UP: f64 = 650.0;
+const SPINDLES_OPEN: f64 = 700.0;
+const SPINDLES_GRIP: f64 = 640.0;
+const OVER_FEEDER: f64 = 300.0;
+const LIFTED: f64 = 280.0;
+const ARM_BACK: f64 = 900.0;
+const ARM_CLEAR: f64 = 400.0;
+const CLAMPS_OPEN: f64 = 690.0;
+
+/// The sensors look down on a block in a V of 90 degrees from this height, in mm.
+const SENSOR_HEIGHT: f64 = 800.0;
+
+/// The pressure that holds a block, in per cent.
+const CLAMP_TORQUE: f64 = 60.0;
+const GATE_TORQUE: f64 = 30.0;
+
+/// What a step may take, but for those that wait for a block or for the lathe.
+const LIMIT: Nanos = Nanos::from_secs(30);
+/// How long all axes have to be well before the program begins anew.
+const WELL: Nanos = Nanos::from_secs(1);
+/// How long a clamp has to stand before it is believed.
+const SETTLE: Nanos = Nanos::from_millis(100);
+/// A simulation whose time stands still for so long has stopped.
+const FROZEN: Nanos = Nanos::from_secs(1);
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Feeding {
+    /// Nothing was done yet: everything goes to its rest.
+    #[default]
+    Rest,
+    Waiting,
+    GateOpens,
+    GateCloses,
+    Up,
+    Down,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Centring {
+    /// The spindles let go.
+    #[default]
+    Release,
+    /// All goes to where the next block is awaited.
+    Home,
+    Waiting,
+    Carry,
+    Measure,
+    Rise,
+    Grip,
+    Lift,
+    Present,
+    /// The block is where the clamps come.
+    Held,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Transfer {
+    /// The clamps open, the arm goes back.
+    #[default]
+    Home,
+    Waiting,
+    Grab,
+    /// The arm goes back with a block, since nobody knows where it stands.
+    Return,
+    AwaitLathe,
+    ToLathe,
+    Presented,
+    Open,
+}
+
+/// A step of a chain, and since when.
+#[derive(Clone, Copy, Debug, Default)]
+struct Chain<S> {
+    step: S,
+    since: Option<Nanos>,
+}
+
+impl<S: Copy + PartialEq> Chain<S> {
+    fn go(&mut self, step: S) {
+        self.step = step;
+        self.since = None;
+    }
+
+    /// How long the step has lasted.
+    fn lasts(&mut self, now: Nanos) -> Nanos {
+        now - *self.since.get_or_insert(now)
+    }
+}
+
+/// The signals beside the axes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Places {
+    /// Steps 1 to 4, linear feeder, centring spindles, clamps, gate.
+    blocks: [Place; 8],
+    distances: [Place; 2],
+    time: Place,
+    presented: Place,
+    clear: Place,
+    lathe_ready: Place,
+    lathe_holds: Place,
+}
+
+/// The charger's program; the [module](self) tells what it does.
+#[derive(Debug)]
+pub struct Charger {
+    options: Options,
+    io: Option<Io>,
+    places: Places,
+    tally: Arc<Tally>,
+    time: SimulationTime,
+    /// Something is wrong, and no axis is enabled.
+    failed: bool,
+    well: Ton,
+    clamped: Ton,
+    feeding: Chain<Feeding>,
+    centring: Chain<Centring>,
+    transfer: Chain<Transfer>,
+    /// Heights of the block's axis at its two ends.
+    heights: [f64; 2],
+}
+
+/// A move to `position`, as fast as the axes of the charger go.
+const fn to(position: f64) -> AxisCommand {
+    AxisCommand {
+        mode: Mode::Position,
+        motion: Motion {
+            position,
+            speed: 400.0,
+            acceleration: 1_500.0,
+            deceleration: 1_500.0,
+            torque: 0.0,
+        },
+        number: 0,
+    }
+}
+
+const fn squeeze(mode: Mode, torque: f64) -> AxisCommand {
+    AxisCommand {
+        mode,
+        motion: Motion {
+            position: 0.0,
+            speed: 0.0,
+            acceleration: 0.0,
+            deceleration: 0.0,
+            torque,
+        },
+        number: 0,
+    }
+}
+
+/// The height of a block's axis over the V that it lies in, from the distance of the sensor to its top.
+fn axis_height(distance: f64) -> f64 {
+    let root = std::f64::consts::SQRT_2;
+    let radius = (SENSOR_HEIGHT - distance) / (1.0 + root);
+    (radius * root).clamp(0.0, LIFTED)
+}
+
+impl Charger {
+    /// Its name in [`program`](crate::program).
+    pub const NAME: &'static str = "charger";
+
+    /// The program with its options: `hold` and `blocks`.
+    ///
+    /// # Errors
+    ///
+    /// There is no such option, or it cannot have that value.
+    pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
+        let options = Options::read(Self::NAME, &Options::CHARGER, options)?;
+        let tally = tally(&AXES);
+        tally.asked.store(options.blocks.unwrap_or(0), Relaxed);
+        Ok(Self {
+            options,
+            io: None,
+            places: Places::default(),
+            tally,
+            time: SimulationTime::default(),
+            failed: false,
+            well: Ton::default(),
+            clamped: Ton::default(),
+            feeding: Chain::default(),
+            centring: Chain::default(),
+            transfer: Chain::default(),
+            heights: [0.0; 2],
+        })
+    }
+
+    /// Begins anew from what the sensors show.
+    fn restart(&mut self, io: &mut Io) {
+        io.forget();
+        let on = |block: usize| io.is_on(self.places.blocks[block]);
+        let held = on(5);
+        let clamped = on(6);
+        let at_lathe = io.axes[ARM].inputs.position < 1.0;
+        self.feeding.go(Feeding::Rest);
+        // Where the clamps come, both hold the same block; anywhere else the spindles hold another one.
+        let with_clamps = clamped
+            && X.into_iter()
+                .all(|axis| io.axes[axis].inputs.position < 1.0);
+        self.centring.go(if held && !with_clamps {
+            Centring::Lift
+        } else {
+            Centring::Release
+        });
+        self.transfer.go(match (clamped, at_lathe) {
+            (true, true) => Transfer::ToLathe,
+            (true, false) => Transfer::Return,
+            (false, _) => Transfer::Home,
+        });
+    }
+
+    fn feed(&mut self, io: &mut Io, now: Nanos) -> Nanos {
+        let on = |block: usize| io.is_on(self.places.blocks[block]);
+        let (first, last, next) = (on(0), on(3), on(7));
+        let any = (0..3).any(on);
+        let linear_free = !on(4)
+            && self.centring.step == Centring::Waiting
+            && (io.axes[LINEAR_FEEDER].inputs.position - PICK_UP).abs() < 1.0;
+        let lasts = self.feeding.lasts(now);
+        let axes = &mut io.axes;
+        match self.feeding.step {
+            Feeding::Rest => {
+                axes[GATE].want(squeeze(Mode::Close, GATE_TORQUE));
+                axes[STEP_FEEDER].want(to(0.0));
+                if axes[STEP_FEEDER].is_done() && axes[GATE].inputs.position < 1.0 {
+                    self.feeding.go(Feeding::Waiting);
+                }
+            }
+            Feeding::Waiting => {
+                if !first && next {
+                    axes[GATE].want(squeeze(Mode::Open, GATE_TORQUE));
+                    self.feeding.go(Feeding::GateOpens);
+                } else if (last && linear_free) || (!last && any) {
+                    axes[STEP_FEEDER].want(to(STROKE));
+                    self.feeding.go(Feeding::Up);
+                }
+                return Nanos::ZERO;
+            }
+            Feeding::GateOpens if first => {
+                axes[GATE].want(squeeze(Mode::Close, GATE_TORQUE));
+                self.feeding.go(Feeding::GateCloses);
+            }
+            Feeding::GateCloses if axes[GATE].stands() && axes[GATE].inputs.position < 1.0 => {
+                self.feeding.go(Feeding::Waiting);
+            }
+            Feeding::Up if axes[STEP_FEEDER].is_done() => {
+                axes[STEP_FEEDER].want(to(0.0));
+                self.feeding.go(Feeding::Down);
+            }
+            Feeding::Down if axes[STEP_FEEDER].is_done() => self.feeding.go(Feeding::Waiting),
+            _ => {}
+        }
+        lasts
+    }
+
+    fn centre(&mut self, io: &mut Io, now: Nanos) -> Nanos {
+        let on = |block: usize| io.is_on(self.places.blocks[block]);
+        let (on_feeder, held) = (on(4), on(5));
+        let distances = self.places.distances.map(|place| io.value(place));
+        let lasts = self.centring.lasts(now);
+        let axes = &mut io.axes;
+        let mut both = |pair: [usize; 2], command: [AxisCommand; 2]| {
+            for (axis, command) in pair.into_iter().zip(command) {
+                axes[axis].want(command);
+            }
+            pair.into_iter().all(|axis| axes[axis].is_done())
+        };
+        let pair = |position| [to(position); 2];
+        let next = match self.centring.step {
+            Centring::Release => both(SPINDLES, pair(SPINDLES_OPEN)).then_some(Centring::Home),
+            Centring::Home => {
+                let down = both(Y, pair(0.0));
+                let over = both(X, pair(OVER_FEEDER));
+                axes[LINEAR_FEEDER].want(to(PICK_UP));
+                (down && over && axes[LINEAR_FEEDER].is_done()).then_some(Centring::Waiting)
+            }
+            Centring::Waiting => {
+                // A block that has just fallen onto the feeder is still held by the step feeder's stroke.
+                if !on_feeder || self.feeding.step != Feeding::Waiting {
+                    return Nanos::ZERO;
+                }
+                axes[LINEAR_FEEDER].want(to(0.0));
+                Some(Centring::Carry)
+            }
+            Centring::Carry => axes[LINEAR_FEEDER].is_done().then_some(Centring::Measure),
+            Centring::Measure => (lasts >= SETTLE).then(|| {
+                self.heights = distances.map(axis_height);
+                Centring::Rise
+            }),
+            Centring::Rise => both(Y, self.heights.map(to)).then_some(Centring::Grip),
+            Centring::Grip => {
+                for axis in SPINDLES {
+                    axes[axis].want(to(SPINDLES_GRIP));
+                }
+                let grips = SPINDLES.into_iter().all(|axis| axes[axis].stands());
+                (held && grips).then_some(Centring::Lift)
+            }
+            Centring::Lift => {
+                let lifted = both(Y, pair(LIFTED));
+                if lifted && self.transfer.step != Transfer::Waiting {
+                    // Where the clamps come there is room for one block: this one waits for the arm to be back, and empty.
+                    return Nanos::ZERO;
+                }
+                lifted.then_some(Centring::Present)
+            }
+            Centring::Present => {
+                let there = both(X, pair(0.0));
+                axes[LINEAR_FEEDER].want(to(PICK_UP));
+                (there && axes[LINEAR_FEEDER].is_done()).then_some(Centring::Held)
+            }
+            Centring::Held => {
+                // The clamps have it: the transfer says so by awaiting the lathe.
+                if self.transfer.step != Transfer::AwaitLathe {
+                    return Nanos::ZERO;
+                }
+                Some(Centring::Release)
+            }
+        };
+        if let Some(next) = next {
+            self.centring.go(next);
+        }
+        lasts
+    }
+
+    fn hand_over(&mut self, io: &mut Io, now: Nanos) -> Nanos {
+        let clamped = io.is_on(self.places.blocks[6]);
+        let (ready, holds) = (
+            io.is_on(self.places.lathe_ready),
+            io.is_on(self.places.lathe_holds),
+        );
+        let lasts = self.transfer.lasts(now);
+        let axes = &mut io.axes;
+        let clamps = |axes: &mut [Axis], mode| {
+            for clamp in CLAMPS {
+                axes[clamp].want(squeeze(mode, CLAMP_TORQUE));
+            }
+        };
+        let arm_to = |axes: &mut [Axis], position: f64| {
+            let mut command = to(position);
+            command.motion.speed = 600.0;
+            axes[ARM].want(command);
+            axes[ARM].is_done()
+        };
+        let stand = CLAMPS.into_iter().all(|clamp| axes[clamp].stands());
+        let opened = CLAMPS
+            .into_iter()
+            .all(|clamp| axes[clamp].inputs.position > CLAMPS_OPEN);
+        let next = match self.transfer.step {
+            Transfer::Home => {
+                clamps(axes, Mode::Open);
+                // With its jaws closed the arm would take along what it is between.
+                (opened && arm_to(axes, ARM_BACK)).then_some(Transfer::Waiting)
+            }
+            Transfer::Waiting => {
+                if self.centring.step != Centring::Held {
+                    return Nanos::ZERO;
+                }
+                clamps(axes, Mode::Close);
+                Some(Transfer::Grab)
+            }
+            Transfer::Grab => self
+                .clamped
+                .call(now, stand && clamped, SETTLE)
+                .then_some(Transfer::AwaitLathe),
+            Transfer::Return => {
+                clamps(axes, Mode::Close);
+                arm_to(axes, ARM_BACK).then_some(Transfer::AwaitLathe)
+            }
+            Transfer::AwaitLathe => {
+                let let_go = !matches!(self.centring.step, Centring::Held | Centring::Release);
+                if !ready || !let_go {
+                    return Nanos::ZERO;
+                }
+                arm_to(axes, 0.0);
+                Some(Transfer::ToLathe)
+            }
+            Transfer::ToLathe => {
+                clamps(axes, Mode::Close);
+                arm_to(axes, 0.0).then_some(Transfer::Presented)
+            }
+            Transfer::Presented => {
+                if !holds {
+                    return Nanos::ZERO;
+                }
+                clamps(axes, Mode::Open);
+                Some(Transfer::Open)
+            }
+            Transfer::Open => (stand && opened).then(|| {
+                self.tally.blocks.fetch_add(1, Relaxed);
+                Transfer::Home
+            }),
+        };
+        if self.transfer.step != Transfer::Grab {
+            self.clamped = Ton::default();
+        }
+        if let Some(next) = next {
+            self.transfer.go(next);
+        }
+        lasts
+    }
+
+    fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
+        let time = alive.then(|| io.value(self.places.time));
+        let simulation = self.time.call(now, time, FROZEN);
+        if self.time.restarted {
+            self.tally.restarts.fetch_add(1, Relaxed);
+            log::info!("charger: the simulation was started again; beginning anew");
+        }
+        let well = self.well.call(now, alive && io.all_healthy(), WELL);
+        if !alive || self.failed || self.time.restarted || simulation == Simulation::Unknown {
+            self.failed = !alive || !well || self.time.restarted;
+            if !self.failed {
+                self.restart(io);
+            }
+            return false;
+        }
+        if !io.all_healthy() {
+            self.fail("an axis is not healthy");
+            return false;
+        }
+        if simulation == Simulation::Stopped {
+            // Nothing gets on, and that is nobody's fault.
+            self.feeding.since = None;
+            self.centring.since = None;
+            self.transfer.since = None;
+            return true;
+        }
+        let spans = [
+            self.feed(io, now),
+            self.centre(io, now),
+            self.hand_over(io, now),
+        ];
+        if spans.into_iter().any(|span| span > LIMIT) {
+            let what = format!(
+                "a step takes too long: {:?}, {:?}, {:?}",
+                self.feeding.step, self.centring.step, self.transfer.step
+            );
+            self.fail(&what);
+            return false;
+        }
+        true
+    }
+
+    fn fail(&mut self, why: &str) {
+        log::warn!("charger: {why}; all axes stop, and the sequence begins anew");
+        self.failed = true;
+        self.well = Ton::default();
+        self.tally.faults.fetch_add(1, Relaxed);
+    }
+}
+
+impl Program for Charger {
+    fn name(&self) -> &str {
+        Self::NAME
+    }
+
+    fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
+        let place = |name: &str| Io::place(Self::NAME, table, name);
+        let mut places = Places::default();
+        for (number, block) in places.blocks.iter_mut().enumerate() {
+            *block = place(&format!("block at feeder step {}", number + 1))?;
+        }
+        places.distances = [
+            place("pre-centring distance 1")?,
+            place("pre-centring distance 2")?,
+        ];
+        places.time = place("simulation time")?;
+        places.presented = place("block presented")?;
+        places.clear = place("transfer clear")?;
+        places.lathe_ready = place("lathe ready")?;
+        places.lathe_holds = place("lathe holds block")?;
+        self.places = places;
+        self.io = Some(Io::new(Self::NAME, table, &AXES, self.options.hold)?);
+        Ok(())
+    }
+
+    fn input_bytes(&self) -> usize {
+        self.io.as_ref().map_or(0, |io| io.input_bytes)
+    }
+
+    fn output_bytes(&self) -> usize {
+        self.io.as_ref().map_or(0, |io| io.output_bytes)
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        let Some(mut io) = self.io.take() else {
+            return;
+        };
+        if io.begin(scan) {
+            let enable = self.solve(&mut io, scan.now, scan.alive);
+            let shown =
+                enable && matches!(self.transfer.step, Transfer::Presented | Transfer::Open);
+            let clear = enable && io.axes[ARM].inputs.position > ARM_CLEAR;
+            io.switch(self.places.presented, shown);
+            io.switch(self.places.clear, clear);
+            io.end(scan, enable, &self.tally);
+        }
+        self.io = Some(io);
+    }
+
+    fn report(&self) -> Option<Arc<dyn Report>> {
+        Some(Arc::clone(&self.tally) as _)
+    }
+}

@@ -1,0 +1,473 @@
+//! The program "lathe": takes a block between its spindles, peels it, and drops the core.
+//!
+//! | step | what happens | leads on when |
+//! |---|---|---|
+//! | home | everything opens and draws back | all is there |
+//! | ready | the charger may come | a block is presented |
+//! | clamp | the spindles close | both have stood on the block for 100 ms |
+//! | clear | the charger lets go and draws back | nothing of it is in the way |
+//! | approach | knife and rolls come near, the block begins to turn | it turns |
+//! | round up | the knife takes a thick veneer per turn, the rolls follow | the block is round |
+//! | peel | veneer | the core is reached |
+//! | retract | knife and rolls draw back, the core stops | it stands |
+//! | drop | the spindles open over the core drop | they are open |
+//!
+//! While it peels, the program keeps the speed of the veneer by that of the spindles, from where the knife is: a new
+//! command whenever the speed is off by more than 1 %, as fast as `Execute` allows.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+use super::io::{Axis, Io, Place, tally};
+use super::options::Options;
+use super::report::Tally;
+use tickbus_axis::{Kind, Mode, Motion};
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::{Addressing, SignalTable};
+use tickbus_plc::blocks::{AxisCommand, Ton};
+use tickbus_plc::{Program, ProgramError, Report, Scan};
+
+/// The axes, in the order in which the program counts them.
+const AXES: [(&str, Kind); 13] = [
+    ("spindle left", Kind::Torque),
+    ("spindle right", Kind::Torque),
+    ("spindle rotation", Kind::Speed),
+    ("knife carriage", Kind::Tracking),
+    ("pitch angle", Kind::Tracking),
+    ("nosebar", Kind::Position),
+    ("top roll", Kind::Tracking),
+    ("bottom roll left", Kind::Tracking),
+    ("bottom roll right", Kind::Tracking),
+    ("roll rotation", Kind::Tracking),
+    ("veneer gate", Kind::Torque),
+    ("round-up gate", Kind::Torque),
+    ("core drop", Kind::Torque),
+];
+
+const SPINDLES: [usize; 2] = [0, 1];
+const ROTATION: usize = 2;
+const KNIFE: usize = 3;
+const PITCH: usize = 4;
+const NOSEBAR: usize = 5;
+const ROLLS: [usize; 3] = [6, 7, 8];
+const ROLL_ROTATION: usize = 9;
+const VENEER_GATE: usize = 10;
+const ROUND_UP_GATE: usize = 11;
+const CORE_DROP: usize = 12;
+
+/// Positions, in mm from the axis of the block.
+const BACK: f64 = 300.0;
+const CLEAR_OF_BLOCK: f64 = 250.0;
+const APPROACH: f64 = 160.0;
+const ROLLS_APPROACH: f64 = 165.0;
+const ROUND: f64 = 125.0;
+const CORE: f64 = 40.0;
+/// The knife is out of the way of a core that drops.
+const CLEAR_OF_CORE: f64 = 100.0;
+const SPINDLES_OPEN: f64 = 690.0;
+/// Where spindles stand that have a block between them.
+const ON_BLOCK: std::ops::RangeInclusive<f64> = 600.0..=690.0;
+const NOSEBAR_BACK: f64 = 20.0;
+const NOSEBAR_CLOSE: f64 = 2.0;
+
+/// The pressure that clamps a block, that which holds it afterwards, and that of the gates, in per cent.
+const CLAMP_TORQUE: f64 = 80.0;
+const HOLD_TORQUE: f64 = 40.0;
+const GATE_TORQUE: f64 = 30.0;
+/// How much faster than the block the rolls turn, in per cent.
+const ROLL_LEAD: f64 = 2.0;
+
+/// Veneer that a block is rounded up by, in mm for each turn.
+const ROUND_UP: f64 = 3.0;
+
+/// Turns a second: at the beginning, and at most.
+const FIRST_TURNS: f64 = 2.0;
+const MOST_TURNS: f64 = 12.0;
+/// The speed is put right when it is off by this part of it.
+const SPEED_BAND: f64 = 0.01;
+
+const LIMIT: Nanos = Nanos::from_secs(30);
+const PEEL_LIMIT: Nanos = Nanos::from_secs(90);
+const WELL: Nanos = Nanos::from_secs(1);
+const SETTLE: Nanos = Nanos::from_millis(100);
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Step {
+    #[default]
+    Home,
+    Ready,
+    Clamp,
+    Clear,
+    Approach,
+    RoundUp,
+    Peel,
+    Retract,
+    Drop,
+}
+
+/// The signals beside the axes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Places {
+    ready: Place,
+    holds: Place,
+    presented: Place,
+    clear: Place,
+}
+
+/// The lathe's program; the [module](self) tells what it does.
+#[derive(Debug)]
+pub struct Lathe {
+    options: Options,
+    io: Option<Io>,
+    places: Places,
+    tally: Arc<Tally>,
+    failed: bool,
+    well: Ton,
+    clamped: Ton,
+    step: Step,
+    since: Option<Nanos>,
+    /// The spindles hold a block that the charger may let go.
+    holds: bool,
+    /// Turns per second that were commanded last.
+    turns: f64,
+}
+
+const fn motion(position: f64, torque: f64) -> Motion<f64> {
+    Motion {
+        position,
+        speed: 400.0,
+        acceleration: 1_500.0,
+        deceleration: 1_500.0,
+        torque,
+    }
+}
+
+const fn to(position: f64) -> AxisCommand {
+    AxisCommand {
+        mode: Mode::Position,
+        motion: motion(position, 0.0),
+        number: 0,
+    }
+}
+
+/// Follows, with this offset, and with `torque` whatever that is to the axis.
+const fn track(offset: f64, torque: f64) -> AxisCommand {
+    AxisCommand {
+        mode: Mode::Tracking,
+        motion: motion(offset, torque),
+        number: 0,
+    }
+}
+
+const fn squeeze(mode: Mode, torque: f64) -> AxisCommand {
+    AxisCommand {
+        mode,
+        motion: Motion {
+            position: 0.0,
+            speed: 0.0,
+            acceleration: 0.0,
+            deceleration: 0.0,
+            torque,
+        },
+        number: 0,
+    }
+}
+
+/// Turns at so many turns a second, without an end.
+const fn turn(turns: f64) -> AxisCommand {
+    AxisCommand {
+        mode: Mode::Speed,
+        motion: Motion {
+            position: 1e9,
+            speed: turns,
+            acceleration: 4.0,
+            deceleration: 4.0,
+            torque: 0.0,
+        },
+        number: 0,
+    }
+}
+
+fn gate(axes: &mut [Axis], axis: usize, open: bool) {
+    let mode = if open { Mode::Open } else { Mode::Close };
+    axes[axis].want(squeeze(mode, GATE_TORQUE));
+}
+
+impl Lathe {
+    /// Its name in [`program`](crate::program).
+    pub const NAME: &'static str = "lathe";
+
+    /// The program with its options: `hold`, `blocks`, `peeling_speed` and `thickness`.
+    ///
+    /// # Errors
+    ///
+    /// There is no such option, or it cannot have that value.
+    pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
+        let options = Options::read(Self::NAME, &Options::LATHE, options)?;
+        let tally = tally(&AXES);
+        tally.asked.store(options.blocks.unwrap_or(0), Relaxed);
+        Ok(Self {
+            options,
+            io: None,
+            places: Places::default(),
+            tally,
+            failed: false,
+            well: Ton::default(),
+            clamped: Ton::default(),
+            step: Step::default(),
+            since: None,
+            holds: false,
+            turns: 0.0,
+        })
+    }
+
+    fn go(&mut self, step: Step) {
+        self.step = step;
+        self.since = None;
+    }
+
+    /// Begins anew. What is between the spindles is clamped on if the charger presents it, and else counts as a
+    /// core; then nobody is told that it is held, so that a charger that has it, too, keeps it.
+    fn restart(&mut self, io: &mut Io) {
+        io.forget();
+        self.turns = 0.0;
+        self.holds = false;
+        let on_block = SPINDLES
+            .into_iter()
+            .all(|axis| ON_BLOCK.contains(&io.axes[axis].inputs.position));
+        let presented = io.is_on(self.places.presented);
+        self.go(match (on_block, presented) {
+            (true, true) => Step::Clamp,
+            (true, false) => Step::Retract,
+            (false, _) => Step::Home,
+        });
+    }
+
+    /// The turns per second that give the veneer its speed where the knife is now.
+    fn wanted_turns(&self, axes: &[Axis]) -> f64 {
+        let radius = axes[KNIFE].inputs.position.max(1.0);
+        (self.options.peeling_speed / (TAU * radius)).min(MOST_TURNS)
+    }
+
+    /// Keeps the speed of the veneer.
+    fn keep_speed(&mut self, axes: &mut [Axis]) {
+        let wanted = self.wanted_turns(axes);
+        let off = (wanted - self.turns).abs() > SPEED_BAND * wanted;
+        if off && axes[ROTATION].control.is_ready() {
+            self.turns = wanted;
+            axes[ROTATION].repeat(turn(wanted));
+        }
+    }
+
+    fn draw_back(axes: &mut [Axis]) -> bool {
+        for axis in [KNIFE, ROLLS[0], ROLLS[1], ROLLS[2]] {
+            axes[axis].want(to(BACK));
+        }
+        axes[NOSEBAR].want(to(NOSEBAR_BACK));
+        axes[PITCH].want(to(0.0));
+        for axis in [ROTATION, ROLL_ROTATION] {
+            axes[axis].release();
+        }
+        gate(axes, VENEER_GATE, false);
+        gate(axes, ROUND_UP_GATE, false);
+        axes[KNIFE].inputs.position > CLEAR_OF_CORE && axes[ROTATION].inputs.speed.abs() < 0.01
+    }
+
+    /// Knife and rolls come near, and the block begins to turn.
+    fn come_near(&mut self, axes: &mut [Axis]) {
+        // The grip is there: less pressure cracks no block.
+        for axis in SPINDLES {
+            axes[axis].want(squeeze(Mode::Close, HOLD_TORQUE));
+        }
+        gate(axes, ROUND_UP_GATE, true);
+        axes[NOSEBAR].want(to(NOSEBAR_CLOSE));
+        axes[KNIFE].want(to(APPROACH));
+        for axis in ROLLS {
+            axes[axis].want(to(ROLLS_APPROACH));
+        }
+        self.turns = FIRST_TURNS;
+        axes[ROTATION].repeat(turn(FIRST_TURNS));
+    }
+
+    /// Lets knife and rolls follow, once they are there and the block turns; tells whether they do.
+    fn begin_to_peel(axes: &mut [Axis]) -> bool {
+        let there = [KNIFE, ROLLS[0], ROLLS[1], ROLLS[2]]
+            .into_iter()
+            .all(|axis| axes[axis].is_done());
+        let turns = axes[ROTATION].inputs.speed.abs() > 0.9 * FIRST_TURNS;
+        if there && turns {
+            for axis in [ROLLS[0], ROLLS[1], ROLLS[2], PITCH] {
+                axes[axis].want(track(0.0, 0.0));
+            }
+            axes[ROLL_ROTATION].want(track(0.0, ROLL_LEAD));
+            axes[KNIFE].want(track(0.0, ROUND_UP));
+        }
+        there && turns
+    }
+
+    /// One scan of the sequence; gives how long the step has lasted, where that matters, and may.
+    fn sequence(&mut self, io: &mut Io, now: Nanos) -> (Nanos, Nanos) {
+        let lasts = now - *self.since.get_or_insert(now);
+        let (presented, clear) = (io.is_on(self.places.presented), io.is_on(self.places.clear));
+        let axes = &mut io.axes;
+        let open = SPINDLES
+            .into_iter()
+            .all(|axis| axes[axis].inputs.position > SPINDLES_OPEN);
+        let stand = SPINDLES.into_iter().all(|axis| axes[axis].stands());
+        let on_block = SPINDLES
+            .into_iter()
+            .all(|axis| ON_BLOCK.contains(&axes[axis].inputs.position));
+        let spindles = |axes: &mut [Axis], mode, torque| {
+            for axis in SPINDLES {
+                axes[axis].want(squeeze(mode, torque));
+            }
+        };
+        let clamping = self.step == Step::Clamp && stand && on_block;
+        let clamped = self.clamped.call(now, clamping, SETTLE);
+        let next = match self.step {
+            Step::Home => {
+                gate(axes, CORE_DROP, false);
+                spindles(axes, Mode::Open, HOLD_TORQUE);
+                let still = Self::draw_back(axes);
+                let back = axes[KNIFE].inputs.position >= CLEAR_OF_BLOCK;
+                (still && back && open && stand).then_some(Step::Ready)
+            }
+            Step::Ready => {
+                if !presented {
+                    return (Nanos::ZERO, LIMIT);
+                }
+                Some(Step::Clamp)
+            }
+            Step::Clamp => {
+                spindles(axes, Mode::Close, CLAMP_TORQUE);
+                clamped.then(|| {
+                    self.holds = true;
+                    Step::Clear
+                })
+            }
+            Step::Clear => {
+                if presented || !clear {
+                    return (Nanos::ZERO, LIMIT);
+                }
+                self.come_near(axes);
+                Some(Step::Approach)
+            }
+            Step::Approach => Self::begin_to_peel(axes).then_some(Step::RoundUp),
+            Step::RoundUp => {
+                self.keep_speed(axes);
+                (axes[KNIFE].inputs.position <= ROUND).then(|| {
+                    gate(axes, VENEER_GATE, true);
+                    gate(axes, ROUND_UP_GATE, false);
+                    axes[KNIFE].want(track(0.0, self.options.thickness));
+                    Step::Peel
+                })
+            }
+            Step::Peel => {
+                self.keep_speed(axes);
+                let wanted = self.wanted_turns(axes);
+                // The first turns are those of a drive that still speeds up.
+                if lasts > WELL && wanted < MOST_TURNS {
+                    self.tally
+                        .kept
+                        .sample(axes[ROTATION].inputs.speed.abs(), wanted);
+                }
+                (axes[KNIFE].inputs.position <= CORE).then_some(Step::Retract)
+            }
+            Step::Retract => Self::draw_back(axes).then(|| {
+                gate(axes, CORE_DROP, true);
+                Step::Drop
+            }),
+            Step::Drop => {
+                if axes[CORE_DROP].stands() {
+                    spindles(axes, Mode::Open, HOLD_TORQUE);
+                }
+                (open && stand).then(|| {
+                    self.holds = false;
+                    self.tally.blocks.fetch_add(1, Relaxed);
+                    Step::Home
+                })
+            }
+        };
+        let most = if self.step == Step::Peel || self.step == Step::RoundUp {
+            PEEL_LIMIT
+        } else {
+            LIMIT
+        };
+        if let Some(next) = next {
+            self.go(next);
+        }
+        (lasts, most)
+    }
+
+    fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
+        let well = self.well.call(now, alive && io.all_healthy(), WELL);
+        if !alive || self.failed {
+            self.failed = !well;
+            if !self.failed {
+                self.restart(io);
+            }
+            return false;
+        }
+        let wrong = if io.all_healthy() {
+            let step = self.step;
+            let (lasts, most) = self.sequence(io, now);
+            (lasts > most).then(|| format!("the step {step:?} takes too long"))
+        } else {
+            Some("an axis is not healthy".to_owned())
+        };
+        let Some(wrong) = wrong else {
+            return true;
+        };
+        log::warn!("lathe: {wrong}; all axes stop, and the sequence begins anew");
+        self.failed = true;
+        self.well = Ton::default();
+        self.tally.faults.fetch_add(1, Relaxed);
+        false
+    }
+}
+
+impl Program for Lathe {
+    fn name(&self) -> &str {
+        Self::NAME
+    }
+
+    fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
+        let place = |name: &str| Io::place(Self::NAME, table, name);
+        self.places = Places {
+            ready: place("lathe ready")?,
+            holds: place("lathe holds block")?,
+            presented: place("block presented")?,
+            clear: place("transfer clear")?,
+        };
+        self.io = Some(Io::new(Self::NAME, table, &AXES, self.options.hold)?);
+        // Until something was heard of the machine, it is not known to be well.
+        self.failed = true;
+        Ok(())
+    }
+
+    fn input_bytes(&self) -> usize {
+        self.io.as_ref().map_or(0, |io| io.input_bytes)
+    }
+
+    fn output_bytes(&self) -> usize {
+        self.io.as_ref().map_or(0, |io| io.output_bytes)
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        let Some(mut io) = self.io.take() else {
+            return;
+        };
+        if io.begin(scan) {
+            let enable = self.solve(&mut io, scan.now, scan.alive);
+            io.switch(self.places.ready, enable && self.step == Step::Ready);
+            io.switch(self.places.holds, self.holds);
+            io.end(scan, enable, &self.tally);
+        }
+        self.io = Some(io);
+    }
+
+    fn report(&self) -> Option<Arc<dyn Report>> {
+        Some(Arc::clone(&self.tally) as _)
+    }
+}

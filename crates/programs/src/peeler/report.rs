@@ -1,0 +1,201 @@
+//! What the two programs tell: commands per axis, blocks, and how well the veneer's speed was kept.
+
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
+
+use tickbus_base::time::Nanos;
+use tickbus_plc::Report;
+
+const SECOND: i64 = 1_000_000_000;
+
+/// What a program has done so far. Written by its scans, which never wait; read by whoever hosts it.
+#[derive(Debug)]
+pub(super) struct Tally {
+    axes: Box<[AxisTally]>,
+    /// Blocks that were passed on.
+    pub(super) blocks: AtomicU64,
+    /// After so many blocks all is done; 0 for never.
+    pub(super) asked: AtomicU64,
+    /// Times that something went wrong and the sequence began anew.
+    pub(super) faults: AtomicU64,
+    /// Times that the simulation was started again.
+    pub(super) restarts: AtomicU64,
+    /// Whether a speed is kept here, and how well.
+    pub(super) kept: Kept,
+}
+
+/// How well a speed was kept, in thousandths of it.
+#[derive(Debug, Default)]
+pub(super) struct Kept {
+    samples: AtomicU64,
+    squares: AtomicU64,
+    most: AtomicU64,
+}
+
+/// The commands of one axis.
+#[derive(Debug)]
+pub(super) struct AxisTally {
+    name: &'static str,
+    commands: AtomicU64,
+    /// Least time between two commands; 0 before the second.
+    least: AtomicI64,
+    last: AtomicI64,
+    /// The second that is being counted: its beginning, and the commands in it.
+    second: AtomicI64,
+    in_second: AtomicU64,
+    /// Commands in the busiest second.
+    busiest: AtomicU64,
+}
+
+impl AxisTally {
+    /// Counts a command at `now`.
+    pub(super) fn count(&self, now: Nanos) {
+        if self.commands.fetch_add(1, Relaxed) > 0 {
+            let span = now.0 - self.last.load(Relaxed);
+            let least = self.least.load(Relaxed);
+            if least == 0 || span < least {
+                self.least.store(span, Relaxed);
+            }
+        }
+        self.last.store(now.0, Relaxed);
+        if now.0 - self.second.load(Relaxed) >= SECOND || self.in_second.load(Relaxed) == 0 {
+            self.second.store(now.0, Relaxed);
+            self.in_second.store(0, Relaxed);
+        }
+        let count = self.in_second.fetch_add(1, Relaxed) + 1;
+        self.busiest.fetch_max(count, Relaxed);
+    }
+}
+
+impl Kept {
+    /// Takes down how far `actual` is from `wanted`.
+    pub(super) fn sample(&self, actual: f64, wanted: f64) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "not negative, and saturating"
+        )]
+        let off = ((actual / wanted - 1.0).abs() * 1_000.0).round() as u64;
+        self.samples.fetch_add(1, Relaxed);
+        self.squares.fetch_add(off.saturating_mul(off), Relaxed);
+        self.most.fetch_max(off, Relaxed);
+    }
+
+    /// Root of the mean square and greatest, in per cent; `None` before the first sample.
+    #[expect(clippy::cast_precision_loss, reason = "for people")]
+    fn per_cent(&self) -> Option<(f64, f64)> {
+        let samples = self.samples.load(Relaxed);
+        let mean = self.squares.load(Relaxed) as f64 / samples as f64;
+        (samples > 0).then(|| (mean.sqrt() / 10.0, self.most.load(Relaxed) as f64 / 10.0))
+    }
+}
+
+impl Tally {
+    pub(super) fn new(axes: impl Iterator<Item = &'static str>) -> Self {
+        let axis = |name| AxisTally {
+            name,
+            commands: AtomicU64::new(0),
+            least: AtomicI64::new(0),
+            last: AtomicI64::new(0),
+            second: AtomicI64::new(0),
+            in_second: AtomicU64::new(0),
+            busiest: AtomicU64::new(0),
+        };
+        Self {
+            axes: axes.map(axis).collect(),
+            blocks: AtomicU64::new(0),
+            asked: AtomicU64::new(0),
+            faults: AtomicU64::new(0),
+            restarts: AtomicU64::new(0),
+            kept: Kept::default(),
+        }
+    }
+
+    /// The axes, in the order of the program.
+    pub(super) fn axes(&self) -> impl Iterator<Item = &AxisTally> {
+        self.axes.iter()
+    }
+
+    /// The busiest axis: its name, its commands in one second, and the least time between two.
+    fn busiest(&self) -> Option<(&'static str, u64, Nanos)> {
+        let busiest = self
+            .axes
+            .iter()
+            .max_by_key(|axis| axis.busiest.load(Relaxed))?;
+        Some((
+            busiest.name,
+            busiest.busiest.load(Relaxed),
+            Nanos(busiest.least.load(Relaxed)),
+        ))
+    }
+
+    fn commands(&self) -> u64 {
+        self.axes
+            .iter()
+            .map(|axis| axis.commands.load(Relaxed))
+            .sum()
+    }
+}
+
+impl Report for Tally {
+    fn write(&self, text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = write!(
+            text,
+            "peeler.blocks={}\npeeler.faults={}\npeeler.restarts={}\npeeler.commands={}\n",
+            self.blocks.load(Relaxed),
+            self.faults.load(Relaxed),
+            self.restarts.load(Relaxed),
+            self.commands(),
+        );
+        for axis in &self.axes {
+            let name = axis.name;
+            let _ = write!(
+                text,
+                "peeler.commands.{name}={}\npeeler.commands_per_s.{name}={}\n\
+                 peeler.command_interval_us.{name}={}\n",
+                axis.commands.load(Relaxed),
+                axis.busiest.load(Relaxed),
+                axis.least.load(Relaxed) / 1_000,
+            );
+        }
+        if let Some((mean, most)) = self.kept.per_cent() {
+            let _ = write!(
+                text,
+                "peeler.speed_error_rms_percent={mean:.2}\npeeler.speed_error_max_percent={most:.1}\n"
+            );
+        }
+    }
+
+    fn summary(&self) -> String {
+        let mut text = format!(
+            "blocks {}, faults {}, restarts of the simulation {}, commands {}\n",
+            self.blocks.load(Relaxed),
+            self.faults.load(Relaxed),
+            self.restarts.load(Relaxed),
+            self.commands(),
+        );
+        if let Some((name, count, least)) = self.busiest().filter(|(_, count, _)| *count > 0) {
+            let _ = writeln!(
+                text,
+                "busiest axis \"{name}\": {count} commands in one second, {least} between two at least"
+            );
+        }
+        if let Some((mean, most)) = self.kept.per_cent() {
+            let _ = writeln!(
+                text,
+                "speed of the veneer kept to {mean:.2} % (root mean square), {most:.1} % at worst"
+            );
+        }
+        text
+    }
+
+    fn is_done(&self) -> bool {
+        let asked = self.asked.load(Relaxed);
+        asked > 0 && self.blocks.load(Relaxed) >= asked
+    }
+
+    fn failure(&self) -> Option<String> {
+        None
+    }
+}

@@ -1,0 +1,159 @@
+//! What a recording has for every tick.
+
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::{Address, DataType, Signal, SignalTable, Slot};
+
+/// How the values of a column are held in a slot, and written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A BOOL: a double that is 0 or 1, or NaN.
+    Bit,
+    /// A double.
+    Real,
+    /// A signed 64-bit integer.
+    Signed,
+    /// An unsigned 64-bit integer.
+    Unsigned,
+    /// A double that counts edges, below 2^32.
+    Count,
+}
+
+impl Kind {
+    /// How the values of a signal of this type are held, which has a scale or not.
+    pub const fn of(data_type: DataType, scaled: bool) -> Self {
+        match data_type {
+            DataType::Bool => Self::Bit,
+            DataType::Lint if !scaled => Self::Signed,
+            DataType::Lword | DataType::Ulint if !scaled => Self::Unsigned,
+            _ => Self::Real,
+        }
+    }
+
+    /// What a recording keeps of a value: a BOOL that is neither 0 nor NaN is 1, and NaN is one NaN.
+    pub fn kept(self, slot: Slot) -> Slot {
+        let value = slot.real();
+        match self {
+            Self::Signed | Self::Unsigned => slot,
+            _ if value.is_nan() => Slot::from_real(f64::NAN),
+            Self::Bit => Slot::from_real(f64::from(u8::from(value != 0.0))),
+            Self::Real | Self::Count => slot,
+        }
+    }
+}
+
+/// One column: a signal, or the edges of one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// The signal's name.
+    pub name: String,
+    /// Whether it counts the signal's edges since the tick before.
+    pub is_edges: bool,
+    /// How its values are held.
+    pub kind: Kind,
+    /// Where the signal lies; unknown in a CSV file.
+    pub address: Option<Address>,
+    /// The signal's type; unknown in a CSV file.
+    pub data_type: Option<DataType>,
+    /// The signal's unit, for people.
+    pub unit: Option<String>,
+    /// The signal's station; empty where there is one station without a name.
+    pub station: String,
+}
+
+impl Column {
+    /// Whether it holds a 64-bit integer as a double, because of a scale.
+    pub(super) fn is_scaled_integer(&self) -> bool {
+        let plain = |data_type| Kind::of(data_type, false) != self.kind;
+        self.kind == Kind::Real && self.data_type.is_some_and(plain)
+    }
+
+    /// Its name for people: `Start button`, or `Start button.edges`.
+    pub fn title(&self) -> String {
+        let edges = if self.is_edges { ".edges" } else { "" };
+        format!("{}{edges}", self.name)
+    }
+}
+
+/// All that a recording has for every tick, and who made it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Columns {
+    /// The driver's name; empty in a CSV file.
+    pub driver: String,
+    /// Which end of the line was recorded: `device` or `controller`; empty in a CSV file.
+    pub role: String,
+    /// The stations, if there is more than one: each has a status of its own.
+    pub stations: Vec<String>,
+    /// The signals in the order of their table, then the edges.
+    pub columns: Vec<Column>,
+}
+
+impl Columns {
+    /// The columns of a driver called `driver` with these signals. `edges` has, per signal, the slot of its
+    /// count of edges, if it has one.
+    pub fn new(driver: &str, role: &str, table: &SignalTable, edges: &[Option<usize>]) -> Self {
+        let column = |signal: &Signal, is_edges| Column {
+            name: signal.name.clone(),
+            is_edges,
+            kind: if is_edges {
+                Kind::Count
+            } else {
+                Kind::of(signal.data_type, signal.scale.is_some())
+            },
+            address: Some(signal.address()),
+            data_type: Some(signal.data_type),
+            unit: signal.unit.clone().filter(|_| !is_edges),
+            station: table.stations[signal.station].name.clone(),
+        };
+        let signals = table.signals.iter().map(|signal| column(signal, false));
+        let counted = table.signals.iter().zip(edges);
+        let counted = counted.filter(|(_, edges)| edges.is_some());
+        let stations = table.stations.iter().map(|station| station.name.clone());
+        Self {
+            driver: driver.to_owned(),
+            role: role.to_owned(),
+            stations: if table.stations.len() > 1 {
+                stations.collect()
+            } else {
+                Vec::new()
+            },
+            columns: signals
+                .chain(counted.map(|(signal, _)| column(signal, true)))
+                .collect(),
+        }
+    }
+
+    /// Where the column of a signal, or of its edges, stands.
+    pub fn position(&self, name: &str, is_edges: bool) -> Option<usize> {
+        self.columns
+            .iter()
+            .position(|column| column.name == name && column.is_edges == is_edges)
+    }
+}
+
+/// One tick of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tick {
+    /// Its number, from 1; where ticks were dropped, numbers are left out.
+    pub number: u64,
+    /// Simulation time.
+    pub time: Nanos,
+    /// The number of its status: 0 fresh, 1 unchanged, 2 stale, negative for errors.
+    pub status: i32,
+    /// Ticks dropped since the recording began, up to this one.
+    pub dropped: u64,
+    /// The status of each of [`Columns::stations`].
+    pub stations: Vec<i32>,
+    /// One value per column.
+    pub values: Vec<Slot>,
+}
+
+impl Tick {
+    /// A tick with room for all `columns`.
+    pub fn new(columns: &Columns) -> Self {
+        Self {
+            stations: vec![0; columns.stations.len()],
+            values: vec![Slot::default(); columns.columns.len()],
+            ..Self::default()
+        }
+    }
+}

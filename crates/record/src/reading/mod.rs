@@ -1,0 +1,202 @@
+//! Reading recordings: tick by tick, in memory that does not grow.
+
+mod csv;
+mod lines;
+mod vcd;
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
+use std::path::Path;
+
+use self::csv::CsvReader;
+use self::vcd::VcdReader;
+use super::{Columns, Format, Tick};
+use tickbus_image::signal::SignalTable;
+
+/// Why a recording cannot be read, or not any further.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{file}{}: {what}; {right}", line.map(|line| format!(":{line}")).unwrap_or_default())]
+pub struct RecordingError {
+    /// The file.
+    pub file: String,
+    /// The line, from 1, where it is one line's fault.
+    pub line: Option<u64>,
+    /// What is wrong.
+    pub what: String,
+    /// What would be right.
+    pub right: String,
+}
+
+/// What a reader finds wrong at its present line.
+#[derive(Debug)]
+struct Fault {
+    what: String,
+    right: String,
+    /// It is no single line's fault.
+    of_file: bool,
+}
+
+impl Fault {
+    fn new(what: impl Into<String>, right: impl Into<String>) -> Self {
+        Self {
+            what: what.into(),
+            right: right.into(),
+            of_file: false,
+        }
+    }
+
+    fn of_file(what: impl Into<String>, right: impl Into<String>) -> Self {
+        Self {
+            of_file: true,
+            ..Self::new(what, right)
+        }
+    }
+
+    fn io(error: &io::Error) -> Self {
+        Self::new(
+            format!("the recording cannot be read: {error}"),
+            "check the file and the disk",
+        )
+    }
+}
+
+/// What to do about a recording that something has damaged.
+const RECORD_AGAIN: &str = "record again, or take a copy that is whole";
+
+enum Reader {
+    Vcd(VcdReader<Box<dyn BufRead + Send>>),
+    Csv(CsvReader<Box<dyn BufRead + Send>>),
+}
+
+/// A recording that is being read.
+pub struct Recording {
+    file: String,
+    columns: Columns,
+    reader: Reader,
+}
+
+impl std::fmt::Debug for Recording {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Recording")
+            .field("file", &self.file)
+            .field("columns", &self.columns)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Recording {
+    /// Opens the recording at `path` and reads its header.
+    ///
+    /// A CSV file does not say what types its columns have: `table` does, where there is one, and else all
+    /// of them are numbers.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read, or is no recording.
+    pub fn open(path: &Path, table: Option<&SignalTable>) -> Result<Self, RecordingError> {
+        let file = path.display().to_string();
+        let refused = |what: String, right: &str| RecordingError {
+            file: file.clone(),
+            line: None,
+            what,
+            right: right.to_owned(),
+        };
+        let format = Format::of(path).map_err(|error| {
+            let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
+            refused(what.to_owned(), right)
+        })?;
+        let opened = File::open(path).and_then(|file| {
+            if file.metadata()?.is_dir() {
+                return Err(io::ErrorKind::IsADirectory.into());
+            }
+            Ok(file)
+        });
+        let opened = opened.map_err(|error| {
+            refused(
+                format!("the recording cannot be read: {error}"),
+                "check the path and the name",
+            )
+        })?;
+        Self::read(
+            &file,
+            format,
+            Box::new(BufReader::with_capacity(1 << 16, opened)),
+            table,
+        )
+    }
+
+    /// The same for a recording that comes from elsewhere; `file` is what errors call it.
+    ///
+    /// # Errors
+    ///
+    /// It is no recording.
+    pub fn read(
+        file: &str,
+        format: Format,
+        from: Box<dyn BufRead + Send>,
+        table: Option<&SignalTable>,
+    ) -> Result<Self, RecordingError> {
+        let placed = |(fault, line): (Fault, u64)| error(file, fault, line);
+        let (reader, columns) = match format {
+            Format::Vcd => {
+                let (reader, columns) = VcdReader::open(from).map_err(placed)?;
+                (Reader::Vcd(reader), columns)
+            }
+            Format::Csv => {
+                let (reader, columns) = CsvReader::open(from, table).map_err(placed)?;
+                (Reader::Csv(reader), columns)
+            }
+        };
+        Ok(Self {
+            file: file.to_owned(),
+            columns,
+            reader,
+        })
+    }
+
+    /// What it has for every tick.
+    pub fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    /// Reads the next tick into `tick`, which must have been made for these columns and must hold the tick
+    /// before; false at the end.
+    ///
+    /// # Errors
+    ///
+    /// What stands there is no tick.
+    pub fn next(&mut self, tick: &mut Tick) -> Result<bool, RecordingError> {
+        let (read, line) = match &mut self.reader {
+            Reader::Vcd(reader) => (reader.next(tick), reader.line()),
+            Reader::Csv(reader) => (reader.next(tick, &self.columns), reader.line()),
+        };
+        read.map_err(|fault| error(&self.file, fault, line))
+    }
+
+    /// Why the recording ends where it does, once it has ended and as far as it says: what its recorder wrote
+    /// last, or that it was cut.
+    pub fn ending(&self) -> String {
+        match &self.reader {
+            Reader::Vcd(reader) => reader.ending(),
+            Reader::Csv(reader) => reader.ending(),
+        }
+    }
+
+    /// Whether the recording ends without having been ended, as after a power failure: known once it has
+    /// ended, and of a CSV file only when the cut is within a line.
+    pub fn is_cut(&self) -> bool {
+        match &self.reader {
+            Reader::Vcd(reader) => reader.is_cut(),
+            Reader::Csv(reader) => reader.is_cut(),
+        }
+    }
+}
+
+fn error(file: &str, fault: Fault, line: u64) -> RecordingError {
+    RecordingError {
+        file: file.to_owned(),
+        line: (!fault.of_file).then_some(line),
+        what: fault.what,
+        right: fault.right,
+    }
+}

@@ -1,0 +1,513 @@
+//! The recorder: what the tick hands over, and the thread that writes it down.
+
+use std::fmt::Write as _;
+use std::fs::{File, OpenOptions};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::columns::{Columns, Tick};
+use super::csv::CsvSink;
+use super::file::{Out, Target};
+use super::places::Place;
+use super::vcd::VcdSink;
+use super::{Format, Options};
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::Slot;
+use tickbus_image::{TickReader, TickWriter, tick_ring};
+
+/// How often the thread looks into the ring. The tick makes no system call, so that it cannot wake it.
+const LOOK: Duration = Duration::from_millis(5);
+
+/// Every so many looks the file gets what there is: what a killed process loses at most is a tenth of a
+/// second.
+const LOOKS_PER_FLUSH: u32 = 20;
+
+/// Bytes that go to the file at once.
+const CHUNK: usize = 64 << 10;
+
+/// So long may the file take nothing while the recording is closed.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Words of a tick in the ring before the statuses of the stations: number, time, status.
+const HEAD: usize = 3;
+
+/// Turns ticks into the bytes of a file.
+pub(super) trait Sink: Send {
+    /// What stands at the beginning.
+    fn header(&mut self, out: &mut Vec<u8>);
+
+    /// One tick; values are as [`Kind::kept`](super::Kind::kept) gives them.
+    fn tick(&mut self, tick: &Tick, out: &mut Vec<u8>);
+
+    /// What stands at the end of a recording that ended in good order.
+    fn end(&mut self, note: &str, out: &mut Vec<u8>);
+}
+
+impl Format {
+    /// A sink for files of this format.
+    pub(super) fn sink(self, columns: Columns) -> Box<dyn Sink> {
+        match self {
+            Self::Vcd => Box::new(VcdSink::new(columns)),
+            Self::Csv => Box::new(CsvSink(columns)),
+        }
+    }
+}
+
+/// What a recorder has done so far; readable from any thread.
+#[derive(Debug, Default)]
+pub struct Tally {
+    file: PathBuf,
+    /// Ticks that were written.
+    ticks: AtomicU64,
+    /// Ticks that were dropped because the ring was full.
+    dropped: AtomicU64,
+    /// Ticks whose time was before that of the tick before them.
+    backwards: AtomicU64,
+    /// Nothing is recorded any more.
+    ended: AtomicBool,
+    /// Why not, if it was an error.
+    error: Mutex<Option<String>>,
+}
+
+impl Tally {
+    /// Why the recording ended before it was told to.
+    pub fn error(&self) -> Option<String> {
+        self.lock_error().clone()
+    }
+
+    /// Appends it, one `key=value` a line.
+    pub fn write(&self, text: &mut String) {
+        let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "record.file={}", self.file.display());
+        let _ = writeln!(text, "record.ticks={}", count(&self.ticks));
+        let _ = writeln!(text, "record.dropped={}", count(&self.dropped));
+        let backwards = count(&self.backwards);
+        if backwards > 0 {
+            let _ = writeln!(text, "record.backwards={backwards}");
+        }
+        if let Some(error) = self.error() {
+            let _ = writeln!(text, "record.error={error}");
+        }
+    }
+
+    fn lock_error(&self) -> MutexGuard<'_, Option<String>> {
+        // A text is whole between any two of its changes.
+        self.error.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Wakes one side of the ring or the other, where either may wait.
+#[derive(Debug, Default)]
+struct Bell {
+    state: Mutex<BellState>,
+    /// There is something to do for the thread that records.
+    work: Condvar,
+    /// There is room in the ring, or nobody who would ever make some.
+    room: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct BellState {
+    stop: bool,
+    rung: bool,
+}
+
+impl Bell {
+    fn lock(&self) -> MutexGuard<'_, BellState> {
+        // Two booleans are whole whatever panicked.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn ring(&self) {
+        self.lock().rung = true;
+        self.work.notify_one();
+    }
+}
+
+/// Records the ticks of one driver; dropping it ends the recording.
+///
+/// What the tick calls, [`record`](Self::record), allocates nothing, and on a free bus it takes no lock and
+/// makes no system call either.
+#[derive(Debug)]
+pub struct Recorder {
+    ring: TickWriter,
+    /// Reserved once, filled in each tick.
+    head: Vec<u64>,
+    slots: usize,
+    lossless: bool,
+    tally: Arc<Tally>,
+    bell: Arc<Bell>,
+    pub(super) close_timeout: Duration,
+    /// Disconnected when the thread ends.
+    ended: Receiver<()>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Why nothing can be recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecorderError {
+    /// Another file, or another moment, would do.
+    #[error("{0}")]
+    File(String),
+    /// The system refused a thread.
+    #[error(
+        "the system refused a thread for the recording: {0}; close other programs or raise the limit"
+    )]
+    Thread(std::io::Error),
+}
+
+/// Whether there is a pipe at `path`: to open it would wait for somebody who reads it.
+#[cfg(unix)]
+fn is_pipe(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt as _;
+
+    std::fs::metadata(path).is_ok_and(|metadata| metadata.file_type().is_fifo())
+}
+
+/// Nothing here waits for a reader.
+#[cfg(not(unix))]
+fn is_pipe(_path: &Path) -> bool {
+    false
+}
+
+/// Makes the file at `path` anew, once it is certain that nobody else of this process uses it. A device is taken as
+/// it is.
+fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
+    let shown = path.display();
+    let cannot = |error: std::io::Error| {
+        RecorderError::File(format!(
+            "{shown}: the recording cannot be made: {error}; check the folder and its permissions"
+        ))
+    };
+    if is_pipe(path) {
+        return Err(RecorderError::File(format!(
+            "{shown}: this is a pipe, and a recording is a file; name a file in [record]"
+        )));
+    }
+    // Nothing is cut before it is known to be nobody's.
+    let open = OpenOptions::new()
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(path);
+    let file = open.map_err(cannot)?;
+    if !file.metadata().map_err(cannot)?.is_file() {
+        return Ok((file, None));
+    }
+    let place = Place::to_record(path, &file)
+        .map_err(cannot)?
+        .map_err(|why| {
+            RecorderError::File(format!("{shown}: {why}; name another file in [record]"))
+        })?;
+    file.set_len(0).map_err(cannot)?;
+    Ok((file, Some(place)))
+}
+
+impl Recorder {
+    /// Creates the file that `options` name, relative to `folder`, and starts the thread that writes it.
+    ///
+    /// When the ring is full, a `lossless` recorder lets the tick wait until there is room; any other drops
+    /// the tick and counts it.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be made or is in use, or the system refused a thread; the text says what to do.
+    pub fn start(
+        options: &Options,
+        folder: &Path,
+        columns: Columns,
+        lossless: bool,
+    ) -> Result<Self, RecorderError> {
+        let path = folder.join(&options.file);
+        let (file, place) = create(&path)?;
+        let words = HEAD + columns.stations.len() + columns.columns.len();
+        let ticks = options.ticks(words);
+        let target = Box::new(file);
+        Self::over(
+            target,
+            options.format,
+            columns,
+            ticks,
+            lossless,
+            path,
+            place,
+        )
+        .map_err(RecorderError::Thread)
+    }
+
+    /// The same over any target.
+    pub(super) fn over(
+        target: Box<dyn Target>,
+        format: Format,
+        columns: Columns,
+        ticks: usize,
+        lossless: bool,
+        path: PathBuf,
+        place: Option<Place>,
+    ) -> std::io::Result<Self> {
+        let head = HEAD + columns.stations.len();
+        let slots = columns.columns.len();
+        let (ring, reader) = tick_ring(ticks, head + slots);
+        let bell = Arc::new(Bell::default());
+        let tally = Arc::new(Tally {
+            file: path,
+            ..Tally::default()
+        });
+        let (end, ended) = mpsc::channel::<()>();
+        let writing = Writing {
+            ring: reader,
+            words: vec![0; head + slots].into(),
+            tick: Tick::new(&columns),
+            kinds: columns.columns.iter().map(|column| column.kind).collect(),
+            sink: format.sink(columns),
+            out: Out::new(target),
+            before: None,
+            tally: Arc::clone(&tally),
+            bell: Arc::clone(&bell),
+            _place: place,
+        };
+        let thread = std::thread::Builder::new()
+            .name("record".to_owned())
+            .spawn(move || {
+                let _end = end;
+                // Dropped before that, so that its file is free by then.
+                let mut writing = writing;
+                writing.run();
+            })?;
+        Ok(Self {
+            ring,
+            head: Vec::with_capacity(head),
+            slots,
+            lossless,
+            tally,
+            bell,
+            close_timeout: CLOSE_TIMEOUT,
+            ended,
+            thread: Some(thread),
+        })
+    }
+
+    /// Records one tick: its number, simulation time and status, the status of each station if there are
+    /// several, and its slots.
+    ///
+    /// # Panics
+    ///
+    /// When there are fewer slots than columns.
+    #[inline]
+    pub fn record(
+        &mut self,
+        number: u64,
+        time: Nanos,
+        status: i32,
+        stations: impl Iterator<Item = i32>,
+        slots: &[Slot],
+    ) {
+        if self.tally.ended.load(Ordering::Relaxed) {
+            return;
+        }
+        let word = |status: i32| i64::from(status).cast_unsigned();
+        self.head.clear();
+        self.head
+            .extend([number, time.0.cast_unsigned(), word(status)]);
+        // Never longer than was reserved.
+        let room = self.head.capacity() - self.head.len();
+        self.head.extend(stations.map(word).take(room));
+        let slots = &slots[..self.slots];
+        if self.lossless && self.ring.is_full() {
+            self.wait_for_room();
+        }
+        if !self.ring.push(&self.head, slots) {
+            self.tally.dropped.fetch_add(1, Ordering::Relaxed);
+        } else if self.lossless && self.ring.is_half_full() {
+            self.bell.ring();
+        }
+    }
+
+    #[cold]
+    fn wait_for_room(&mut self) {
+        self.bell.ring();
+        let mut state = self.bell.lock();
+        while self.ring.is_full() && !self.tally.ended.load(Ordering::Acquire) {
+            let waited = self.bell.room.wait_timeout(state, LOOK);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// What it has done so far.
+    pub fn tally(&self) -> &Arc<Tally> {
+        &self.tally
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.bell.lock().stop = true;
+        self.bell.work.notify_one();
+        let written = || self.tally.ticks.load(Ordering::Relaxed);
+        let mut before = written();
+        while self.ended.recv_timeout(self.close_timeout) == Err(Timeout) {
+            let ticks = written();
+            if ticks == before {
+                log::error!(
+                    "{}: the file has taken nothing for {:?}, and the thread that records is left behind; the \
+                     recording may lack its end, see whether its disc answers",
+                    self.tally.file.display(),
+                    self.close_timeout
+                );
+                return;
+            }
+            before = ticks;
+        }
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            log::error!("{}: the recording panicked", self.tally.file.display());
+        }
+    }
+}
+
+/// The thread's half.
+struct Writing {
+    ring: TickReader,
+    words: Box<[u64]>,
+    tick: Tick,
+    kinds: Box<[super::Kind]>,
+    sink: Box<dyn Sink>,
+    out: Out,
+    /// Number and time of the tick before.
+    before: Option<(u64, Nanos)>,
+    tally: Arc<Tally>,
+    bell: Arc<Bell>,
+    _place: Option<Place>,
+}
+
+impl Writing {
+    fn run(&mut self) {
+        // Whatever happens here, no tick waits for it any more afterwards.
+        let (tally, bell) = (Arc::clone(&self.tally), Arc::clone(&self.bell));
+        let _end = Ended { tally, bell };
+        if let Err(error) = self.write() {
+            let ticks = self.out.ticks();
+            let why = format!("the recording ended with tick {ticks} of the file: {error}");
+            self.tally.ticks.store(ticks, Ordering::Relaxed);
+            // There may be room for a few words where there was none for a tick.
+            if self.out.has_begun() {
+                self.sink.end(&why, self.out.buffer());
+                self.out.whole(ticks);
+                let _ = self.out.flush();
+            }
+            log::error!(
+                "{}: {why}; the run goes on without it; free some space and open the driver again",
+                self.tally.file.display()
+            );
+            *self.tally.lock_error() = Some(why);
+        }
+    }
+
+    fn write(&mut self) -> std::io::Result<()> {
+        self.sink.header(self.out.buffer());
+        self.out.whole(0);
+        self.out.flush()?;
+        let mut looks = 0;
+        loop {
+            let stopped = self.bell.lock().stop;
+            self.drain()?;
+            looks += 1;
+            if stopped {
+                break;
+            }
+            if looks % LOOKS_PER_FLUSH == 0 {
+                self.out.flush()?;
+            }
+            let mut state = self.bell.lock();
+            if !state.stop && !state.rung {
+                let waited = self.bell.work.wait_timeout(state, LOOK);
+                state = waited.unwrap_or_else(PoisonError::into_inner).0;
+            }
+            state.rung = false;
+        }
+        let tally = &self.tally;
+        let ticks = tally.ticks.load(Ordering::Relaxed);
+        let dropped = tally.dropped.load(Ordering::Relaxed);
+        let note = format!("ticks={ticks} dropped={dropped}");
+        self.sink.end(&note, self.out.buffer());
+        self.out.whole(ticks);
+        self.out.flush()
+    }
+
+    /// Writes all that the ring holds.
+    fn drain(&mut self) -> std::io::Result<()> {
+        while self.ring.take(&mut self.words) {
+            self.unpack();
+            self.sink.tick(&self.tick, self.out.buffer());
+            let ticks = self.tally.ticks.fetch_add(1, Ordering::Relaxed) + 1;
+            self.out.whole(ticks);
+            if self.out.pending() >= CHUNK {
+                self.bell.room.notify_one();
+                self.out.flush()?;
+            }
+        }
+        self.bell.room.notify_one();
+        Ok(())
+    }
+
+    /// Makes the tick of its words.
+    fn unpack(&mut self) {
+        #[expect(clippy::cast_possible_truncation, reason = "made from an i32")]
+        let status = |word: u64| word.cast_signed() as i32;
+        let tick = &mut self.tick;
+        let (head, slots) = self.words.split_at(HEAD + tick.stations.len());
+        tick.number = head[0];
+        tick.time = Nanos(head[1].cast_signed());
+        tick.status = status(head[2]);
+        for (place, word) in tick.stations.iter_mut().zip(&head[HEAD..]) {
+            *place = status(*word);
+        }
+        for ((value, word), kind) in tick.values.iter_mut().zip(slots).zip(&self.kinds) {
+            *value = kind.kept(Slot(*word));
+        }
+        let first = (tick.number.saturating_sub(1), Nanos::ZERO);
+        let (number, time) = self.before.unwrap_or(first);
+        let gap = tick.number.saturating_sub(number).saturating_sub(1);
+        if gap > 0 && tick.dropped == 0 {
+            log::warn!(
+                "{}: ticks are dropped, since they come faster than they can be written; the recording has \
+                 gaps, record.dropped counts them; write a larger ring in [record]",
+                self.tally.file.display()
+            );
+        }
+        tick.dropped += gap;
+        // VCD knows no time before the one before.
+        if tick.time < time {
+            if self.tally.backwards.fetch_add(1, Ordering::Relaxed) == 0 {
+                log::warn!(
+                    "{}: simulation time went back from {time} to {} in tick {}; the recording has it at \
+                     {time}",
+                    self.tally.file.display(),
+                    tick.time,
+                    tick.number
+                );
+            }
+            tick.time = time;
+        }
+        self.before = Some((tick.number, tick.time));
+    }
+}
+
+/// Says, when it is dropped, that nothing is recorded any more.
+struct Ended {
+    tally: Arc<Tally>,
+    bell: Arc<Bell>,
+}
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        self.tally.ended.store(true, Ordering::Release);
+        self.bell.room.notify_one();
+    }
+}

@@ -1,0 +1,341 @@
+//! Writing VCD, the value change dump of IEEE 1364, which waveform viewers open.
+//!
+//! A line for each value that changed; last of all, in every tick, the line of the variable `tick`. So a
+//! tick is whole when its line is, and ticks in which nothing else changed are in the file, too. Comments in
+//! the header say what the variables are, since VCD itself has no types, units or free names.
+
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+use vcd::{IdCode, TimescaleUnit, VarType, Writer};
+
+use super::VERSION;
+use super::columns::{Column, Columns, Kind, Tick};
+use super::recorder::Sink;
+use tickbus_image::signal::Area;
+
+/// What an unsigned number of two's complement has for -1 and so on.
+const STATUS_BITS: u32 = 32;
+
+/// A station's name, and one of its areas.
+type Place<'a> = (&'a str, Option<Area>);
+
+/// Writes VCD.
+pub(super) struct VcdSink {
+    columns: Columns,
+    /// What stands behind the values of each column: its identifier.
+    ids: Vec<String>,
+    tick: String,
+    dropped: String,
+    /// The status of the whole, and of each station.
+    status: Vec<String>,
+    /// The tick before.
+    last: Option<Tick>,
+}
+
+impl VcdSink {
+    pub(super) fn new(columns: Columns) -> Self {
+        let mut next = IdCode::FIRST;
+        // Without quotation marks, which are kept for the names in comments.
+        let mut id = || loop {
+            let id = next.to_string();
+            next = next.next();
+            if !id.contains('"') {
+                break id;
+            }
+        };
+        Self {
+            tick: id(),
+            dropped: id(),
+            status: (0..=columns.stations.len()).map(|_| id()).collect(),
+            ids: columns.columns.iter().map(|_| id()).collect(),
+            columns,
+            last: None,
+        }
+    }
+
+    /// Comments, which the reader of recordings understands, in front of the scopes.
+    fn comments(&self) -> Vec<String> {
+        let Self { columns, ids, .. } = self;
+        let mut lines = vec![
+            format!("tickbus recording {VERSION}"),
+            format!("driver {} {}", quoted(&columns.driver), columns.role),
+            format!("tick {}", self.tick),
+            format!("dropped {}", self.dropped),
+            format!("status {}", self.status[0]),
+        ];
+        for (id, station) in self.status[1..].iter().zip(&columns.stations) {
+            lines.push(format!("status {id} station={}", quoted(station)));
+        }
+        for (id, column) in ids.iter().zip(&columns.columns) {
+            let what = if column.is_edges { "edges" } else { "signal" };
+            let mut line = format!("{what} {id}");
+            // Writing to a string cannot fail.
+            if let (Some(address), Some(data_type)) = (column.address, column.data_type) {
+                let _ = write!(line, " {address} {data_type}");
+            }
+            let _ = write!(line, " {}", quoted(&column.name));
+            if column.is_scaled_integer() {
+                line.push_str(" scaled");
+            }
+            if let Some(unit) = &column.unit {
+                let _ = write!(line, " unit={}", quoted(unit));
+            }
+            if !column.station.is_empty() {
+                let _ = write!(line, " station={}", quoted(&column.station));
+            }
+            lines.push(line);
+        }
+        lines
+    }
+
+    /// The scopes with their variables: the driver, in it the bus, and each station's areas.
+    fn scopes(&self, out: &mut Vec<u8>) -> std::io::Result<()> {
+        let mut writer = Writer::new(out);
+        let var = |writer: &mut Writer<_>, kind, width, id: &str, name: &str| {
+            let id: IdCode = id.parse().expect("made by the same crate");
+            writer.var_def(kind, width, id, name, None)
+        };
+        let mut modules = Names::default();
+        writer.add_module(&modules.unique(&self.columns.driver))?;
+        let mut inner = Names::default();
+        writer.add_module(&inner.unique("bus"))?;
+        let mut names = Names::default();
+        let integer = VarType::Integer;
+        var(&mut writer, integer, 64, &self.tick, &names.unique("tick"))?;
+        let name = names.unique("dropped");
+        var(&mut writer, integer, 64, &self.dropped, &name)?;
+        let stations = self.columns.stations.iter();
+        let titles = stations.map(|station| format!("status {station}"));
+        for (id, title) in self
+            .status
+            .iter()
+            .zip(std::iter::once("status".to_owned()).chain(titles))
+        {
+            let name = names.unique(&title);
+            var(&mut writer, integer, STATUS_BITS, id, &name)?;
+        }
+        writer.upscope()?;
+        for (place, members) in self.places() {
+            let (station, area) = place;
+            let name = match (station.is_empty(), area) {
+                (true, Some(area)) => letter(area).to_owned(),
+                (false, Some(area)) => format!("{station} {}", letter(area)),
+                (_, None) => "signals".to_owned(),
+            };
+            writer.add_module(&inner.unique(&name))?;
+            let mut names = Names::default();
+            for index in members {
+                let column = &self.columns.columns[index];
+                let (kind, width) = match column.kind {
+                    Kind::Bit => (VarType::Wire, 1),
+                    Kind::Real => (VarType::Real, 64),
+                    Kind::Signed => (VarType::Integer, 64),
+                    Kind::Unsigned => (VarType::Wire, 64),
+                    Kind::Count => (VarType::Integer, 32),
+                };
+                let name = names.unique(&column.title());
+                var(&mut writer, kind, width, &self.ids[index], &name)?;
+            }
+            writer.upscope()?;
+        }
+        writer.upscope()?;
+        writer.enddefinitions()
+    }
+
+    /// The columns by station and area, in the order in which these first occur.
+    fn places(&self) -> Vec<(Place<'_>, Vec<usize>)> {
+        let mut places: Vec<(Place<'_>, Vec<usize>)> = Vec::new();
+        let place = |column: &'_ Column| column.address.map(|address| address.area);
+        for (index, column) in self.columns.columns.iter().enumerate() {
+            let key = (column.station.as_str(), place(column));
+            match places.iter_mut().find(|(known, _)| *known == key) {
+                Some((_, members)) => members.push(index),
+                None => places.push((key, vec![index])),
+            }
+        }
+        places
+    }
+}
+
+fn letter(area: Area) -> &'static str {
+    match area {
+        Area::Input => "I",
+        Area::Output => "Q",
+    }
+}
+
+impl Sink for VcdSink {
+    fn header(&mut self, out: &mut Vec<u8>) {
+        // Writing to memory cannot fail. No date: two runs that are equal give files that are equal.
+        let _ = writeln!(out, "$version tickbus {} $end", env!("CARGO_PKG_VERSION"));
+        let _ = Writer::new(&mut *out).timescale(1, TimescaleUnit::NS);
+        for line in self.comments() {
+            let _ = writeln!(out, "$comment {line} $end");
+        }
+        let _ = self.scopes(out);
+    }
+
+    fn tick(&mut self, tick: &Tick, out: &mut Vec<u8>) {
+        let last = self.last.as_ref();
+        if last.is_none_or(|last| last.time != tick.time) {
+            let _ = writeln!(out, "#{}", tick.time.0);
+        }
+        if last.is_none() {
+            out.extend_from_slice(b"$dumpvars\n");
+        }
+        for (index, (column, id)) in self.columns.columns.iter().zip(&self.ids).enumerate() {
+            let value = tick.values[index];
+            if last.is_some_and(|last| last.values[index] == value) {
+                continue;
+            }
+            let _ = match column.kind {
+                Kind::Bit if value.real().is_nan() => writeln!(out, "x{id}"),
+                Kind::Bit => writeln!(out, "{}{id}", u8::from(value.real() != 0.0)),
+                Kind::Real => {
+                    out.push(b'r');
+                    real(value.real(), out);
+                    writeln!(out, " {id}")
+                }
+                Kind::Signed | Kind::Unsigned => writeln!(out, "b{:b} {id}", value.unsigned()),
+                Kind::Count => writeln!(out, "b{:b} {id}", count(value.real())),
+            };
+        }
+        let statuses = std::iter::once(&tick.status).chain(&tick.stations);
+        for (index, (status, id)) in statuses.zip(&self.status).enumerate() {
+            let before = last.map(|last| match index {
+                0 => last.status,
+                station => last.stations[station - 1],
+            });
+            if before != Some(*status) {
+                let _ = writeln!(out, "b{status:b} {id}");
+            }
+        }
+        if last.is_none_or(|last| last.dropped != tick.dropped) {
+            let _ = writeln!(out, "b{:b} {}", tick.dropped, self.dropped);
+        }
+        let _ = writeln!(out, "b{:b} {}", tick.number, self.tick);
+        if last.is_none() {
+            out.extend_from_slice(b"$end\n");
+        }
+        match &mut self.last {
+            Some(last) => last.clone_from(tick),
+            none => *none = Some(tick.clone()),
+        }
+    }
+
+    fn end(&mut self, note: &str, out: &mut Vec<u8>) {
+        let _ = writeln!(out, "$comment end {} $end", quoted(note));
+    }
+}
+
+/// Writes a number so that it reads back the same, in at most 30 characters.
+pub(super) fn real(value: f64, out: &mut Vec<u8>) {
+    let size = value.abs();
+    let plain = !value.is_finite() || value == 0.0 || (1e-5..1e16).contains(&size);
+    let _ = if plain {
+        write!(out, "{value}")
+    } else {
+        write!(out, "{value:e}")
+    };
+}
+
+/// A count of edges as the integer that it is.
+pub(super) fn count(value: f64) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "made from a u32; a cast saturates"
+    )]
+    let count = value as u32;
+    count
+}
+
+/// A text in quotes that cannot be taken for the end of a comment, or for more than one line; ASCII, since
+/// not all readers take more.
+fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        if matches!(c, '"' | '\\' | '$') || !c.is_ascii() || c.is_ascii_control() {
+            let _ = write!(out, "\\u{{{:x}}}", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// Names as VCD allows them, each different from those before.
+#[derive(Default)]
+struct Names(HashMap<String, usize>);
+
+impl Names {
+    /// Letters, digits and underscores, not beginning with a digit.
+    fn unique(&mut self, name: &str) -> String {
+        let legal = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+        let mut base: String = name.chars().map(legal).collect();
+        if base.is_empty() || base.starts_with(|c: char| c.is_ascii_digit()) {
+            base.insert(0, '_');
+        }
+        let mut unique = base.clone();
+        // How often the name was wanted is where the search for the next number begins.
+        while self.0.contains_key(&unique) {
+            let wanted = self.0.entry(base.clone()).or_default();
+            *wanted += 1;
+            unique = format!("{base}_{}", *wanted + 1);
+        }
+        self.0.insert(unique.clone(), 0);
+        unique
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_legal_and_stay_apart() {
+        let mut names = Names::default();
+        let seen = [
+            "LA1 position",
+            "LA1.position",
+            "4 way",
+            "",
+            "Förderband",
+            "a",
+        ]
+        .map(|name| names.unique(name));
+        let wanted = [
+            "LA1_position",
+            "LA1_position_2",
+            "_4_way",
+            "_",
+            "F_rderband",
+            "a",
+        ];
+        assert_eq!(seen, wanted);
+    }
+
+    #[test]
+    fn numbers_read_back_and_are_short() {
+        for value in [
+            0.0,
+            -0.0,
+            0.1,
+            1e-300,
+            -1.797_693_134_862_315_7e308,
+            f64::MIN_POSITIVE / 8.0,
+            123_456_789_012_345.6,
+            1e16,
+            f64::INFINITY,
+        ] {
+            let mut text = Vec::new();
+            real(value, &mut text);
+            let text = String::from_utf8(text).expect("ASCII");
+            assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(value.to_bits()));
+            assert!(text.len() <= 30, "{text}");
+        }
+    }
+}

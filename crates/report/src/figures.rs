@@ -1,0 +1,226 @@
+//! Small figures that need no script: SVG within the page.
+
+use std::fmt::Write as _;
+
+use super::html::{count, counted, span};
+use super::statistics::Distribution;
+use tickbus_base::time::{Nanos, Spans};
+
+/// The width of a distribution's figure, in its own units.
+const WIDTH: f64 = 260.0;
+
+/// At most so many bars has a histogram.
+const MOST_BARS: f64 = 48.0;
+
+/// From the median to the maximum, on one logarithmic scale for all `alike`: a box from p50 to p90, a line on to p99,
+/// a dot at the maximum.
+pub(super) fn distribution(of: &Distribution, alike: &[&Distribution]) -> String {
+    let all = || {
+        alike
+            .iter()
+            .flat_map(|d| [d.values[0], d.values[3]])
+            .map(log)
+    };
+    let low = all().fold(f64::INFINITY, f64::min);
+    let high = all().fold(f64::NEG_INFINITY, f64::max);
+    let x = |value: f64| {
+        let share = if high > low {
+            (log(value) - low) / (high - low)
+        } else {
+            0.5
+        };
+        6.0 + share.clamp(0.0, 1.0) * (WIDTH - 12.0)
+    };
+    let [p50, p90, p99, max, _] = of.values.map(x);
+    let width = (p90 - p50).max(2.0);
+    format!(
+        "<svg class=\"box\" viewBox=\"0 0 {WIDTH} 16\" width=\"{WIDTH}\" height=\"16\" aria-hidden=\"true\">\
+         <path class=\"rail\" d=\"M0 8H{WIDTH}\"/><path class=\"line\" d=\"M{p50:.1} 8H{p99:.1}\"/>\
+         <path class=\"thin\" d=\"M{p99:.1} 8H{max:.1}\"/>\
+         <rect class=\"bar\" x=\"{p50:.1}\" y=\"3\" width=\"{width:.1}\" height=\"10\"/>\
+         <circle class=\"dot\" cx=\"{max:.1}\" cy=\"8\" r=\"3.5\"/></svg>"
+    )
+}
+
+/// The logarithm; of what is no more than a thousandth, that of a thousandth.
+fn log(value: f64) -> f64 {
+    value.max(1e-3).log10()
+}
+
+/// A histogram of spans as bars, or a sentence if all are alike.
+pub(super) fn histogram(
+    out: &mut String,
+    what: &str,
+    spans: &Spans,
+    shortest: Nanos,
+    longest: Nanos,
+) {
+    let total = counted(spans.count(), what, &format!("{what}s"));
+    if shortest == longest {
+        let _ = writeln!(out, "<p>{total}, each {} long.</p>", span(shortest));
+        return;
+    }
+    let [p50, p99] = [0.5, 0.99].map(|share| span(spans.quantile(share)));
+    let _ = writeln!(
+        out,
+        "<p>{total}: shortest {}, median {p50}, 99 % at most {p99}, longest {}.</p>",
+        span(shortest),
+        span(longest)
+    );
+    let axis = Axis::new(shortest, longest);
+    let bars = axis.bars(spans);
+    let most = bars.iter().copied().max().unwrap_or(1).max(1);
+    let (wide, high) = (720.0, 160.0);
+    let x = |edge: usize| wide * axis.place(edge);
+    let _ = write!(
+        out,
+        "<figure><svg class=\"histogram\" viewBox=\"0 0 {wide} {}\" role=\"img\" aria-label=\"Histogram of {what}s\">\
+         <path class=\"rail\" d=\"M0 {high}H{wide}\"/>",
+        high + 24.0
+    );
+    for (place, bar) in bars.iter().enumerate().filter(|(_, bar)| **bar > 0) {
+        #[expect(clippy::cast_precision_loss, reason = "places in a figure")]
+        // What is there can be seen, however rare.
+        let height = (*bar as f64 / most as f64 * (high - 12.0)).max(2.0);
+        let _ = write!(
+            out,
+            "<rect class=\"bar\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{height:.1}\">\
+             <title>{} to {}: {}</title></rect>",
+            x(place) + 0.5,
+            high - height,
+            (x(place + 1) - x(place) - 1.0).max(1.0),
+            span(axis.edge(place)),
+            span(axis.edge(place + 1)),
+            count(*bar)
+        );
+    }
+    for (edge, anchor) in [(0, "start"), (axis.bars / 2, "middle"), (axis.bars, "end")] {
+        let (x, y) = (x(edge), high + 16.0);
+        let _ = write!(
+            out,
+            "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
+            span(axis.edge(edge))
+        );
+    }
+    let scale = if axis.is_logarithmic {
+        ", on a logarithmic scale"
+    } else {
+        ""
+    };
+    let _ = writeln!(
+        out,
+        "</svg><figcaption>How many {what}s are how long{scale}; the highest bar has {}.</figcaption></figure>",
+        count(most)
+    );
+}
+
+/// The axis of a histogram, cut into bars that are no narrower than the spans are exact.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    from: f64,
+    to: f64,
+    bars: usize,
+    is_logarithmic: bool,
+}
+
+impl Axis {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "places in a figure; the number of bars is small"
+    )]
+    fn new(shortest: Nanos, longest: Nanos) -> Self {
+        let (from, to) = (shortest.0.max(1) as f64, longest.0.max(2) as f64);
+        let is_logarithmic = to / from > 50.0;
+        let fit = if is_logarithmic {
+            (to / from).ln() / 0.02
+        } else {
+            (to - from) / (0.015 * to)
+        };
+        Self {
+            from,
+            to,
+            bars: fit.clamp(1.0, MOST_BARS) as usize,
+            is_logarithmic,
+        }
+    }
+
+    /// Where, from 0 to 1, the left edge of a bar is.
+    #[expect(clippy::cast_precision_loss, reason = "places in a figure")]
+    fn place(self, edge: usize) -> f64 {
+        edge as f64 / self.bars as f64
+    }
+
+    /// How long a span at the left edge of a bar is.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "between the shortest and the longest"
+    )]
+    fn edge(self, edge: usize) -> Nanos {
+        let (share, Self { from, to, .. }) = (self.place(edge), self);
+        Nanos(if self.is_logarithmic {
+            from * (to / from).powf(share)
+        } else {
+            from + (to - from) * share
+        } as i64)
+    }
+
+    /// How many spans each bar has.
+    fn bars(self, spans: &Spans) -> Vec<u64> {
+        let mut bars = vec![0; self.bars];
+        for (length, count) in spans.steps() {
+            let beyond = (1..self.bars).find(|edge| length < self.edge(*edge));
+            bars[beyond.unwrap_or(self.bars) - 1] += count;
+        }
+        bars
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_histogram_of_one_value_is_a_sentence() {
+        let mut spans = Spans::new();
+        let tick = Nanos::from_millis(1);
+        (0..1500).for_each(|_| spans.record(tick));
+        let mut out = String::new();
+        histogram(&mut out, "interval", &spans, tick, tick);
+        assert_eq!(out, "<p>1,500 intervals, each 1 ms long.</p>\n");
+    }
+
+    #[test]
+    fn the_bars_have_all_spans() {
+        let mut spans = Spans::new();
+        (1..5000).for_each(|micros| spans.record(Nanos::from_micros(micros)));
+        for shortest in [1, 1000, 4990] {
+            let axis = Axis::new(Nanos::from_micros(shortest), Nanos::from_micros(4999));
+            assert_eq!(axis.bars(&spans).iter().sum::<u64>(), 4999);
+            assert!((1..=48).contains(&axis.bars), "{axis:?}");
+            assert_eq!(axis.edge(0), Nanos::from_micros(shortest));
+        }
+    }
+
+    #[test]
+    fn figures_stay_within_their_frame() {
+        let one = |values: [f64; 5]| Distribution {
+            name: String::new(),
+            unit: "µs",
+            count: 1,
+            values,
+        };
+        for values in [
+            [0.0; 5],
+            [1.0, 1.0, 1.0, 1.0, 1.0],
+            [0.1, 2.0, 1e9, 1e9, 5.0],
+        ] {
+            let figure = distribution(&one(values), &[&one(values)]);
+            assert!(
+                !figure.contains("NaN") && !figure.contains("inf"),
+                "{figure}"
+            );
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! Pages as files: the only place of the room that opens any.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::{Contents, DEFAULT_BUDGET, Statistics, read, write};
+use tickbus_record::Recording;
+
+/// Writes a page beside its place first: an old page is there until the new one is whole. Gives its size.
+///
+/// # Errors
+///
+/// The file cannot be written.
+pub fn write_file(contents: &Contents<'_>, path: &Path) -> io::Result<u64> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let part = PathBuf::from(part);
+    let written = (|| {
+        let mut out = BufWriter::new(File::create(&part)?);
+        write(contents, &mut out)?;
+        out.flush()?;
+        let bytes = out.get_ref().metadata()?.len();
+        fs::rename(&part, path)?;
+        Ok(bytes)
+    })();
+    if written.is_err() {
+        let _ = fs::remove_file(&part);
+    }
+    written
+}
+
+/// Makes the page of a recording, beside it and ending with .html, and gives its path. The texts stand on it
+/// under their headings.
+///
+/// # Errors
+///
+/// Nothing of the recording can be read, or the page cannot be written; what would be right stands there, too.
+pub fn page_beside(
+    recording: &Path,
+    title: &str,
+    statistics: Option<&str>,
+    texts: &[(String, String)],
+) -> Result<PathBuf, String> {
+    let mut read_from = Recording::open(recording, None).map_err(|error| error.to_string())?;
+    // What came before a fault of the recording is worth a page, too.
+    let (run, _) = read(&mut read_from, DEFAULT_BUDGET);
+    let statistics = statistics.map(Statistics::read);
+    let file = recording.file_name().unwrap_or(recording.as_os_str());
+    let contents = Contents {
+        title,
+        source: &file.to_string_lossy(),
+        run: &run,
+        steps: None,
+        faults: &[],
+        statistics: statistics.as_ref(),
+        texts,
+    };
+    let page = recording.with_extension("html");
+    match write_file(&contents, &page) {
+        Ok(_) => Ok(page),
+        Err(error) => Err(format!(
+            "{}: the page cannot be written: {error}; check the folder and the disk",
+            page.display()
+        )),
+    }
+}

@@ -1,0 +1,464 @@
+//! The page as a whole.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use super::html::{Json, Text, count, counted, digits, span};
+use super::spans::{self, Span};
+use super::tables::{self, Scale};
+use super::{Kind, MarkKind, Run, Statistics, code, figures};
+use tickbus_base::time::Nanos;
+
+const TEMPLATE: &str = include_str!("template.html");
+const CHART: &str = include_str!("chart.html");
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: [&str; 4] = [
+    include_str!("data.js"),
+    include_str!("draw.js"),
+    include_str!("chart.js"),
+    include_str!("start.js"),
+];
+
+/// How many bars the strip has that shows where in the run something changes.
+const ACTIVITY: usize = 400;
+
+/// Of one band, the chart draws no more than this.
+const MOST_SPANS: usize = 20_000;
+
+/// What a page is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Contents<'a> {
+    /// The heading.
+    pub title: &'a str,
+    /// Where it comes from: one line, such as the recording's file name.
+    pub source: &'a str,
+    /// The run.
+    pub run: &'a Run,
+    /// The signal whose values are numbers of steps; 0 is none.
+    pub steps: Option<usize>,
+    /// Signals that say, while they are on, that there is a fault.
+    pub faults: &'a [usize],
+    /// Statistics of a driver or a PLC program.
+    pub statistics: Option<&'a Statistics>,
+    /// Texts to be shown as they are, each under its heading.
+    pub texts: &'a [(String, String)],
+}
+
+/// What lasted, drawn above the signals.
+struct Band {
+    name: String,
+    kind: &'static str,
+    spans: Vec<Span>,
+}
+
+/// Writes the page.
+///
+/// # Errors
+///
+/// What `out` gives.
+pub fn write(contents: &Contents<'_>, out: &mut dyn Write) -> io::Result<()> {
+    let run = contents.run;
+    let (begin, end) = run.extent();
+    let times = run
+        .signals()
+        .iter()
+        .flat_map(|s| s.changes().iter().map(|change| change.at));
+    let scale = Scale {
+        begin,
+        unit: code::common_unit(begin, times.chain([end])),
+    };
+    let bands = bands(contents);
+    let mut rest = TEMPLATE;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, after) = after.split_once("}}").expect("the template is whole");
+        out.write_all(before.as_bytes())?;
+        rest = after;
+        match name {
+            "title" => write!(out, "{}", Text(contents.title))?,
+            "source" => write!(out, "{}", Text(contents.source))?,
+            "version" => out.write_all(env!("CARGO_PKG_VERSION").as_bytes())?,
+            "style" => out.write_all(STYLE.as_bytes())?,
+            "facts" => out.write_all(facts(contents, &bands).as_bytes())?,
+            "chart" => out.write_all(CHART.as_bytes())?,
+            "sections" => out.write_all(sections(contents, &bands, scale).as_bytes())?,
+            "data" => data(contents, &bands, scale, out)?,
+            "script" => SCRIPT
+                .iter()
+                .try_for_each(|part| out.write_all(part.as_bytes()))?,
+            name => unreachable!("the template has no {name}"),
+        }
+    }
+    out.write_all(rest.as_bytes())
+}
+
+fn bands(contents: &Contents<'_>) -> Vec<Band> {
+    let run = contents.run;
+    let mut bands = Vec::new();
+    for of in spans::concerned(run, MarkKind::Link) {
+        let name = if of.is_empty() {
+            "Data".to_owned()
+        } else {
+            format!("Data, {of}")
+        };
+        bands.push(Band {
+            name,
+            kind: "link",
+            spans: spans::states(run, MarkKind::Link, of),
+        });
+    }
+    let mut faults = spans::events(run, MarkKind::Fault);
+    faults.extend(
+        contents
+            .faults
+            .iter()
+            .flat_map(|signal| spans::while_on(run, *signal)),
+    );
+    faults.sort_by_key(|fault| fault.from);
+    bands.push(Band {
+        name: "Faults".to_owned(),
+        kind: "fault",
+        spans: faults,
+    });
+    bands.push(Band {
+        name: "Not recorded".to_owned(),
+        kind: "gap",
+        spans: spans::events(run, MarkKind::Gap),
+    });
+    bands.push(Band {
+        name: "Steps".to_owned(),
+        kind: "step",
+        spans: spans::steps(run, contents.steps),
+    });
+    bands.push(Band {
+        name: "Notes".to_owned(),
+        kind: "note",
+        spans: spans::events(run, MarkKind::Note),
+    });
+    bands.retain(|band| !band.spans.is_empty());
+    for band in bands
+        .iter_mut()
+        .filter(|band| band.spans.len() > MOST_SPANS)
+    {
+        let _ = write!(band.name, ", the first {}", count(MOST_SPANS as u64));
+    }
+    bands
+}
+
+/// The class of a state of a line, by its word.
+pub(super) fn state_class(word: &str) -> &'static str {
+    match word {
+        "running" | "live" => "good",
+        "stale" => "stale",
+        "failed" => "bad",
+        _ => "idle",
+    }
+}
+
+fn of_kind<'b>(bands: &'b [Band], kind: &'b str) -> impl Iterator<Item = &'b Span> {
+    bands
+        .iter()
+        .filter(move |band| band.kind == kind)
+        .flat_map(|band| &band.spans)
+}
+
+fn facts(contents: &Contents<'_>, bands: &[Band]) -> String {
+    let run = contents.run;
+    let (begin, end) = run.extent();
+    let changes: u64 = run
+        .signals()
+        .iter()
+        .map(|signal| signal.seen().saturating_sub(1))
+        .sum();
+    let mut out = String::new();
+    let mut fact = |name: &str, value: &str, class: &str| {
+        let _ = writeln!(
+            out,
+            "<div class=\"{class}\"><dt>{name}</dt><dd>{}</dd></div>",
+            Text(value)
+        );
+    };
+    fact("Simulated", &span(end - begin), "");
+    fact("Ticks", &count(run.ticks()), "");
+    fact("Signals", &count(run.signals().len() as u64), "");
+    fact("Changes", &count(changes), "");
+    let steps = of_kind(bands, "step").count();
+    if steps > 0 {
+        fact("Steps", &count(steps as u64), "");
+    }
+    if let Some(share) = share_good(bands) {
+        let text = format!("{} %", digits((share * 1000.0).floor() / 10.0));
+        fact(
+            "Data live",
+            &text,
+            if share < 1.0 { "warn" } else { "good" },
+        );
+    }
+    let faults = of_kind(bands, "fault").count() as u64;
+    let (text, class) = if faults == 0 {
+        ("none".to_owned(), "good")
+    } else {
+        (count(faults), "bad")
+    };
+    fact("Faults", &text, class);
+    let gaps = of_kind(bands, "gap").count() as u64;
+    let (text, class) = if gaps == 0 {
+        ("complete".to_owned(), "good")
+    } else {
+        (counted(gaps, "gap", "gaps"), "warn")
+    };
+    fact("Recording", &text, class);
+    out
+}
+
+/// For which share of the time all lines were live; none if nothing is known of them.
+#[expect(clippy::cast_precision_loss, reason = "a share, for people")]
+fn share_good(bands: &[Band]) -> Option<f64> {
+    let (mut good, mut all) = (0_i64, 0_i64);
+    for state in of_kind(bands, "link") {
+        let length = (state.until - state.from).0;
+        all = all.saturating_add(length);
+        let word = state.text.split(": ").next().unwrap_or_default();
+        if state_class(word) == "good" {
+            good = good.saturating_add(length);
+        }
+    }
+    (all > 0).then(|| good as f64 / all as f64)
+}
+
+fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> String {
+    let run = contents.run;
+    let mut out = String::new();
+    let section = |out: &mut String, id: &str, heading: &str, inner: String| {
+        if !inner.is_empty() {
+            let heading = Text(heading);
+            let _ = write!(
+                out,
+                "<section id=\"{id}\">\n<h2>{heading}</h2>\n{inner}</section>\n"
+            );
+        }
+    };
+    let mut inner = String::new();
+    let of = |kind| of_kind(bands, kind).cloned().collect::<Vec<_>>();
+    let steps = of("step");
+    if !steps.is_empty() {
+        tables::steps(&mut inner, &steps, scale);
+    }
+    section(&mut out, "steps", "Steps", std::mem::take(&mut inner));
+
+    let named = |kind, name| of(kind).into_iter().map(move |span| (name, span));
+    let mut events: Vec<_> = named("fault", "Fault")
+        .chain(named("gap", "Gap"))
+        .chain(named("note", "Note"))
+        .collect();
+    events.sort_by_key(|(_, event)| event.from);
+    if events.is_empty() {
+        inner.push_str("<p>No faults and no gaps were recorded.</p>\n");
+    } else {
+        tables::events(&mut inner, &events, scale);
+    }
+    if run.marks_left_out() > 0 {
+        let more = counted(run.marks_left_out(), "more was", "more were");
+        let _ = writeln!(
+            inner,
+            "<p class=\"note\">{more} recorded, and not taken into this report.</p>"
+        );
+    }
+    section(
+        &mut out,
+        "faults",
+        "Faults and gaps",
+        std::mem::take(&mut inner),
+    );
+
+    let states = of("link");
+    if let Some(statistics) = contents.statistics {
+        line(&mut inner, statistics);
+    }
+    if !states.is_empty() {
+        tables::states(&mut inner, &states, scale);
+    }
+    section(
+        &mut out,
+        "link",
+        "State of the line",
+        std::mem::take(&mut inner),
+    );
+
+    if let Some((intervals, shortest, longest)) = run.intervals() {
+        inner.push_str("<h3>From one tick to the next, in simulation time</h3>\n");
+        figures::histogram(&mut inner, "interval", intervals, shortest, longest);
+    }
+    if let Some(statistics) = contents
+        .statistics
+        .filter(|statistics| !statistics.distributions().is_empty())
+    {
+        inner.push_str("<h3>Distributions from the statistics</h3>\n");
+        tables::distributions(&mut inner, &statistics.distributions());
+    }
+    section(&mut out, "timing", "Timing", std::mem::take(&mut inner));
+
+    for (place, (heading, text)) in contents.texts.iter().enumerate() {
+        let _ = writeln!(inner, "<pre tabindex=\"0\">{}</pre>", Text(text.trim_end()));
+        section(
+            &mut out,
+            &format!("text{place}"),
+            heading,
+            std::mem::take(&mut inner),
+        );
+    }
+    figures_of_signals(&mut inner, contents);
+    section(&mut out, "figures", "In figures", inner);
+    out
+}
+
+/// What the statistics say of the line as it is at the end.
+fn line(out: &mut String, statistics: &Statistics) {
+    let Some(state) = statistics.get("state") else {
+        return;
+    };
+    let class = state_class(state);
+    let _ = write!(
+        out,
+        "<p>At the end: <span class=\"tag {class}\">{}</span>",
+        Text(state)
+    );
+    if let Some(reason) = statistics.get("reason") {
+        let _ = write!(out, " {}", Text(reason));
+    }
+    if let Some(address) = statistics.get("address") {
+        let _ = write!(out, " ({})", Text(address));
+    }
+    out.push_str("</p>\n");
+    let entered = statistics.all().iter().filter_map(|(key, value)| {
+        let state = key.strip_prefix("link.")?;
+        (value != "0").then(|| format!("{} {}", Text(state), Text(value)))
+    });
+    let entered: Vec<String> = entered.collect();
+    if !entered.is_empty() {
+        let _ = writeln!(
+            out,
+            "<p>How often each state was entered: {}.</p>",
+            entered.join(", ")
+        );
+    }
+}
+
+fn figures_of_signals(out: &mut String, contents: &Contents<'_>) {
+    let run = contents.run;
+    let signals = counted(run.signals().len() as u64, "signal", "signals");
+    let _ = writeln!(
+        out,
+        "<details><summary>{signals}: changes, least, greatest, last value</summary>"
+    );
+    tables::signals(out, run);
+    out.push_str("</details>\n");
+    if let Some(statistics) = contents
+        .statistics
+        .filter(|statistics| !statistics.is_empty())
+    {
+        let all = counted(statistics.all().len() as u64, "line", "lines");
+        let _ = writeln!(out, "<details><summary>All statistics: {all}</summary>");
+        tables::statistics(out, statistics);
+        out.push_str("</details>\n");
+    }
+}
+
+/// What the script works with: the run as JSON, and a packed block for each signal.
+fn data(
+    contents: &Contents<'_>,
+    bands: &[Band],
+    scale: Scale,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let run = contents.run;
+    let (begin, end) = run.extent();
+    let signals = run.signals();
+    let mut codings = Vec::with_capacity(signals.len());
+    for (number, signal) in signals.iter().enumerate() {
+        let (coding, block) = code::block(signal.changes(), begin, scale.unit);
+        codings.push(coding);
+        writeln!(
+            out,
+            "<script type=\"text/plain\" id=\"b{number}\">{block}</script>"
+        )?;
+    }
+    write!(
+        out,
+        "<script type=\"application/json\" id=\"run\">{{\"begin\":\"{}\",\"unit\":{},\"end\":{},\"activity\":{:?},\n\"signals\":[",
+        begin.0,
+        scale.unit,
+        scale.units(end),
+        activity(run)
+    )?;
+    for (number, (signal, coding)) in signals.iter().zip(codings).enumerate() {
+        let kind = match signal.kind {
+            Kind::Bool => "bool",
+            Kind::Real => "real",
+        };
+        let comma = if number > 0 { "," } else { "" };
+        write!(
+            out,
+            "{comma}\n{{\"name\":{},\"kind\":\"{kind}\",\"unit\":{},\"count\":{},\"coding\":\"{}\"",
+            Json(&signal.name),
+            Json(&signal.unit),
+            signal.changes().len(),
+            coding.name()
+        )?;
+        // Infinite numbers are none in JSON, and no chart can show them.
+        if let Some((low, high)) = signal
+            .range()
+            .filter(|(low, high)| low.is_finite() && high.is_finite())
+        {
+            write!(out, ",\"low\":{low:?},\"high\":{high:?}")?;
+        }
+        if signal.resolution() > Nanos::ZERO {
+            write!(out, ",\"resolution\":{}", Json(&span(signal.resolution())))?;
+        }
+        out.write_all(b"}")?;
+    }
+    out.write_all(b"],\n\"bands\":[")?;
+    for (number, band) in bands.iter().enumerate() {
+        let comma = if number > 0 { "," } else { "" };
+        write!(
+            out,
+            "{comma}\n{{\"name\":{},\"kind\":\"{}\",\"spans\":[",
+            Json(&band.name),
+            band.kind
+        )?;
+        for (number, span) in band.spans.iter().take(MOST_SPANS).enumerate() {
+            let comma = if number > 0 { "," } else { "" };
+            let word = span.text.split(": ").next().unwrap_or_default();
+            let class = if band.kind == "link" {
+                state_class(word)
+            } else {
+                band.kind
+            };
+            let (from, until) = (scale.units(span.from), scale.units(span.until));
+            let text = if band.kind == "link" {
+                word
+            } else {
+                &span.text
+            };
+            write!(out, "{comma}[{from},{until},\"{class}\",{}]", Json(text))?;
+        }
+        out.write_all(b"]}")?;
+    }
+    out.write_all(b"]}</script>\n")
+}
+
+/// How many changes each of equal parts of the run has.
+fn activity(run: &Run) -> Vec<u64> {
+    let (begin, end) = run.extent();
+    let length = i128::from((end - begin).0) + 1;
+    let mut bars = vec![0; ACTIVITY];
+    for signal in run.signals() {
+        // The first change is the first value, no change.
+        for change in signal.changes().iter().skip(1) {
+            let bar = i128::from((change.at - begin).0) * ACTIVITY as i128 / length;
+            if let Some(bar) = usize::try_from(bar).ok().and_then(|bar| bars.get_mut(bar)) {
+                *bar += 1;
+            }
+        }
+    }
+    bars
+}

@@ -1,0 +1,310 @@
+//! Conditions on signals, as a test file writes them.
+
+use std::fmt;
+
+use tickbus_base::toml_text::{short_number, shown};
+use tickbus_fieldbus::faults::{self, unknown};
+use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
+
+use super::watch::{Watch, real};
+
+/// A condition on one signal: those of faults, and what only a test asks for.
+///
+/// | text | holds when |
+/// |---|---|
+/// | `NAME`, `not NAME` | it is on, it is off |
+/// | `NAME == 3`, `!=`, `<`, `<=`, `>`, `>=` | it compares so |
+/// | `NAME == 120 ± 0.5` (or `+- 0.5`) | it is that near |
+/// | `NAME rises`, `NAME falls` | it has gone on, off, since the wait began |
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condition {
+    /// Index of the signal in the table.
+    pub signal: usize,
+    /// What must be true of it.
+    pub demand: Demand,
+}
+
+/// What must be true of a signal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Demand {
+    /// It is not 0.
+    On,
+    /// It is 0.
+    Off,
+    /// It compares as the text says.
+    Compares(faults::Condition, String),
+    /// It differs from a number by no more than another.
+    Near(f64, f64),
+    /// It is a 64-bit integer with these bits, which is nearly this number.
+    Is(Slot, f64),
+    /// It has gone from 0 to something else since the wait began.
+    Rises,
+    /// It has gone to 0 since the wait began.
+    Falls,
+}
+
+/// What is wrong with a text, and what would be right.
+type Wrong = (String, String);
+
+impl Condition {
+    /// Reads a condition on a signal of `table`.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong, and what would be right: there is no such signal, or nothing that it is compared with.
+    pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Wrong> {
+        let text = text.trim();
+        if let Some(signal) = table.position(text) {
+            return bit(signal, Demand::On, table);
+        }
+        let ending = |ending, demand| Some((text.strip_suffix(ending)?.trim(), demand));
+        let special = text
+            .strip_prefix("not ")
+            .map(|name| (name.trim(), Demand::Off))
+            .or_else(|| ending(" rises", Demand::Rises))
+            .or_else(|| ending(" falls", Demand::Falls));
+        match special.map(|(name, demand)| (table.position(name), name, demand)) {
+            Some((Some(signal), _, Demand::Off)) => return bit(signal, Demand::Off, table),
+            Some((Some(signal), _, demand)) => return Ok(Self { signal, demand }),
+            Some((None, name, _)) if !name.contains(['<', '>', '=']) => {
+                return Err(unknown(name, table));
+            }
+            _ => {}
+        }
+        let around = text.split_once('±').or_else(|| text.split_once("+-"));
+        if let Some((comparison, tolerance)) = around {
+            return near(comparison, tolerance, table);
+        }
+        Self::compares(text, table)
+    }
+
+    fn compares(text: &str, table: &SignalTable) -> Result<Self, Wrong> {
+        let condition = faults::Condition::parse(text, table)?;
+        let signal = condition.signal();
+        if table.signals[signal].data_type == DataType::Bool {
+            let mut on = vec![Slot::default(); table.signals.len()];
+            on[signal] = Slot::from_real(1.0);
+            let demand = if condition.holds(&on) {
+                Demand::On
+            } else {
+                Demand::Off
+            };
+            return Ok(Self { signal, demand });
+        }
+        let words = text.strip_prefix(table.signals[signal].name.as_str());
+        let words = words.unwrap_or(text).trim();
+        let words = words.strip_prefix("==").unwrap_or(words).trim().to_owned();
+        let demand = Demand::Compares(condition, words);
+        Ok(Self { signal, demand })
+    }
+
+    /// Whether it holds for a signal that is as `watch` and `slots` have it; edges count from the bookmark on.
+    pub(super) fn holds(&self, watch: &Watch, slots: &[Slot], since: Bookmark) -> bool {
+        match &self.demand {
+            Demand::On => watch.value() != 0.0,
+            Demand::Off => watch.value() == 0.0,
+            Demand::Near(number, tolerance) => (watch.value() - number).abs() <= *tolerance,
+            Demand::Is(slot, _) => slots[self.signal] == *slot,
+            Demand::Compares(condition, _) => condition.holds(slots),
+            Demand::Rises => watch.rises() > since.rises,
+            Demand::Falls => watch.falls() > since.falls,
+        }
+    }
+
+    /// Whether it is about an edge and not a level.
+    pub(super) const fn is_edge(&self) -> bool {
+        matches!(self.demand, Demand::Rises | Demand::Falls)
+    }
+}
+
+impl Demand {
+    /// The signal has the value of this slot, as near as its type can have it.
+    pub(super) fn equal(slot: Slot, signal: &Signal) -> Self {
+        let number = real(slot, signal);
+        match signal.data_type {
+            DataType::Bool if number == 0.0 => Self::Off,
+            DataType::Bool => Self::On,
+            _ if signal.is_integer_slot() => Self::Is(slot, number),
+            _ => Self::Near(
+                number,
+                signal.scale.map_or(0.0, |scale| scale.gain.abs() / 2.0),
+            ),
+        }
+    }
+}
+
+/// Where the counts of edges stood when a wait began.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bookmark {
+    rises: u64,
+    falls: u64,
+}
+
+impl Bookmark {
+    pub(super) fn of(watch: &Watch) -> Self {
+        Self {
+            rises: watch.rises(),
+            falls: watch.falls(),
+        }
+    }
+}
+
+/// What is expected, after the name of the signal: `on`, `> 3`.
+impl fmt::Display for Demand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::On => f.write_str("on"),
+            Self::Off => f.write_str("off"),
+            Self::Compares(_, words) => f.write_str(words),
+            Self::Near(number, tolerance) if *tolerance == 0.0 => {
+                f.write_str(&short_number(*number))
+            }
+            Self::Near(number, tolerance) => {
+                write!(
+                    f,
+                    "{} ± {}",
+                    short_number(*number),
+                    short_number(*tolerance)
+                )
+            }
+            Self::Is(_, number) => f.write_str(&short_number(*number)),
+            Self::Rises => f.write_str("a rising edge"),
+            Self::Falls => f.write_str("a falling edge"),
+        }
+    }
+}
+
+/// A condition that only a BOOL can meet.
+fn bit(signal: usize, demand: Demand, table: &SignalTable) -> Result<Condition, Wrong> {
+    // Faults know what to say of other types.
+    faults::Condition::parse(&table.signals[signal].name, table)?;
+    Ok(Condition { signal, demand })
+}
+
+/// `NAME == 120 ± 0.5`, cut at its sign.
+fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condition, Wrong> {
+    let condition = Condition::compares(comparison.trim(), table)?;
+    let Some((_, number)) = comparison.split_once("==") else {
+        return Err((
+            "a tolerance stands at a sign other than ==".to_owned(),
+            "write == for it, or leave the tolerance out".to_owned(),
+        ));
+    };
+    let name = &table.signals[condition.signal].name;
+    let parsed = |text: &str| {
+        let number = text.trim().parse::<f64>().ok();
+        let wrong = || {
+            (
+                format!("\"{}\" is no number", shown(text.trim())),
+                format!("write such as \"{} == 120 ± 0.5\"", shown(name)),
+            )
+        };
+        number.filter(|number| number.is_finite()).ok_or_else(wrong)
+    };
+    let (middle, tolerance) = (parsed(number)?, parsed(tolerance)?);
+    if tolerance < 0.0 {
+        return Err((
+            format!("a tolerance of {tolerance} lets nothing through"),
+            "write 0 or more".to_owned(),
+        ));
+    }
+    Ok(Condition {
+        signal: condition.signal,
+        demand: Demand::Near(middle, tolerance),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tickbus_driver_cfg::Config;
+
+    fn table() -> SignalTable {
+        let text = "[driver]\nid = 1\nname = \"T\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"l\"\n\
+                    [[signal]]\nname = \"Not OK\"\naddress = \"%IX0.0\"\n\
+                    [[signal]]\nname = \"Level >= 3\"\naddress = \"%IX0.1\"\n\
+                    [[signal]]\nname = \"Height\"\naddress = \"%QW2\"\ntype = \"INT\"\nunit = \"mm\"\n";
+        Config::parse("t", text)
+            .unwrap_or_else(|mistakes| panic!("{mistakes}"))
+            .table
+    }
+
+    #[test]
+    fn conditions_read_as_they_are_written() {
+        let table = table();
+        for (text, signal, demand) in [
+            ("Not OK", 0, "on"),
+            (" not Not OK", 0, "off"),
+            ("Not OK == 1", 0, "on"),
+            ("Not OK == false", 0, "off"),
+            ("Not OK != 1", 0, "off"),
+            ("Not OK rises", 0, "a rising edge"),
+            ("Not OK falls", 0, "a falling edge"),
+            ("Level >= 3", 1, "on"),
+            ("Level >= 3 == 0", 1, "off"),
+            ("not Level >= 3", 1, "off"),
+            ("Height > 3", 2, "> 3"),
+            ("Height<=-2.5 mm", 2, "<=-2.5 mm"),
+            ("Height == 7", 2, "7"),
+            ("Height == 120 ± 0.5", 2, "120 ± 0.5"),
+            ("Height == 120 +- 0.5", 2, "120 ± 0.5"),
+        ] {
+            let read = Condition::parse(text, &table).expect(text);
+            assert_eq!(
+                (read.signal, read.demand.to_string()),
+                (signal, demand.to_owned()),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_what_can() {
+        let table = table();
+        for (text, told) in [
+            (
+                "Heigth > 3",
+                "there is no signal \"Heigth\"; did you mean \"Height\"?",
+            ),
+            (
+                "not Heigth",
+                "there is no signal \"Heigth\"; did you mean \"Height\"?",
+            ),
+            (
+                "Heigth rises",
+                "there is no signal \"Heigth\"; did you mean \"Height\"?",
+            ),
+            (
+                "",
+                "no signal is named; signals are Not OK, Level >= 3, Height",
+            ),
+            (
+                "not Height",
+                "\"Height\" is no BOOL, and cannot be true by itself; compare it, such as \"Height > 0\"",
+            ),
+            (
+                "Not OK > 1",
+                "\"Not OK > 1\" never changes; \"Not OK\" (BOOL) goes from 0 to 1",
+            ),
+            (
+                "Height == 40000",
+                "\"Height == 40000\" never changes; \"Height\" (INT) goes from -32768 to 32767 mm",
+            ),
+            (
+                "Height == 1 ± -2",
+                "a tolerance of -2 lets nothing through; write 0 or more",
+            ),
+            (
+                "Height == 1 ± x",
+                "\"x\" is no number; write such as \"Height == 120 ± 0.5\"",
+            ),
+            (
+                "Height > 1 ± 2",
+                "a tolerance stands at a sign other than ==; write == for it, or leave the tolerance out",
+            ),
+        ] {
+            let (what, right) = Condition::parse(text, &table).expect_err(text);
+            assert_eq!(format!("{what}; {right}"), told);
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! A recording in the place of the machine: what its sensors showed then, they show again.
+
+use std::path::{Path, PathBuf};
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{nearest, shown};
+use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
+use tickbus_record::{Kind, Recording, RecordingError, Tick};
+
+use super::suite::Place;
+
+/// A recording that fits a signal table.
+#[derive(Clone, Debug)]
+pub(super) struct Tape {
+    file: PathBuf,
+    /// Column and signal of what the machine sent.
+    sent: Vec<(usize, usize)>,
+    /// Column and signal of what the PLC must send as it did then.
+    compared: Vec<(usize, usize)>,
+    /// Where the test file says so.
+    pub(super) place: Place,
+}
+
+/// What is wrong with a recording, and what would be right.
+type Wrong = (String, String);
+
+impl Tape {
+    /// Opens the recording at `file`, which must have signals of `table`; `own` is the area that the machine
+    /// writes.
+    pub(super) fn open(
+        file: &Path,
+        table: &SignalTable,
+        own: Area,
+        place: Place,
+    ) -> Result<Self, Wrong> {
+        let recording = Recording::open(file, Some(table))
+            .map_err(|error| (format!("{}: {}", file.display(), error.what), error.right))?;
+        let mut sent = Vec::new();
+        for (index, signal) in table.signals.iter().enumerate() {
+            if signal.area == own
+                && let Some(column) = column(&recording, signal)?
+            {
+                sent.push((column, index));
+            }
+        }
+        if sent.is_empty() {
+            return Err((
+                format!("{} has no signal that the PLC reads", file.display()),
+                "use a recording of a driver with this signal table".to_owned(),
+            ));
+        }
+        Ok(Self {
+            file: file.to_owned(),
+            sent,
+            compared: Vec::new(),
+            place,
+        })
+    }
+
+    /// Adds a signal that the PLC must send as it did then.
+    pub(super) fn compare(&mut self, index: usize, table: &SignalTable) -> Result<(), Wrong> {
+        let signal = &table.signals[index];
+        let recording =
+            Recording::open(&self.file, Some(table)).map_err(|error| (error.what, error.right))?;
+        let Some(column) = column(&recording, signal)? else {
+            let names = recording.columns().columns.iter();
+            let near = nearest(&signal.name, names.map(|column| column.name.as_str()));
+            let right = near.map_or_else(
+                || "compare signals that were recorded".to_owned(),
+                |near| format!("it has \"{near}\""),
+            );
+            return Err((
+                format!("the recording has no \"{}\"", shown(&signal.name)),
+                right,
+            ));
+        };
+        self.compared.push((column, index));
+        Ok(())
+    }
+
+    /// Its file, as messages name it.
+    pub(super) fn name(&self) -> String {
+        self.file.display().to_string()
+    }
+}
+
+/// The column of a signal, if the recording has one, and if it is of the same kind.
+fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Wrong> {
+    let columns = recording.columns();
+    let Some(index) = columns.position(&signal.name, false) else {
+        return Ok(None);
+    };
+    let column = &columns.columns[index];
+    let moved = column.address.is_some_and(|was| was.area != signal.area);
+    if moved || column.kind != kind(signal) {
+        return Err((
+            format!(
+                "\"{}\" ({} {}) is another signal in this recording",
+                shown(&signal.name),
+                signal.address(),
+                signal.data_type
+            ),
+            "use a recording of a driver with this signal table".to_owned(),
+        ));
+    }
+    Ok(Some(index))
+}
+
+fn kind(signal: &Signal) -> Kind {
+    Kind::of(signal.data_type, signal.scale.is_some())
+}
+
+/// A signal that is not as it was recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Difference {
+    pub(super) signal: usize,
+    pub(super) expected: Slot,
+    /// The number of the recorded tick.
+    pub(super) tick: u64,
+}
+
+/// A recording that is being played.
+#[derive(Debug)]
+pub(super) struct Playback<'a> {
+    tape: &'a Tape,
+    recording: Recording,
+    next: Tick,
+    more: bool,
+    present: Tick,
+    /// Whether a recorded tick fell on this tick.
+    taken: bool,
+    offset: Option<Nanos>,
+}
+
+impl<'a> Playback<'a> {
+    pub(super) fn start(tape: &'a Tape, table: &SignalTable) -> Result<Self, RecordingError> {
+        let mut recording = Recording::open(&tape.file, Some(table))?;
+        let mut next = Tick::new(recording.columns());
+        let more = recording.next(&mut next)?;
+        Ok(Self {
+            tape,
+            present: next.clone(),
+            recording,
+            next,
+            more,
+            taken: false,
+            offset: None,
+        })
+    }
+
+    /// One tick that ends at `now`: sets what the sensors showed. The first recorded tick falls on the first one.
+    pub(super) fn step(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), RecordingError> {
+        let offset = *self.offset.get_or_insert(now - self.next.time);
+        self.taken = false;
+        while self.more && self.next.time + offset <= now {
+            self.present.clone_from(&self.next);
+            self.taken = true;
+            self.more = self.recording.next(&mut self.next)?;
+        }
+        if self.taken {
+            for (column, signal) in &self.tape.sent {
+                slots[*signal] = self.present.values[*column];
+            }
+        }
+        Ok(())
+    }
+
+    /// The first signal that the PLC sends otherwise than it did then.
+    pub(super) fn difference(&self, slots: &[Slot], signals: &[Signal]) -> Option<Difference> {
+        if !self.taken {
+            return None;
+        }
+        let differs = |(column, signal): &&(usize, usize)| {
+            let kept = kind(&signals[*signal]).kept(slots[*signal]);
+            kept != self.present.values[*column]
+        };
+        let (column, signal) = self.tape.compared.iter().find(differs)?;
+        Some(Difference {
+            signal: *signal,
+            expected: self.present.values[*column],
+            tick: self.present.number,
+        })
+    }
+}

@@ -1,0 +1,349 @@
+//! Running one test.
+
+use std::path::Path;
+
+use tickbus_base::time::{Manual, Nanos};
+use tickbus_driver::{Code, Driver, DriverError};
+use tickbus_image::signal::{Signal, Slot};
+use tickbus_record as record;
+
+use super::condition::{Bookmark, Condition};
+use super::machine::Stub;
+use super::playback::{Difference, Playback, Tape};
+use super::suite::{Passage, Place, Step, Suite, Test};
+use super::watch::{Watch, moment, real, span, text_of};
+
+/// What came of one test.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ran {
+    /// Ticks that have passed.
+    pub ticks: u64,
+    /// Simulation time that has passed.
+    pub time: Nanos,
+    /// Why it failed, if it did.
+    pub failure: Option<Failure>,
+}
+
+impl Ran {
+    /// The simulation time that has passed, in seconds.
+    #[expect(clippy::cast_precision_loss, reason = "for people")]
+    pub fn seconds(&self) -> f64 {
+        self.time.0 as f64 / 1e9
+    }
+}
+
+/// Why a test failed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// Where in the test file.
+    pub place: Place,
+    /// When, what was expected and what was seen, in one line.
+    pub what: String,
+    /// What more there is to tell, such as the last changes of the signal, a line each.
+    pub more: Vec<String>,
+}
+
+impl Suite {
+    /// Runs one of its tests from a fresh start; with a name, it is recorded to that file.
+    ///
+    /// # Errors
+    ///
+    /// The PLC program and the driver.cfg do not fit, or a recording cannot be read or written.
+    pub fn run(&self, test: &Test, record: Option<&Path>) -> Result<Ran, DriverError> {
+        let bench = &self.bench;
+        let mut config = bench.config.clone();
+        // What the driver.cfg records is the plant's.
+        config.record = record
+            .map(record::Options::to)
+            .transpose()
+            .map_err(DriverError::Config)?;
+        let table = &bench.config.table;
+        let playback = bench.tape.as_ref().map(|tape| Playback::start(tape, table));
+        let playback = playback
+            .transpose()
+            .map_err(|error| DriverError::Config(error.to_string()))?;
+        // A stepped bus keeps simulation time, and looks at no other clock.
+        let driver = Driver::open(config, Manual::new())?;
+        let mut slots = driver.initial_slots();
+        for (signal, value) in bench.initial.iter().chain(&test.initial) {
+            slots[*signal] = *value;
+        }
+        let signals = &bench.config.table.signals;
+        let watch = |(signal, slot): (&Signal, &Slot)| Watch::new(*slot, signal);
+        let watches: Vec<Watch> = signals.iter().zip(&slots).map(watch).collect();
+        let mut stand = Stand {
+            stub: Stub::new(&bench.rules, &watches),
+            playback,
+            tape: bench.tape.as_ref(),
+            driver,
+            signals,
+            slots,
+            watches,
+            step: bench.step,
+            ticks: 0,
+            forced: Vec::new(),
+            faults: Vec::new(),
+            standing: Vec::new(),
+        };
+        let failure = test.steps.iter().find_map(|step| stand.run(step).err());
+        let ran = Ran {
+            ticks: stand.ticks,
+            time: stand.time(),
+            failure,
+        };
+        stand.driver.close();
+        Ok(ran)
+    }
+}
+
+/// A condition with the edges that it counts from.
+#[derive(Clone, Debug)]
+struct Watched {
+    condition: Condition,
+    place: Place,
+    since: Bookmark,
+}
+
+/// A condition that has to hold, or must not, at every tick.
+#[derive(Clone, Debug)]
+struct Standing {
+    watched: Watched,
+    never: bool,
+    from: u64,
+}
+
+/// Everything that a test is run on.
+struct Stand<'a> {
+    driver: Driver,
+    signals: &'a [Signal],
+    slots: Vec<Slot>,
+    watches: Vec<Watch>,
+    stub: Stub<'a>,
+    playback: Option<Playback<'a>>,
+    tape: Option<&'a Tape>,
+    step: Nanos,
+    ticks: u64,
+    forced: Vec<(usize, Slot)>,
+    /// Faults that were injected, with their numbers.
+    faults: Vec<(String, u32)>,
+    standing: Vec<Standing>,
+}
+
+impl Stand<'_> {
+    fn time(&self) -> Nanos {
+        self.step
+            .times(i64::try_from(self.ticks).unwrap_or(i64::MAX))
+    }
+
+    fn run(&mut self, step: &Step) -> Result<(), Failure> {
+        for (signal, value) in &step.set {
+            self.slots[*signal] = *value;
+        }
+        for (signal, value) in &step.force {
+            self.force(*signal, *value);
+        }
+        self.forced
+            .retain(|(signal, _)| !step.release.contains(signal));
+        for (fault, place) in &step.inject {
+            let id = self
+                .driver
+                .inject(fault)
+                .map_err(|error| self.broken(*place, &error))?;
+            self.faults.retain(|(name, _)| *name != fault.name);
+            self.faults.push((fault.name.clone(), id));
+        }
+        for (name, place) in &step.end {
+            let ended = self.faults.iter().find(|(known, _)| known == name);
+            let Some((_, id)) = ended else {
+                return Err(self.broken(*place, &format!("no fault \"{name}\" was injected")));
+            };
+            self.driver.end_fault(*id);
+        }
+        for (conditions, never) in [(&step.always, false), (&step.never, true)] {
+            for watched in self.watched(conditions) {
+                let standing = Standing {
+                    watched,
+                    never,
+                    from: self.ticks,
+                };
+                self.check_standing(&standing)?;
+                self.standing.push(standing);
+            }
+        }
+        match &step.passage {
+            None => {}
+            Some(Passage::Ticks(count)) => self.pass(*count, step.place)?,
+            Some(Passage::Press(button, count)) => {
+                self.force(*button, Slot::from_real(1.0));
+                self.pass(*count, step.place)?;
+                self.forced.retain(|(signal, _)| signal != button);
+                self.slots[*button] = Slot::from_real(0.0);
+            }
+            Some(Passage::Await(conditions, limit)) => self.wait(conditions, *limit, step.place)?,
+        }
+        let expected = self.watched(&step.expect);
+        self.expect(&expected, "")?;
+        if step.during > 0 {
+            let from = self.ticks;
+            let when = format!(" for {} from tick {from}", span(step.during, self.step));
+            for _ in 0..step.during {
+                self.tick(step.place)?;
+                self.expect(&expected, &when)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn force(&mut self, signal: usize, value: Slot) {
+        self.forced.retain(|(other, _)| *other != signal);
+        self.forced.push((signal, value));
+        self.slots[signal] = value;
+    }
+
+    fn pass(&mut self, count: u64, place: Place) -> Result<(), Failure> {
+        (0..count).try_for_each(|_| self.tick(place))
+    }
+
+    /// One tick: the machine moves, then the PLC scans if its scan is due.
+    fn tick(&mut self, place: Place) -> Result<(), Failure> {
+        let now = self.time() + self.step;
+        if let Some(playback) = &mut self.playback
+            && let Err(error) = playback.step(now, &mut self.slots)
+        {
+            return Err(self.broken(place, &format!("the recording: {error}")));
+        }
+        self.stub
+            .step(now, self.step, &self.watches, &mut self.slots);
+        for (signal, value) in &self.forced {
+            self.slots[*signal] = *value;
+        }
+        let done = self.driver.exchange(now, &mut self.slots);
+        self.ticks += 1;
+        if done.code == Code::BusFailed {
+            let reason = self.driver.link().reason;
+            return Err(self.broken(place, &format!("the line failed: {reason}")));
+        }
+        let seen = self.slots.iter().zip(self.signals);
+        for (watch, (slot, signal)) in self.watches.iter_mut().zip(seen) {
+            watch.look(*slot, signal, self.ticks);
+        }
+        self.check_recorded()?;
+        self.standing
+            .iter()
+            .try_for_each(|standing| self.check_standing(standing))
+    }
+
+    /// Fails where the PLC sends something else than was recorded.
+    fn check_recorded(&self) -> Result<(), Failure> {
+        let (Some(playback), Some(tape)) = (&self.playback, self.tape) else {
+            return Ok(());
+        };
+        let Some(difference) = playback.difference(&self.slots, self.signals) else {
+            return Ok(());
+        };
+        let Difference {
+            signal: index,
+            expected,
+            tick,
+        } = difference;
+        let signal = &self.signals[index];
+        let expected = text_of(real(expected, signal), signal);
+        Err(Failure {
+            place: tape.place,
+            what: format!(
+                "{}: \"{}\" is {}, expected {expected} as in tick {tick} of {}",
+                moment(self.ticks, self.step),
+                signal.name,
+                text_of(self.value(index), signal),
+                tape.name(),
+            ),
+            more: vec![self.watches[index].history(signal, self.step)],
+        })
+    }
+
+    fn broken(&self, place: Place, what: &str) -> Failure {
+        Failure {
+            place,
+            what: format!("{}: {what}", moment(self.ticks, self.step)),
+            more: Vec::new(),
+        }
+    }
+
+    fn wait(
+        &mut self,
+        conditions: &[(Condition, Place)],
+        limit: u64,
+        place: Place,
+    ) -> Result<(), Failure> {
+        let awaited = self.watched(conditions);
+        let from = self.ticks;
+        while !awaited.iter().all(|one| self.holds(one)) {
+            if self.ticks - from == limit {
+                let when = format!(" within {} of tick {from}", span(limit, self.step));
+                return self.expect(&awaited, &when);
+            }
+            self.tick(place)?;
+        }
+        Ok(())
+    }
+
+    fn watched(&self, conditions: &[(Condition, Place)]) -> Vec<Watched> {
+        let watched = |(condition, place): &(Condition, Place)| Watched {
+            condition: condition.clone(),
+            place: *place,
+            since: Bookmark::of(&self.watches[condition.signal]),
+        };
+        conditions.iter().map(watched).collect()
+    }
+
+    fn value(&self, signal: usize) -> f64 {
+        self.watches[signal].value()
+    }
+
+    fn holds(&self, one: &Watched) -> bool {
+        let watch = &self.watches[one.condition.signal];
+        one.condition.holds(watch, &self.slots, one.since)
+    }
+
+    /// Fails with the first of these that does not hold.
+    fn expect(&self, expected: &[Watched], when: &str) -> Result<(), Failure> {
+        match expected.iter().find(|one| !self.holds(one)) {
+            None => Ok(()),
+            Some(one) => Err(self.failure(one, &format!("{}{when}", one.condition.demand))),
+        }
+    }
+
+    fn check_standing(&self, standing: &Standing) -> Result<(), Failure> {
+        let Standing {
+            watched,
+            never,
+            from,
+        } = standing;
+        // An edge that must come is awaited, not there at every tick.
+        if self.holds(watched) != *never {
+            return Ok(());
+        }
+        let demand = &watched.condition.demand;
+        let expected = if *never {
+            format!("never {demand} since tick {from}")
+        } else {
+            format!("{demand} at every tick since tick {from}")
+        };
+        Err(self.failure(watched, &expected))
+    }
+
+    fn failure(&self, one: &Watched, expected: &str) -> Failure {
+        let index = one.condition.signal;
+        let signal = &self.signals[index];
+        Failure {
+            place: one.place,
+            what: format!(
+                "{}: \"{}\" is {}, expected {expected}",
+                moment(self.ticks, self.step),
+                signal.name,
+                text_of(self.value(index), signal),
+            ),
+            more: vec![self.watches[index].history(signal, self.step)],
+        }
+    }
+}

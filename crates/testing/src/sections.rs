@@ -1,0 +1,455 @@
+//! What the sections of a test file say: the machine, the tests, their steps.
+
+use std::path::Path;
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value, shown};
+use tickbus_fieldbus::Role;
+use tickbus_fieldbus::faults::{self, Fault, unknown};
+use tickbus_image::signal::section::slot_of;
+use tickbus_image::signal::{Area, SignalTable, Slot};
+
+use super::condition::{Condition, Demand};
+use super::playback::Tape;
+use super::suite::{Passage, Place, Ramp, Rule, Step, Test};
+
+/// The longest that time may pass in one go: ten minutes on a fast machine.
+const MOST_TICKS: i128 = 1_000_000_000;
+
+/// How long a button is pressed: as long as a finger does, and longer than any scan.
+const PRESS: Nanos = Nanos::from_millis(200);
+
+/// The longest name of a test, in characters.
+const NAME_LIMIT: usize = 200;
+
+/// What is known while the rest is read.
+pub(super) struct Reader<'a> {
+    pub(super) table: &'a SignalTable,
+    pub(super) role: Role,
+    pub(super) step: Nanos,
+    pub(super) folder: &'a Path,
+}
+
+/// What a test file says of the machine.
+#[derive(Default)]
+pub(super) struct Machine {
+    pub(super) initial: Vec<(usize, Slot)>,
+    pub(super) rules: Vec<Rule>,
+    pub(super) tape: Option<Tape>,
+}
+
+impl Reader<'_> {
+    pub(super) fn machine(&self, mut table: Table<'_>) -> Machine {
+        let set = table.take("set");
+        let recording = table.take("recording");
+        let compare = table.take("compare");
+        let rules = table.take("rule");
+        table.finish();
+        if let (Some(value), None) = (&compare, &recording) {
+            value.wrong(
+                "\"compare\" stands without \"recording\"",
+                "name the recording that the PLC is compared with, or remove it",
+            );
+        }
+        let initial = self.assignments(set.as_ref());
+        let rules = rules.map(|value| value.tables("[[machine.rule]]"));
+        let rules = rules.into_iter().flatten();
+        Machine {
+            initial: initial.unwrap_or_default(),
+            rules: rules.filter_map(|table| self.rule(table)).collect(),
+            tape: recording.and_then(|value| self.tape(&value, compare.as_ref())),
+        }
+    }
+
+    /// The area that the machine writes.
+    const fn own(&self) -> Area {
+        match self.role {
+            Role::Device => Area::Input,
+            Role::Controller => Area::Output,
+        }
+    }
+
+    fn tape(&self, value: &Value<'_>, compare: Option<&Value<'_>>) -> Option<Tape> {
+        let file = value.text("write the path of a recording, as seen from this file")?;
+        let wrong = |value: &Value<'_>, (what, right): (String, String)| value.wrong(what, right);
+        let opened = Tape::open(
+            &self.folder.join(file),
+            self.table,
+            self.own(),
+            value.place(),
+        );
+        let mut tape = opened.map_err(|error| wrong(value, error)).ok()?;
+        let compared = match compare {
+            None => Vec::new(),
+            Some(value) => value.list("write a list of signals, such as [\"LA1 run\"]")?,
+        };
+        for value in compared {
+            let name = value.text("write the name of a signal in quotes")?;
+            let added = match self.table.position(name) {
+                None => Err(unknown(name, self.table)),
+                Some(index) => tape.compare(index, self.table),
+            };
+            if let Err(error) = added {
+                wrong(&value, error);
+            }
+        }
+        Some(tape)
+    }
+
+    fn rule(&self, mut table: Table<'_>) -> Option<Rule> {
+        let when = table.require("when", "write a condition, such as \"LA1 run\"");
+        let after = table.take("after");
+        let set = table.take("set");
+        let otherwise = table.take("else");
+        let ramp = table.take("ramp");
+        table.require_one_of(&["set", "ramp"], "say what the machine does then");
+        table.finish();
+        let when = when.and_then(|value| self.conditions(Some(&value)));
+        let after = after.map_or(Some(Nanos::ZERO), |value| value.duration());
+        let set = self.assignments(set.as_ref());
+        if let (Some(when), Some(value)) = (&when, &otherwise)
+            && when.iter().any(|(condition, _)| condition.is_edge())
+        {
+            value.wrong(
+                "an edge has no \"else\": it is over at once",
+                "write the condition without \"rises\" or \"falls\", or a second rule",
+            );
+        }
+        let otherwise = self.assignments(otherwise.as_ref());
+        let ramp = match ramp {
+            None => Some(None),
+            Some(value) => self.ramp(&value).map(Some),
+        };
+        Some(Rule {
+            when: when?.into_iter().map(|(condition, _)| condition).collect(),
+            after: after?,
+            set: set?,
+            otherwise: otherwise?,
+            ramp: ramp?,
+        })
+    }
+
+    fn ramp(&self, value: &Value<'_>) -> Option<Ramp> {
+        const SHAPE: &str =
+            "write ramp = { signal = \"LA1 position\", to = 180, per_second = 250 }";
+        let mut table = value.table("ramp", SHAPE)?;
+        let signal = table.require("signal", SHAPE);
+        let to = table.require("to", SHAPE);
+        let rate = table.require("per_second", SHAPE);
+        table.finish();
+        let signal = signal.and_then(|value| self.settable(&value, value.text(SHAPE)?));
+        let to = to.and_then(|value| value.number(SHAPE));
+        let rate = rate.and_then(|value| {
+            let rate = value.number(SHAPE)?;
+            if rate <= 0.0 {
+                value.wrong(
+                    format!("\"per_second\" is {}", value.written()),
+                    "write how fast it moves, above 0; \"to\" says whether up or down",
+                );
+                return None;
+            }
+            Some(rate)
+        });
+        let signal = signal?;
+        if self.table.signals[signal].is_integer_slot() {
+            value.wrong(
+                "a 64-bit integer cannot move along a ramp",
+                "use a signal of another type, or give it a scale",
+            );
+            return None;
+        }
+        Some(Ramp {
+            signal,
+            to: to?,
+            per_second: rate?,
+        })
+    }
+
+    pub(super) fn test(&self, mut table: Table<'_>) -> Option<Test> {
+        let place = table.collector().place(table.at());
+        let name = table.require("name", "say in a sentence what is tested");
+        let set = table.take("set");
+        let steps = table.require("steps", "write the steps, such as [{ tick = 1 }]");
+        table.finish();
+        let name = name.and_then(|value| {
+            let name = value.label(NAME_LIMIT, "say in a sentence what is tested");
+            name.map(str::to_owned)
+        });
+        let initial = self.assignments(set.as_ref());
+        let steps = steps.and_then(|value| {
+            let tables = value.tables("steps");
+            if tables.is_empty() {
+                value.wrong(
+                    "a test without steps proves nothing",
+                    "write some, such as [{ run = \"1s\" }, { expect = \"Ready lamp\" }]",
+                );
+            }
+            let steps: Vec<_> = tables.into_iter().map(|table| self.step(table)).collect();
+            steps.into_iter().collect::<Option<Vec<Step>>>()
+        });
+        Some(Test {
+            name: name?,
+            place,
+            initial: initial?,
+            steps: steps?,
+        })
+    }
+
+    fn step(&self, mut table: Table<'_>) -> Option<Step> {
+        let place = table.collector().place(table.at());
+        let (set, force) = (table.take("set"), table.take("force"));
+        let release = table.take("release");
+        let (fault, end) = (table.take("fault"), table.take("end"));
+        let passages = ["press", "tick", "run", "await"].map(|key| (key, table.take(key)));
+        let within = table.take("within");
+        let expect = table.take("expect");
+        let during = table.take("during");
+        let (always, never) = (table.take("always"), table.take("never"));
+        if table.all().next().is_none() {
+            table.wrong(
+                "a step without anything to do",
+                "write such as { run = \"1s\" }",
+            );
+        }
+        table.finish();
+
+        let given: Vec<_> = passages
+            .iter()
+            .filter_map(|(key, value)| Some((*key, value.as_ref()?)))
+            .collect();
+        if let [(first, _), (key, value), ..] = given[..] {
+            value.wrong(
+                format!("\"{key}\" stands beside \"{first}\" in one step"),
+                "write a step for each",
+            );
+        }
+        let passage = given
+            .first()
+            .map(|(key, value)| self.passage(key, value, within.as_ref()));
+        if let (Some(value), false) = (&within, given.iter().any(|(key, _)| *key == "await")) {
+            value.wrong(
+                "\"within\" stands without \"await\"",
+                "add the condition that is waited for, or remove it",
+            );
+        }
+        if let (Some(value), None) = (&during, &expect) {
+            value.wrong(
+                "\"during\" stands without \"expect\"",
+                "add what is expected for so long, or write run",
+            );
+        }
+        let set = self.assignments(set.as_ref());
+        let force = self.assignments(force.as_ref());
+        let release = release.map_or(Some(Vec::new()), |value| self.names(&value));
+        let inject = fault.map_or(Some(Vec::new()), |value| self.faults(&value));
+        let end = end.map_or(Some(Vec::new()), |value| ended(&value));
+        let expect = self.conditions(expect.as_ref());
+        let during = during.map_or(Some(0), |value| self.ticks(&value, true));
+        let (always, never) = (
+            self.conditions(always.as_ref()),
+            self.conditions(never.as_ref()),
+        );
+        let passage = match passage {
+            None => None,
+            Some(passage) => Some(passage?),
+        };
+        Some(Step {
+            place,
+            set: set?,
+            force: force?,
+            release: release?,
+            inject: inject?,
+            end: end?,
+            passage,
+            expect: expect?,
+            during: during?,
+            always: always?,
+            never: never?,
+        })
+    }
+
+    fn passage(&self, key: &str, value: &Value<'_>, within: Option<&Value<'_>>) -> Option<Passage> {
+        match key {
+            "press" => {
+                let name = value.text("write the name of a push button in quotes")?;
+                let signal = self.settable(value, name)?;
+                let ticks = PRESS.0.div_euclid(self.step.0) + 1;
+                Some(Passage::Press(signal, u64::try_from(ticks).ok()?))
+            }
+            "tick" => {
+                let ticks = value.whole(1..=MOST_TICKS)?;
+                Some(Passage::Ticks(u64::try_from(ticks).ok()?))
+            }
+            "run" => self.ticks(value, true).map(Passage::Ticks),
+            _ => {
+                let conditions = self.conditions(Some(value));
+                let Some(within) = within else {
+                    value.wrong(
+                        "\"await\" has no \"within\"",
+                        "add the limit, such as within = \"3s\", or within = 40 for ticks",
+                    );
+                    return None;
+                };
+                let limit = self.ticks(within, false);
+                Some(Passage::Await(conditions?, limit?))
+            }
+        }
+    }
+
+    /// A span of simulation time in ticks: a number of them, or a duration, rounded up or down.
+    fn ticks(&self, value: &Value<'_>, up: bool) -> Option<u64> {
+        if value.as_text().is_none() {
+            return u64::try_from(value.whole(1..=MOST_TICKS)?).ok();
+        }
+        let span = value.duration()?;
+        let whole = span.0 / self.step.0;
+        let ticks = whole + i64::from(up && span.0 % self.step.0 != 0);
+        if ticks < 1 {
+            value.wrong(
+                format!("{span} is shorter than one tick of {}", self.step),
+                "write a longer time, or a shorter step at the top of the file",
+            );
+            return None;
+        }
+        if i128::from(ticks) > MOST_TICKS {
+            value.wrong(
+                format!("{span} is {ticks} ticks of {}", self.step),
+                format!("write at most {MOST_TICKS} ticks, or a longer step"),
+            );
+            return None;
+        }
+        u64::try_from(ticks).ok()
+    }
+
+    /// A signal that this end writes, by its name.
+    fn settable(&self, value: &Value<'_>, name: &str) -> Option<usize> {
+        let Some(index) = self.table.position(name) else {
+            let (what, right) = unknown(name, self.table);
+            value.wrong(what, right);
+            return None;
+        };
+        let signal = &self.table.signals[index];
+        if signal.area != self.own() {
+            value.wrong(
+                format!(
+                    "\"{}\" ({}) is written by the PLC program",
+                    shown(name),
+                    signal.address()
+                ),
+                "set the signals that it reads; of the others, expect what you want to see",
+            );
+            return None;
+        }
+        Some(index)
+    }
+
+    /// `{ "Start button" = true }`: signals and their values.
+    fn assignments(&self, value: Option<&Value<'_>>) -> Option<Vec<(usize, Slot)>> {
+        let Some(value) = value else {
+            return Some(Vec::new());
+        };
+        let table = value.table(
+            "signals",
+            "write signals and values, such as { \"Start button\" = true }",
+        )?;
+        let assignment = |(name, value): (&str, Value<'_>)| {
+            let index = self.settable(&value, name)?;
+            let slot = slot_of(&value, &self.table.signals[index], "the value")?;
+            Some((index, slot))
+        };
+        let read: Vec<_> = table.all().map(assignment).collect();
+        read.into_iter().collect()
+    }
+
+    /// One name or a list of them.
+    fn names(&self, value: &Value<'_>) -> Option<Vec<usize>> {
+        const RIGHT: &str = "write the name of a signal in quotes, or a list of names";
+        let name = |value: &Value<'_>| self.settable(value, value.text(RIGHT)?);
+        if value.as_text().is_some() {
+            return name(value).map(|name| vec![name]);
+        }
+        let read: Vec<_> = value.list(RIGHT)?.iter().map(name).collect();
+        read.into_iter().collect()
+    }
+
+    /// One fault or a list of them.
+    fn faults(&self, value: &Value<'_>) -> Option<Vec<(Fault, Place)>> {
+        const RIGHT: &str =
+            "write a fault, such as { kind = \"stuck\", signal = \"LA1 bottom\", value = true }";
+        let values = if value.is_table() {
+            vec![value.clone()]
+        } else {
+            value.list(RIGHT)?
+        };
+        let fault = |value: Value<'_>| {
+            let section = value.table("fault", RIGHT)?;
+            // One that cannot be read has its mistakes reported.
+            let fault = faults::read_sections(vec![section], Some(self.table)).pop()?;
+            Some((fault, value.place()))
+        };
+        let read: Vec<_> = values.into_iter().map(fault).collect();
+        read.into_iter().collect()
+    }
+
+    /// A condition, a list of them, or a table of signals and values.
+    fn conditions(&self, value: Option<&Value<'_>>) -> Option<Vec<(Condition, Place)>> {
+        const RIGHT: &str = "write a condition such as \"Ready lamp\", a list of them, or \
+                             { \"Phase\" = 3 }";
+        let Some(value) = value else {
+            return Some(Vec::new());
+        };
+        if value.as_text().is_some() {
+            return self.condition(value).map(|condition| vec![condition]);
+        }
+        if value.is_table() {
+            let read: Vec<_> = value
+                .table("signals", RIGHT)?
+                .all()
+                .map(|(name, value)| self.equality(name, &value))
+                .collect();
+            return read.into_iter().collect();
+        }
+        let list = value.list(RIGHT)?;
+        if list.is_empty() {
+            value.wrong("an empty list demands nothing", RIGHT);
+            return None;
+        }
+        let read: Vec<_> = list.iter().map(|value| self.condition(value)).collect();
+        read.into_iter().collect()
+    }
+
+    fn condition(&self, value: &Value<'_>) -> Option<(Condition, Place)> {
+        let text = value.text("write a condition in quotes, such as \"Phase == 3\"")?;
+        match Condition::parse(text, self.table) {
+            Ok(condition) => Some((condition, value.place())),
+            Err((what, right)) => {
+                value.wrong(what, right);
+                None
+            }
+        }
+    }
+
+    /// `"Phase" = 3` among expectations.
+    fn equality(&self, name: &str, value: &Value<'_>) -> Option<(Condition, Place)> {
+        let Some(signal) = self.table.position(name) else {
+            let (what, right) = unknown(name, self.table);
+            value.wrong(what, right);
+            return None;
+        };
+        let slot = slot_of(value, &self.table.signals[signal], "the value")?;
+        let demand = Demand::equal(slot, &self.table.signals[signal]);
+        Some((Condition { signal, demand }, value.place()))
+    }
+}
+
+/// Names of faults: one, or a list of them.
+fn ended(value: &Value<'_>) -> Option<Vec<(String, Place)>> {
+    const RIGHT: &str = "write the name of a fault in quotes, or a list of names";
+    let values = match value.as_text() {
+        Some(_) => vec![value.clone()],
+        None => value.list(RIGHT)?,
+    };
+    let name = |value: Value<'_>| Some((value.text(RIGHT)?.to_owned(), value.place()));
+    let read: Vec<_> = values.into_iter().map(name).collect();
+    read.into_iter().collect()
+}

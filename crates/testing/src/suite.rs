@@ -1,0 +1,285 @@
+//! Reading test files.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::Fault;
+
+use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Options;
+use tickbus_driver_cfg::loopback::{self, Mode, Peer};
+use tickbus_fieldbus::Role;
+use tickbus_image::signal::Slot;
+use tickbus_plc as plc;
+
+use super::condition::Condition;
+use super::playback::Tape;
+use super::sections::{Machine, Reader};
+
+/// The step of a test file that states none.
+const STEP: Nanos = Nanos::from_millis(1);
+
+/// Line and column, both from 1.
+pub type Place = (usize, usize);
+
+/// One test file, read and checked.
+#[derive(Clone, Debug)]
+pub struct Suite {
+    /// Its path, as messages name it.
+    pub file: String,
+    /// Its tests. Never empty.
+    pub tests: Vec<Test>,
+    pub(super) bench: Bench,
+}
+
+/// What the tests of one file have in common.
+#[derive(Clone, Debug)]
+pub(super) struct Bench {
+    pub(super) config: Config,
+    pub(super) step: Nanos,
+    pub(super) initial: Vec<(usize, Slot)>,
+    pub(super) rules: Vec<Rule>,
+    pub(super) tape: Option<Tape>,
+}
+
+/// One test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Test {
+    /// Its name, unique in its file.
+    pub name: String,
+    /// Where it begins.
+    pub place: Place,
+    pub(super) initial: Vec<(usize, Slot)>,
+    pub(super) steps: Vec<Step>,
+}
+
+/// One step: some signals are set, time passes, something is expected; in this order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Step {
+    pub(super) place: Place,
+    pub(super) set: Vec<(usize, Slot)>,
+    pub(super) force: Vec<(usize, Slot)>,
+    pub(super) release: Vec<usize>,
+    pub(super) inject: Vec<(Fault, Place)>,
+    /// Faults to be ended, by their names.
+    pub(super) end: Vec<(String, Place)>,
+    pub(super) passage: Option<Passage>,
+    pub(super) expect: Vec<(Condition, Place)>,
+    /// For how many ticks the expectations have to hold.
+    pub(super) during: u64,
+    pub(super) always: Vec<(Condition, Place)>,
+    pub(super) never: Vec<(Condition, Place)>,
+}
+
+/// How time passes in a step.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Passage {
+    /// So many ticks.
+    Ticks(u64),
+    /// So many ticks, with a button pressed.
+    Press(usize, u64),
+    /// Until all of these hold, at most so many ticks.
+    Await(Vec<(Condition, Place)>, u64),
+}
+
+/// One rule of the machine's stub.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Rule {
+    /// All of these. Never empty.
+    pub(super) when: Vec<Condition>,
+    pub(super) after: Nanos,
+    pub(super) set: Vec<(usize, Slot)>,
+    pub(super) otherwise: Vec<(usize, Slot)>,
+    pub(super) ramp: Option<Ramp>,
+}
+
+/// A signal that moves towards a value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ramp {
+    pub(super) signal: usize,
+    pub(super) to: f64,
+    /// Units a second. Positive.
+    pub(super) per_second: f64,
+}
+
+impl Suite {
+    /// Reads the test file at `path`, and the driver.cfg that it names.
+    ///
+    /// # Errors
+    ///
+    /// With every mistake of the test file; if it has none but its driver.cfg does, with those.
+    pub fn load(path: &Path) -> Result<Self, Mistakes> {
+        let text = load_text(path)?;
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        Self::parse(&path.display().to_string(), &text, folder)
+    }
+
+    /// Reads the text of a test file; `folder` is where its paths begin.
+    ///
+    /// # Errors
+    ///
+    /// As [`load`](Self::load).
+    pub fn parse(file: &str, text: &str, folder: &Path) -> Result<Self, Mistakes> {
+        let mut collector = Collector::new(file, text);
+        let mut of_config = None;
+        let read = read_text(&mut collector, text, |root| {
+            read(root, folder, &mut of_config)
+        });
+        match (collector.finish(), of_config) {
+            (Some(mistakes), _) | (None, Some(mistakes)) => Err(mistakes),
+            (None, None) => {
+                let (bench, tests) = read.expect("what is not read has a mistake");
+                Ok(Self {
+                    file: file.to_owned(),
+                    tests,
+                    bench,
+                })
+            }
+        }
+    }
+}
+
+/// Reads the file; the mistakes of its driver.cfg go to `of_config`.
+fn read(
+    mut root: Table<'_>,
+    folder: &Path,
+    of_config: &mut Option<Mistakes>,
+) -> Option<(Bench, Vec<Test>)> {
+    let right = "write the path of the driver.cfg, as seen from this file";
+    let config = root.require("config", format!("add config = \"driver.cfg\": {right}"));
+    let program = root.take("program");
+    let options = root.take("program_options");
+    let scan = root.take("scan");
+    let step = root.take("step");
+    let machine = root.take("machine");
+    let tests = root.require("test", "write a [[test]] with name and steps for each test");
+    if let (None, true) = (&program, root.is_whole()) {
+        for (key, value) in [("program_options", &options), ("scan", &scan)] {
+            if let Some(value) = value {
+                let what = format!("\"{key}\" stands without \"program\"");
+                value.wrong(what, "add program = \"…\", or remove it");
+            }
+        }
+    }
+    root.finish();
+
+    let step = step.map_or(Some(STEP), |value| value.duration());
+    let peer = match &program {
+        None => Some(None),
+        // The driver.cfg may lie in another folder than this file.
+        Some(program) => {
+            Peer::hosted(program, options, scan.as_ref()).map(|peer| Some(peer.seen_from(folder)))
+        }
+    };
+    let config = config.and_then(|value| {
+        let config = load_config(&value, right, folder, of_config)?;
+        on_simulation_time(config, &value, folder, peer?)
+    });
+    let (config, step) = (config?, step?);
+    let reader = Reader {
+        table: &config.table,
+        role: config.role,
+        step,
+        folder,
+    };
+    let machine = match machine {
+        None => Machine::default(),
+        Some(value) => reader.machine(value.table("[machine]", "write a [machine] table")?),
+    };
+    let tables = tests?.tables("[[test]]");
+    check_twins(&tables);
+    let tests: Vec<Option<Test>> = tables.into_iter().map(|table| reader.test(table)).collect();
+    let tests: Option<Vec<Test>> = tests.into_iter().collect();
+    let tests = tests?;
+    let bench = Bench {
+        config,
+        step,
+        initial: machine.initial,
+        rules: machine.rules,
+        tape: machine.tape,
+    };
+    Some((bench, tests))
+}
+
+fn load_config(
+    value: &Value<'_>,
+    right: &str,
+    folder: &Path,
+    of_config: &mut Option<Mistakes>,
+) -> Option<Config> {
+    let name = value.text(right)?;
+    match Config::load(&folder.join(name)) {
+        Ok(config) => Some(config),
+        Err(mistakes) => {
+            match mistakes.iter().next() {
+                Some(mistake) if mistake.place.is_none() => {
+                    value.wrong(format!("{}: {}", shown(name), mistake.what), right);
+                }
+                _ => *of_config = Some(mistakes),
+            }
+            None
+        }
+    }
+}
+
+/// Puts the PLC program at the other end of the line, and the line on simulation time.
+fn on_simulation_time(
+    mut config: Config,
+    value: &Value<'_>,
+    folder: &Path,
+    peer: Option<Peer>,
+) -> Option<Config> {
+    if let Some(mut peer) = peer {
+        // A program's file counts from this file, and not from the driver.cfg's folder.
+        if let Peer::Program { name, .. } = &mut peer
+            && plc::Hosted::is_path(name)
+            && let Ok(file) = std::path::absolute(folder.join(&*name))
+        {
+            *name = file.to_string_lossy().into_owned();
+        }
+        config.role = Role::Device;
+        config.bus = Options::Loopback(loopback::Options {
+            mode: Mode::Stepped,
+            peer,
+            events: false,
+        });
+        return Some(config);
+    }
+    if let Options::Loopback(options) = &mut config.bus
+        && let Peer::Program { .. } = &options.peer
+    {
+        options.mode = Mode::Stepped;
+        return Some(config);
+    }
+    value.wrong(
+        "this driver.cfg has no PLC program at the other end of its bus",
+        "name the one to be tested: program = \"…\"",
+    );
+    None
+}
+
+/// No name twice, so that a report tells the tests apart.
+fn check_twins(tables: &[Table<'_>]) {
+    let mut first: HashMap<&str, Value<'_>> = HashMap::new();
+    for table in tables {
+        let Some((_, value)) = table.all().find(|(key, _)| *key == "name") else {
+            continue;
+        };
+        match value.as_text().map(|name| (name, first.get(name))) {
+            Some((name, Some(earlier))) => value.wrong(
+                format!(
+                    "the name \"{}\" is that of the test on line {}",
+                    shown(name),
+                    earlier.line()
+                ),
+                "give each test a name of its own",
+            ),
+            Some((name, None)) => {
+                first.insert(name, value);
+            }
+            None => {}
+        }
+    }
+}

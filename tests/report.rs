@@ -218,8 +218,9 @@ fn a_million_changes_that_follow_a_rule_take_little_room() {
 
 /// The colours of the style sheet, by name: those of light and of dark.
 fn colours() -> [Vec<(String, [f64; 3])>; 2] {
-    let style =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/report/style.css"));
+    let style = fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/report/src/style.css"),
+    );
     let style = style.expect("the style sheet is there");
     let (light, dark) = style
         .split_once("prefers-color-scheme: dark")

@@ -5,11 +5,11 @@
 use std::collections::HashSet;
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::toml_text::Mistakes;
-use tickbus::driver_cfg::Config;
-use tickbus::faults::{Effect, LIMIT};
-use tickbus::signal::{Area, DataType};
-use tickbus::time::Nanos;
+use tickbus_base::toml_text::Mistakes;
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::{Effect, LIMIT};
+use tickbus_image::signal::{Area, DataType};
+use tickbus_base::time::Nanos;
 
 fuzz_target!(|text: &str| {
     match Config::parse("fuzz.cfg", text) {

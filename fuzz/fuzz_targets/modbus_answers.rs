@@ -7,7 +7,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::fieldbus::modbus::{
+use tickbus_bus_modbus::{
     Abilities, Fault, Identification, Map, PDU_LIMIT, Piece, Query, Side, Spot, Table, Tables,
     answer, queries,
 };

@@ -5,11 +5,11 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::fieldbus::modbus::mbap::Telegram;
-use tickbus::fieldbus::modbus::{
+use tickbus_bus_modbus::mbap::Telegram;
+use tickbus_bus_modbus::{
     Done, Function, Identification, Map, PDU_LIMIT, Side, Tables, answer, rtu,
 };
-use tickbus::time::Nanos;
+use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: &[u8]| {
     let Some((header, stream)) = data.split_first_chunk::<4>() else {

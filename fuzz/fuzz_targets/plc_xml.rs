@@ -5,9 +5,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::driver_cfg::Config;
-use tickbus::import::{Reading, import};
-use tickbus::signal::Addressing;
+use tickbus_driver_cfg::Config;
+use tickbus_import::{Reading, import};
+use tickbus_image::signal::Addressing;
 
 fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else {

@@ -4,7 +4,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::fieldbus::plugin::{Answer, Inbox, Message, WireError};
+use tickbus_bus_plugin::{Answer, Inbox, Message, WireError};
 
 fuzz_target!(|data: (u8, &[u8])| {
     let (piece, bytes) = data;

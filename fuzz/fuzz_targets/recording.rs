@@ -7,9 +7,9 @@
 use std::io::Cursor;
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::record::{Format, Recording, Tick};
-use tickbus::signal::{Area, ByteOrder, DataType, Signal, SignalTable, Slot, Station};
-use tickbus::time::Nanos;
+use tickbus_record::{Format, Recording, Tick};
+use tickbus_image::signal::{Area, ByteOrder, DataType, Signal, SignalTable, Slot, Station};
+use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else {

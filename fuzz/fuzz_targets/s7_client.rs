@@ -6,13 +6,13 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::driver_cfg::Config;
-use tickbus::fieldbus::s7::item;
-use tickbus::fieldbus::s7::pdu::{Pdu, function};
-use tickbus::fieldbus::s7::{Frames, News, Terms, Tsap, transport};
-use tickbus::driver_cfg::Options;
-use tickbus::fieldbus::Role;
-use tickbus::time::Nanos;
+use tickbus_driver_cfg::Config;
+use tickbus_bus_s7::item;
+use tickbus_bus_s7::pdu::{Pdu, function};
+use tickbus_bus_s7::{Frames, News, Terms, Tsap, transport};
+use tickbus_driver_cfg::Options;
+use tickbus_fieldbus::Role;
+use tickbus_base::time::Nanos;
 
 const CONFIG: &str = "[driver]\nid = 1\nname = \"fuzz\"\n[fieldbus]\nkind = \"s7-client\"\n\
     address = \"127.0.0.1:1\"\ninput = \"DB1\"\noutput = \"%DB2.DBB3\"\n\

@@ -8,12 +8,12 @@
 use std::ops::Range;
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::fieldbus::s7::item::{Code, Object};
-use tickbus::fieldbus::s7::szl::{Facts, Identity};
-use tickbus::fieldbus::s7::pdu::Pdu;
-use tickbus::fieldbus::s7::transport::{self, Tpdu};
-use tickbus::fieldbus::s7::{Conversation, Fault, Memory};
-use tickbus::time::Nanos;
+use tickbus_bus_s7::item::{Code, Object};
+use tickbus_bus_s7::szl::{Facts, Identity};
+use tickbus_bus_s7::pdu::Pdu;
+use tickbus_bus_s7::transport::{self, Tpdu};
+use tickbus_bus_s7::{Conversation, Fault, Memory};
+use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: (u8, &[u8])| {
     let (piece, bytes) = data;

@@ -6,8 +6,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus::fieldbus::socket::{Sending, Session, Terms};
-use tickbus::time::Nanos;
+use tickbus_bus_socket::{Sending, Session, Terms};
+use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: &[u8]| {
     if let Some((terms, operations)) = terms(data) {

@@ -1,39 +1,19 @@
 //! The rules of the house, each as a function from one source file to what is wrong with it.
 
-use super::source::{Token, root_paths, texts, tokens};
-
-/// The rooms, each on a level; a room uses only rooms on the levels before its own.
-pub(crate) const LEVELS: &[&[&str]] = &[
-    &["time"],
-    &["os"],
-    &["config"],
-    &["signal"],
-    &["axis"],
-    &["faults"],
-    &["image"],
-    &["record"],
-    &["report"],
-    &["plc"],
-    &["fieldbus"],
-    &["driver"],
-    &["export", "import"],
-    &["testing"],
-    &["jni", "cli"],
-];
+use super::source::{Token, texts, tokens};
 
 /// Where `unsafe` may stand: files that begin like this.
 const UNSAFE_HOMES: &[&str] = &[
     "src/jni.rs",
     "src/jni/",
-    "src/os.rs",
-    "src/os/",
-    "src/image/triple.rs",
-    "src/plc/hosted/table.rs",
-    "src/fieldbus/plugin/library.rs",
+    "crates/base/src/os/",
+    "crates/bus-plugin/src/library.rs",
+    "crates/image/src/triple.rs",
+    "crates/plc/src/hosted/table.rs",
 ];
 
 /// Where the system's clocks may be read.
-const CLOCK_HOMES: &[&str] = &["src/time/", "src/cli/"];
+const CLOCK_HOMES: &[&str] = &["crates/base/src/time/", "src/cli/"];
 
 /// The longest a source file may be.
 const MOST_LINES: usize = 700;
@@ -48,53 +28,10 @@ pub(crate) struct File<'a> {
 /// All that is wrong with `file`, one line each.
 pub(crate) fn mistakes(file: File<'_>) -> Vec<String> {
     let tokens = tokens(file.text);
-    let mut found = rooms(file, &tokens);
-    found.extend(unsafe_code(file, &tokens));
+    let mut found = unsafe_code(file, &tokens);
     found.extend(clocks(file, &tokens));
     found.extend(length(file));
     found
-}
-
-fn level(room: &str) -> Option<usize> {
-    LEVELS.iter().position(|level| level.contains(&room))
-}
-
-/// The module that a file is: `src/a/b.rs` and `src/a/b/mod.rs` are `a::b`.
-fn module(path: &str) -> Vec<&str> {
-    let inner = path.strip_prefix("src/").unwrap_or(path);
-    let inner = inner.strip_suffix(".rs").unwrap_or(inner);
-    let mut module: Vec<&str> = inner.split('/').collect();
-    if matches!(module.last(), Some(&("mod" | "lib" | "main"))) {
-        module.pop();
-    }
-    module
-}
-
-fn rooms(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
-    let module = module(file.path);
-    // The crate's root names all rooms, and main.rs is no room.
-    let Some(&room) = module.first() else {
-        return Vec::new();
-    };
-    let Some(own) = level(room) else {
-        return vec![format!(
-            "{}:1: the room \"{room}\" has no place in the order of rooms; give it one in LEVELS of \
-             tests/architecture/rules.rs, in src/lib.rs and in docs/ARCHITECTURE.md",
-            file.path
-        )];
-    };
-    let used = root_paths(tokens, &module);
-    let forbidden = used.iter().filter(|used| used.name != room);
-    forbidden
-        .filter(|used| level(&used.name).is_none_or(|level| level >= own))
-        .map(|used| {
-            format!(
-                "{}:{}: {room} uses {}, which does not stand above it; move what both need into a \
-                 room above, or hand it in as an argument (docs/ARCHITECTURE.md, Rooms)",
-                file.path, used.line, used.name
-            )
-        })
-        .collect()
 }
 
 fn at_home(file: File<'_>, homes: &[&str]) -> bool {
@@ -110,7 +47,7 @@ fn unsafe_code(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
         .map(|token| {
             format!(
                 "{}:{}: unsafe code outside its homes; write it safely, or move it into src/jni/ (for \
-                 the JVM) or src/os/ (for the system) behind a safe function",
+                 the JVM) or crates/base/src/os/ (for the system) behind a safe function",
                 file.path, token.line
             )
         })

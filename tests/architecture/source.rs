@@ -8,13 +8,6 @@ pub(crate) struct Token<'a> {
     pub(crate) text: &'a str,
 }
 
-/// A path that starts at the crate's root, as far as its first name.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct RootPath {
-    pub(crate) line: usize,
-    pub(crate) name: String,
-}
-
 /// The tokens of `source`; a literal becomes the single mark `"`, so that nothing joins across it.
 pub(crate) fn tokens(source: &str) -> Vec<Token<'_>> {
     let mut found = Vec::new();
@@ -125,84 +118,7 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(length.unwrap_or(text.len()))
 }
 
-/// Every path in `tokens` that starts at the crate's root: by `crate::`, or by so many `super::` that
-/// it gets there from `module` (the file's own module path).
-pub(crate) fn root_paths(tokens: &[Token<'_>], module: &[&str]) -> Vec<RootPath> {
-    let mut found = Vec::new();
-    // How deep in braces each inline module of the present place began.
-    let (mut inline, mut depth): (Vec<usize>, usize) = (Vec::new(), 0);
-    for (at, token) in tokens.iter().enumerate() {
-        match token.text {
-            "{" => {
-                if at >= 2 && tokens[at - 2].text == "mod" {
-                    inline.push(depth);
-                }
-                depth += 1;
-            }
-            "}" => {
-                depth = depth.saturating_sub(1);
-                if inline.last() == Some(&depth) {
-                    inline.pop();
-                }
-            }
-            "crate" => first_names(&tokens[at + 1..], &mut found),
-            "super" if !follows(tokens, at, &["super", ":", ":"]) => {
-                let mut supers = 1;
-                let mut next = at + 1;
-                while texts(&tokens[next..], &[":", ":", "super"]) {
-                    (supers, next) = (supers + 1, next + 3);
-                }
-                if supers == module.len() + inline.len() {
-                    first_names(&tokens[next..], &mut found);
-                }
-            }
-            _ => {}
-        }
-    }
-    found
-}
-
-/// Whether the tokens before `at` are `wanted`.
-fn follows(tokens: &[Token<'_>], at: usize, wanted: &[&str]) -> bool {
-    at >= wanted.len() && texts(&tokens[at - wanted.len()..], wanted)
-}
-
 /// Whether `tokens` begin with `wanted`.
 pub(crate) fn texts(tokens: &[Token<'_>], wanted: &[&str]) -> bool {
     tokens.len() >= wanted.len() && tokens.iter().zip(wanted).all(|(t, w)| t.text == *w)
-}
-
-/// The names right behind `::`, one or a group in braces.
-fn first_names(tokens: &[Token<'_>], found: &mut Vec<RootPath>) {
-    if !texts(tokens, &[":", ":"]) {
-        return;
-    }
-    let mut add = |token: &Token<'_>| {
-        found.push(RootPath {
-            line: token.line,
-            name: token.text.to_owned(),
-        });
-    };
-    match &tokens[2..] {
-        [open, group @ ..] if open.text == "{" => {
-            let (mut depth, mut wanted) = (1, true);
-            for token in group {
-                match token.text {
-                    "{" => depth += 1,
-                    "}" => depth -= 1,
-                    "," if depth == 1 => wanted = true,
-                    _ if wanted => {
-                        add(token);
-                        wanted = false;
-                    }
-                    _ => {}
-                }
-                if depth == 0 {
-                    break;
-                }
-            }
-        }
-        [name, ..] => add(name),
-        [] => {}
-    }
 }

@@ -450,7 +450,8 @@ fn addresses_count_as_the_driver_cfg_says_unless_the_option_does() {
         error.to_string().contains("say addressing = \"iec\""),
         "{error}"
     );
-    let mut program = programs::program(path.to_str().expect("text"), &options(&[IEC])).expect("loads");
+    let mut program =
+        programs::program(path.to_str().expect("text"), &options(&[IEC])).expect("loads");
     program
         .fit(&elements.table, Addressing::Bytes)
         .expect("the option counts");

@@ -142,7 +142,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let (file, program) = (folder.path().join("abi.c"), folder.path().join("abi"));
         std::fs::write(&file, source).expect("the source is written");
-        let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("include");
+        let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../include");
         let built = Command::new("cc")
             .args(["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-I"])
             .args([&include, Path::new("-o"), &program, &file])

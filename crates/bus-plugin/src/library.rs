@@ -336,7 +336,7 @@ mod tests {
     impl Plugin {
         fn build(switches: &[&str]) -> Self {
             let folder = tempfile::tempdir().expect("a folder");
-            let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+            let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
             let built = Command::new("cc")
                 .args([
                     "-std=c99", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared",

@@ -398,7 +398,7 @@ mod tests {
     }
 
     fn rig_as(role: Role) -> Config {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("driver.cfg");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../driver.cfg");
         let asked = Asked { role, moved: false };
         Config::load_as(&path, Some(asked)).unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }

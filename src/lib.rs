@@ -1,8 +1,8 @@
 //! Puts a simulated machine on a real PLC's fieldbus.
 //!
-//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms of
-//! this crate follow the way of the data, and each uses only the rooms above it in this list (a
-//! test checks that; `docs/ARCHITECTURE.md` tells why):
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms of this crate
+//! follow the data flow, and each uses only the rooms above it in this list (a test checks that;
+//! `docs/ARCHITECTURE.md` explains why):
 //!
 //! | room | what lives there |
 //! |---|---|
@@ -10,12 +10,12 @@
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
 //! | [`config`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
-//! | [`axis`] | axes: their structures of command and feedback, profiles of motion, what a command means |
-//! | [`faults`] | wrong values and troubles of the line, when they are asked for |
+//! | [`axis`] | axes: their command and feedback structures, motion profiles, what a command means |
+//! | [`faults`] | injected faults: wrong values, and trouble on the line |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
 //! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
 //! | [`report`] | one HTML page about one run |
-//! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
+//! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`driver`] | one device: configuration, open, exchange, statistics, close |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |

@@ -7,7 +7,7 @@ use crate::signal::section::{Section, Structure, address_of, name_of};
 use crate::signal::{Addressing, Area, ByteOrder, DataType, Signal, Slot, Width};
 use crate::time::Nanos;
 
-/// What is right where a trip point stands.
+/// The remedy where a trip point is expected.
 const POSITION: &str = "write a position in the unit of the axis, such as 395.0";
 
 /// Reads the end switches of the axis with this `number`.

@@ -16,7 +16,7 @@ pub(super) struct Ring {
 const FRAMES: usize = 4096;
 /// The fewest frames that it holds, however large they are.
 const LEAST_FRAMES: usize = 64;
-/// Its size in bytes otherwise.
+/// The memory in bytes that a ring may take; within the two limits above it sets the number of frames.
 const BYTES: usize = 8 << 20;
 
 impl Ring {

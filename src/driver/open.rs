@@ -203,7 +203,7 @@ impl Driver {
             last: Exchange::NONE,
             faults: None,
             board,
-            // Axes are the machine's: a PLC has none.
+            // Only a machine has reflexes; a PLC program handles its axes itself.
             reflexes: (config.role == Role::Device)
                 .then(|| Reflexes::new(&config.axes))
                 .flatten(),

@@ -287,7 +287,8 @@ impl Row<'_> {
             );
             return None;
         }
-        // A list of a PLC's inputs is written by the simulation; a bare client list is read.
+        // Clients only read a PLC's inputs, but the simulation writes them. Without a known direction, a tag
+        // is read.
         let area = spots.area.or(stated).unwrap_or(Area::Output);
         Some(Found {
             area,

@@ -1,4 +1,4 @@
-//! Makes the `Code` enum of `src/driver/status.rs` from the table `src/driver/status.tsv`.
+//! Generates the `Code` enum of `src/driver/status.rs` from the table `src/driver/status.tsv`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::{env, fs};
 
 const TABLE: &str = "src/driver/status.tsv";
 
-/// What a row has in one of its columns.
+/// Selects one of a row's columns.
 type Column = for<'r> fn(&'r Row<'_>) -> &'r str;
 
 struct Row<'a> {
@@ -43,7 +43,7 @@ fn main() {
     fs::write(&out, generate(&rows)).unwrap_or_else(|error| panic!("{}: {error}", out.display()));
 }
 
-/// The tests of the plug-in bus build plug-ins in C; `no_cc` leaves them out.
+/// The tests of the plug-in bus need a C compiler; `no_cc` leaves them out.
 fn find_compiler() {
     println!("cargo::rustc-check-cfg=cfg(no_cc)");
     let answer = std::process::Command::new("cc").arg("--version").output();
@@ -83,7 +83,7 @@ fn variant(name: &str) -> String {
         .collect()
 }
 
-/// Text for a doc comment, with names from configuration files marked as code.
+/// Text for a doc comment, with names in configuration files marked as code.
 fn marked(text: &str) -> String {
     let words = text.split(' ').map(|word| {
         let name = word.trim_end_matches([';', ',', ':']);

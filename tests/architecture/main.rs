@@ -1,5 +1,5 @@
-//! The house keeps its order: rooms use only rooms above them, unsafe code and the system's clocks
-//! have their homes, no file grows without end.
+//! Enforces the project's structure: rooms use only rooms above them, unsafe code and reading the system's
+//! clocks are confined to certain files, and no file grows without limit.
 
 mod rules;
 mod source;
@@ -59,7 +59,8 @@ fn the_table_of_rooms_in_the_crate_docs_has_the_same_order() {
     assert_eq!(rooms, levels);
 }
 
-/// The lines, within a made-up file, that a check complains about, with a word of the complaint.
+/// Checks that exactly these lines of an imaginary file are complained about, each with a word of the
+/// complaint.
 #[track_caller]
 fn finds(path: &str, text: &str, expected: &[(usize, &str)]) {
     let found = mistakes(File { path, text });

@@ -1,8 +1,8 @@
-//! The rules of the house, each as a function from one source file to what is wrong with it.
+//! The rules, each a function from a source file to its violations.
 
 use super::source::{Token, root_paths, texts, tokens};
 
-/// The rooms, each on a level; a room uses only rooms on the levels before its own.
+/// The rooms by level; a room may only use rooms on earlier levels.
 pub(crate) const LEVELS: &[&[&str]] = &[
     &["time"],
     &["os"],
@@ -21,7 +21,7 @@ pub(crate) const LEVELS: &[&[&str]] = &[
     &["jni", "cli"],
 ];
 
-/// Where `unsafe` may stand: files that begin like this.
+/// Where `unsafe` is allowed: files that start like this.
 const UNSAFE_HOMES: &[&str] = &[
     "src/jni.rs",
     "src/jni/",
@@ -35,7 +35,7 @@ const UNSAFE_HOMES: &[&str] = &[
 /// Where the system's clocks may be read.
 const CLOCK_HOMES: &[&str] = &["src/time/", "src/cli/"];
 
-/// The longest a source file may be.
+/// The largest number of lines in a source file.
 const MOST_LINES: usize = 700;
 
 /// One source file: its path from the project's root, with `/`, and its text.
@@ -45,7 +45,7 @@ pub(crate) struct File<'a> {
     pub(crate) text: &'a str,
 }
 
-/// All that is wrong with `file`, one line each.
+/// All violations in `file`, one per line.
 pub(crate) fn mistakes(file: File<'_>) -> Vec<String> {
     let tokens = tokens(file.text);
     let mut found = rooms(file, &tokens);
@@ -59,7 +59,7 @@ fn level(room: &str) -> Option<usize> {
     LEVELS.iter().position(|level| level.contains(&room))
 }
 
-/// The module that a file is: `src/a/b.rs` and `src/a/b/mod.rs` are `a::b`.
+/// The module of a file: `src/a/b.rs` and `src/a/b/mod.rs` are `a::b`.
 fn module(path: &str) -> Vec<&str> {
     let inner = path.strip_prefix("src/").unwrap_or(path);
     let inner = inner.strip_suffix(".rs").unwrap_or(inner);
@@ -72,7 +72,7 @@ fn module(path: &str) -> Vec<&str> {
 
 fn rooms(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     let module = module(file.path);
-    // The crate's root names all rooms, and main.rs is no room.
+    // The crate's root names all rooms, and main.rs is not a room.
     let Some(&room) = module.first() else {
         return Vec::new();
     };
@@ -130,7 +130,7 @@ fn clocks(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     for (at, token) in tokens.iter().enumerate() {
         let rest = &tokens[at..];
         let is_named = names.iter().any(|wanted| texts(rest, wanted));
-        // Every type that knows what time it is by itself: Instant, DateTime, Utc, ...
+        // Any type that can read the time: Instant, DateTime, Utc, ...
         let is_type = token.text.starts_with(char::is_uppercase) && token.text != "Self";
         let tells = is_type && texts(&rest[1..], &[":", ":"]) && rest.get(3).is_some_and(asks_time);
         if is_named || tells {
@@ -151,7 +151,7 @@ fn clocks(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     found
 }
 
-/// Whether a function of this name tells the time: `now`, `now_utc`, `now_with_offset`.
+/// Whether a function of this name reads the time: `now`, `now_utc`, `now_with_offset`.
 fn asks_time(token: &Token<'_>) -> bool {
     token.text == "now" || token.text.starts_with("now_")
 }

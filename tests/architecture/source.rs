@@ -1,5 +1,5 @@
-//! Just enough of Rust's grammar to find names in it: comments and literals fall away, words and
-//! punctuation stay.
+//! Just enough of Rust's grammar to find names: comments and literals are dropped, words and punctuation
+//! remain.
 
 /// A word or a mark of punctuation, with its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ enum Kind {
     Token,
 }
 
-/// How long the piece at the start of `rest` is, and what it is.
+/// The length and the kind of the piece at the start of `rest`.
 fn measure(rest: &str, first: char) -> (usize, Kind) {
     if first.is_whitespace() {
         return (first.len_utf8(), Kind::Nothing);
@@ -63,8 +63,8 @@ fn measure(rest: &str, first: char) -> (usize, Kind) {
     }
     if let Some(quote) = rest.strip_prefix('b').unwrap_or(rest).strip_prefix('\'') {
         let before = rest.len() - quote.len() - 1;
-        // 'x' and '\n' are characters; 'x without the second quote is a lifetime.
-        if quote.starts_with('\\') || quote.chars().nth(1) == Some('\'') {
+        // 'x' and '\n' are characters; 'x without a second quote is a lifetime.
+            if quote.starts_with('\\') || quote.chars().nth(1) == Some('\'') {
             return (before + quoted(&rest[before..], '\''), Kind::Literal);
         }
         if before == 0 {
@@ -113,7 +113,7 @@ fn quoted(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Length of `#"…"#` with any number of `#`, if that is what stands here.
+/// Length of `#"…"#` with any number of `#`, if `text` starts with that.
 fn raw_string(text: &str) -> Option<usize> {
     let hashes = text.len() - text.trim_start_matches('#').len();
     if !text[hashes..].starts_with('"') {
@@ -125,11 +125,11 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(length.unwrap_or(text.len()))
 }
 
-/// Every path in `tokens` that starts at the crate's root: by `crate::`, or by so many `super::` that
-/// it gets there from `module` (the file's own module path).
+/// Every path in `tokens` that starts at the crate's root: by `crate::`, or by enough `super::` to get there
+/// from `module` (the file's own module path).
 pub(crate) fn root_paths(tokens: &[Token<'_>], module: &[&str]) -> Vec<RootPath> {
     let mut found = Vec::new();
-    // How deep in braces each inline module of the present place began.
+    // The brace depth at which each enclosing inline module began.
     let (mut inline, mut depth): (Vec<usize>, usize) = (Vec::new(), 0);
     for (at, token) in tokens.iter().enumerate() {
         match token.text {

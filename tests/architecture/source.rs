@@ -64,7 +64,7 @@ fn measure(rest: &str, first: char) -> (usize, Kind) {
     if let Some(quote) = rest.strip_prefix('b').unwrap_or(rest).strip_prefix('\'') {
         let before = rest.len() - quote.len() - 1;
         // 'x' and '\n' are characters; 'x without a second quote is a lifetime.
-            if quote.starts_with('\\') || quote.chars().nth(1) == Some('\'') {
+        if quote.starts_with('\\') || quote.chars().nth(1) == Some('\'') {
             return (before + quoted(&rest[before..], '\''), Kind::Literal);
         }
         if before == 0 {

@@ -5,7 +5,7 @@ fn main() {
     find_compiler();
 }
 
-/// The tests of the plug-in bus build plug-ins in C; `no_cc` leaves them out.
+/// The tests of the plug-in bus need a C compiler; `no_cc` leaves them out.
 fn find_compiler() {
     println!("cargo::rustc-check-cfg=cfg(no_cc)");
     let answer = std::process::Command::new("cc").arg("--version").output();

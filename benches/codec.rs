@@ -9,12 +9,12 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use tickbus::signal::{Area, ByteOrder, DataType, Plan, Scale, Signal, SignalTable, Slot, Station};
 use tickbus::time::Nanos;
 
-/// How the signals of the two areas follow each other in the table.
+/// How the signals of the two areas are ordered in the table.
 #[derive(Clone, Copy)]
 enum Files {
     /// All `%I`, then all `%Q`.
     AreaByArea,
-    /// One `%I`, one `%Q` by turns.
+    /// %I and %Q alternate.
     Interleaved,
 }
 
@@ -28,7 +28,7 @@ struct Device {
 }
 
 impl Device {
-    /// `count` signals each way, whose types `data_type` gives by position.
+    /// `count` signals in each direction, with types by position.
     fn new(
         count: usize,
         files: Files,
@@ -108,7 +108,7 @@ impl Device {
     }
 }
 
-/// What somebody would write who has `count` REALs in a row each way and nothing else.
+/// Hand-written code for `count` consecutive REALs in each direction and nothing else.
 fn exchange_by_hand(slots: &mut [Slot], input_frame: &mut [u8], output_frame: &[u8]) {
     let (inputs, outputs) = slots.split_at_mut(input_frame.len() / 4);
     for (slot, bytes) in inputs.iter().zip(input_frame.chunks_exact_mut(4)) {

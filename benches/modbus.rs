@@ -1,12 +1,12 @@
-//! The Modbus server beside the same with nothing but TCP, and beside servers that others wrote, in alternating
-//! rounds of one run.
+//! The Modbus server compared with a bare TCP server and with third-party servers, in alternating rounds of
+//! one run.
 //!
-//! One client with prepared telegrams writes 64 registers and reads 64 (function 23): a bare server that answers
-//! as many bytes, ours, and those of libmodbus, tokio-modbus and pymodbus where they are installed. Then 1,000
-//! clients at once write one register each every 100 ms. Medians over the rounds; one `rust NAME VALUE` a line on
-//! stdout.
+//! One client with prepared telegrams writes 64 registers and reads 64 (function 23): from a bare server that
+//! answers as many bytes, from ours, and from libmodbus, tokio-modbus and pymodbus if installed. Then 1,000
+//! clients write one register each every 100 ms. Medians over the rounds; prints one `rust NAME VALUE` per
+//! line on stdout.
 //!
-//! To be pinned to one core from outside, since waking another one costs more than all that is measured.
+//! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
 #![allow(unsafe_code, reason = "libmodbus is a library in C")]
 
@@ -27,10 +27,10 @@ use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::time::{Monotonic, Nanos, Spans};
 
-/// Registers that are written and read in one request.
+/// Registers written and read in one request.
 const REGISTERS: u8 = 64;
 
-/// Bytes of such a request and of its answer.
+/// Size of such a request and of its answer, in bytes.
 const REQUEST: usize = 7 + 10 + 2 * REGISTERS as usize;
 const ANSWER: usize = 7 + 2 + 2 * REGISTERS as usize;
 
@@ -38,9 +38,9 @@ const ANSWER: usize = 7 + 2 + 2 * REGISTERS as usize;
 const WINDOW: u16 = 1024;
 
 struct Extent {
-    /// Rounds: many and short, so that what else the machine does hits all alike.
+    /// Many short rounds, so that other load on the machine affects all servers alike.
     rounds: usize,
-    /// Of one server in a round.
+    /// Time per server and round.
     span: Duration,
     clients: usize,
     /// How long they write.
@@ -48,7 +48,7 @@ struct Extent {
 }
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let extent = if measured {
         Extent {
@@ -69,7 +69,7 @@ fn main() {
     crowd(&extent);
 }
 
-/// A Device with 16 latched bits each way, as the rig has them, and its listening address.
+/// A Device with 16 latched bits in each direction, like the rig, and its listening address.
 fn device() -> (Driver, String) {
     let bytes = 2 * usize::from(REGISTERS);
     let mut text = format!(
@@ -107,7 +107,7 @@ fn connect(address: &str) -> TcpStream {
     stream
 }
 
-/// Writes 64 registers from 0 on and reads 64 from `reads` on.
+/// Writes 64 registers from 0 on, and reads 64 from `reads` on.
 fn request(reads: u16) -> [u8; REQUEST] {
     let mut request = [0; REQUEST];
     request[5] = u8::try_from(REQUEST - 6).expect("it is short");
@@ -119,13 +119,13 @@ fn request(reads: u16) -> [u8; REQUEST] {
     request
 }
 
-/// Asks for `span`; gives the exchanges per second.
+/// Sends requests for `span`; returns the exchanges per second.
 fn ping_pong(stream: &mut TcpStream, request: &[u8], span: Duration) -> f64 {
     let mut answer = [0; ANSWER];
     let begin = Instant::now();
     let mut exchanges = 0_u32;
     while begin.elapsed() < span {
-        // The clock is looked at now and then only.
+        // The clock is read only once per batch.
         for _ in 0..10 {
             stream.write_all(request).expect("the other end reads");
             stream.read_exact(&mut answer).expect("an answer");
@@ -135,8 +135,8 @@ fn ping_pong(stream: &mut TcpStream, request: &[u8], span: Duration) -> f64 {
     f64::from(exchanges) / begin.elapsed().as_secs_f64()
 }
 
-/// A server as a child process that prints a line when it is ready, which has its address or is the name of one
-/// that was given.
+/// A server in a child process that prints a line when it is ready: with its address, or anything if it was
+/// given one.
 struct Peer(Child);
 
 impl Peer {
@@ -161,7 +161,7 @@ impl Drop for Peer {
     }
 }
 
-/// An address that nobody listens on, or the next moment.
+/// An address that is not in use at the moment.
 fn free_address() -> std::net::SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     listener.local_addr().expect("it is bound")
@@ -177,7 +177,7 @@ fn pymodbus() -> Option<(Peer, String)> {
     Some((peer, address.to_string()))
 }
 
-/// The one that tools/bench builds.
+/// The server built by tools/bench.
 fn tokio_modbus() -> Option<(Peer, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     Peer::start(Command::new(
@@ -241,7 +241,7 @@ fn resident() -> f64 {
     pages.unwrap_or(0.0) * 4096.0
 }
 
-/// Many clients, each with a rhythm of its own; a request is timed from when it was due.
+/// Many clients, each with its own schedule; a request is timed from when it was due.
 fn crowd(extent: &Extent) {
     const INTERVAL: Duration = Duration::from_millis(100);
     // Both ends of each connection are in this process.

@@ -1,10 +1,10 @@
-//! The plug-in bus: an exchange with a library that does next to nothing, on the bus thread and in a helper
+//! The plug-in bus: an exchange with a library that does almost nothing, on the bus thread and in a helper
 //! process, in alternating rounds of one run.
 //!
-//! The cycles follow each other without a pause, so that the time from one to the next is that of an
-//! exchange. Medians over the rounds; one `rust NAME VALUE` a line on stdout, in microseconds.
+//! The cycles follow one another without a pause, so that the time between two is that of an exchange.
+//! Medians over the rounds; prints one `rust NAME VALUE` per line on stdout, in microseconds.
 //!
-//! To be pinned to one core from outside, since waking another one costs more than all that is measured.
+//! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
 
 #[cfg(all(unix, not(no_cc)))]
@@ -32,7 +32,7 @@ mod plugin {
     const INPUT: usize = 134;
 
     pub(crate) fn main() {
-        // `cargo bench` says so; `cargo test` only wants to see that it runs.
+        // `cargo bench` passes this; `cargo test` only checks that the bench runs.
         let measured = std::env::args().any(|argument| argument == "--bench");
         let (rounds, cycles) = if measured { (7, 20_000) } else { (1, 2) };
         let folder = tempfile::tempdir().expect("a folder");
@@ -49,7 +49,7 @@ mod plugin {
         }
     }
 
-    /// The tests' plug-in: without options it sends back what it gets.
+    /// The tests' plug-in: without options it returns what it is sent.
     fn build(folder: &Path) -> PathBuf {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let library = folder.join("libecho.so");

@@ -1,11 +1,12 @@
-//! The reaction of a machine, per bus: from an edge at the PLC to the answer back at the PLC.
+//! The reaction time of a machine, per bus: from an edge at the PLC to the response at the PLC.
 //!
-//! The PLC is the program `reaction`. The machine ticks every millisecond and brings its %Q bit back on its %I
-//! bit: within the tick, as `tickbus mirror` does, or as a simulator that receives, answers and sends; or with the next one, as a
-//! simulator that exchanges once a tick. Beside them the bare TCP ping-pong of 360 and 134 bytes, and the limit for an
-//! answer within the tick: 1.5 times that, and half a tick for which an edge waits on average. One `rust NAME VALUE` a line.
+//! The PLC is the program `reaction`. The machine ticks every millisecond and copies its %Q bit to its %I
+//! bit: within the tick, like `tickbus mirror` or a simulator that receives, answers and sends; or in the
+//! next one, like a simulator that exchanges once per tick. For comparison: a bare TCP ping-pong of 360 and
+//! 134 bytes, and the limit for a response within the tick, which is 1.5 times that plus the half tick for
+//! which an edge waits on average. Prints one `rust NAME VALUE` per line.
 //!
-//! To be pinned to one core from outside.
+//! Pin it to one core from outside.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::io::{Read, Write};
@@ -41,7 +42,7 @@ fn config(fieldbus: &str) -> String {
 }
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let (edges, exchanges) = if measured { (3000, 200_000) } else { (3, 10) };
     let bare = ping_pong(exchanges);
@@ -81,7 +82,7 @@ fn main() {
     opcua(edges.min(500));
 }
 
-/// By Write one way and by a subscription the other; publishing is in whole milliseconds.
+/// Write in one direction and a subscription in the other; publishing intervals are whole milliseconds.
 #[cfg(feature = "opcua")]
 fn opcua(edges: usize) {
     let device = config(
@@ -133,7 +134,7 @@ fn statistic(text: &str, key: &str) -> Option<String> {
     found.map(str::to_owned)
 }
 
-/// How the machine answers.
+/// How the machine responds.
 #[derive(Clone, Copy, Debug)]
 enum Machine {
     /// Within its tick.
@@ -144,7 +145,7 @@ enum Machine {
     Answers,
 }
 
-/// A running machine, which ends when it is dropped.
+/// A running machine; ends when dropped.
 enum Running {
     Mirror(Box<Host>),
     Simulator(Box<Driver>),
@@ -159,8 +160,8 @@ impl Running {
     }
 }
 
-/// The median reaction in microseconds, of a machine and a PLC with these driver.cfg; without one of its own
-/// the PLC has the machine's.
+/// The median reaction in microseconds of a machine and a PLC with these driver.cfg; without `controller` the
+/// PLC uses the machine's.
 fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usize) -> f64 {
     let clock = Monotonic::shared();
     let config = Config::parse("device.cfg", device).unwrap_or_else(|why| panic!("{why}"));

@@ -1,9 +1,9 @@
-//! Recording: what it costs the tick, and how fast a recording is replayed.
+//! Recording: its cost to the tick, and the speed of a replay.
 //!
-//! The rig's 16 latched bits each way. Ticks are timed in batches, with and without a recorder in turns, with a
-//! pause after each in which the recorder writes; the medians of the batches count. Then a stepped run of a
-//! million ticks, some of whose values change in each, is recorded and replayed. One `rust NAME VALUE` a line on
-//! stdout.
+//! The rig's 16 latched bits in each direction. Ticks are timed in batches, alternately with and without a
+//! recorder, with a pause after each batch in which the recorder writes; the results are medians over the
+//! batches. Then a stepped run of a million ticks, with some changes in each, is recorded and replayed.
+//! Prints one `rust NAME VALUE` per line on stdout.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
 
-/// How much is measured.
+/// The extent of the measurement.
 struct Extent {
     batches: usize,
     ticks: i64,
@@ -27,7 +27,7 @@ struct Extent {
 const BATCH: i64 = 256;
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let extent = if measured {
         Extent {
@@ -119,7 +119,7 @@ fn tick(extent: &Extent, folder: &Path, mode: &str) {
             let nanos = begun.elapsed().as_nanos();
             #[expect(clippy::cast_precision_loss, reason = "below a second")]
             spans.push(nanos as f64 / BATCH as f64);
-            // The recorder looks into its ring every 5 ms.
+            // The recorder polls its ring every 5 ms.
             std::thread::sleep(Duration::from_millis(1));
         }
     }
@@ -176,7 +176,7 @@ fn replay(extent: &Extent, folder: &Path, format: &str) {
     assert_eq!(run.statistic("replay.ticks"), extent.ticks.unsigned_abs());
 }
 
-/// Memory of this process in KiB, where the system tells.
+/// Memory of this process in KiB, if the system tells.
 fn resident() -> Option<i64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

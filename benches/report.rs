@@ -1,9 +1,10 @@
-//! The report of a long run: how long it takes to write, how large it is, and how it does in Chromium, where
-//! that and chromedriver are there.
+//! The report of a long run: how long it takes to write, its size, and its performance in Chromium, if that
+//! and chromedriver are installed.
 //!
-//! 1,000,000 ticks of 32 signals, 7 of them numbers that change in every tick. In the browser: from the beginning
-//! of loading to the first chart, to all signals unpacked, and the longest wait from one picture to the next while
-//! keys zoom in as far as it goes, and out again. One `rust NAME VALUE` a line on stdout.
+//! 1,000,000 ticks of 32 signals, 7 of them numbers that change in every tick. In the browser: the time from
+//! the start of loading to the first chart, the time until all signals are unpacked, and the longest time
+//! between two frames while keys zoom in as far as possible and out again. Prints one `rust NAME VALUE` per
+//! line on stdout.
 #![allow(missing_docs, reason = "a bench")]
 
 #[path = "../tests/browser/samples.rs"]
@@ -39,7 +40,7 @@ const ZOOM: &str = "
     return [longest, tickbusReport.drawn().longest];";
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let ticks = if measured { 1_000_000 } else { 1_000 };
     let begun = Instant::now();

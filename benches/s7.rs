@@ -1,11 +1,11 @@
-//! The S7 server at its clients' end, beside python-snap7's server and the same with nothing but TCP, in alternating
-//! rounds of one run.
+//! The S7 server as its clients see it, compared with python-snap7's server and a bare TCP server, in
+//! alternating rounds of one run.
 //!
-//! An exchange is two transactions by frames that were prepared: 360 bytes are written into a data block, 134 are
-//! read from another one. Bare TCP sends 360 bytes and receives 134, once. Medians over the rounds; one
-//! `rust NAME VALUE` a line on stdout.
+//! An exchange is two transactions with prepared frames: 360 bytes are written to a data block, 134 are read
+//! from another one. The bare TCP server receives 360 bytes and sends 134, once. Medians over the rounds;
+//! prints one `rust NAME VALUE` per line on stdout.
 //!
-//! To be pinned to one core from outside, since waking another one costs more than all that is measured.
+//! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::fmt::Write as _;
@@ -23,15 +23,15 @@ use tickbus::time::Monotonic;
 const REQUEST: usize = 360;
 const ANSWER: usize = 134;
 
-/// How much is measured.
+/// The extent of the measurement.
 struct Extent {
     rounds: usize,
-    /// Of one kind in a round: short, so that what else the machine does hits all alike.
+    /// Time per server and round: short, so that other load on the machine affects all servers alike.
     span: Duration,
 }
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let extent = if measured {
         Extent {
@@ -96,7 +96,7 @@ fn main() {
     }
 }
 
-/// A Device with 16 latched bits each way, as the rig has them, and its listening address.
+/// A Device with 16 latched bits in each direction, like the rig, and its listening address.
 fn device() -> (Driver, String) {
     let mut text = format!(
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n\
@@ -141,7 +141,8 @@ struct Client {
     read: Vec<u8>,
 }
 
-/// Lengths of the answers: packet, header, function and number of items; then a code, or an item's data.
+/// Lengths of the answers: packet header, PDU header, function and number of items; then a return code, or an
+/// item's data.
 const WRITTEN: usize = 7 + 12 + 2 + 1;
 const READ: usize = 7 + 12 + 2 + 4 + ANSWER;
 
@@ -235,18 +236,18 @@ impl Python {
 
 impl Drop for Python {
     fn drop(&mut self) {
-        // The end of its stdin ends it.
+        // It ends with its stdin.
         drop(self.process.stdin.take());
         let _ = self.process.wait();
     }
 }
 
-/// How often it goes in a second.
+/// The rate of `once` per second.
 fn rate(span: Duration, mut once: impl FnMut()) -> f64 {
     let begin = Instant::now();
     let mut count = 0_u32;
     while begin.elapsed() < span {
-        // The clock is looked at now and then only.
+        // The clock is read only once per batch.
         for _ in 0..10 {
             once();
         }

@@ -1,10 +1,10 @@
-//! The socket bus at its adapter, beside the same with nothing but TCP, in alternating rounds of one run.
+//! The socket bus as its peer sees it, compared with bare TCP, in alternating rounds of one run.
 //!
-//! `reply`: a client sends 360 bytes and waits for 134, to a Device with `send = "reply"` and to a bare
-//! server that answers. `cycle`: 134 bytes every 10 ms, from a Device and from a bare thread that sleeps
-//! until its deadlines. Medians over the rounds; one `rust NAME VALUE` a line on stdout.
+//! `reply`: a client sends 360 bytes and waits for 134, from a Device with `send = "reply"` and from a bare
+//! server. `cycle`: 134 bytes every 10 ms, from a Device and from a bare thread that sleeps until its
+//! deadlines. Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
 //!
-//! To be pinned to one core from outside, since waking another one costs more than all that is measured.
+//! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::fmt::Write as _;
@@ -23,19 +23,19 @@ const ANSWER: usize = 134;
 
 const CYCLE: Duration = Duration::from_millis(10);
 
-/// How much is measured.
+/// The extent of the measurement.
 struct Extent {
     rounds: usize,
-    /// Rounds of the ping-pongs: many and short, so that what else the machine does hits both alike.
+    /// Many short rounds of ping-pong, so that other load on the machine affects both alike.
     replies: usize,
-    /// Of one kind of ping-pong in a round.
+    /// Time per kind of ping-pong and round.
     replying: Duration,
-    /// Cycles of one kind in a round.
+    /// Cycles per kind and round.
     cycles: usize,
 }
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let extent = if measured {
         Extent {
@@ -56,7 +56,7 @@ fn main() {
     cycle(&extent);
 }
 
-/// A Device with 16 latched bits each way, as the rig has them, and its listening address.
+/// A Device with 16 latched bits in each direction, like the rig, and its listening address.
 fn device(keys: &str) -> (Driver, String) {
     let mut text = format!(
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
@@ -93,13 +93,13 @@ fn connect(address: &str) -> TcpStream {
     stream
 }
 
-/// Sends and receives for `span`; gives the exchanges per second.
+/// Sends and receives for `span`; returns the exchanges per second.
 fn ping_pong(stream: &mut TcpStream, span: Duration) -> f64 {
     let (request, mut answer) = ([0; REQUEST], [0; ANSWER]);
     let begin = Instant::now();
     let mut exchanges = 0_u32;
     while begin.elapsed() < span {
-        // The clock is looked at now and then only.
+        // The clock is read only once per batch.
         for _ in 0..50 {
             stream.write_all(&request).expect("the other end reads");
             stream.read_exact(&mut answer).expect("an answer");
@@ -141,7 +141,7 @@ fn reply(extent: &Extent) {
     println!("rust socket.reply.ratio {:.3}", median(&mut ratios));
 }
 
-/// When records came in.
+/// The times at which records arrived.
 #[derive(Default)]
 struct Intervals {
     means: Vec<f64>,
@@ -151,7 +151,7 @@ struct Intervals {
 }
 
 impl Intervals {
-    /// Receives `cycles` records and one more, and takes down the times between them.
+    /// Receives `cycles` records and one more, and records the times between them.
     fn receive(&mut self, stream: &mut TcpStream, cycles: usize) {
         let mut record = [0; ANSWER];
         stream.read_exact(&mut record).expect("a first record");
@@ -166,7 +166,7 @@ impl Intervals {
             self.deviations
                 .push(interval.abs_diff(CYCLE).as_secs_f64() * 1e6);
             self.gaps += usize::from(interval > CYCLE + CYCLE / 5);
-            // A cycle that was left out is missing, and no longer interval: what is wanted is the drift.
+            // A skipped cycle is removed from its interval, since only the drift is of interest.
             let here = interval.div_duration_f64(CYCLE).round();
             passed += here;
             self.missed += here - 1.0;
@@ -182,7 +182,7 @@ impl Intervals {
     }
 }
 
-/// Sends a record at each deadline until the other end is gone; missed ones are left out, as the bus does.
+/// Sends a record at each deadline until the other end is gone; missed ones are skipped, as by the bus.
 fn send_on_deadlines(mut stream: TcpStream) {
     let mut due = Instant::now();
     while stream.write_all(&[0; ANSWER]).is_ok() {

@@ -1,8 +1,10 @@
-//! The tick while a peer storms: 10,000 connections in 3 s that say nothing, and the same while nobody reads stderr.
+//! The tick while a peer opens 10,000 connections in 3 s without sending anything, and the same while stderr
+//! is not read.
 //!
-//! Three phases in turn, in several rounds of one run: quiet, storm, storm with stderr a pipe that is full. Each tick is
-//! timed by itself; p99.9 and the maximum are medians over the rounds. One `rust NAME VALUE` a line on stdout. The lines
-//! of the log are those that reached the log of the process, whether or not they were dropped after that.
+//! Three alternating phases in several rounds of one run: quiet, storm, and storm with stderr on a full pipe.
+//! Each tick is timed on its own; p99.9 and the maximum are medians over the rounds. Prints one `rust NAME
+//! VALUE` per line on stdout. The counted log lines are those that reached the log of the process, whether or
+//! not they were dropped after that.
 #![allow(missing_docs, reason = "a bench")]
 
 #[cfg(unix)]
@@ -32,13 +34,13 @@ mod storm {
 
     use super::full_pipe::full_pipe;
 
-    /// Between two ticks.
+    /// The time between two ticks.
     const TICK: Nanos = Nanos::from_micros(100);
     /// Connections per second.
     const RATE: u32 = 10_000 / 3;
 
     pub(super) fn main() {
-        // `cargo bench` says so; `cargo test` only wants to see that it runs.
+        // `cargo bench` passes this; `cargo test` only checks that the bench runs.
         let measured = std::env::args().any(|argument| argument == "--bench");
         let (rounds, span) = if measured {
             (7, Duration::from_secs(3))
@@ -128,7 +130,7 @@ mod storm {
         }
     }
 
-    /// A device that has nothing to say until it is spoken to, and its address.
+    /// A device that sends nothing until it receives something, and its address.
     fn device() -> (Driver, SocketAddr) {
         let text = "[driver]\nid = 1\nname = \"stormed\"\n[fieldbus]\nkind = \"socket\"\n\
                     address = \"127.0.0.1:0\"\nsend = \"reply\"\n\
@@ -147,7 +149,7 @@ mod storm {
         }
     }
 
-    /// Connects and closes, at its rate; gives how often.
+    /// Connects and closes at its rate; returns how many times.
     fn storm(address: SocketAddr, over: &AtomicBool) -> u64 {
         let begin = Instant::now();
         let mut connections = 0_u32;
@@ -160,7 +162,7 @@ mod storm {
         connections.into()
     }
 
-    /// Ticks on its beat for `span`; how long each exchange took.
+    /// Ticks at a fixed interval for `span`; returns how long each exchange took.
     fn tick(driver: &mut Driver, span: Duration) -> Spans {
         let clock = Monotonic::shared();
         let mut slots = driver.initial_slots();

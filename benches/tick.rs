@@ -1,8 +1,8 @@
-//! The tick in Rust: one exchange of a driver, without the way from Java.
+//! The tick in Rust: one exchange of a driver, without the call from Java.
 //!
-//! `rig` is the test rig's 16 bits each way, `reals` a number of REAL signals each way. On a free bus
-//! most exchanges find nothing new, as in a simulation that ticks faster than its bus; on a stepped
-//! one every exchange runs a bus cycle and a scan of the hosted program, on the same thread.
+//! `rig` has the test rig's 16 bits in each direction, `reals` a number of REAL signals in each direction. On
+//! a free bus most exchanges find nothing new, as in a simulation that ticks faster than its bus; on a
+//! stepped one every exchange runs a bus cycle and a scan of the hosted program, on the same thread.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ use tickbus::image::{Frame, triple_buffer};
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
 
-/// Faults of the rig's first bits, and of the line, as sections of a driver.cfg; none of them hides the bus.
+/// Faults of the rig's first bits, and of the line, as sections of a driver.cfg; none of them stops the bus.
 const FAULTS: &str = "
 [[fault]]
 kind   = \"invert\"
@@ -55,7 +55,7 @@ fn bits(latch: &str) -> String {
     text
 }
 
-/// Bits in bytes of their own, as the `Execute` of so many axes are.
+/// Bits each in a byte of its own, like the `Execute` bits of `count` axes.
 fn lone_bits(count: usize, latch: &str) -> String {
     let mut text = String::new();
     for area in ['Q', 'I'] {
@@ -83,7 +83,7 @@ fn reals(count: usize) -> String {
     text
 }
 
-/// What 2,000 latched signals cost when all of them change in each tick.
+/// The cost of 2,000 latched signals that all change in each tick.
 fn latches(criterion: &mut Criterion) {
     const COUNT: usize = 2_000;
     let mut group = criterion.benchmark_group("latches");
@@ -111,7 +111,7 @@ fn exchange(criterion: &mut Criterion) {
     let clock = Monotonic::shared();
     let mut group = criterion.benchmark_group("exchange");
     let latched = bits("latch = \"rising\"");
-    // Faults that wait, and faults that are active.
+    // Waiting faults, and active faults.
     let wait = FAULTS.replace("[[fault]]", "[[fault]]\nat = \"1000h\"");
     let tables = [
         ("rig, faults waiting", format!("{latched}{wait}")),
@@ -141,7 +141,7 @@ fn exchange(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Our triple buffer against the crate of that name: publish and read on one thread.
+/// Our triple buffer compared with the crate of that name: publish and read on one thread.
 fn hand_over(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("hand-over");
     for size in [64, 512, 4096] {

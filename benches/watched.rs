@@ -1,8 +1,8 @@
-//! The tick while another thread reads the statistics all the time, 4,000 BOOLs behind a hosted program.
+//! The tick while another thread continually reads the statistics, with 4,000 BOOLs and a hosted program.
 //!
-//! Both reach the driver as Java's threads do: the tick tries again at once, the reader copies what it needs, gives the
-//! driver back, and writes the text then. Quiet and watched take turns; p99.9 and the maximum are medians over the rounds. One
-//! `rust NAME VALUE` a line.
+//! Both access the driver as Java's threads do: the tick retries at once, the reader copies what it needs,
+//! releases the driver, and only then formats the text. Rounds alternate between quiet and watched; p99.9 and
+//! the maximum are medians over the rounds. Prints one `rust NAME VALUE` per line.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::fmt::Write as _;
@@ -15,12 +15,12 @@ use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Clock, Monotonic, Nanos, Pace, Spans, Stop};
 
-/// Between two ticks.
+/// The time between two ticks.
 const TICK: Nanos = Nanos::from_micros(100);
 const BITS: usize = 2_000;
 
 fn main() {
-    // `cargo bench` says so; `cargo test` only wants to see that it runs.
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let (rounds, span) = if measured {
         (7, Duration::from_secs(2))
@@ -93,7 +93,7 @@ fn config() -> Config {
     Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// Reads the statistics again and again.
+/// Reads the statistics continually.
 fn watch(driver: &Mutex<Driver>, texts: &AtomicU64, over: &AtomicBool) {
     while !over.load(Ordering::Relaxed) {
         let snapshot = driver.lock().expect("no panic").snapshot();
@@ -102,7 +102,8 @@ fn watch(driver: &Mutex<Driver>, texts: &AtomicU64, over: &AtomicBool) {
     }
 }
 
-/// Ticks on its beat for `span`; how long each exchange took, with what it waited for the driver.
+/// Ticks at a fixed interval for `span`; returns how long each exchange took, including the wait for the
+/// driver.
 fn tick(driver: &Mutex<Driver>, slots: &mut [Slot], span: Duration) -> Spans {
     let clock = Monotonic::shared();
     let (begin, stop) = (Instant::now(), Stop::new());

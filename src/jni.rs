@@ -1,8 +1,8 @@
 //! The native methods of the Java class `tickbus.Tickbus`.
 //!
-//! Each is one line into the rooms above. `xChangeData` is the tick, `receiveNative` and `sendNative` are its
-//! halves: raw functions that take no lock, make no system call, allocate nothing and never throw. All the others go
-//! through the jni crate, and throw `tickbus.FieldbusException`.
+//! Each is one line that calls into the rooms above. `xChangeData` is the tick; `receiveNative` and
+//! `sendNative` are its halves: raw functions that take no lock, make no system call, allocate nothing and
+//! never throw. All others go through the jni crate and throw `tickbus.FieldbusException`.
 
 #![allow(
     unsafe_code,
@@ -35,7 +35,7 @@ use handles::Handles;
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
 
-/// How long closing waits for whoever reads the log.
+/// How long closing waits for the log to reach stderr.
 const LAST_WORDS: Nanos = Nanos::from_millis(100);
 
 /// Called by the JVM when it loads the library.
@@ -77,7 +77,7 @@ extern "system" fn Java_tickbus_Tickbus_xChangeData(
     _class: jclass,
     handle: jlong,
 ) -> jint {
-    // The table catches a panic of the driver; nothing around it can panic.
+    // The handle table catches a panic of the driver; nothing else here can panic.
     DRIVERS
         .with(handle, Device::exchange)
         .unwrap_or_else(Code::code)
@@ -116,7 +116,7 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
 ) {
     env.with_env(|_| {
         let closed = DRIVERS.close(handle, Device::close);
-        // The process may end right after this, and nobody has the driver any more.
+        // The process may end right after this, and the driver's messages must not be lost.
         tickbus_base::os::flush_log(LAST_WORDS);
         closed.map_err(Failure::plain)
     })
@@ -204,7 +204,7 @@ extern "system" fn Java_tickbus_Tickbus_reportNative<'local>(
         .resolve::<ThrowFieldbusException>()
 }
 
-/// `static native int emptyNative()`: what crossing the border costs, the baseline of the benchmarks.
+/// `static native int emptyNative()`: the cost of a call through JNI, the baseline of the benchmarks.
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_emptyNative(
     _env: *mut jni::sys::JNIEnv,
@@ -275,7 +275,8 @@ fn report<'local>(
     Ok(env.new_string(page.to_string_lossy())?)
 }
 
-/// Work on a driver, with the text of its panic where it has failed.
+/// Calls `work` with the driver of `handle`; if the driver has failed, the error carries the text of its
+/// panic.
 fn with<R>(handle: jlong, work: impl FnOnce(&mut Device<open::Keep>) -> R) -> Result<R, Failure> {
     DRIVERS
         .with(handle, work)

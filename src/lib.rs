@@ -1,8 +1,8 @@
 //! Puts a simulated machine on a real PLC's fieldbus.
 //!
-//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are crates of their own
-//! under `crates/`, each of use without the others; this crate is the native library of the Java driver, the `tickbus`
-//! command, and one name for all of them:
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms of this crate
+//! follow the data flow, and each uses only the rooms above it in this list (a test checks that;
+//! `docs/ARCHITECTURE.md` explains why):
 //!
 //! | room | what lives there |
 //! |---|---|
@@ -10,16 +10,14 @@
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
+//! | [`axis`] | axes: their command and feedback structures, motion profiles, what a command means |
+//! | [`faults`] | injected faults: wrong values, and trouble on the line |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
-//! | [`axis`] | axes: their structures of command and feedback, profiles of motion, what a command means |
-//! | [`faults`] | wrong values and troubles of the line, when they are asked for |
-//! | [`fieldbus`] | the bus traits, the port, and one room per bus |
 //! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
 //! | [`report`] | one HTML page about one run |
-//! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on a clock that is handed in |
-//! | [`programs`] | the PLC programs of the demos |
-//! | [`driver_cfg`] | driver.cfg, and the list of bus kinds |
-//! | [`driver`] | one device: open, exchange, statistics, close |
+//! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
+//! | [`fieldbus`] | the bus traits, and one room per bus |
+//! | [`driver`] | one device: configuration, open, exchange, statistics, close |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |

@@ -1,4 +1,4 @@
-//! `tickbus check`, the real program, over good files and wrong ones.
+//! `tickbus check`, run as a program, on good and on wrong files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ fn check(directory: &Path, file: impl AsRef<std::ffi::OsStr>) -> Output {
         .expect("the tickbus program runs")
 }
 
-/// Asserts exit code 1 with nothing printed but these mistakes and their count.
+/// Asserts exit code 1, and nothing printed except these mistakes and their count.
 #[track_caller]
 fn assert_mistakes(output: &Output, mistakes: &[String]) {
     let told = String::from_utf8_lossy(&output.stderr);
@@ -51,8 +51,8 @@ fn files(folder: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Each `tests/wrong/NAME.cfg` has its mistakes in `NAME.txt`. With the environment variable `BLESS`
-/// set, they are written there instead: read the difference before you commit it.
+/// Each `tests/wrong/NAME.cfg` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is set,
+/// they are written there instead: review the difference before committing it.
 #[test]
 fn every_wrong_file_has_exactly_its_mistakes() {
     for file in wrong_files() {
@@ -116,7 +116,7 @@ fn the_rig_is_right() {
         printed.lines().last(),
         Some("check: ok signals=38 input_bytes=8 output_bytes=8")
     );
-    // From bit 8 on a bit of the word lies in its first byte: the lines that people get wrong.
+    // Bits 8 and up of the word are in its first byte: the lines that people get wrong.
     for line in [
         "%QX1.0   %QW0 bit 0   BOOL  PLC output → simulation  rising",
         "%QX0.7   %QW0 bit 15  BOOL  PLC output → simulation  rising",
@@ -129,7 +129,7 @@ fn the_rig_is_right() {
     }
 }
 
-/// Each `tests/right/NAME.cfg` prints as `NAME.txt`; `BLESS` writes that, as it does for the wrong ones.
+/// Each `tests/right/NAME.cfg` prints as `NAME.txt`; `BLESS` rewrites that, as for the wrong files.
 #[test]
 fn every_right_file_prints_as_its_golden_file() {
     let right = files("right");
@@ -192,7 +192,7 @@ fn wrong_usage_is_exit_code_2() {
     }
 }
 
-/// A folder whose name is Latin-1, as an old disc has it.
+/// A folder whose name is in Latin-1, as on an old disk.
 #[test]
 #[cfg(target_os = "linux")]
 fn files_beside_a_driver_cfg_are_found_in_a_folder_whose_name_is_no_utf_8() {

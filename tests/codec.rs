@@ -1,4 +1,4 @@
-//! The codec plan against an oracle that works bit by bit, and against vectors written by hand.
+//! The codec plan against an oracle that works bit by bit, and against hand-written vectors.
 
 #![allow(clippy::float_cmp)] // decoded values are exact
 
@@ -389,7 +389,7 @@ fn nan_becomes_the_fail_safe_value() {
 
 #[test]
 fn any_number_but_zero_is_a_high_bool() {
-    // Eight consecutive slots make a byte of their own way; one alone makes another.
+    // Eight consecutive slots are encoded as a byte in one way, a single slot in another.
     let values = [-0.0, 1.0, 0.5, -1.0, f64::INFINITY, 5e-324, 2.0, f64::NAN];
     let signals = (0..8).map(|bit| Signal {
         fail_safe: Slot::from_real(1.0),
@@ -481,7 +481,7 @@ fn a_short_frame_panics_before_anything_is_written() {
     Plan::new(&table, 0, Area::Input).encode(&[Slot::default()], &mut [0; 2]);
 }
 
-/// A stretch of signals that follow each other in the frame.
+/// Signals that are adjacent in the frame.
 #[derive(Clone, Debug)]
 struct Stretch {
     data_type: DataType,
@@ -538,7 +538,7 @@ fn scale() -> impl Strategy<Value = Scale> {
     .prop_map(|(gain, offset)| Scale { gain, offset })
 }
 
-/// Values near everything that has an edge.
+/// Values near all thresholds.
 fn value() -> impl Strategy<Value = f64> {
     let powers = prop::sample::select(&[0, 7, 8, 15, 16, 31, 32, 52, 53, 63, 64, 127, 128][..]);
     let near_powers = (powers, -2..=2_i8, any::<bool>()).prop_map(|(power, halves, negative)| {
@@ -572,7 +572,7 @@ fn slot(signal: &Signal) -> BoxedStrategy<Slot> {
     }
 }
 
-/// Puts the stretches one after the other into the frames of their area and station.
+/// Places the stretches one after another in the frames of their area and station.
 fn placed(stretches: &[Stretch], scales: &[Scale]) -> SignalTable {
     let mut bit_positions = [[0_usize; 2]; 2];
     let mut scales = scales.iter().cycle();

@@ -1,11 +1,11 @@
-//! The native library, looked at as a JVM looks at it: by the names that it exports.
+//! The native library as a JVM sees it: the names that it exports.
 #![allow(unsafe_code, reason = "a library is loaded")]
 
 use std::path::PathBuf;
 
 use libloading::Library;
 
-/// The cdylib that cargo built for this test, beside or above the test's own program.
+/// The cdylib built by cargo for this test, beside or above the test's executable.
 fn cdylib() -> PathBuf {
     let name = libloading::library_filename("tickbus");
     let test = std::env::current_exe().expect("a test has a path");
@@ -23,7 +23,7 @@ fn cdylib() -> PathBuf {
 
 #[test]
 fn the_native_methods_of_tickbus_are_exported() {
-    // SAFETY: our own library; its initialisers are those of the Rust runtime.
+    // SAFETY: this is our own library; its only initialisers are those of the Rust runtime.
     let library = unsafe { Library::new(cdylib()) }.expect("loads");
     for name in [
         "JNI_OnLoad",

@@ -22,7 +22,7 @@ use tickbus::fieldbus::{Cause, LinkState};
 use tickbus::programs::Mirror;
 use tickbus::time::{Manual, Nanos};
 
-/// A link name of its own for every test.
+/// A link name used by one test only.
 struct Link(String);
 
 impl Link {
@@ -46,7 +46,7 @@ impl Bus for Link {
     }
 }
 
-/// A TCP port of its own for every test: free a moment ago.
+/// A TCP port used by one test only: it was free a moment ago.
 struct Tcp(u16);
 
 impl Tcp {
@@ -79,7 +79,7 @@ fn inject(end: &mut End, text: &str) -> u32 {
         .unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// A machine with a mirror as its PLC, stepped: what it writes comes back in the same exchange. Exchanges
+/// A machine with a mirror as its PLC, stepped: what it writes is read back in the same exchange. Exchanges
 /// are 10 ms apart.
 struct Stepped {
     end: End,
@@ -112,7 +112,7 @@ impl Stepped {
         self.end.driver.exchange(time, &mut self.end.slots).code
     }
 
-    /// Ticks with a position that counts them, and gives what came back of it.
+    /// Ticks while the position counts the ticks; returns the values that came back.
     fn count(&mut self, ticks: usize) -> Vec<f64> {
         let one = |_| {
             let position = f64::from(i32::try_from(self.ticks).expect("few"));
@@ -172,7 +172,7 @@ fn faults_are_right_in_both_halves_of_a_tick() {
             "the simulation keeps its own value"
         );
     }
-    // What tick n sends comes back in tick n + 1: wrong when it was sent, or wrong when it was read.
+    // The value sent in tick n is read in tick n + 1: wrong if bent when sent, or when read.
     assert_eq!(seen, [0.0, 1.0, 2.0, 50.0, 50.0, 105.0, 106.0, 7.0, 8.0]);
 }
 
@@ -247,7 +247,7 @@ fn a_line_that_was_in_trouble_when_its_cable_was_pulled_runs_for_its_own_reason_
     );
 }
 
-/// Pulls the cable of a running line, waits until both ends have noticed, and plugs it in again.
+/// Disconnects a running line, waits until both ends have noticed, and reconnects it.
 fn pulls_the_cable(bus: &impl Bus) {
     let mut rig = Rig::new(bus);
     rig.connect();
@@ -287,7 +287,7 @@ fn a_cable_that_is_pulled_is_noticed_at_both_ends_of_a_socket() {
     pulls_the_cable(&Tcp::new());
 }
 
-/// What comes late comes in order, whole, and with all its pulses.
+/// Delayed data arrive in order, complete, and with all pulses.
 fn delays(bus: &impl Bus, kind: &str, at_device: bool) {
     let mut rig = Rig::new(bus);
     rig.connect();
@@ -309,7 +309,7 @@ fn delays(bus: &impl Bus, kind: &str, at_device: bool) {
         };
         end.statistic("fault.active") == kind
     });
-    // Until the bus has looked, too.
+    // Until the bus has noticed as well.
     for _ in 0..5 {
         pass(&rig.clock, 2);
         rig.device.tick();
@@ -335,7 +335,7 @@ fn delays(bus: &impl Bus, kind: &str, at_device: bool) {
     assert_eq!(edges, 1.0);
     let late = came.expect("it came") - begun;
     assert!(late >= Nanos::from_millis(50), "{late}");
-    // The fault ends while something is on its way.
+    // The fault ends while data are in transit.
     rig.controller.set("speed", 2.0);
     rig.controller.set("run", 1.0);
     rig.controller.tick();
@@ -392,7 +392,7 @@ fn slow_answers_over_a_socket_keep_every_pulse() {
 #[test]
 fn a_delay_counts_ticks_of_a_stepped_bus() {
     let mut bus = Stepped::new("[[fault]]\nkind = \"delay\"\nby = \"30ms\"\ntick = 3\nticks = 4\n");
-    // The frames of ticks 3 to 6 come 3 ticks late; with the end of the fault all the others come at once.
+    // The frames of ticks 3 to 6 arrive 3 ticks late; when the fault ends, all remaining ones arrive at once.
     assert_eq!(bus.count(9), [0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 6.0, 7.0, 8.0]);
     let mut bus =
         Stepped::new("[[fault]]\nkind = \"slow-answers\"\nby = \"20ms\"\ntick = 3\nticks = 4\n");
@@ -560,7 +560,7 @@ fn a_file_for_both_ends_has_the_faults_of_the_machine() {
     }
 }
 
-/// The same faults, the same run, bit for bit.
+/// The same faults give the same run, bit for bit.
 #[test]
 fn a_stepped_run_with_every_fault_repeats_itself() {
     let run = || {
@@ -682,7 +682,7 @@ fn a_program_of_its_own_takes_faults_from_its_command_line() {
     assert!(err.ends_with("plc: failed mistakes=2\n"), "{err}");
 }
 
-/// Every example of the documentation, on the rig that it is about.
+/// Every example in the documentation, on the rig that it is about.
 #[test]
 fn the_examples_of_the_documentation_are_right() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));

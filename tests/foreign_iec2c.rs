@@ -1,4 +1,4 @@
-//! Programs for `OpenPLC` under the eyes of its own compiler, `iec2c`, called as its runtime calls it.
+//! Programs for `OpenPLC`, compiled by its own compiler, `iec2c`, called as its runtime does.
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
 mod foreign;
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
     ])
 }
 
-/// Names from machines, and words that C, `iec2c` or the text itself has a use for.
+/// Names from machines, and words that have a meaning in C, to `iec2c` or in the generated text.
 const NAMES: &str = "\
     Config Config0 Res0 PLC plc Ramp PID Integral Derivative Hysteresis Run Cycle Auto Busy Error T TR SP ET CV PV Q Q1 IN \
     PT CU CD CLK R S S1 R1 Start Stop Reset Enable Alarm Fault Status Mode Speed Position Home Step Time Date Day Left \
@@ -43,7 +43,7 @@ const NAMES: &str = "\
     NULL M_PI M_E MAX_INPUT LINE_MAX BUFSIZ RAND_MAX INT_MAX SECONDS_PER_DAY errno int main double struct register volatile TIME_TO_OPEN INT_TO_REAL ADD_TIME \
     CTU_DINT ANY_STRING ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE REF_TO RTC SEMA data retain global located";
 
-/// Lines of `[fieldbus]` for the buses that have a program.
+/// The `[fieldbus]` lines of each bus that has a program.
 const BUSES: [&str; 4] = [
     "kind = \"loopback\"\nprogram = \"rig\"",
     "kind = \"socket\"\naddress = \"127.0.0.1:2000\"",
@@ -58,7 +58,7 @@ fn config(driver: &str, bus: &str, names: &[&str]) -> Config {
     for (number, name) in names.iter().enumerate() {
         let (side, kind) = (number % 2, number / 2 % types.len());
         let (letter, size) = [("X", 1), ("B", 1), ("W", 2), ("D", 4), ("L", 8), ("L", 8)][kind];
-        // One in three begins at an odd byte.
+        // One signal in three starts at an odd byte.
         let byte = if kind == 1 {
             bytes[side]
         } else {
@@ -89,8 +89,8 @@ struct Compiler {
 }
 
 impl Compiler {
-    /// The one that `IEC2C` names, that is on the `PATH`, or that lies in `shared/peers` beside the checkout; with the
-    /// library that `IEC2C_LIB` names, or that is beside it.
+    /// The compiler named by `IEC2C`, on the `PATH`, or in `shared/peers` beside the checkout; with the
+    /// library named by `IEC2C_LIB`, or beside the compiler.
     fn find() -> Result<Self, Absent> {
         let absent = |why: &str| Absent(why.to_owned());
         let stated = std::env::var_os("IEC2C").map(PathBuf::from);
@@ -115,7 +115,7 @@ impl Compiler {
         Ok(Self { program, library })
     }
 
-    /// Every word in its library of blocks and functions: their names, their variables, types and keywords.
+    /// Every word in its library: blocks and functions, their variables, types and keywords.
     fn words(&self) -> Vec<String> {
         let files = std::fs::read_dir(&self.library).expect("its folder");
         let mut words = BTreeSet::new();
@@ -132,11 +132,11 @@ impl Compiler {
         words.into_iter().collect()
     }
 
-    /// Compiles a program as the runtime of `OpenPLC` v3 calls it, and the C that comes of it.
+    /// Compiles a program as the runtime of `OpenPLC` v3 does, and the resulting C.
     ///
     /// # Errors
     ///
-    /// What the compilers told, or which file of those that `OpenPLC` wants is not there.
+    /// The compilers' messages, or the file required by `OpenPLC` that is missing.
     fn compile(&self, text: &str) -> Result<(), String> {
         let folder = tempfile::tempdir().expect("a folder");
         let source = folder.path().join("program.st");
@@ -153,7 +153,7 @@ impl Compiler {
             let told = String::from_utf8_lossy(&output.stderr).into_owned();
             return Err(format!("iec2c: {}\n{told}", output.status));
         }
-        // Those that OpenPLC's build moves and compiles by name.
+        // Files that OpenPLC's build moves and compiles by name.
         for name in [
             "POUS.c",
             "POUS.h",
@@ -216,7 +216,7 @@ fn signals_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Abs
         .chain(words.iter().map(String::as_str))
         .collect();
     let names: Vec<&str> = names.into_iter().collect();
-    // All of them on the bus whose programs compile fastest, those of NAMES on each.
+    // All words on the bus whose programs compile fastest, those in NAMES on each bus.
     for names in names.chunks(150) {
         compiles(&compiler, &config("Test rig", BUSES[2], names));
     }
@@ -236,7 +236,7 @@ fn compiles(compiler: &Compiler, config: &Config) {
 fn drivers_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Absent> {
     let compiler = Compiler::find()?;
     let words = compiler.words();
-    // The program is called PREFIX_program, its instance PREFIX_instance: no word there is.
+    // The program is called PREFIX_program, its instance PREFIX_instance: no word may equal these.
     let alike = |word: &&String| word.ends_with("_PROGRAM") || word.ends_with("_INSTANCE");
     assert_eq!(words.iter().find(alike), None);
     for name in [
@@ -254,7 +254,7 @@ fn drivers_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Abs
         "every scan",
         "Week end",
     ] {
-        // A signal called as the driver is, and two called as its program and its instance.
+        // A signal with the driver's name, and two with the names of its program and instance.
         let signals = [
             name,
             &format!("{name} program"),

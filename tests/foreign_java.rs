@@ -1,5 +1,5 @@
-//! The servers with clients of Apache PLC4X and Eclipse Milo, and `opcua-client` with a server of Milo: programs that
-//! others wrote, in Java.
+//! The servers with clients of Apache PLC4X and Eclipse Milo, and `opcua-client` with a server of Milo:
+//! third-party software in Java.
 #![allow(
     missing_docs,
     clippy::float_cmp,
@@ -104,7 +104,7 @@ impl Machine {
         std::thread::sleep(Duration::from_millis(1));
     }
 
-    /// Ticks until `done` gives something.
+    /// Ticks until `done` returns something.
     #[track_caller]
     fn until<T>(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> Option<T>) -> T {
         let limit = Instant::now() + Duration::from_secs(60);
@@ -138,7 +138,7 @@ impl Machine {
     }
 }
 
-/// A program of tests/peers/java, spoken to by lines.
+/// A program from tests/peers/java, controlled by lines of text.
 struct Peer {
     child: Child,
     stdin: Option<ChildStdin>,
@@ -186,7 +186,7 @@ impl Peer {
         Ok(peer)
     }
 
-    /// Asks, and lets the machine tick until the answer is there.
+    /// Sends a request, and lets the machine tick until the answer arrives.
     #[track_caller]
     fn ask(&mut self, machine: &mut Machine, words: &[&str]) -> String {
         let stdin = self.stdin.as_mut().expect("it lives");
@@ -210,7 +210,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // The end of its stdin is the end of it; one that hangs must not hang the test.
+        // It ends with its stdin; if it hangs, the test must not hang as well.
         drop(self.stdin.take());
         let limit = Instant::now() + Duration::from_secs(10);
         while Instant::now() < limit {
@@ -224,7 +224,7 @@ impl Drop for Peer {
     }
 }
 
-/// Where a client of PLC4X finds the signals, and what it calls a truth.
+/// The names by which a PLC4X client finds the signals, and its notation of booleans.
 struct Tags<'a> {
     run: &'a str,
     speed: &'a str,
@@ -234,7 +234,7 @@ struct Tags<'a> {
     pressure: &'a str,
 }
 
-/// Values in both directions, by a client of PLC4X.
+/// Values in both directions, with a PLC4X client.
 fn plc4x(machine: &mut Machine, url: &str, tags: &Tags<'_>) -> Result<(), Absent> {
     let mut plc = Peer::start(machine, "Plc4xClient", &[url])?;
     for (tag, name, text, value) in [
@@ -318,7 +318,7 @@ fn milo_as_client() -> Result<(), Absent> {
         let written = milo.ask(&mut machine, &["write", speed, "Int16", text]);
         assert_eq!(written, "good");
         machine.until_value("speed", value);
-        // Write and verify: a value that was just accepted is good at once.
+        // Write and verify: a value that was just accepted has good quality at once.
         assert_eq!(milo.ask(&mut machine, &["read", speed]), text);
     }
     let subscribed = milo.ask(&mut machine, &["subscribe", "ns=2;s=position"]);
@@ -333,7 +333,7 @@ fn milo_as_client() -> Result<(), Absent> {
                 .then_some(())
         });
     }
-    // The whole structure ServerStatus is read, and its clock goes.
+    // The whole structure ServerStatus is read, and its clock runs.
     let lag: i64 = milo.ask(&mut machine, &["status"]).parse().expect("a lag");
     assert!(lag.abs() < 5_000, "its clock is {lag} ms behind");
     Ok(())
@@ -373,7 +373,7 @@ fn milo_as_server() -> Result<(), Absent> {
     machine.set("pressure", 0.75);
     plc.ask_until(&mut machine, &["get", "position"], "42");
     plc.ask_until(&mut machine, &["get", "pressure"], "0.75");
-    // It was killed and comes back.
+    // It was killed and is started again.
     drop(plc);
     machine.until_value("speed", -1.0);
     let mut plc = Peer::start(&mut machine, "MiloServer", &arguments)?;

@@ -1,5 +1,5 @@
-//! The Modbus buses with ends that others wrote: pymodbus as client and as server, mbpoll, and tshark as a
-//! judge of what our server sends.
+//! The Modbus buses with third-party software at the other end: pymodbus as client and as server, mbpoll, and
+//! tshark to check what our server sends.
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 mod foreign;
@@ -63,7 +63,7 @@ fn main() -> ExitCode {
     ])
 }
 
-/// A driver on the system's clock, which mirrors each byte of %Q on the byte of %I at the same offset.
+/// A driver on the system's clock, which copies each byte of %Q to the byte of %I at the same offset.
 struct Machine {
     driver: Driver,
     slots: Vec<Slot>,
@@ -100,7 +100,7 @@ impl Machine {
         self.driver.exchange(Nanos::ZERO, &mut self.slots);
     }
 
-    /// A tick that brings the bytes `q N` back on `i N`.
+    /// A tick that copies the bytes `q N` to `i N`.
     fn mirror(&mut self) {
         self.tick();
         for index in 0..self.slots.len() {
@@ -144,7 +144,7 @@ impl Machine {
         address.parse().expect("an address")
     }
 
-    /// Ticks until the program at the other end ends; gives what it printed.
+    /// Ticks until the program at the other end exits; returns its output.
     #[track_caller]
     fn mirror_until_the_end_of(&mut self, mut command: Command) -> String {
         let mut child = command
@@ -179,7 +179,7 @@ impl Machine {
     }
 }
 
-/// A byte each way at every offset but some of %Q, where REALs in two orders lie.
+/// A byte in each direction at every offset, except for some of %Q with REALs in two byte orders.
 fn signals() -> String {
     let mut text = format!("input_bytes = {BYTES}\noutput_bytes = {BYTES}\n");
     for byte in 0..BYTES {
@@ -198,7 +198,7 @@ fn signals() -> String {
         "[[signal]]\nname = \"abcd\"\naddress = \"%QD20\"\ntype = \"REAL\"\n\
          [[signal]]\nname = \"cdab\"\naddress = \"%QD24\"\ntype = \"REAL\"\norder = \"CDAB\"\n",
     );
-    // What lies under the REALs is mirrored from byte 0.
+    // The bytes below the REALs are copied starting at byte 0.
     for byte in 20..28 {
         text = text.replace(&format!("\"i {byte}\""), &format!("\"in {byte}\""));
     }
@@ -309,7 +309,7 @@ impl Drop for Server {
     }
 }
 
-/// Words each way, so many that no request takes them all.
+/// More words in each direction than fit into one request.
 fn words(count: usize) -> String {
     let mut text = String::new();
     for word in 0..count {
@@ -323,7 +323,7 @@ fn words(count: usize) -> String {
     text
 }
 
-/// Lets values go out and come back, where %I and %Q lie at the same place.
+/// Sends values out and back, with %I and %Q at the same place.
 #[track_caller]
 fn loop_through(fieldbus: &str, count: usize) -> Machine {
     let mut machine = Machine::open(fieldbus, &words(count));
@@ -350,7 +350,7 @@ const ALLOWED: &str = "write_to = \"ACME PLC 7 1.2\"";
 fn our_client_drives_pymodbus() -> Result<(), Absent> {
     let (server, address) = Server::tcp()?;
     let client = format!("kind = \"modbus-client\"\naddress = \"{address}\"\n{ALLOWED}\n");
-    // Functions 23; 16 and 3; 15 and 1; and more than one request takes.
+    // Function 23; functions 16 and 3; 15 and 1; and more than fits into one request.
     for (keys, count) in [
         ("inputs = \"offset:0\"", 64),
         ("inputs = \"offset:0\"\nread_write = false", 64),
@@ -366,7 +366,7 @@ fn our_client_drives_pymodbus() -> Result<(), Absent> {
         let machine = loop_through(&format!("{client}{keys}"), count);
         machine.driver.close();
     }
-    // The server dies and comes back.
+    // The server dies and is started again.
     let mut machine = loop_through(&format!("{client}inputs = \"offset:0\""), 4);
     drop(server);
     machine.until("the line is lost", |machine| {
@@ -412,7 +412,7 @@ fn our_client_reads_inputs() -> Result<(), Absent> {
     });
     let keys = format!("{client}inputs = \"discrete-input:1\"\n");
     let mut bits = Machine::open(&keys, "[[signal]]\nname = \"i\"\naddress = \"%IW0\"\n");
-    // Every third bit, from bit 0 of byte 0 on.
+    // Every third bit, starting with bit 0 of byte 0.
     bits.until("discrete inputs come", |machine| {
         machine.get("i") == f64::from(0b0100_1001_1001_0010_u16)
     });
@@ -467,7 +467,7 @@ fn mbpoll_everything(machine: &mut Machine, mode: &[&str], host: &str) -> Result
     machine.until("the machine has it", |machine| machine.get("q 8") == 5.0);
     let told = run(machine, &["-t", "1", "-r", "65", "-c", "3", host])?;
     assert!(told.contains("[67]: \t1"), "{told}");
-    // A REAL with its words swapped, as mbpoll has it by default, and with -B big-endian.
+    // A REAL with swapped words, mbpoll's default, and big-endian with -B.
     run(machine, &["-t", "4:float", "-r", "13", host, "1.5"])?;
     run(machine, &["-t", "4:float", "-B", "-r", "11", host, "2.5"])?;
     machine.until("the machine has both", |machine| machine.get("abcd") == 2.5);
@@ -493,7 +493,7 @@ fn pymodbus_drives_our_server_on_a_line() -> Result<(), Absent> {
 #[cfg(unix)]
 fn serial(end: &str, device: &std::path::Path) -> String {
     let device = device.display();
-    // However slow the other end is, what it wrote stays.
+    // However slow the other end is, the values that it wrote stay.
     format!(
         "kind = \"modbus-{end}\"\nmax_age = \"1h\"\ndevice = \"{device}\"\nbaud = 115200\nparity = \"none\"\nstop_bits = 1\n"
     )
@@ -581,7 +581,7 @@ fn tshark_finds_nothing() -> Result<(), Absent> {
     };
     let telegrams = ask("mbtcp", "modbus.func_code")?;
     assert_eq!(telegrams.lines().count(), 2 * REQUESTS.len(), "{telegrams}");
-    // Of the requests some are wrong on purpose.
+    // Some of the requests are wrong on purpose.
     let bad = "tcp.srcport == 502 && (_ws.malformed || _ws.expert.severity >= 0x600000)";
     let complaints = ask(bad, "_ws.expert.message")?;
     assert_eq!(complaints, "");

@@ -1,4 +1,4 @@
-//! The OPC UA buses with asyncua, which others wrote, at the other end.
+//! The OPC UA buses with the third-party library asyncua at the other end.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -110,7 +110,7 @@ fn reads_and_writes() -> Result<(), Absent> {
     assert_eq!(device.end.statistic("identity"), IDENTITY);
     assert_eq!(device.end.statistic("writes"), "allowed");
     assert_eq!(device.end.statistic("quality"), "good");
-    // A pulse that is over before the next cycle reaches the PLC as a level that was there.
+    // A pulse that is over before the next cycle reaches the PLC as a visible level.
     for level in [0.0, 1.0, 0.0] {
         device.end.set("sensor", level);
         device.end.tick();
@@ -154,7 +154,7 @@ fn in_stop() -> Result<(), Absent> {
     });
     assert_eq!(device.end.link().cause.name(), "stopped");
     assert_eq!(device.end.statistic("cpu"), "stop");
-    // Nothing has changed meanwhile, so the server reports no value again.
+    // Nothing has changed in the meantime, so the server does not report any value again.
     plc.ask(&json!({"state": 0}));
     device.until("values again", |end| end.get("speed") == 7.0);
     assert_eq!(device.end.link().state, LinkState::Running);
@@ -438,7 +438,7 @@ fn serves() -> Result<(), Absent> {
         (&read["value"], &read["status"]),
         (&json!(77), &json!("Good"))
     );
-    // The subscription alone keeps the line alive: the client goes on asking for more.
+    // The subscription by itself keeps the line alive: the client keeps requesting publishes.
     for _ in 0..100 {
         device.end.tick();
         std::thread::sleep(std::time::Duration::from_millis(10));
@@ -486,7 +486,7 @@ fn pulses() -> Result<(), Absent> {
     Ok(())
 }
 
-/// A whole conversation with asyncua, and one of our client, as tshark reads them.
+/// A complete conversation with asyncua, and one of our client, checked by tshark.
 fn nothing_malformed() -> Result<(), Absent> {
     let tshark = || foreign::command("tshark", "tshark");
     tshark()?;

@@ -1,4 +1,4 @@
-//! The socket bus against a program that somebody else could have written, in another language.
+//! The socket bus against a program in another language, as a third party might write it.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
 mod foreign;
@@ -99,7 +99,7 @@ fn run(mut python: Command) -> Result<(), String> {
         plc.try_wait().expect("it was started")
     });
     if ended.is_none() {
-        // It is waited for below, whether or not it had just ended by itself.
+        // Waited for below, whether or not it has just ended by itself.
         let _ = plc.kill();
     }
     let output = plc.wait_with_output().map_err(|why| why.to_string())?;
@@ -117,7 +117,7 @@ fn run(mut python: Command) -> Result<(), String> {
     }
 }
 
-/// Looks again and again until there is something, for 20 s at most.
+/// Polls until there is something, for at most 20 s.
 fn wait_for<T>(mut look: impl FnMut() -> Option<T>) -> Option<T> {
     let limit = Instant::now() + Duration::from_secs(20);
     loop {

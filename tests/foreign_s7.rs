@@ -1,4 +1,4 @@
-//! S7 with the programs of others at the other end: Snap7 in Python and in C, rust7, and tshark looking on.
+//! S7 with third-party software at the other end: Snap7 in Python and in C, rust7; checked by tshark.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -165,7 +165,7 @@ impl End {
     }
 }
 
-/// Runs a Python script with these arguments while `end` ticks; gives what it printed.
+/// Runs a Python script with these arguments while `end` ticks; returns its output.
 #[track_caller]
 fn run(end: &mut End, mut python: Command, script: &str, arguments: &[String]) -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/");
@@ -186,7 +186,7 @@ fn run(end: &mut End, mut python: Command, script: &str, arguments: &[String]) -
     out
 }
 
-/// What a client wrote last stays when it is gone.
+/// The last values that a client wrote stay after it is gone.
 const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\n\
     db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\", offset = 2, length = 6 }]";
 
@@ -237,13 +237,13 @@ impl Cpu {
         Self { process, port, out }
     }
 
-    /// Tells it something by a line of its stdin.
+    /// Sends it a line on stdin.
     fn tell(&mut self, line: &str) {
         let stdin = self.process.stdin.as_mut().expect("it was piped");
         writeln!(stdin, "{line}").expect("it reads");
     }
 
-    /// Ends it; gives what it says at its end.
+    /// Ends it; returns its final output.
     fn end(mut self) -> String {
         drop(self.process.stdin.take());
         let mut rest = String::new();
@@ -270,7 +270,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             cpu.port
         )
     };
-    // That server does the first item of a job that writes, and no other: so what is written lies without gaps.
+    // Of a job that writes, this server only executes the first item: so what is written has no gaps.
     let mut further = String::from(
         "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
          [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n",
@@ -349,7 +349,7 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
         )
     };
     let mut end = End::open(&fieldbus(""));
-    // What its data block holds before anybody has written, plus 1.
+    // The initial content of its data block, plus 1.
     end.until("it reads", |end| end.get("speed") == 28_399.0);
     let who = end.statistic("identity").expect("it was met");
     end.driver.close();
@@ -370,7 +370,7 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
     cpu.tell("run");
     end.until("it runs again", |end| end.get("speed") == 72.0);
     end.driver.close();
-    // A word, a bit that was 0 in 0xEE, and a REAL of 1.5.
+    // A WORD, a bit that was 0 in 0xEE, and a REAL of 1.5.
     assert_eq!(cpu.end(), "changed 2 3 20 40 41 42 43\n");
     Ok(())
 }
@@ -457,7 +457,7 @@ fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
         &["frame.number", "_ws.expert.message"],
     );
     assert_eq!(wrong, "");
-    // And of ours, what the client says, too.
+    // With our server, also what the client sends.
     let ours = "tcp.port == 50003 && (_ws.malformed || _ws.expert.severity == error)";
     let wrong = pcap::tshark(
         tshark()?,

@@ -1,4 +1,4 @@
-//! Exports in Structured Text under the eyes of a parser that somebody else wrote: blark.
+//! Exports in Structured Text, checked by a third-party parser: blark.
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
 mod foreign;
@@ -30,7 +30,7 @@ fn main() -> ExitCode {
     ])
 }
 
-/// Writes the sources for `target` into `folder`; where they are.
+/// Writes the sources for `target` to `folder`; returns their paths.
 fn write(file: &str, target: Target, folder: &Path) -> Vec<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
@@ -73,9 +73,9 @@ fn blark_reads_every_source_in_structured_text() -> Result<(), Absent> {
     let mut files = Vec::new();
     let (codesys, twincat, openplc) = (Target::Codesys, Target::TwinCat, Target::OpenPlc);
     for (file, targets) in [
-        // TwinCAT's file differs from that for CODESYS in what brings records alone.
+        // TwinCAT's file differs from the one for CODESYS only in what transfers records.
         ("driver.cfg", &[codesys, twincat, openplc][..]),
-        // A hosted program serves one station, and OpenPLC has no OPC UA.
+        // A hosted program serves a single station, and OpenPLC has no OPC UA.
         ("tests/export/right/everything.cfg", &[codesys]),
         ("tests/export/right/opcua-client.cfg", &[codesys]),
         ("tests/export/right/loopback-life.cfg", &[codesys, openplc]),
@@ -112,7 +112,7 @@ fn blark_refuses_a_source_that_is_broken() -> Result<(), Absent> {
     Ok(())
 }
 
-/// The schema is PLCopen's own, and not ours to give away: it is read where `PLCOPEN_XSD` says that it is.
+/// The schema is PLCopen's and may not be redistributed: it is read from the path in `PLCOPEN_XSD`.
 fn plcopen_xml_is_valid_under_its_schema() -> Result<(), Absent> {
     let schema = std::env::var_os("PLCOPEN_XSD");
     let why =
@@ -139,7 +139,7 @@ fn plcopen_xml_is_valid_under_its_schema() -> Result<(), Absent> {
                         .is_some_and(|one| one == "xml")
                 })
                 .expect("XML");
-            // The editors' namespace is that of 2.00; the schema that is published is that of 2.01.
+            // The editors use the namespace of 2.00; the published schema is that of 2.01.
             let text = xml.text.replace("tc6_0200", "tc6_0201");
             let path = folder.path().join(format!("{}-{}", files.len(), xml.name));
             std::fs::write(&path, text).expect("the file is written");

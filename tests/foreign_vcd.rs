@@ -1,4 +1,4 @@
-//! Recordings under the eyes of readers that others wrote.
+//! Recordings, read by third-party software.
 #![allow(missing_docs, reason = "a test")]
 
 mod foreign;
@@ -14,7 +14,7 @@ use tickbus::time::{Manual, Nanos};
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/read_vcd.py");
 
-/// Beside the rig's signals: one of each other kind, with names that VCD does not allow.
+/// In addition to the rig's signals: one of each other kind, with names that VCD does not allow.
 const MORE: &str = r#"
 [[signal]]
 name    = "2 Förderband, \"links\""

@@ -1,4 +1,4 @@
-//! The log: nobody waits for whoever reads it, and no peer can fill it.
+//! The log: logging never waits for a reader, and no peer can fill the log.
 #![cfg(unix)]
 #![allow(
     missing_docs,
@@ -42,7 +42,7 @@ fn device() -> (End, SocketAddr) {
     (end, address.expect("it was waited for"))
 }
 
-/// Comes and goes, until that many clients were served and have left.
+/// Connects and disconnects until this many clients were served and have left.
 fn storm(end: &End, address: SocketAddr, times: u64) {
     let left = || number(end, "cause.left");
     while left() < times {
@@ -52,7 +52,7 @@ fn storm(end: &End, address: SocketAddr, times: u64) {
     }
 }
 
-/// What a key of the statistics counts; 0 where it is left out.
+/// The value of a counter in the statistics; 0 if it is absent.
 fn number(end: &End, key: &str) -> u64 {
     let text = end.driver.statistics();
     let found = text
@@ -61,18 +61,18 @@ fn number(end: &End, key: &str) -> u64 {
     found.map_or(0, |count| count.parse().expect("a number"))
 }
 
-/// Ends a child that hangs.
+/// Kills a child process that hangs.
 struct Killed(Child);
 
 impl Drop for Killed {
     fn drop(&mut self) {
-        // Both fail when it has ended already.
+        // Both fail if it has ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// Says that this process is the child of a test.
+/// Tells a process that it is the child of a test.
 const MARK: &str = "TICKBUS_TEST_STDERR_IS_FULL";
 
 #[test]
@@ -127,7 +127,7 @@ fn with_a_full_stderr() {
     end.driver.close();
 }
 
-/// What the log has been told, and at what level.
+/// The messages logged, with their levels.
 static LOGGED: Mutex<Vec<(log::Level, String)>> = Mutex::new(Vec::new());
 
 struct Logger;
@@ -163,12 +163,12 @@ fn a_storm_of_connections_gives_a_bounded_number_of_log_lines() {
         .filter(|line| line.starts_with(left_at_once))
         .collect();
     assert!(left >= 2000 && untold >= 1900, "{left}, {untold}");
-    // The first 20, and 32, 64, ... up to what came.
+    // The first 20, and 32, 64, ... up to the number of messages.
     let most = 20 + (left.ilog2() as usize).saturating_sub(4);
     assert!((20..=most).contains(&lines.len()), "{lines:#?}");
     let last = lines.last().expect("there are some");
     let ends = last.ends_with(" times so far; told more rarely from now on)");
     assert!(ends, "{last}");
-    // Coming and leaving, being turned away, and the end.
+    // Connecting, leaving, being turned away, and the end of the line.
     assert!(logged.len() <= 3 * (most + 2), "{}", logged.len());
 }

@@ -1,4 +1,4 @@
-//! The loopback: the conformance suite, and what is its own.
+//! The loopback: the conformance suite, and tests of its own.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -15,7 +15,7 @@ use conformance::rig::{Bus, End, Liar, Rig, await_that, config};
 use tickbus::driver::Code;
 use tickbus::time::{Clock as _, Manual, Monotonic, Nanos};
 
-/// A link name of its own for every test.
+/// A link name used by one test only.
 struct Link(String);
 
 impl Link {
@@ -266,7 +266,7 @@ fn without_simulation_time_a_stepped_program_is_scanned_once_in_each_tick() {
         assert_eq!(end.tick().granted, Nanos::from_millis(10 * tick));
     }
     assert_eq!(end.statistic("plc.scans"), "5");
-    // Once there was a time, it stands.
+    // Once a time was given, it is kept.
     end.driver.exchange(Nanos::from_millis(60), &mut end.slots);
     end.tick();
     assert_eq!(end.statistic("plc.scans"), "7");
@@ -301,7 +301,7 @@ fn a_machine_that_steps_in_large_steps_is_there_all_along() {
         end.send();
     }
     assert_eq!(end.get("out"), 1.0);
-    // Before it had ever sent there was nothing to see.
+    // Before it had sent anything, there was nothing to see.
     assert_eq!(end.statistic("plc.stale"), "1");
     assert_eq!(end.statistic("plc.scans"), "401");
 }
@@ -357,8 +357,8 @@ fn a_tick_is_a_receive_and_the_first_send_after_it() {
     assert_eq!(end.statistic("fresh"), "4");
 }
 
-/// The clock is read on the tick itself. A time that a thread keeps in memory falls behind by as much as that thread
-/// is kept waiting.
+/// The clock is read in the tick itself. A time kept in memory by another thread would lag by as long as that
+/// thread is not scheduled.
 #[test]
 fn age_is_never_understated_however_busy_the_machine_is() {
     let (link, clock) = (Link::new(), Monotonic::shared());
@@ -371,7 +371,7 @@ fn age_is_never_understated_however_busy_the_machine_is() {
     controller.driver.close();
     let link_is_lost = || device.statistic("cause") == "left";
     await_that("it is gone", link_is_lost);
-    // When it was heard of last, at the latest.
+    // The latest time at which it was last heard from.
     let first = device.tick();
     let heard = clock.now() - first.age;
     let over = AtomicBool::new(false);

@@ -1,4 +1,4 @@
-//! The Modbus buses: the conformance suite, each end by ours, and clients by hand that do not behave.
+//! The Modbus buses: the conformance suite in both directions, and hand-written clients that misbehave.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -34,7 +34,7 @@ use tickbus::time::Nanos;
 conformance!(device_serves, crate::Tcp::device_serves());
 conformance!(controller_serves, crate::Tcp::controller_serves());
 
-/// A Device that listens on a port which the system chooses, with the signals of the suite: `speed` is holding
+/// A Device that listens on a port chosen by the system, with the signals of the suite: `speed` is holding
 /// register 1.
 fn device(further: &str) -> (Alone, TcpStream) {
     let mut device = Alone::open(&conformance::rig::config(&AnyPort, "device", further));
@@ -102,7 +102,7 @@ fn each_write_is_one_commit_and_reading_back_gives_it() {
     device.until_speed(6);
     assert_eq!(device.end.statistic("bus_cycles"), "2");
     assert_eq!(device.end.get("echo"), 6.0);
-    // A read is no cycle, but a sign of life.
+    // A read is not a cycle, but a sign of life.
     ask(&mut stream, 3, &[3, 0, 1, 0, 1]);
     assert_eq!(device.end.statistic("bus_cycles"), "2");
 }
@@ -117,7 +117,7 @@ fn changes_are_events_or_every_write_is() {
         for speed in [5, 5, 6] {
             ask(&mut stream, 1, &[6, 0, 1, 0, speed]);
         }
-        // A coil of another signal, and a byte that no signal has.
+        // A coil of another signal, and a byte without signals.
         ask(&mut stream, 1, &[5, 0, 9, 0xFF, 0]);
         device.until_speed(6);
         let mut events = [tickbus::image::Event::default(); 16];
@@ -144,11 +144,11 @@ fn a_pulse_is_held_until_a_client_has_read_it() {
         device.end.set("sensor", level);
         device.end.tick();
     }
-    // Of another place no pulse is read.
+    // Reading another place shows no pulse.
     for _ in 0..3 {
         assert_eq!(ask(&mut stream, 1, &[4, 0, 1, 0, 2])[0], 4);
     }
-    // Nor of the other bits of its byte.
+    // Nor do the other bits of its byte.
     for _ in 0..3 {
         assert_eq!(ask(&mut stream, 1, &[2, 0, 1, 0, 7])[0], 2);
     }
@@ -156,7 +156,7 @@ fn a_pulse_is_held_until_a_client_has_read_it() {
     assert_eq!(ask(&mut stream, 3, &[2, 0, 0, 0, 1]), [2, 1, 0]);
 }
 
-/// Lets a fault of the line begin.
+/// Starts a line fault.
 fn suffer(device: &mut Alone, fault: &str) {
     let injected = device.end.driver.inject_text(fault);
     injected.unwrap_or_else(|why| panic!("{why}"));
@@ -217,7 +217,7 @@ fn telegrams_that_come_together_or_in_pieces_are_answered_one_by_one() {
     device.until_speed(9);
 }
 
-/// Clients that break the rules are dropped, each with its reason; the honest one beside them notices nothing.
+/// Clients that violate the protocol are disconnected, each with its reason; an honest one is not affected.
 #[test]
 fn a_client_that_breaks_the_rules_is_dropped_alone() {
     let (mut device, mut honest) = device("");
@@ -265,7 +265,8 @@ fn a_client_that_leaves_half_a_telegram_is_given_up_alone() {
     assert_eq!(device.end.statistic("link.running"), "1");
 }
 
-/// Half-open: the client is gone without a word, and another one that never reads is not waited for.
+/// Half-open connections: one client has gone silently, another one never reads; neither keeps the others
+/// waiting.
 #[test]
 fn clients_that_do_not_read_or_are_gone_hold_nobody_up() {
     let (mut device, mut honest) = device("");
@@ -273,7 +274,7 @@ fn clients_that_do_not_read_or_are_gone_hold_nobody_up() {
     deaf.set_write_timeout(Some(Duration::from_millis(50)))
         .expect("an option");
     let all = request(1, 1, &[3, 0, 0, 0, 3]).repeat(400);
-    // Until neither system has room any more.
+    // Until neither system has buffer space left.
     while deaf.write_all(&all).is_ok() {}
     let gone = client(device.address());
     SockRef::from(&gone)
@@ -340,7 +341,7 @@ fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
         end.tick().code == Code::Stale
     });
     assert_eq!(device.end.get("speed"), -1.0);
-    // A write of the panel would be one.
+    // A write by the panel would be reported.
     ask(&mut panel, 4, &[6, 0, 1, 0, 8]);
     device.until_speed(8);
 }
@@ -348,7 +349,7 @@ fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
 #[test]
 fn the_line_runs_while_a_client_talks_and_is_stale_when_none_does() {
     let (mut device, mut stream) = device("");
-    // What is refused is no sign of life: nobody knows that it was meant for this one.
+    // A refused request is not a sign of life: it may have been meant for another server.
     ask(&mut stream, 1, &[3, 0, 99, 0, 1]);
     ask(&mut stream, 2, &[3, 0, 0, 0, 1]);
     device.until("it runs", |end| end.link().state == LinkState::Running);
@@ -363,7 +364,7 @@ fn the_line_runs_while_a_client_talks_and_is_stale_when_none_does() {
     });
 }
 
-/// A machine that asks `plc`, and may write into it though it does not say who it is.
+/// A machine that polls `plc`, and may write to it although it does not report its identity.
 fn asks(plc: &Plc, further: &str) -> Alone {
     let address = plc.address;
     Alone::open(&format!(
@@ -432,7 +433,7 @@ fn single_signals_lie_where_the_plc_has_them_and_nothing_else_in_it_is_written()
         let identity = format!("modbus device at {}, unit 1", plc.address);
         let before = plc.with(|memory| {
             memory.registers[1][20] = 4711;
-            // 1.5 with its words in the other order.
+            // 1.5 with swapped words.
             memory.registers[0][30..34].copy_from_slice(&[0, 0, 0, 0x3FF8]);
             memory.bits[1][2] = true;
             memory.bits[0][7] = true;
@@ -446,7 +447,7 @@ fn single_signals_lie_where_the_plc_has_them_and_nothing_else_in_it_is_written()
             let written = plc.with(|memory| memory.registers[1][40..42] == [0x4020, 0]);
             arrived && written && end.get("door") == 1.0 && end.get("valve") == 1.0
         });
-        // A pulse of one tick in a bit of a register is written there.
+        // A pulse of one tick is written to a bit of a register.
         machine.end.set("ready", 1.0);
         machine.end.tick();
         machine.end.set("ready", 0.0);
@@ -531,7 +532,7 @@ fn a_plc_that_ignores_or_hangs_up_on_the_question_who_it_is_is_read_and_written(
     }
 }
 
-/// Two stations that a machine has, each with a register to read that is safe at -1.
+/// A machine with two stations, each with a register to read whose fail-safe value is -1.
 const TWO_UNITS: &str = "[[station]]\nname = \"press\"\nunit = 3\n[[station]]\nname = \"oven\"\nunit = 7\n\
      [[signal]]\nname = \"press\"\nstation = \"press\"\naddress = \"%QW0\"\ntype = \"INT\"\nfail_safe = -1\n\
      [[signal]]\nname = \"oven\"\nstation = \"oven\"\naddress = \"%QW0\"\ntype = \"INT\"\nfail_safe = -1\n";
@@ -605,18 +606,18 @@ fn function_3_reads_the_inputs_behind_the_outputs() {
     let both = [23, 4, 1, 0, 1, 0, 1, 0, 1, 2, 0, 9];
     assert_eq!(ask(&mut stream, 2, &both), [23, 2, 0, 5]);
     device.until_speed(9);
-    // Nobody writes them.
+    // They cannot be written.
     assert_eq!(ask(&mut stream, 3, &[6, 4, 1, 0, 1]), [0x86, 2]);
 }
 
-/// A line whose receiver stays on while it sends.
+/// A line whose receiver stays enabled while sending.
 #[cfg(unix)]
 #[test]
 fn a_server_on_a_line_that_echoes_answers_each_request_once() {
     use tickbus::fieldbus::modbus::rtu;
 
     let line = pty::Line::new();
-    // A slow line, as the clock of the test runs faster than the pseudo-terminal carries.
+    // A slow line, because the test's clock runs faster than the pseudo-terminal.
     let slow = "unit = 1\necho = true\nbaud = 50\nsilence = \"1ms\"";
     let config = conformance::rig::config(&AnyPort, "device", slow);
     let serial = format!("device = \"{}\"", line.end(0).display());
@@ -636,8 +637,8 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
         let mut answer = [0; 8];
         std::thread::scope(|scope| {
             let reading = scope.spawn(|| master.read_exact(&mut answer));
-            // An echo is expected for as long as the answer takes on this line, which is 1.8 s: less goes by here, however
-            // long the pseudo-terminal takes.
+            // The echo is expected for the duration of the answer on this line, 1.8 s: less time passes here,
+            // however slow the pseudo-terminal is.
             let mut passes = 0;
             await_that("it answers", || {
                 if passes < 500 {
@@ -649,11 +650,11 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
             });
         });
         assert_eq!(answer[..], request);
-        // All that it says comes back.
+        // Everything that it sends is echoed.
         master.write_all(&answer).expect("a line");
         device.until_speed(i16::from(speed));
     }
-    // An answer to an echo would be an exception, or a second write.
+    // Answering an echo would give an exception, or a second write.
     for _ in 0..200 {
         pass(&device.clock, 1);
     }

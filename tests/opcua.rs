@@ -1,4 +1,4 @@
-//! The OPC UA buses: the conformance suite, each of them as either end.
+//! The OPC UA buses: the conformance suite with each of them at either end.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -23,7 +23,7 @@ use tickbus::time::Manual;
 conformance!(device_serves, crate::OpcUa::new("device"));
 conformance!(device_is_client, crate::OpcUa::new("controller"));
 
-/// A server and a client without protection, on an address of their own.
+/// A server and a client without protection, at an address used by one test only.
 struct OpcUa {
     address: SocketAddr,
     /// The role of the server.
@@ -47,7 +47,7 @@ impl Bus for OpcUa {
                 "kind = \"opcua-server\"\naddress = \"{address}\"\nsecurity = \"None\"\nanonymous = true"
             )
         } else {
-            // The other end is called by its role.
+            // The other end is named after its role.
             format!(
                 "kind = \"opcua-client\"\nurl = \"opc.tcp://{address}\"\nsecurity = \"None\"\n\
                  write_to = \"urn:tickbus:{server} tickbus\""
@@ -55,7 +55,7 @@ impl Bus for OpcUa {
         }
     }
 
-    /// Whoever is there says what is no OPC UA.
+    /// The peer sends bytes that are not OPC UA.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
         let over = Arc::new(AtomicBool::new(false));
         let address = self.address;
@@ -83,7 +83,7 @@ impl Bus for OpcUa {
         let (cause, words) = if listens {
             ("protocol", "does not answer as an OPC UA server")
         } else {
-            // A server goes on waiting for somebody who can.
+            // A server keeps waiting for a valid client.
             ("waiting", "nobody has written yet")
         };
         Liar {
@@ -136,15 +136,15 @@ impl Bus for OpcUa {
     }
 }
 
-/// Says what is no OPC UA, and leaves in good order.
+/// Sends bytes that are not OPC UA, and closes properly.
 fn lie(mut stream: TcpStream) {
-    // If the other end is quicker to go, so be it.
+    // The other end may have closed first.
     let _ = stream.set_nonblocking(false);
     let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\n\r\n");
     leave(stream);
 }
 
-/// A thread that is told to end, and waited for.
+/// A thread that is told to end, and joined.
 struct Ending {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,

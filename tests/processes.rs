@@ -1,4 +1,4 @@
-//! The two commands as processes of their own, over a real socket: started, killed, interrupted, misused.
+//! The two commands as separate processes, over a real socket: started, killed, interrupted, misused.
 #![cfg(unix)]
 #![allow(missing_docs, reason = "tests")]
 
@@ -48,7 +48,7 @@ fn save(text: &str) -> tempfile::NamedTempFile {
     file
 }
 
-/// A running `tickbus`, which ends with the test.
+/// A running `tickbus`; ends with the test.
 struct Process {
     child: Child,
     lines: Lines<BufReader<ChildStdout>>,
@@ -81,7 +81,7 @@ impl Process {
         panic!("no line with {text:?}, but {before:#?}");
     }
 
-    /// All that is left to read, and how it ended.
+    /// The rest of its output, and its exit status.
     fn end(mut self) -> (Vec<String>, ExitStatus) {
         let lines = (&mut self.lines).map(|line| line.expect("text")).collect();
         let status = self.child.wait().expect("it was started");
@@ -98,7 +98,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // Both fail when it has ended already.
+        // Both fail if it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -135,7 +135,7 @@ fn device() -> (Driver, Vec<Slot>, String) {
     (driver, slots, address.expect("found"))
 }
 
-/// A PLC that is killed in the midst of it, again and again, and started again.
+/// A PLC is killed at arbitrary times, and restarted.
 #[test]
 fn a_killed_plc_is_stale_and_its_successor_is_served() {
     const KILLS: u8 = 200;
@@ -171,7 +171,7 @@ fn a_killed_plc_is_stale_and_its_successor_is_served() {
     driver.close();
 }
 
-/// Both commands against each other: `mirror` for the machine, `plc reaction` for the PLC.
+/// The two commands against each other: `mirror` as the machine, `plc reaction` as the PLC.
 #[test]
 fn reaction_measures_a_mirror() {
     let file = save(&config("address = \"127.0.0.1:0\""));
@@ -338,7 +338,7 @@ fn what_is_wrong_is_told_before_anything_starts() {
     assert_eq!(code, Some(2));
 }
 
-/// One server with two stations, as two remote I/O units behind one address.
+/// One server with two stations, like two remote I/O units at one address.
 #[test]
 fn a_mirror_serves_several_stations() {
     let stations = "[[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n".to_owned()

@@ -20,7 +20,7 @@ use tickbus::record::{Recording, Tick};
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};
 
-/// A folder with driver.cfg files and recordings, which goes with the test.
+/// A folder with driver.cfg files and recordings; deleted with the test.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -45,7 +45,7 @@ impl Folder {
         Config::parse(path.to_str().expect("UTF-8"), text).unwrap_or_else(|why| panic!("{why}"))
     }
 
-    /// What opening fails with.
+    /// The error on opening.
     fn refusal(&self, text: &str) -> String {
         let config = self.config(text);
         let error = Driver::open(config, Manual::new()).expect_err("refused");
@@ -100,7 +100,8 @@ impl Run {
         self.slots[index] = Slot::from_real(value);
     }
 
-    /// A machine that does as it likes: some of what this end writes changes, some of it after what it reads.
+    /// A machine that acts at random: some of the values that this end writes change, some of them depending
+    /// on what it reads.
     fn machine(&mut self) {
         for index in 0..self.driver.config().table.signals.len() {
             let signal = &self.driver.config().table.signals[index];
@@ -130,7 +131,7 @@ impl Run {
     }
 }
 
-/// The rig's driver.cfg on another bus, recorded to `file`.
+/// The rig's driver.cfg on another bus, recording to `file`.
 fn rig(fieldbus: &str, file: &str) -> String {
     let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/driver.cfg"))
         .expect("the rig's driver.cfg");
@@ -166,7 +167,7 @@ fn two_runs_of_the_stepped_rig_give_the_same_bytes() {
         run.ticks(1..=3_000);
         run.driver.close();
     }
-    // Busy threads beside, more than there are processors, and a ring that is always full.
+    // More busy threads than there are processors, and a ring that is always full.
     let stop = Arc::new(AtomicBool::new(false));
     let busy: Vec<_> = (0..4)
         .map(|_| {
@@ -230,7 +231,7 @@ fn a_replay_of_a_replay_is_the_recording() {
     }
 }
 
-/// Ticks of two halves: the model answers in each to what it received in the same.
+/// Ticks in two halves: the model answers in each to what it has received in the same tick.
 fn answers(run: &mut Run, ticks: u64, step: u64) {
     for tick in 1..=ticks {
         let time = Nanos::from_millis(i64::try_from(step * tick).expect("small"));
@@ -278,7 +279,7 @@ fn a_row_has_the_answer_beside_the_question() {
         run.set("in", run.slots[out].real() + 1.0);
         run.driver.send(&mut run.slots);
     }
-    // Its answer is never sent, and it is a tick all the same.
+    // Its answer is never sent, but it counts as a tick.
     run.driver.receive(Nanos::from_millis(4), &mut run.slots);
     run.driver.receive(Nanos::from_millis(5), &mut run.slots);
     run.driver.close();
@@ -350,7 +351,7 @@ fn when_the_recording_ends_the_data_become_stale() {
     }
     run.driver.close();
     let mut run = Run::open(&folder, &rig("replay = \"run.vcd\"", ""));
-    // Another step size, and another beginning.
+    // A different step size, and a different start.
     for tick in 0..5 {
         assert_eq!(run.exchange(1_000 + 2 * tick).code, Code::Fresh);
     }
@@ -391,7 +392,7 @@ fn free(fieldbus: &str, record: &str) -> String {
     text
 }
 
-/// What was recorded on a free bus, pulses, stale data and all, is shown again by a replay.
+/// A recording made on a free bus, with pulses and stale data, is reproduced by a replay.
 #[test]
 fn a_recording_of_a_free_bus_replays_value_by_value() {
     let folder = Folder::new();
@@ -405,7 +406,7 @@ fn a_recording_of_a_free_bus_replays_value_by_value() {
     let plc = free(&format!("{link}\nrole = \"controller\""), "");
     let mut plc = Run::on(&folder, &plc, &clock);
     for tick in 1..=600 {
-        // Up to four changes of the PLC between two ticks of the machine; sometimes it is silent.
+        // Up to four changes by the PLC between two ticks of the machine; sometimes it is silent.
         for _ in 0..plc.random() % 5 {
             for index in 0..plc.slots.len().min(14) {
                 if plc.random().is_multiple_of(3) {
@@ -520,7 +521,7 @@ fn another_signal_table_is_refused_by_name() {
         );
         assert!(error.starts_with(&begin), "{error}\n{begin}");
     }
-    // A sensor that is new is no hindrance, and said.
+    // A sensor that is not in the recording is permitted, and reported.
     let more = "[[signal]]\nname = \"new\"\naddress = \"%IX9.0\"\n";
     let mut run = Run::open(&folder, &(replay + more));
     run.exchange(1);
@@ -583,7 +584,7 @@ fn a_cut_recording_replays_up_to_its_last_whole_tick() {
         reason.contains("tick 39 was its last, the recording is cut"),
         "{reason}"
     );
-    // Damage in the midst of it is an error, with its line.
+    // Damage in the middle is an error, reported with its line.
     let broken = whole.replacen("#80000000\n", "#8000\n", 1);
     fs::write(folder.path("run.vcd"), broken).expect("written");
     let mut run = Run::open(&folder, &rig("replay = \"run.vcd\"", ""));

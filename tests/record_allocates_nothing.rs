@@ -1,4 +1,4 @@
-//! A record that comes in over a socket, and its reply, allocate nothing.
+//! Receiving a record over a socket, and replying, allocates nothing.
 //!
 //! All threads of the process are counted, so this test is alone in its file.
 #![allow(missing_docs, reason = "a test")]
@@ -17,7 +17,7 @@ static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 
 struct Counting;
 
-// SAFETY: all calls are handed on to the system's allocator, as they came.
+// SAFETY: all calls are passed on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::SeqCst);

@@ -1,4 +1,4 @@
-//! `tickbus report` as its users meet it, and what can be said of a page without a browser.
+//! `tickbus report` as users run it, and checks of a page that need no browser.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -216,7 +216,7 @@ fn a_million_changes_that_follow_a_rule_take_little_room() {
     assert!(size < 200_000, "{size} bytes");
 }
 
-/// The colours of the style sheet, by name: those of light and of dark.
+/// The colours of the style sheet, by name, for light and for dark mode.
 fn colours() -> [Vec<(String, [f64; 3])>; 2] {
     let style = fs::read_to_string(
         Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/report/src/style.css"),
@@ -239,7 +239,7 @@ fn colours() -> [Vec<(String, [f64; 3])>; 2] {
     })
 }
 
-/// The contrast of two colours as the accessibility guidelines of the W3C reckon it.
+/// The contrast of two colours as defined in the W3C's accessibility guidelines.
 fn contrast(a: [f64; 3], b: [f64; 3]) -> f64 {
     let light = |colour: [f64; 3]| {
         let [r, g, b] = colour.map(|c| {

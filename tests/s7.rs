@@ -1,4 +1,4 @@
-//! The S7 buses: the conformance suite with a server and a client of ours, and what is their own.
+//! The S7 buses: the conformance suite with a server and a client of ours, and tests of their own.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -34,7 +34,7 @@ const INPUTS: u8 = 0x81;
 const OUTPUTS: u8 = 0x82;
 const FLAGS: u8 = 0x83;
 
-/// A Device that serves the conformance suite's signals at a port which the system chooses.
+/// A Device that serves the conformance suite's signals at a port chosen by the system.
 fn server(further: &str) -> (Alone, SocketAddr) {
     let pair = Pair {
         address: (Ipv4Addr::LOCALHOST, 0).into(),
@@ -105,7 +105,7 @@ fn events_are_changes_or_every_write_as_asked() {
             client.write(OUTPUTS, 2, &[0, 5]);
         }
         for _ in 0..2 {
-            // Bit 0 of byte 0 alone, whose neighbours are no events.
+            // Only bit 0 of byte 0; its neighbours must not become events.
             let bit = [&[5, 1, 0x12, 10, 0x10, 1, 0, 1, 0, 0, OUTPUTS, 0, 0, 0][..]].concat();
             client.ask(&job(&bit, &[0, 3, 0, 1, 1]));
         }
@@ -126,7 +126,7 @@ fn what_is_read_is_the_latest_and_a_pulse_elsewhere_is_not_taken_as_seen() {
     for _ in 0..3 {
         assert_eq!(client.read(INPUTS, 2, 2), [2, 1]);
     }
-    // Another bit of its byte.
+    // Another bit of the same byte.
     let beside = [4, 1, 0x12, 0x0A, 0x10, 1, 0, 1, 0, 0, INPUTS, 0, 0, 1];
     let beside = job(&beside, &[]);
     for _ in 0..3 {
@@ -191,7 +191,7 @@ fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
         end.tick().code == Code::Stale
     });
     assert_eq!(device.end.get("speed"), -1.0);
-    // A write of the panel would be one.
+    // A write by the panel would be reported.
     panel.write(OUTPUTS, 2, &[0, 8]);
     device.until_speed(8);
 }
@@ -224,7 +224,7 @@ fn every_station_has_a_slot_and_blocks_of_its_own() {
     assert_eq!((device.end.get("a"), device.end.get("b")), (11.0, 13.0));
 }
 
-/// Whatever a client does that is wrong, another one and the image do not notice.
+/// Whatever mistakes a client makes, other clients and the image are not affected.
 #[test]
 fn a_client_that_breaks_the_protocol_is_dropped_and_disturbs_nobody() {
     let (mut device, at) = server("");
@@ -295,7 +295,7 @@ fn jobs_that_do_not_add_up_are_refused_and_nothing_of_them_is_done() {
         ),
         ([&[5, 1][..], &item].concat(), vec![0, 4, 255, 255, 0, 1]),
         ([&[4, 255][..], &item].concat(), Vec::new()),
-        // An answer would be longer than was agreed.
+        // The answer would exceed the negotiated length.
         (
             [&[4, 1][..], &address(FLAGS, 0, 0, 60_000)].concat(),
             Vec::new(),
@@ -341,7 +341,7 @@ fn a_flood_of_one_client_leaves_time_for_another() {
     flood.0.set_nonblocking(true).expect("a TCP option");
     let many = request(INPUTS, 0, 6).repeat(1000);
     for value in 0..100 {
-        // It never reads, so there comes the moment from which on it is not read any more.
+        // It never reads, so at some point the server stops reading from it.
         let _ = std::io::Write::write(&mut flood.0, &many);
         good.write(OUTPUTS, 2, &[0, value]);
         device.end.tick();
@@ -393,7 +393,7 @@ fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
     assert!(plc.link().reason.contains("tickbus device"));
 }
 
-/// A CPU by hand that answers a client of ours; one that is asked who it is hangs up.
+/// A hand-written CPU that serves our client, and closes the connection when asked for its identity.
 #[test]
 fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
     logged::expect("nothing is written into the PLC");
@@ -424,7 +424,7 @@ fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
                 &[0xFF, 4, 0, 48, 0, 0, 0, 7, 0, 7],
             ];
             client.send(&packet(&answer.concat()));
-            // Until it has been taken, and the client goes.
+            // Until the value was taken, and the client leaves.
             while client.receive().is_some() {}
             return connections;
         }
@@ -436,7 +436,7 @@ fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
     assert_eq!(cpu.join().expect("no panic"), 3);
 }
 
-/// Two stations in one job each way, and one that has inputs alone.
+/// Two stations in one job per direction, and one with inputs only.
 #[test]
 fn the_stations_of_a_client_lie_where_their_tables_say() {
     let signals = "[[signal]]\nname = \"a\"\nstation = \"one\"\naddress = \"%QW0\"\n\
@@ -476,7 +476,7 @@ fn the_stations_of_a_client_lie_where_their_tables_say() {
     assert_eq!(plc.statistic("pdu"), "960");
 }
 
-/// Signals in the memory of a CPU of which each byte was 0xA5.
+/// Signals in the memory of a CPU in which every byte was 0xA5.
 #[test]
 fn nothing_is_written_but_the_bits_that_signals_cover() {
     let (device, at) = server("m_bytes = 256");
@@ -508,7 +508,7 @@ fn nothing_is_written_but_the_bits_that_signals_cover() {
     });
     assert_eq!(panel.read(FLAGS, 0, 256), expected);
     machine.set("open", 0.0);
-    // A neighbour that somebody else writes meanwhile is his.
+    // Adjacent bits written by another client in the meantime must be kept.
     panel.write(FLAGS, 30, &[0xFF]);
     expected[30] = !0b1000;
     await_that("the bit is cleared", || {
@@ -544,7 +544,7 @@ fn machine_of_two(cpu: Cpu) -> (Alone, Arc<Mutex<Cpu>>) {
     machine_with(cpu, "output = \"DB7\"", "%QB0")
 }
 
-/// The same, whose right station lies elsewhere, as does its signal.
+/// The same with the right station at another place, and its signal, too.
 fn machine_with(cpu: Cpu, right: &str, address: &str) -> (Alone, Arc<Mutex<Cpu>>) {
     logged::expect("nothing is written into the PLC");
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");

@@ -1,9 +1,9 @@
-//! The soak: a device that ticks as fast as it can, and a peer at the highest rate that dies again and
-//! again, in every way that a peer can.
+//! The soak: a device that ticks as fast as it can, and a peer at the highest rate that dies again and again,
+//! in every way that a peer can.
 //!
-//! Some seconds by default; `make soak` runs it for minutes, or hours (`make soak MINUTES=120`). It counts what
-//! the peer did to the device, and what the device says was done to it: both must agree, so no error is
-//! unexplained. Threads, descriptors and memory must be the same in the end as at the beginning.
+//! It takes some seconds by default; `make soak` runs it for minutes or hours (`make soak MINUTES=120`). It
+//! counts what the peer did to the device and what the device reports: both must agree, so that no error is
+//! unexplained. Threads, descriptors and memory must be the same at the end as at the beginning.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -60,16 +60,16 @@ address = "%IB133"
 const RECORD: usize = 360;
 const ANSWER: usize = 134;
 
-/// How a peer ends.
+/// How a peer dies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Death {
-    /// It closes in good order.
+    /// It closes properly.
     Close,
     /// The connection is reset.
     Reset,
     /// It dies in the middle of a record.
     Half,
-    /// It falls silent until the device gives it up.
+    /// It falls silent until the device gives up on it.
     Silence,
 }
 
@@ -98,7 +98,7 @@ fn count(driver: &Driver, key: &str) -> u64 {
     statistic(driver, key).map_or(0, |text| text.parse().expect("a count"))
 }
 
-/// One life of a peer: flat out for `span`, then its death. Gives how many records were answered.
+/// One life of a peer: full load for `span`, then its death. Returns the number of answered records.
 fn live(address: &str, span: Duration, death: Death) -> u64 {
     let mut stream = TcpStream::connect(address).expect("the device listens");
     stream.set_nodelay(true).expect("a socket option");
@@ -115,7 +115,7 @@ fn live(address: &str, span: Duration, death: Death) -> u64 {
     match death {
         Death::Close => {}
         Death::Reset => {
-            // Unread bytes would do it, too; this does it at once.
+            // Unread bytes would also cause a reset; this does it at once.
             let socket = SockRef::from(&stream);
             let linger = Some(Duration::ZERO);
             socket.set_linger(linger).expect("a socket option");
@@ -132,7 +132,7 @@ fn live(address: &str, span: Duration, death: Death) -> u64 {
     u64::from(answered)
 }
 
-/// What the process holds when the last peer is forgotten.
+/// What the process holds after the last peer is gone.
 fn rest() -> Resources {
     Resources::settled(|| std::thread::sleep(Duration::from_millis(2)))
 }
@@ -171,14 +171,14 @@ fn a_device_outlives_all_peers() {
         while Instant::now() < end {
             round += 1;
             for (death, lives) in DEATHS.into_iter().zip(&mut lives) {
-                // Silence takes a second, and is less frequent.
+                // Silence takes a second, so it is less frequent.
                 if death == Death::Silence && round % 10 != 1 {
                     continue;
                 }
                 answered += live(&address, Duration::from_millis(50), death);
                 *lives += 1;
             }
-            // The first rounds fill what is filled once.
+            // The first rounds fill caches that are filled only once.
             if round == 5 {
                 before = Some(rest());
             }

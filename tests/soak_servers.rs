@@ -1,8 +1,10 @@
-//! The soak of the servers: a Modbus, an S7 and an OPC UA server tick side by side, while clients come, work and go in every
-//! way that a client can: in good order, reset, in the middle of a telegram, silent, talking nonsense.
+//! The soak of the servers: a Modbus, an S7 and an OPC UA server tick side by side, while clients connect,
+//! work and leave in every way that a client can: properly, by reset, within a telegram, silently, or sending
+//! garbage.
 //!
-//! Some seconds by default; `make soak` runs it for minutes, or hours. Threads, descriptors and memory must be the same in
-//! the end as after the first rounds, every client of good order must have been served, and no line may have failed.
+//! It takes some seconds by default; `make soak` runs it for minutes or hours. Threads, descriptors and
+//! memory must be the same at the end as after the first rounds, every well-behaved client must have been
+//! served, and no line may have failed.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -43,7 +45,7 @@ address = "%IW0"
 type    = "INT"
 "#;
 
-/// Rounds that fill what is filled once, before anything is counted.
+/// Rounds that fill what is filled only once, before anything is counted.
 const FIRST_ROUNDS: u32 = 5;
 
 fn open(fieldbus: &str) -> (Driver, Vec<Slot>) {
@@ -65,7 +67,7 @@ fn statistic(driver: &Driver, key: &str) -> Option<String> {
     found.map(str::to_owned)
 }
 
-/// Where a server listens.
+/// The address of a server.
 fn address(driver: &Driver) -> SocketAddr {
     let limit = Instant::now() + Duration::from_secs(20);
     loop {
@@ -77,7 +79,7 @@ fn address(driver: &Driver) -> SocketAddr {
     }
 }
 
-/// How a client ends that says only bytes.
+/// How a raw client ends.
 #[derive(Clone, Copy, Debug)]
 enum Death {
     Close,
@@ -88,7 +90,7 @@ enum Death {
 
 const DEATHS: [Death; 4] = [Death::Close, Death::Reset, Death::Half, Death::Nonsense];
 
-/// A connection that says `telegram`, hears at least one byte if it is `answered`, and dies.
+/// A connection that sends `telegram`, receives at least one byte if `answered`, and dies.
 fn say(address: SocketAddr, telegram: &[u8], answered: bool, death: Death) {
     let mut stream = TcpStream::connect(address).expect("the server listens");
     stream.set_nodelay(true).expect("a socket option");
@@ -106,7 +108,7 @@ fn say(address: SocketAddr, telegram: &[u8], answered: bool, death: Death) {
             let socket = SockRef::from(&stream);
             socket.set_linger(linger).expect("a socket option");
         }
-        // Who has been cut off already may not be able to say it.
+        // Sending may fail if the server has already disconnected it.
         Death::Half => drop(stream.write_all(&telegram[..telegram.len() / 2])),
         Death::Nonsense => drop(stream.write_all(&[0xA5; 300])),
     }
@@ -126,7 +128,7 @@ fn modbus_clients(address: SocketAddr) {
     client.close();
 }
 
-/// Until a client of ours has exchanged with its server.
+/// Exchanges until a client of ours has fresh data from its server.
 fn until_fresh(client: &mut Driver, slots: &mut [Slot]) {
     let limit = Instant::now() + Duration::from_secs(30);
     while client.exchange(Nanos::ZERO, slots).code != Code::Fresh {
@@ -135,7 +137,7 @@ fn until_fresh(client: &mut Driver, slots: &mut [Slot]) {
     }
 }
 
-/// A connection request of COTP to rack 0, slot 1.
+/// A COTP connect request to rack 0, slot 1.
 const COTP: [u8; 22] = [
     3, 0, 0, 22, 17, 0xE0, 0, 0, 0, 1, 0, 0xC0, 1, 10, 0xC1, 2, 1, 0, 0xC2, 2, 1, 1,
 ];
@@ -178,7 +180,7 @@ fn opcua_clients(address: SocketAddr, pki: &std::path::Path) {
     client.close();
 }
 
-/// What the process holds when the last client is forgotten.
+/// What the process holds after the last client is gone.
 fn rest() -> Resources {
     Resources::settled(|| std::thread::sleep(Duration::from_millis(5)))
 }

@@ -1,4 +1,4 @@
-//! The socket bus: the conformance suite, and what is its own, with foreign peers.
+//! The socket bus: the conformance suite, and its own tests with foreign peers.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -99,7 +99,7 @@ fn a_peer_that_leaves_within_a_record_is_told_by_its_bytes() {
     assert_eq!(device.end.link().state, LinkState::Opening);
 }
 
-/// A stream of two records, cut off behind every byte of it.
+/// A stream of two records, truncated after every byte.
 #[test]
 fn every_truncation_of_a_stream_is_told_as_what_it_is() {
     let stream = [record(7), record(8)].concat();
@@ -177,7 +177,7 @@ fn a_client_that_never_reads_is_given_up_with_its_byte_count() {
     let clock = std::sync::Arc::clone(&device.clock);
     let mut reason = String::new();
     await_that("the device gives it up", || {
-        // It speaks, so it is not silent, but it does not listen.
+        // It sends, so it is not silent, but it does not read.
         let _ = peer.write_all(&[0, 1]);
         pass(&clock, 1);
         device.end.tick();
@@ -234,7 +234,7 @@ fn a_client_that_comes_back_at_once_is_not_turned_away() {
         let mut peer = client(address);
         peer.write_all(&record(speed)).expect("the device reads");
         device.until_speed(speed);
-        // More than one read's worth, right before it leaves and comes back.
+        // More than one read takes, right before it leaves and comes back.
         let many = record(speed).repeat(8_000);
         peer.write_all(&many).expect("the device reads");
     }
@@ -315,7 +315,7 @@ fn on_change_sends_what_has_left_its_dead_band_and_signs_of_life() {
     let mut go_on = |device: &mut Alone, level: f64, cycles: u32| {
         device.end.set("level", level);
         for _ in 0..cycles {
-            // The peer sends, so that it is not silent, and takes down what came since.
+            // The peer sends, so that it is not silent, and records what has arrived.
             peer.write_all(&[0]).expect("the device reads");
             device.end.tick();
             pass(&device.clock, 1);
@@ -403,7 +403,7 @@ fn a_second_device_on_one_address_is_told_so() {
     });
 }
 
-/// A listener that takes no more connections: the system leaves all further attempts unanswered.
+/// A listener that accepts no more connections: the system does not answer further attempts.
 #[cfg(target_os = "linux")]
 fn unanswering() -> (socket2::Socket, Vec<socket2::Socket>, std::net::SocketAddr) {
     use socket2::{Domain, Socket, Type};
@@ -417,7 +417,7 @@ fn unanswering() -> (socket2::Socket, Vec<socket2::Socket>, std::net::SocketAddr
         .map(|_| {
             let socket = new();
             socket.set_nonblocking(true).expect("an option");
-            // It is under way, and that is all that is wanted.
+            // The attempt only needs to be in progress.
             let _ = socket.connect(&address.into());
             socket
         })
@@ -471,7 +471,7 @@ fn a_controller_whose_server_turns_it_away_says_what_to_do() {
         if graceful {
             leave(stream);
         } else {
-            // With what the controller has sent unread, which resets the connection.
+            // Data from the controller are unread, so closing resets the connection.
             await_that("a record has come", || stream.peek(&mut [0; 1]).is_ok());
             drop(stream);
         }

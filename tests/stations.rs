@@ -1,4 +1,4 @@
-//! One driver with a peer for each of its stations: what happens to one is no matter for the other.
+//! One driver with a peer for each of its stations: what happens to one peer does not affect the others.
 #![cfg(unix)]
 #![allow(
     missing_docs,
@@ -55,7 +55,7 @@ fn device() -> (Alone, [SocketAddr; 2]) {
     (alone, [addresses[0], addresses[1]])
 }
 
-/// Sends `value` from each of these peers, again and again, until it has arrived.
+/// Sends `value` repeatedly from each of these peers, until it has arrived.
 #[track_caller]
 fn until_heard(device: &mut Alone, peers: &mut [(&str, &mut TcpStream)], value: u8) {
     device.until("the values arrive", |end| {
@@ -63,7 +63,7 @@ fn until_heard(device: &mut Alone, peers: &mut [(&str, &mut TcpStream)], value: 
             peer.write_all(&[value]).expect("the device reads");
             end.get(&format!("to {name}")) == f64::from(value)
         };
-        // Each is to send, whatever the others have done.
+        // Every peer sends, whether or not the others have arrived.
         let arrived: Vec<bool> = peers.iter_mut().map(sent).collect();
         arrived.into_iter().all(|one| one)
     });
@@ -141,7 +141,7 @@ fn a_system_without_descriptors_costs_the_served_peer_nothing() {
     let mut a = client(a);
     until_heard(&mut device, &mut [("a", &mut a)], 1);
     logged::expect("a client could not be accepted");
-    // Room for one more, which the client of b takes.
+    // Room for one more descriptor, which the client of b takes.
     let next = File::open("/dev/null").expect("it is there").as_raw_fd();
     let usual = getrlimit(Resource::Nofile);
     let one_more = Rlimit {

@@ -1,4 +1,4 @@
-//! `tickbus test`, the real program, over good test files, red ones and wrong ones.
+//! `tickbus test`, run as a program, on test files that pass, fail, or are wrong.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -75,8 +75,8 @@ fn the_example_of_the_docs_is_green() {
     assert!(out(&output).contains("passed=1 "));
 }
 
-/// Each `tests/wrong-tests/NAME.toml` has its mistakes in `NAME.txt`. With the environment variable `BLESS`
-/// set, they are written there instead: read the difference before you commit it.
+/// Each `tests/wrong-tests/NAME.toml` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is
+/// set, they are written there instead: review the difference before committing it.
 #[test]
 fn every_wrong_file_has_exactly_its_mistakes() {
     let directory = repository().join("tests/wrong-tests");
@@ -129,7 +129,7 @@ fn a_failure_names_place_tick_time_signal_expected_seen_and_the_last_changes() {
     );
 }
 
-/// Steps, and how the failure of them reads.
+/// Steps, and the messages when they fail.
 #[test]
 fn every_kind_of_step_can_fail() {
     for (steps, told) in [

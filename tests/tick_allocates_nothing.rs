@@ -16,7 +16,7 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: everything is handed on to the system's allocator as it came.
+// SAFETY: all calls are passed on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.set(ALLOCATIONS.get() + 1);
@@ -33,7 +33,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Every type in both directions, latched bits that move, values that saturate, a NaN.
+/// Every type in both directions, latched bits that change, values that saturate, a NaN.
 fn config(fieldbus: &str, faults: &str) -> Config {
     use std::fmt::Write as _;
 
@@ -66,7 +66,7 @@ fn config(fieldbus: &str, faults: &str) -> Config {
     Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// Every fault of a signal in both directions, and every trouble of the line, beginning and ending.
+/// Every signal fault in both directions, and every line fault, beginning and ending.
 const FAULTS: &str = "
 [[fault]]\nkind = \"stuck\"\nsignal = \"I bit 0.0\"\n
 [[fault]]\nkind = \"invert\"\nsignal = \"Q bit 0.1\"\n
@@ -81,7 +81,8 @@ const FAULTS: &str = "
 [[fault]]\nkind = \"slow-answers\"\nby = \"30ms\"\n
 ";
 
-/// Ticks with moving values; gives the allocations of 10,000 ticks after a warm-up, exchanges and ticks of two halves.
+/// Ticks with changing values; returns the allocations in 10,000 ticks after a warm-up, both exchanges and
+/// ticks in two halves.
 fn allocations(fieldbus: &str, faults: &str) -> u64 {
     let clock = Manual::new();
     let mut driver =
@@ -135,7 +136,7 @@ fn a_stepped_bus_with_faults() {
     assert_eq!(allocations(STEPPED, FAULTS), 0);
 }
 
-/// Every reflex of an axis; on a mirror the PLC's bits come back as feedback and the other way round.
+/// Every reflex of an axis; with a mirror the PLC's bits come back as feedback and vice versa.
 const AXES: &str = "
 [[axis]]\nname = \"A\"\ncommand_offset = 100\nfeedback_offset = 100\nacknowledge = true\ndiagnostics = true\n
 command = [{ number = 1, position = 5.0 }, { number = 2, mode = \"speed\", speed = 1.0 }]\n
@@ -154,7 +155,7 @@ fn a_link_whose_other_end_is_absent() {
     assert_eq!(allocations("kind = \"loopback\"\nlink = \"nobody\"", ""), 0);
 }
 
-/// On a bus where the ring is never full, on one where it always is, and on one that waits for room.
+/// With a ring that is never full, with one that is always full, and with one that waits for room.
 #[test]
 fn a_recording() {
     let folder = tempfile::tempdir().expect("a folder");

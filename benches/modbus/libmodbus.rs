@@ -1,4 +1,4 @@
-//! A server by libmodbus, on a thread of this process.
+//! A libmodbus server on a thread of this process.
 
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::net::SocketAddr;
@@ -15,7 +15,7 @@ type Reply = unsafe extern "C" fn(*mut c_void, *const u8, c_int, *mut c_void) ->
 /// The longest telegram over TCP.
 const LONGEST: usize = 260;
 
-/// Serves one client of `address`, for as long as it asks; `None` where there is no libmodbus.
+/// Serves one client of `address` until it leaves; `None` if libmodbus is not installed.
 pub(crate) fn serve(address: SocketAddr) -> Option<SocketAddr> {
     // SAFETY: libmodbus runs no code when it is loaded.
     let library = unsafe { Library::new("libmodbus.so.5") }.ok()?;
@@ -23,9 +23,9 @@ pub(crate) fn serve(address: SocketAddr) -> Option<SocketAddr> {
     let port = c_int::from(address.port());
     let (ready, listening) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
-        // SAFETY: the types are those of modbus.h and modbus-tcp.h, and the library outlives its functions. The
-        // context and the mapping are the library's own and used by this thread alone; a request is at most as
-        // long as the buffer, by the library's promise.
+        // SAFETY: the types are those of modbus.h and modbus-tcp.h, and the library outlives its functions.
+        // The context and the mapping belong to the library and are used by this thread only; libmodbus
+        // guarantees that a request fits into the buffer.
         unsafe {
             let symbol = |name: &[u8]| -> Symbol<'_, *const ()> {
                 library.get(name).expect("a function of libmodbus")

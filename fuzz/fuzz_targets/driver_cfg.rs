@@ -1,4 +1,4 @@
-//! Any text as a driver.cfg: it is read or refused, never a panic, and what is read is consistent.
+//! Any text as a driver.cfg: it is accepted or refused without a panic, and if accepted it is consistent.
 
 #![no_main]
 
@@ -21,7 +21,7 @@ fuzz_target!(|text: &str| {
     }
 });
 
-/// Every rule that the rest of the crate relies upon.
+/// Every property that the rest of the crate relies on.
 fn check_config(config: &Config) {
     assert!(config.id > 0);
     assert!(!config.name.is_empty());
@@ -71,7 +71,7 @@ fn check_config(config: &Config) {
     }
 }
 
-/// What the faults' layers take for granted, without a check of their own.
+/// What the faults' layers assume without checking.
 fn check_faults(config: &Config) {
     assert!(config.faults.len() <= LIMIT);
     for fault in &config.faults {
@@ -84,7 +84,7 @@ fn check_faults(config: &Config) {
     }
 }
 
-/// Mistakes lie within the text, in order, and fill one line each.
+/// Mistakes are located within the text, in order, and take one line each.
 fn check_mistakes(mistakes: &Mistakes, text: &str) {
     assert!(mistakes.len() > 0);
     let lines: Vec<&str> = text.split('\n').collect();

@@ -1,8 +1,8 @@
-//! A Modbus client's half of the codec: addresses as people write them, requests planned for signals anywhere, and
-//! whatever a server answers to them.
+//! The client's half of the Modbus codec: addresses as people write them, requests planned for signals
+//! anywhere, and arbitrary answers to them.
 //!
-//! The first bytes are the device's abilities and the number of signals, of which each has five bytes; then come answers,
-//! each behind its length. The same input is also read as the text of an address.
+//! The first bytes are the device's abilities and the number of signals, each of which has five bytes; then
+//! come answers, each preceded by its length. The same input is also read as the text of an address.
 
 #![no_main]
 
@@ -51,7 +51,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// What is an address is one in the spelling that messages have, too.
+/// A valid address is also valid in the notation used in messages.
 fn address(text: &str) {
     let Ok(spot) = text.parse::<Spot>() else {
         return;
@@ -69,7 +69,7 @@ fn address(text: &str) {
     }
 }
 
-/// Signals, one behind the other in the frame; none of those that are written is where another one is.
+/// Signals at consecutive places in the frame; those that are written do not overlap.
 fn pieces(count: usize, mut data: &[u8], writes: bool) -> (Vec<Piece>, &[u8]) {
     let (mut pieces, mut frame) = (Vec::<Piece>::new(), 0_usize);
     for _ in 0..count {
@@ -101,7 +101,7 @@ fn pieces(count: usize, mut data: &[u8], writes: bool) -> (Vec<Piece>, &[u8]) {
             bits,
             fills,
         };
-        // Whole registers, so that no two share one.
+        // Rounded to whole registers, so that no two share one.
         let meets = |other: &Piece| {
             let (one, two) = (piece.span(), other.span());
             other.table == table && one.first < two.end() && two.first < one.end()
@@ -115,13 +115,13 @@ fn pieces(count: usize, mut data: &[u8], writes: bool) -> (Vec<Piece>, &[u8]) {
     (pieces, data)
 }
 
-/// Bytes of the frame that these signals need.
+/// The length of frame that these signals need.
 fn length(pieces: &[Piece]) -> usize {
     let ends = pieces.iter().map(|piece| (piece.bit + piece.bits).div_ceil(8));
     ends.max().unwrap_or_default()
 }
 
-/// A server of ours takes every request, and nothing in it changes but what the query says.
+/// Our server accepts every request, and only what the query says changes in it.
 fn serve(query: &Query, request: &[u8], receives: &mut [u8]) {
     let mut holds = vec![0x55; 0x1_0000];
     let mut tables = Tables {

@@ -1,6 +1,6 @@
-//! A Modbus server's half of the codec: any stream of TCP or RTU telegrams against the tables of one unit.
+//! The server's half of the Modbus codec: any stream of TCP or RTU telegrams against the tables of one unit.
 //!
-//! The first bytes choose role, window and sizes; what follows is the stream.
+//! The first bytes choose role, window and sizes; the rest is the stream.
 
 #![no_main]
 
@@ -46,7 +46,7 @@ struct Unit {
 }
 
 impl Unit {
-    /// Answers, and checks what the standard says of every answer.
+    /// Answers, and checks what the standard requires of every answer.
     fn ask(&mut self, pdu: &[u8]) {
         let before = self.holds.clone();
         let mut tables = Tables {
@@ -80,7 +80,7 @@ impl Unit {
         if let Some(bits) = read {
             assert!(bits.end <= self.sends.len() * 8);
         }
-        // Nothing changes but the bits that were written.
+        // Nothing changes except the bits that were written.
         let wrote = wrote.unwrap_or(0..0);
         assert!(wrote.end <= self.holds.len() * 8);
         for (at, (old, new)) in before.iter().zip(&self.holds).enumerate() {
@@ -101,7 +101,7 @@ fn tcp(unit: &mut Unit, mut stream: &[u8]) {
     }
 }
 
-/// Pieces of the stream, each behind its length and the pause before it.
+/// Pieces of the stream, each preceded by its length and the pause before it.
 fn serial(unit: &mut Unit, mut stream: &[u8]) {
     let mut framer = rtu::Framer::new(Nanos(16));
     let mut now = Nanos::ZERO;
@@ -114,7 +114,8 @@ fn serial(unit: &mut Unit, mut stream: &[u8]) {
                 unit.ask(pdu);
             }
         });
-        // A fuzzer does not find checksums: the piece is a telegram of its own, too, if it can be one.
+        // A fuzzer cannot guess checksums: the piece is also tried as a telegram on its own, if its length
+        // permits.
         if (2..=PDU_LIMIT + 1).contains(&piece.len()) && *pause >= 128 {
             let mut whole = Vec::new();
             rtu::append(piece[0], &mut whole, |pdu| {

@@ -1,6 +1,6 @@
 //! Any text as PLCopen XML or L5X: the first byte chooses how it is read.
 //!
-//! Nothing may panic, and a project that is read becomes a driver.cfg in which nothing is wrong.
+//! Nothing may panic, and a project that is accepted becomes a driver.cfg without mistakes.
 
 #![no_main]
 
@@ -13,7 +13,7 @@ fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else {
         return;
     };
-    // What does not begin as XML does is the business of tag_table.
+    // Anything that does not start like XML is left to tag_table.
     if bytes.first() != Some(&b'<') {
         return;
     }

@@ -1,5 +1,5 @@
-//! Any bytes as the answers of a helper process: they are read or refused, never a panic, the same however
-//! they are cut, and what is read is written again as the same bytes.
+//! Any bytes as the answers of a helper process: they are accepted or refused without a panic, in the same
+//! way however they are split, and what is read is written again as the same bytes.
 
 #![no_main]
 
@@ -15,7 +15,7 @@ fuzz_target!(|data: (u8, &[u8])| {
     assert!(answers.iter().all(|answer| answer.write().len() <= Answer::MOST + 4));
 });
 
-/// All answers in `bytes`, handed in by pieces of `piece` bytes, and how it ended.
+/// All answers in `bytes`, passed in pieces of `piece` bytes, and how it ended.
 fn read(bytes: &[u8], piece: usize) -> (Vec<Answer>, Option<WireError>) {
     let (mut inbox, mut answers) = (Inbox::new(), Vec::new());
     for piece in bytes.chunks(piece) {

@@ -1,6 +1,6 @@
 //! Any bytes as a recording: the first byte chooses between VCD and CSV, and whether the signals are known.
 //!
-//! Nothing may panic, ticks come in order, and the memory of a reader does not grow with what it has read.
+//! Nothing may panic, ticks are in order, and a reader's memory does not grow with what it has read.
 
 #![no_main]
 
@@ -37,7 +37,7 @@ fuzz_target!(|data: &[u8]| {
     let _ = recording.ending();
 });
 
-/// The signals of the seeds.
+/// The signals in the seeds.
 fn table() -> SignalTable {
     let signal = |name: &str, data_type: DataType, byte| Signal {
         name: name.to_owned(),

@@ -1,7 +1,7 @@
-//! Any bytes as what a CPU answers to an S7 client, in pieces of any size.
+//! Any bytes as a CPU's answers to an S7 client, in pieces of any size.
 //!
-//! The first byte chooses what is asked; then come pieces, each with its length before it. Nothing may panic or go
-//! on without end, what the client sends is well made, and it writes no byte that no signal covers.
+//! The first byte chooses the request; then come pieces, each preceded by its length. Nothing may panic or
+//! loop forever, the client's requests are well-formed, and it only writes bytes that signals cover.
 
 #![no_main]
 
@@ -70,7 +70,7 @@ fuzz_target!(|data: &[u8]| {
         if dialog.is_idle() && choice & 4 != 0 && now.0 % 3 == 0 {
             dialog.ask_state(now);
         } else if dialog.is_idle() && dialog.begin(now).is_some() {
-            // All that there is was left out.
+            // Everything was left out.
             dialog.suspend(0, false);
         }
         check(dialog.to_write());
@@ -81,7 +81,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// What is sent are packets of whole units.
+/// Everything sent consists of packets with whole PDUs.
 fn check(mut sent: &[u8]) {
     let mut message = Vec::new();
     while !sent.is_empty() {
@@ -99,7 +99,7 @@ fn check(mut sent: &[u8]) {
     assert!(message.is_empty());
 }
 
-/// What is written are signals.
+/// Only signals are written.
 fn check_writing(pdu: &Pdu<'_>) {
     let [function::WRITE, _, items @ ..] = pdu.parameters else {
         return;

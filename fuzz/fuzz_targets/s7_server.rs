@@ -1,7 +1,7 @@
-//! Any bytes as what a client sends to an S7 server, in pieces of any size.
+//! Any bytes as a client's requests to an S7 server, in pieces of any size.
 //!
-//! Nothing may panic; answers are the same however the bytes are cut, well made, and no longer than was agreed;
-//! nothing is written that was not asked for in bounds.
+//! Nothing may panic; answers are the same however the bytes are split, well-formed, and within the
+//! negotiated length; nothing is written except what was requested within bounds.
 
 #![no_main]
 
@@ -22,7 +22,7 @@ fuzz_target!(|data: (u8, &[u8])| {
     check(&answers);
 });
 
-/// Outputs and data block 1 over the same bytes, inputs that cannot be written.
+/// Outputs and data block 1 on the same bytes, and inputs that cannot be written.
 struct Bytes {
     outputs: [u8; 64],
     inputs: [u8; 700],
@@ -58,7 +58,7 @@ impl Memory for Bytes {
     }
 }
 
-/// All answers to `bytes`, handed in by pieces of `piece` bytes, and how it ended.
+/// All answers to `bytes`, passed in pieces of `piece` bytes, and how it ended.
 fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<Fault>) {
     let mut conversation = Conversation::default();
     let mut memory = Bytes { outputs: [0; 64], inputs: [7; 700] };
@@ -79,7 +79,7 @@ fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<Fault>) {
     (answers, None)
 }
 
-/// Answers are packets of whole units.
+/// The answers are packets with whole PDUs.
 fn check(mut answers: &[u8]) {
     let mut message = Vec::new();
     while !answers.is_empty() {

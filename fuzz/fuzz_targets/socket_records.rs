@@ -1,7 +1,7 @@
-//! Any sequence of what can happen to one connection of the socket bus: bytes that come in any pieces,
-//! a system that takes any part of what goes out, time that passes.
+//! Any sequence of events on one connection of the socket bus: bytes that arrive in any pieces, a system that
+//! accepts any part of what is sent, time that passes.
 //!
-//! The input is a header with the terms, and then operations of two bytes and more.
+//! The input is a header with the parameters, followed by operations of two or more bytes.
 
 #![no_main]
 
@@ -34,10 +34,10 @@ struct Run {
     terms: Terms,
     session: Session,
     now: Nanos,
-    /// All that came in, and the records that were cut out of it.
+    /// Everything received, and the records extracted from it.
     heard: Vec<u8>,
     records: Vec<u8>,
-    /// All that went out; each record is of one byte, over and over.
+    /// Everything sent; each record is one byte repeated.
     said: Vec<u8>,
     image: u8,
 }
@@ -103,7 +103,7 @@ impl Run {
             self.said.extend_from_slice(&rest[..count]);
             room -= count;
             if !self.session.wrote(count) {
-                // Blocked: it is looked at again when the system takes more, or time has passed.
+                // Blocked until the system accepts more, or time has passed.
                 break;
             }
         }
@@ -114,7 +114,7 @@ impl Run {
 
     fn finish(mut self) {
         self.speak(usize::MAX);
-        // Told in words, whatever it was.
+        // Every ending can be put into words.
         let _ = self.session.left().of("peer").to_string();
         let Terms { receives, sends, sending, .. } = self.terms;
         if receives > 0 {

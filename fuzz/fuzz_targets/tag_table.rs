@@ -1,6 +1,6 @@
-//! Any bytes as a list of PLC tags: the first one chooses how it is read.
+//! Any bytes as a list of PLC tags: the first byte chooses how it is read.
 //!
-//! Nothing may panic, and a table that is read becomes a driver.cfg in which nothing is wrong.
+//! Nothing may panic, and a table that is accepted becomes a driver.cfg without mistakes.
 
 #![no_main]
 

@@ -26,7 +26,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Outcome {
     let role = Role::Device;
     let asked = Asked { role, moved: true };
-    // What is wrong with the file is told by the host, who reads it, too.
+    // The host reads the file again, and reports what is wrong with it.
     let config = Config::load_as(&arguments.file, Some(asked));
     let axes = config.map(|config| config.axes).unwrap_or_default();
     let job = Job {

@@ -30,7 +30,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    // A reader that has gone away (`| head`) needs no report of it.
+    // If the reader of stdout is gone (`| head`), that need not be reported.
     match Config::load(&arguments.file) {
         Ok(config) => {
             let _ = std::io::stdout()
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-/// The whole report on a good driver.cfg.
+/// The complete report on a valid driver.cfg.
 fn report(config: &Config) -> String {
     let mut out = String::new();
     let stations = &config.table.stations;
@@ -209,7 +209,7 @@ fn s7_client(options: &s7::ClientOptions) -> Vec<String> {
         }
     }
     parts.push(match &options.write_to {
-        // It was read as one line, and matters to its last character.
+        // Always one line; shown completely, because every character matters.
         Some(identity) => format!("writes into \"{identity}\" alone"),
         None => "writes nothing".to_owned(),
     });
@@ -266,7 +266,7 @@ fn timing(timing: &Timing) -> String {
     )
 }
 
-/// A line for each signal by which the ends see that the other one lives, as this end has it.
+/// A line for each signal by which an end knows that the other one is alive, as seen from this end.
 fn life_signs(config: &Config, line: &mut impl FnMut(&str, &str)) {
     let name = |signal: usize| &config.table.signals[signal].name;
     for watch in config
@@ -367,7 +367,7 @@ fn row(
 /// The WORD around a BOOL, by station, area and even byte offset.
 type WordKey = (usize, Area, usize);
 
-/// The WORDs of which some part is a signal that is no BOOL.
+/// The WORDs that contain a part of a signal other than a BOOL.
 fn words_of_values(signals: &[Signal]) -> HashSet<WordKey> {
     let values = signals
         .iter()
@@ -380,8 +380,8 @@ fn words_of_values(signals: &[Signal]) -> HashSet<WordKey> {
         .collect()
 }
 
-/// Which bit of the big-endian WORD at the even byte below it a BOOL is: the bus cards of old, and
-/// many a wiring list, count that way. Empty where there is no such WORD.
+/// The bit number of a BOOL in the big-endian WORD at the even offset: old bus cards and many wiring lists
+/// count that way. Empty if there is no such WORD.
 fn bit_of_word(signal: &Signal, station: &Station, taken: &HashSet<WordKey>) -> String {
     let size = Width::Word.bytes();
     let even = signal.byte & !1;
@@ -445,7 +445,7 @@ fn fail_safe(signal: &Signal) -> String {
     }
 }
 
-/// Rows under their headings in columns; a column without a word in it is left out.
+/// Rows under their headings, in columns; columns without content are left out.
 fn aligned<const N: usize>(
     headings: &[&str; N],
     rows: impl Iterator<Item = [String; N]>,

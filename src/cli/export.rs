@@ -94,7 +94,7 @@ fn folder_beside(arguments: &Arguments) -> PathBuf {
         .with_file_name(format!("{stem}-{}", arguments.target.name()))
 }
 
-/// Writes all files, or none if one of them would overwrite another.
+/// Writes all files, or none if any of them would overwrite another one.
 fn write(made: &Export, folder: &Path, force: bool) -> Result<(), Vec<String>> {
     let paths: Vec<PathBuf> = made
         .files

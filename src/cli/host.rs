@@ -1,4 +1,4 @@
-//! What `tickbus plc` and `tickbus mirror` share: a PLC program at one end of a bus, until told to stop.
+//! Shared by `tickbus plc` and `tickbus mirror`: hosts a PLC program at one end of a bus until it is stopped.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -14,7 +14,7 @@ use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_plc::Program;
 use tickbus_record as record;
 
-/// How often the command looks after its line.
+/// How often the command checks its line.
 const LOOK: Nanos = Nanos::from_millis(20);
 
 /// Arguments that both commands have.
@@ -56,7 +56,7 @@ fn stats(text: &str) -> Result<Stats, String> {
     span(text).map(Stats::Every)
 }
 
-/// A duration on the command line.
+/// Parses a duration on the command line.
 pub(super) fn span(text: &str) -> Result<Nanos, String> {
     match text.parse() {
         Ok(Nanos::ZERO) => Err("this is no time at all; write a longer one".to_owned()),
@@ -65,9 +65,9 @@ pub(super) fn span(text: &str) -> Result<Nanos, String> {
     }
 }
 
-/// What a command hosts.
+/// The program that a command hosts.
 pub(super) struct Job<'a> {
-    /// What its lines begin with.
+    /// The prefix of its output lines.
     pub(super) title: &'a str,
     pub(super) file: &'a Path,
     pub(super) role: Role,
@@ -75,7 +75,7 @@ pub(super) struct Job<'a> {
     pub(super) interval: Nanos,
 }
 
-/// Reads the driver.cfg, hosts the program, and tells on stdout how it goes.
+/// Reads the driver.cfg, hosts the program, and reports on stdout.
 pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let title = job.title;
     let asked = Asked {
@@ -131,12 +131,12 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         }
     };
     let is_done = || report.as_ref().is_some_and(|report| report.is_done());
-    // A reader that has gone away (`| head`) is no reason to stop the line.
+    // If the reader of stdout is gone (`| head`), the line keeps running.
     let told = watch(title, &host, arguments, &*clock, &stop, &is_done);
     let statistics = host.statistics();
     let (scans, stale) = host.scans();
     let fault = host.fault();
-    // A scan that never ends is noticed here, if the command was too short to notice it before.
+    // A scan that never ends is detected here if the command was too short to detect it before.
     let unended = host.close();
     let fault = fault.or(unended);
     let failure = fault.or_else(|| report.as_ref().and_then(|report| report.failure()));
@@ -160,14 +160,15 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     }
 }
 
-/// What the command line wants recorded: relative to the present folder, not to that of the driver.cfg.
+/// The recording asked for on the command line: relative to the current folder, not to that of the
+/// driver.cfg.
 fn recording(file: &Path) -> Result<record::Options, String> {
     let path = std::path::absolute(file)
         .map_err(|error| format!("\"{}\" is no path: {error}", file.display()))?;
     record::Options::to(&path)
 }
 
-/// Tells every change of the line and the statistics when they are due, until stopped or done.
+/// Reports every change of the line, and the statistics when due, until stopped or done.
 fn watch(
     title: &str,
     host: &Host,
@@ -212,12 +213,12 @@ fn watch(
     result
 }
 
-/// What was told of injected faults: how often each had begun, and where it stood.
+/// The injected faults as last reported: how often each had begun, and its state.
 #[derive(Debug, Default)]
 struct ToldFaults(Vec<(u64, Phase)>);
 
 impl ToldFaults {
-    /// Tells every fault that has begun or ended since the last time.
+    /// Reports every fault that has begun or ended since the last call.
     fn tell(&mut self, title: &str, faults: Vec<Injected>, text: &mut String) {
         self.0.resize(faults.len(), (0, Phase::Waiting));
         for (told, fault) in self.0.iter_mut().zip(faults) {
@@ -235,10 +236,10 @@ impl ToldFaults {
     }
 }
 
-/// Whether a line's state is to be told: it changed, or what it waits for.
+/// Whether to report a line's state: it has changed, or what it waits for has.
 fn is_news(told: Option<&Link>, link: &Link) -> bool {
     let Some(told) = told else {
-        // That it is not open at the very beginning is no news.
+        // At the very beginning every line is closed.
         return link.state != LinkState::Closed;
     };
     (told.state, told.cause, told.since) != (link.state, link.cause, link.since)

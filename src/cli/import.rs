@@ -111,7 +111,7 @@ fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
 
 fn write(arguments: &Arguments, imported: &Imported) -> Result<(), Mistakes> {
     let Some(out) = &arguments.out else {
-        // A reader that has gone away needs no report of it.
+        // If the reader of stdout is gone, that need not be reported.
         let _ = std::io::stdout().lock().write_all(imported.text.as_bytes());
         return Ok(());
     };

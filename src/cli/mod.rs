@@ -1,6 +1,6 @@
 //! The `tickbus` command.
 //!
-//! One file for each subcommand: its arguments, and `run`, which answers with an `Outcome`.
+//! One file per subcommand, with its arguments and `run`, which returns an `Outcome`.
 
 mod axes;
 mod check;
@@ -44,14 +44,14 @@ enum Command {
     PluginHelper,
 }
 
-/// How a command ended, as its exit code tells.
+/// How a command ended, for its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
     /// 0: done.
     Done,
     /// 1: the input was wrong.
     WrongInput,
-    /// 2: the command line was wrong. Most of that clap reports.
+    /// 2: the command line was wrong. clap reports most such mistakes.
     Usage,
     /// 3: the bus or the peer failed.
     BusFailed,
@@ -68,13 +68,13 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// How long the end of the process waits for whoever reads its log.
+/// How long the process waits at its end for the log to reach stderr.
 const LAST_WORDS: Nanos = Nanos::from_secs(1);
 
 /// Runs the command with the arguments of the process.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // What happens to the line is told on stdout.
+    // Events on the line are reported on stdout.
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),

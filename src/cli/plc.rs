@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         Ok(program) => program,
         Err(error) => {
             eprintln!("plc: {error}");
-            // A wrong name is a slip on the command line, a wrong file is a wrong file.
+            // A wrong name is a mistake on the command line; a wrong file is wrong input.
             return if plc::Hosted::is_path(&arguments.program) {
                 Outcome::WrongInput
             } else {

@@ -62,10 +62,10 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-/// What goes onto the page beside the recording.
+/// What the page shows in addition to the recording.
 struct Beside {
     statistics: Option<Statistics>,
-    /// Each with the name of its file.
+    /// Each with its file name.
     texts: Vec<(String, String)>,
 }
 
@@ -100,7 +100,7 @@ impl Beside {
     }
 }
 
-/// Makes the page, and tells what it has; or all mistakes.
+/// Makes the page and describes it, or returns all mistakes.
 fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
     let mut mistakes = Vec::new();
     let beside = Beside::read(arguments, &mut mistakes);
@@ -145,7 +145,7 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
         texts: &beside.texts,
     };
     let mut told = String::new();
-    // What came before a fault of the recording is worth a page, too; mistakes of the command line are not.
+    // What precedes a damaged place in the recording is worth a page; mistakes on the command line are not.
     if mistakes.is_empty() {
         let beside = || arguments.recording.with_extension("html");
         let out = arguments.out.clone().unwrap_or_else(beside);

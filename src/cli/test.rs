@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     list: bool,
 }
 
-/// How many of each there are.
+/// The numbers of tests by result.
 #[derive(Default)]
 struct Count {
     passed: usize,
@@ -107,10 +107,10 @@ fn conclude(arguments: &Arguments, count: &Count) -> Outcome {
     }
 }
 
-/// The test files at `path`, in the order of their names.
+/// The test files at `path`, in order of their names.
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     if !path.is_dir() {
-        // That it is there, and may be read, shows when it is read.
+        // Whether it exists and can be read is found out when it is read.
         files.push(path.to_owned());
         return Ok(());
     }
@@ -118,7 +118,7 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     let mut entries: Vec<PathBuf> = entries?.into_iter().map(|entry| entry.path()).collect();
     entries.sort();
     for entry in entries {
-        // A link may lead back up; what it leads to can be named by itself.
+        // Links are not followed: one may lead back up. Their targets can be named on the command line.
         if entry.is_dir() && !entry.is_symlink() {
             collect(&entry, files)?;
         } else if entry.extension().is_some_and(|ending| ending == "toml") {
@@ -158,7 +158,7 @@ fn run_file(file: &Path, arguments: &Arguments, count: &mut Count) -> Group {
     Group { name, cases }
 }
 
-/// A file that cannot be read, as a CI server shows it.
+/// A file that cannot be read, in the form that a CI server shows.
 fn wrong_file(mistakes: &Mistakes) -> Case {
     let first = mistakes.iter().next();
     let line = first.and_then(|mistake| mistake.place);
@@ -223,11 +223,12 @@ fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) 
     }
 }
 
-/// Runs a failed test once more, with a recorder: it is the same run. Says where the recording is.
+/// Runs a failed test again with a recorder; being deterministic, it fails in the same way. Returns where the
+/// recording is.
 fn record(suite: &Suite, test: &Test, folder: &Path, failure: &str) -> String {
     let stem = Path::new(&suite.file).file_stem().unwrap_or_default();
     let name = format!("{} - {}", stem.to_string_lossy(), test.name);
-    // What some file system would take for something else.
+    // Replaces characters that some file systems do not allow.
     let name: String = name
         .chars()
         .map(|c| match c {
@@ -266,7 +267,7 @@ fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
     std::fs::write(path, text)
 }
 
-/// A line on stdout; a reader that has gone away (`| head`) is no reason to stop.
+/// Prints a line on stdout; if its reader is gone (`| head`), the tests go on.
 fn tell(line: &str) {
     let _ = writeln!(std::io::stdout().lock(), "{line}");
 }

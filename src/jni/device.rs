@@ -1,5 +1,4 @@
-//! One open driver with the buffer it shares with Java: all that the native methods do, without a
-//! JVM in sight.
+//! An open driver with the buffer it shares with Java: everything that the native methods do, without a JVM.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -13,14 +12,13 @@ use tickbus_image::Event;
 
 use super::shared::{NO_TIME, Shared, Word};
 
-/// Events handed over in one call at most.
+/// The most events handed over in one call.
 pub(super) const EVENTS: usize = 64;
 
 /// Words per event: signal, value, time.
 pub(super) const EVENT_WORDS: usize = 3;
 
-/// The injected faults, a line each: number, state, how often begun, kind, name, what it does; with tabs
-/// between them.
+/// The injected faults, one per line: number, state, how often begun, kind, name, effect; separated by tabs.
 pub(super) fn faults(board: &Board) -> String {
     let mut text = String::new();
     for fault in board.list() {
@@ -62,7 +60,7 @@ impl<K> Device<K> {
         }
     }
 
-    /// One tick: takes the slots that the simulation wrote, fills those that it reads, and the header.
+    /// One tick: sends the slots that the simulation wrote, fills those that it reads, and the header.
     #[inline]
     pub(super) fn exchange(&mut self) -> i32 {
         self.ticks += 1;
@@ -70,7 +68,7 @@ impl<K> Device<K> {
         self.tell(done)
     }
 
-    /// The half that begins a tick: fills the slots that the simulation reads, and the header.
+    /// The first half of a tick: fills the slots that the simulation reads, and the header.
     #[inline]
     pub(super) fn receive(&mut self) -> i32 {
         self.ticks += 1;
@@ -78,14 +76,14 @@ impl<K> Device<K> {
         self.tell(done)
     }
 
-    /// The half that ends it: takes the slots that the simulation wrote.
+    /// The second half of a tick: sends the slots that the simulation wrote.
     #[inline]
     pub(super) fn send(&mut self) -> i32 {
         let done = self.driver.send(self.shared.slots());
         self.tell(done)
     }
 
-    /// The time that Java wrote, if it wrote one.
+    /// The time that Java wrote, if any.
     #[inline]
     fn time(&self) -> Option<Nanos> {
         let time = self.shared.read(Word::SimulationTime);
@@ -104,7 +102,7 @@ impl<K> Device<K> {
         done.code.code()
     }
 
-    /// What the statistics are made of; the text is made when the driver is given back.
+    /// The data of the statistics; they are formatted after the driver is released.
     pub(super) fn snapshot(&self) -> Snapshot {
         self.driver.snapshot()
     }
@@ -114,22 +112,22 @@ impl<K> Device<K> {
         Arc::clone(self.driver.config())
     }
 
-    /// Injects a fault and gives its number; or says that there are too many.
+    /// Injects a fault and returns its number, or an error if there are too many.
     pub(super) fn inject(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
         self.driver.inject_read(fault)
     }
 
-    /// Ends a fault; false if there is none with this number.
+    /// Ends a fault; false if no fault has this number.
     pub(super) fn end_fault(&mut self, id: u32) -> bool {
         self.driver.end_fault(id)
     }
 
-    /// Where the injected faults are told of.
+    /// Where the injected faults publish their state.
     pub(super) fn board(&self) -> Arc<Board> {
         Arc::clone(self.driver.board())
     }
 
-    /// Moves waiting events into `into`, three words each, and says how many.
+    /// Moves pending events to `into`, three words each; returns their number.
     pub(super) fn events(&mut self, into: &mut [i64]) -> usize {
         let room = (into.len() / EVENT_WORDS).min(EVENTS);
         let count = self.driver.poll_events(&mut self.events[..room]);

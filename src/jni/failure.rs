@@ -1,4 +1,4 @@
-//! How a failure reaches Java: one exception class, one policy.
+//! How failures reach Java: one exception class, one policy.
 
 use std::any::Any;
 
@@ -12,24 +12,24 @@ use tickbus_driver::{Code, DriverError};
 
 use super::handles::said;
 
-/// Why a native method could not do its work.
+/// Why a native method failed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Failure {
-    /// A status code, with what happened.
+    /// A status code, and what happened.
     #[error("{text}")]
     Coded { code: i32, text: String },
-    /// A call into the JVM failed; where it threw, the exception is still pending.
+    /// A call into the JVM failed; if it threw, the exception is still pending.
     #[error(transparent)]
     Jni(#[from] Error),
 }
 
 impl Failure {
-    /// A failure with the meaning and the remedy that the status table gives.
+    /// A failure with the status table's meaning and remedy.
     pub(super) fn plain(code: Code) -> Self {
         Self::coded(code, code.text())
     }
 
-    /// A failure that says what happened; the remedy is the status table's.
+    /// A failure with its own description; the remedy is the status table's.
     pub(super) fn coded(code: Code, what: impl std::fmt::Display) -> Self {
         let text = format!(
             "{} ({}): {what}\n  {}",
@@ -52,18 +52,18 @@ impl From<DriverError> for Failure {
 
 /// `tickbus.FieldbusException`.
 ///
-/// A global reference keeps its class from being unloaded, and with it the class loader and this
-/// library: no bus thread ever loses the code it runs.
+/// A global reference keeps its class, its class loader and thus this library from being unloaded: no bus
+/// thread can lose the code it is running.
 static EXCEPTION: OnceCell<Global<JClass<'static>>> = OnceCell::new();
 
-/// Finds the exception class; to be called while the library is being loaded, when the JVM looks
-/// classes up in the class loader that loads it.
+/// Finds the exception class. To be called while the library is being loaded, when the JVM looks up classes
+/// in the class loader that loads it.
 pub(super) fn find_exception(env: &mut Env<'_>) -> Result<(), Error> {
     let find = || {
         let class = env.find_class(jni_str!("tickbus/FieldbusException"))?;
         env.new_global_ref(class)
     };
-    // A library that is loaded again finds its class here already.
+    // If the library is loaded again, the class is here already.
     EXCEPTION.get_or_try_init(find).map(|_| ())
 }
 
@@ -125,7 +125,7 @@ fn throw(env: &mut Env<'_>, failure: &Failure) -> Result<(), Error> {
     )?;
     let exception = env.cast_local::<JThrowable>(exception)?;
     match env.throw(exception) {
-        // This is how the crate says that the exception is pending now, as it should be.
+        // The crate's way of saying that the exception is now pending, as intended.
         Err(Error::JavaException) => Ok(()),
         other => other,
     }

@@ -1,8 +1,8 @@
 //! The table of open drivers: checked ids instead of pointers.
 //!
-//! A handle is an index into a fixed table, and a generation that tells this tenant of the place
-//! from all earlier ones. Whatever number a caller brings, it either names a tenant that is open
-//! now, or gets a status code.
+//! A handle is an index into a fixed table, and a generation that distinguishes the current tenant of the
+//! place from all previous ones. Any number either denotes a tenant that is open now, or is answered with a
+//! status code.
 
 #![allow(
     unsafe_code,
@@ -26,24 +26,24 @@ const _: () = assert!(PLACES <= 1 << INDEX_BITS);
 /// A place's word: its generation, and in the low bits one of the states below.
 const STATE_BITS: u32 = 2;
 const STATE: u64 = (1 << STATE_BITS) - 1;
-/// Nobody lives here.
+/// There is no tenant.
 const FREE: u64 = 0;
-/// A tenant lives here, and nobody uses it at this moment.
+/// There is a tenant, not in use at the moment.
 const OPEN: u64 = 1;
-/// One thread has the tenant to itself.
+/// One thread is using the tenant.
 const CLAIMED: u64 = 2;
-/// The tenant panicked; it waits to be closed.
+/// The tenant has panicked, and waits to be closed.
 const FAILED: u64 = 3;
 
 const fn word(generation: u64, state: u64) -> u64 {
     generation << STATE_BITS | state
 }
 
-/// One place, on cache lines of its own: drivers that tick on different cores share nothing.
+/// One place, on its own cache lines: drivers that tick on different cores share nothing.
 #[repr(align(128))]
 struct Place<T> {
     word: AtomicU64,
-    /// Touched only by the thread that moved the word to [`CLAIMED`], until it moves it on.
+    /// Only accessed by the thread that has moved the word to [`CLAIMED`], until it moves it on.
     content: UnsafeCell<Content<T>>,
 }
 
@@ -78,7 +78,7 @@ impl<T, const N: usize> Handles<T, N> {
         Self { places }
     }
 
-    /// Takes a place for a tenant that is yet to be made.
+    /// Reserves a place for a tenant that has yet to be created.
     pub(super) fn reserve(&self) -> Result<Reservation<'_, T>, Code> {
         for (index, place) in self.places.iter().enumerate() {
             let found = place.word.load(Ordering::Relaxed);
@@ -92,9 +92,9 @@ impl<T, const N: usize> Handles<T, N> {
         Err(Code::TooManyDrivers)
     }
 
-    /// Has `work` done on the tenant, which no other thread can reach meanwhile.
+    /// Calls `work` with the tenant, which no other thread can access in the meantime.
     ///
-    /// A panic in `work` marks the tenant as failed; from then on it answers INTERNAL until closed.
+    /// A panic in `work` marks the tenant as failed; from then on it returns INTERNAL until closed.
     #[inline]
     pub(super) fn with<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
         let mut claim = self.claim(handle, OPEN)?;
@@ -111,8 +111,8 @@ impl<T, const N: usize> Handles<T, N> {
         }
     }
 
-    /// Ends a tenancy: `close` gets the tenant, failed or not. The place is free from then on, and the handle
-    /// closed, however long `close` takes.
+    /// Ends a tenancy: `close` is called with the tenant, failed or not. The place is free and the handle
+    /// closed from then on, however long `close` takes.
     pub(super) fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
         let mut claim = match self.claim(handle, OPEN) {
             Err(Code::Internal) => self.claim(handle, FAILED)?,
@@ -125,7 +125,7 @@ impl<T, const N: usize> Handles<T, N> {
         tenant.map(close).ok_or(Code::Internal)
     }
 
-    /// The text of the panic that this handle's tenant failed with.
+    /// The message of the panic that made this handle's tenant fail.
     pub(super) fn panic_of(&self, handle: i64) -> Option<String> {
         let mut claim = self.claim(handle, FAILED).ok()?;
         Some(claim.content().panic.clone())
@@ -144,7 +144,7 @@ impl<T, const N: usize> Handles<T, N> {
 }
 
 impl<T> Place<T> {
-    /// Why a claim by this generation failed.
+    /// Why a claim with this generation failed.
     #[cold]
     fn refusal(&self, generation: u64) -> Code {
         let found = self.word.load(Ordering::Relaxed);
@@ -156,17 +156,17 @@ impl<T> Place<T> {
             _ if generation < living => Code::Closed,
             FREE => Code::Closed,
             FAILED => Code::Internal,
-            // OPEN: whoever had it gave it back between the claim and this look.
+            // OPEN: the thread that had it has released it between the claim and this check.
             _ => Code::Busy,
         }
     }
 }
 
-/// The sole use of a place; ends when dropped.
+/// Exclusive use of a place; ends when dropped.
 struct Claim<'a, T> {
     place: &'a Place<T>,
     generation: u64,
-    /// The state that the place goes to.
+    /// The state in which the place is left.
     end: u64,
 }
 
@@ -203,14 +203,14 @@ impl<T> Drop for Claim<'_, T> {
     }
 }
 
-/// A place that waits for its tenant; free again if dropped before.
+/// A place waiting for its tenant; free again if this is dropped before.
 pub(super) struct Reservation<'a, T> {
     claim: Claim<'a, T>,
     index: usize,
 }
 
 impl<T> Reservation<'_, T> {
-    /// Lets the tenant in and gives its handle, which is positive.
+    /// Adds the tenant and returns its handle, which is positive.
     pub(super) fn fill(mut self, tenant: T) -> i64 {
         self.claim.content().tenant = Some(tenant);
         self.claim.end = OPEN;
@@ -218,7 +218,7 @@ impl<T> Reservation<'_, T> {
     }
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub(super) fn said(payload: Box<dyn Any + Send>) -> String {
     let text = panic_text(&*payload).to_owned();
     // Dropping a payload of unknown type could panic again.

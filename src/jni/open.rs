@@ -1,5 +1,5 @@
-//! Opening a driver for Java: its signals are described to a `tickbus.Layout`, which gives the
-//! shared buffer.
+//! Opening a driver for Java: its signals are described to a `tickbus.Layout`, which allocates the shared
+//! buffer.
 
 #![allow(unsafe_code, reason = "the shared buffer is memory that the JVM gives")]
 
@@ -20,14 +20,14 @@ use super::device::Device;
 use super::failure::Failure;
 use super::shared::Shared;
 
-/// What keeps the memory of a shared buffer alive.
+/// Keeps the memory of a shared buffer alive.
 pub(super) type Keep = Global<JByteBuffer<'static>>;
 
-/// What mistakes in the tables that Java hands in are called by.
+/// The file name in mistakes in the tables handed in by Java.
 const TABLES: &str = "tables instead of driver.cfg's";
 
-/// The file that Java names: a path, or a `file:` URI where the path is no text to the JVM. It then still has the
-/// bytes of the name, as percent escapes.
+/// The file named by Java: a path, or a `file:` URI for a path that the JVM cannot represent as text. The URI
+/// has the bytes of the name as percent escapes.
 pub(super) fn file_of(name: &str) -> PathBuf {
     let Some(escaped) = name.strip_prefix("file://") else {
         return PathBuf::from(name);
@@ -53,13 +53,13 @@ pub(super) fn file_of(name: &str) -> PathBuf {
     }
     #[cfg(not(unix))]
     {
-        // Names are texts there, and begin behind the slash: /C:/cell.
+        // On this system names are text, and a path starts after the slash: /C:/cell.
         let name = String::from_utf8_lossy(&bytes).into_owned();
         PathBuf::from(name.strip_prefix('/').unwrap_or(&name))
     }
 }
 
-/// Opens the driver that the file describes, with `tables` instead of its own, and describes it to `layout`.
+/// Opens the driver that the file describes, with `tables` in place of its own, and describes it to `layout`.
 pub(super) fn open(
     env: &mut Env<'_>,
     path: &Path,
@@ -98,7 +98,7 @@ fn describe(
         };
         let station = &config.table.stations[signal.station].name;
         let edges = driver.slots().edges[slot];
-        // A frame per signal: its local references would add up otherwise.
+        // One frame per signal, because local references would accumulate otherwise.
         env.with_local_frame(8, |env| {
             describe_signal(env, layout, signal, station, written, slot, edges)
         })?;
@@ -142,7 +142,7 @@ fn describe_signal(
     Ok(())
 }
 
-/// Java counts bytes and slots with its int.
+/// Java counts bytes and slots as int.
 fn index(number: usize) -> Result<i32, Failure> {
     i32::try_from(number).map_err(|_| {
         Failure::coded(

@@ -17,7 +17,7 @@ use tickbus_image::signal::Slot;
 /// Version of the layout; Java compares it with its own.
 pub(super) const VERSION: u64 = 1;
 
-/// What stands for the simulation time while none was given.
+/// The simulation time as long as none was given.
 pub(super) const NO_TIME: u64 = i64::MIN.cast_unsigned();
 
 /// Words before the first slot.
@@ -37,7 +37,7 @@ pub(super) enum Word {
     SlotCount = 7,
 }
 
-/// The shared buffer of one driver, and whatever keeps its memory alive.
+/// The shared buffer of one driver, and the owner of its memory.
 pub(super) struct Shared<K> {
     words: NonNull<u64>,
     slots: usize,
@@ -48,7 +48,7 @@ pub(super) struct Shared<K> {
 unsafe impl<K: Send> Send for Shared<K> {}
 
 impl<K> Shared<K> {
-    /// Bytes that a buffer for so many slots needs.
+    /// Size in bytes of a buffer for this many slots.
     pub(super) const fn bytes(slots: usize) -> usize {
         (HEADER + slots) * size_of::<u64>()
     }
@@ -81,7 +81,7 @@ impl<K> Shared<K> {
         Some(shared)
     }
 
-    /// The slots, which this side has to itself while they are borrowed.
+    /// The slots, to which this side has exclusive access while they are borrowed.
     #[inline]
     pub(super) fn slots(&mut self) -> &mut [Slot] {
         // SAFETY: `new` was promised HEADER + slots words, aligned and initialised, that live as long
@@ -103,7 +103,7 @@ impl<K> Shared<K> {
         self.header(word as usize).store(value, Ordering::Relaxed);
     }
 
-    /// Java threads may read the header at any time, so that its words are atomic.
+    /// Java threads may read the header at any time, so its words are atomic.
     #[inline]
     fn header(&self, word: usize) -> &AtomicU64 {
         debug_assert!(word < HEADER);

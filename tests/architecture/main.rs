@@ -1,5 +1,5 @@
-//! The house keeps its order: no circles inside a crate, unsafe code and the system's clocks have their homes, no file
-//! grows without end. That a crate uses only crates below it is in its manifest, and the compiler sees to it.
+//! Enforces the project's structure: rooms use only rooms above them, unsafe code and reading the system's
+//! clocks are confined to certain files, and no file grows without limit.
 
 mod circles;
 mod rules;
@@ -75,7 +75,8 @@ fn every_crate_has_its_row_in_the_table_of_rooms() {
     }
 }
 
-/// The lines, within a made-up file, that a check complains about, with a word of the complaint.
+/// Checks that exactly these lines of an imaginary file are complained about, each with a word of the
+/// complaint.
 #[track_caller]
 fn finds(path: &str, text: &str, expected: &[(usize, &str)]) {
     let found = mistakes(File { path, text });

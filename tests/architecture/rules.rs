@@ -1,8 +1,8 @@
-//! The rules of the house, each as a function from one source file to what is wrong with it.
+//! The rules, each a function from a source file to its violations.
 
 use super::source::{Token, texts, tokens};
 
-/// Where `unsafe` may stand: files that begin like this.
+/// Where `unsafe` is allowed: files that start like this.
 const UNSAFE_HOMES: &[&str] = &[
     "src/jni.rs",
     "src/jni/",
@@ -15,7 +15,7 @@ const UNSAFE_HOMES: &[&str] = &[
 /// Where the system's clocks may be read.
 const CLOCK_HOMES: &[&str] = &["crates/base/src/time/", "src/cli/"];
 
-/// The longest a source file may be.
+/// The largest number of lines in a source file.
 const MOST_LINES: usize = 700;
 
 /// One source file: its path from the project's root, with `/`, and its text.
@@ -25,7 +25,7 @@ pub(crate) struct File<'a> {
     pub(crate) text: &'a str,
 }
 
-/// All that is wrong with `file`, one line each.
+/// All violations in `file`, one per line.
 pub(crate) fn mistakes(file: File<'_>) -> Vec<String> {
     let tokens = tokens(file.text);
     let mut found = unsafe_code(file, &tokens);
@@ -67,7 +67,7 @@ fn clocks(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     for (at, token) in tokens.iter().enumerate() {
         let rest = &tokens[at..];
         let is_named = names.iter().any(|wanted| texts(rest, wanted));
-        // Every type that knows what time it is by itself: Instant, DateTime, Utc, ...
+        // Any type that can read the time: Instant, DateTime, Utc, ...
         let is_type = token.text.starts_with(char::is_uppercase) && token.text != "Self";
         let tells = is_type && texts(&rest[1..], &[":", ":"]) && rest.get(3).is_some_and(asks_time);
         if is_named || tells {
@@ -88,7 +88,7 @@ fn clocks(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     found
 }
 
-/// Whether a function of this name tells the time: `now`, `now_utc`, `now_with_offset`.
+/// Whether a function of this name reads the time: `now`, `now_utc`, `now_with_offset`.
 fn asks_time(token: &Token<'_>) -> bool {
     token.text == "now" || token.text.starts_with("now_")
 }

@@ -1,5 +1,5 @@
-//! Just enough of Rust's grammar to find names in it: comments and literals fall away, words and
-//! punctuation stay.
+//! Just enough of Rust's grammar to find names: comments and literals are dropped, words and punctuation
+//! remain.
 
 /// A word or a mark of punctuation, with its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ enum Kind {
     Token,
 }
 
-/// How long the piece at the start of `rest` is, and what it is.
+/// The length and the kind of the piece at the start of `rest`.
 fn measure(rest: &str, first: char) -> (usize, Kind) {
     if first.is_whitespace() {
         return (first.len_utf8(), Kind::Nothing);
@@ -56,7 +56,7 @@ fn measure(rest: &str, first: char) -> (usize, Kind) {
     }
     if let Some(quote) = rest.strip_prefix('b').unwrap_or(rest).strip_prefix('\'') {
         let before = rest.len() - quote.len() - 1;
-        // 'x' and '\n' are characters; 'x without the second quote is a lifetime.
+        // 'x' and '\n' are characters; 'x without a second quote is a lifetime.
         if quote.starts_with('\\') || quote.chars().nth(1) == Some('\'') {
             return (before + quoted(&rest[before..], '\''), Kind::Literal);
         }
@@ -106,7 +106,7 @@ fn quoted(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// Length of `#"…"#` with any number of `#`, if that is what stands here.
+/// Length of `#"…"#` with any number of `#`, if `text` starts with that.
 fn raw_string(text: &str) -> Option<usize> {
     let hashes = text.len() - text.trim_start_matches('#').len();
     if !text[hashes..].starts_with('"') {

@@ -1,4 +1,4 @@
-//! Ideal drives in the machine's place.
+//! Ideal drives in place of the machine.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use tickbus::time::Nanos;
 
 use crate::{bytes, parse};
 
-/// Drives in the machine's place, and a test in the PLC's.
+/// Drives in place of the machine, and a test in place of the PLC.
 struct Drives {
     program: tickbus::plc::Axes,
     config: Config,
@@ -38,7 +38,7 @@ impl Drives {
         }
     }
 
-    /// Sends these values until the signal is on; gives the milliseconds that it took.
+    /// Sends these values until the signal is on; returns how many milliseconds that took.
     #[track_caller]
     fn until(&mut self, values: &[(&str, f64)], signal: &str) -> i64 {
         use tickbus::plc::{Program as _, Scan};
@@ -75,7 +75,7 @@ fn ideal_drives_take_the_time_of_their_profile_with_and_without_a_limit_of_jerk(
         ("A.Execute", 1.0),
         ("A.CommandNumber", 3.0),
     ];
-    // From the middle, 10000, it is the move of 6300 that the thesis shows: 1.32083 s.
+    // From the middle, 10000, this is the move of 6300 documented in the thesis: 1.32083 s.
     let mut drives = Drives::new(axis);
     drives.until(&rest, "A.Healthy");
     let trapezoid = drives.until(&go, "A.CommandDone");
@@ -86,12 +86,13 @@ fn ideal_drives_take_the_time_of_their_profile_with_and_without_a_limit_of_jerk(
     drives.until(&rest, "A.Healthy");
     let mut smooth = go.to_vec();
     smooth.push(("A.Jerk", 150_000.0));
-    // Either ramp takes a / j = 0.1 s longer, and its mean speed is half of the highest.
+    // Each ramp takes a / j = 0.1 s longer, and its mean speed is half of the highest.
     let s_curve = drives.until(&smooth, "A.CommandDone");
     assert!((1_419..=1_424).contains(&s_curve), "{s_curve} ms");
 }
 
-/// Two processes over TCP: the charger's program brings all axes home. Whole images, and one axis at a time.
+/// Two processes over TCP: the charger's program homes all axes. With whole images, and with one axis at a
+/// time.
 #[test]
 fn the_charger_moves_its_axes_over_a_real_socket() {
     use std::io::BufRead as _;

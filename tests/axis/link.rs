@@ -8,7 +8,7 @@ fn the_machine_acknowledges_so_that_the_edge_may_fall_at_once() {
     for _ in 0..20 {
         pair.outputs[0] = 0x11;
         pair.until("an acknowledge", |pair| pair.inputs[0] & 4 != 0);
-        // Whoever sees it knows that a tick has had the command.
+        // The acknowledge tells the PLC that a tick has seen the command.
         pair.outputs[0] = 0x10;
         pair.until("its fall", |pair| pair.inputs[0] & 4 == 0);
     }
@@ -23,7 +23,7 @@ fn a_command_number_stands_for_what_the_table_of_the_machine_says() {
          [[axis.command]]\nnumber = 2\ntorque = 1.5\n",
     );
     assert_eq!((pair.outputs.len(), pair.inputs.len()), (30, 16));
-    // What the table does not state comes from the PLC: here the deceleration.
+    // Values missing in the table come from the PLC: here the deceleration.
     pair.outputs[0] = 0x11;
     pair.outputs[2..6].copy_from_slice(&7.0_f32.to_be_bytes());
     pair.outputs[14..18].copy_from_slice(&99.0_f32.to_be_bytes());

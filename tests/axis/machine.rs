@@ -41,7 +41,7 @@ impl Machine {
         lines.find_map(|line| Some(line.strip_prefix(key)?.strip_prefix('=')?.to_owned()))
     }
 
-    /// Connects with each address that it listens on.
+    /// Connects to each address that it listens on.
     pub(crate) fn clients(&self, count: usize) -> Vec<TcpStream> {
         let begun = Instant::now();
         let addresses = loop {
@@ -118,7 +118,7 @@ impl Pair {
         self.machine.set(name, value);
     }
 
-    /// The PLC sends its outputs and takes a record; the machine ticks.
+    /// The PLC sends its outputs and receives a record; the machine ticks.
     pub(crate) fn turn(&mut self) {
         self.plc
             .write_all(&self.outputs)

@@ -49,7 +49,7 @@ fn both_records_have_the_sizes_that_were_captured_in_2018() {
 
 #[test]
 fn a_position_command_has_the_bytes_that_the_structure_says() {
-    // The move that the thesis shows: 63 mm in hundredths, v = 8000, a = b = 15000.
+    // The move documented in the thesis: 63 mm in hundredths, v = 8000, a = b = 15000.
     let frame = bytes(
         &peeler("charger"),
         Area::Output,
@@ -109,7 +109,7 @@ fn each_bit_lies_where_the_structure_says() {
         let frame = bytes(&lathe, Area::Input, &[(signal, 1.0)]);
         assert_eq!((frame[30], frame[31]), (bits, 0), "{signal}");
     }
-    // −15536 is what becomes of 50000 where somebody takes an INT for a UINT.
+    // −15536 is 50000 misread: an INT taken for a UINT.
     let frame = bytes(
         &lathe,
         Area::Input,
@@ -138,7 +138,7 @@ fn the_charger_s_fourteen_bytes_lie_behind_its_axes() {
     }
 }
 
-/// An axis as a test makes it up.
+/// An axis made up by a test.
 #[derive(Clone, Debug)]
 struct Made {
     kind: Kind,
@@ -163,7 +163,8 @@ fn made() -> impl Strategy<Value = Made> {
     )
 }
 
-/// The driver.cfg of these axes, and where it puts each: the offsets of its structures and the size of the second.
+/// The driver.cfg of these axes, and the places of each: the offsets of its structures and the size of the
+/// second.
 fn made_up(axes: &[Made]) -> (String, Vec<(usize, usize, usize)>) {
     use std::fmt::Write as _;
 
@@ -225,7 +226,8 @@ proptest! {
                 let raw: [u8; 4] = frame[at..at + 4].try_into().expect("four bytes");
                 f64::from(f32::from_be_bytes(raw))
             };
-            // Inverted, a position counts from the other limit, and a speed the other way; sizes stay.
+            // When inverted, positions count from the other limit and speeds in the other direction;
+            // magnitudes do not change.
             let position = if axis.inverted { 300.0 - 75.0 } else { 75.0 };
             let sign = if axis.inverted { -1.0 } else { 1.0 };
             prop_assert_eq!(real(Area::Output, command + 2, "TargetPosition", 75.0), position * axis.gain);
@@ -256,7 +258,7 @@ proptest! {
     }
 }
 
-/// Whatever is wrong with a file of axes is told, and what is right is consistent.
+/// A file of axes is either reported as wrong, or consistent.
 fn check_any(text: &str) -> Result<(), TestCaseError> {
     use std::collections::HashSet;
 

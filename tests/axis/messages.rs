@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::machine::Machine;
 
-/// Three axes, one signal beside them, and one message for each.
+/// Three axes, one further signal, and one message per part.
 const ONE_BY_ONE: &str = "[driver]\nid = 1\nname = \"one by one\"\n[fieldbus]\nkind = \"socket\"\n\
     address = \"127.0.0.1:0\"\nmessage = \"axis\"\ncycle = \"2ms\"\n\
     [[axis]]\nname = \"A\"\n[[axis]]\nname = \"B\"\n[[axis]]\nname = \"C\"\ndiagnostics = true\n\
@@ -32,7 +32,7 @@ fn an_axis_per_message_reaches_that_axis_and_leaves_the_others() {
     assert_eq!(machine.get("A.Enable"), 0.0);
     let pulses = machine.place("B.Execute");
     assert_eq!(machine.slots[pulses].real(), 1.0, "B goes on as it was");
-    // An edge between two ticks is seen, too.
+    // An edge between two ticks must be seen as well.
     plc.write_all(&message(2, 0x10, 20.0)).expect("it reads");
     machine.until("its end", |machine| machine.get("B.Execute") == 0.0);
     let both = [message(2, 0x11, 21.0), message(2, 0x10, 21.0)].concat();
@@ -68,7 +68,7 @@ fn feedback_comes_axis_by_axis_what_has_changed_first() {
     );
     machine.set("B.ActualPosition", 5.0);
     machine.tick();
-    // At most what was under way, and then B before its turn.
+    // At most what was in transit, and then B ahead of its turn.
     let mut turns = 0;
     while record[1] != 2 || record[4..8] != 5.0_f32.to_be_bytes() {
         plc.read_exact(&mut record).expect("a message");
@@ -131,7 +131,7 @@ fn both_plcs_are_two_stations_of_one_driver_each_at_a_port_of_its_own() {
     let running = |machine: &Machine| machine.statistic("state").as_deref() == Some("running");
     assert!(running(&machine), "{:?}", machine.statistic("reason"));
 
-    // One goes, and the other does not notice.
+    // One connection is closed; the other is not affected.
     drop(lathe);
     while machine.get("knife.Enable") == 1.0 {
         talk(&mut machine, &mut charger, 0);
@@ -145,7 +145,7 @@ fn both_plcs_are_two_stations_of_one_driver_each_at_a_port_of_its_own() {
         "{reason}"
     );
 
-    // And it comes back.
+    // It is opened again.
     let mut lathe = machine.clients(2).remove(1);
     while !running(&machine) || machine.get("knife.Enable") == 0.0 {
         talk(&mut machine, &mut charger, 0);

@@ -1,7 +1,7 @@
-//! The report in a browser: what it shows is what was recorded, and it can be used.
+//! The report in a browser: what it shows is what was recorded, and it can be operated.
 //!
-//! Not among the tests that `cargo test` runs by itself, since it needs Chromium and chromedriver:
-//! `cargo test --test browser` runs them, and so does `make test` where these are.
+//! Not part of a plain `cargo test`, because it needs Chromium and chromedriver: `cargo test --test browser`
+//! runs it, and so does `make test` if both are installed.
 
 mod samples;
 mod webdriver;
@@ -65,7 +65,7 @@ fn assert_quiet(browser: &Browser) {
     assert_eq!(loaded, json!([]), "the page loads nothing");
 }
 
-/// All that a page has of a run, compared with the run.
+/// Compares everything that a page knows about a run with the run.
 #[track_caller]
 fn assert_same(browser: &Browser, run: &Run) {
     for (number, signal) in run.signals().iter().enumerate() {
@@ -324,7 +324,7 @@ fn the_chart_is_zoomed_and_moved_by_keys_wheel_mouse_and_links() {
         {"type": "pointerMove", "x": 600, "y": 300, "duration": 50}, {"type": "pointerUp", "button": 0},
     ]}]));
     browser.wait(&format!("tickbusReport.view().from > {}", before.0));
-    // A time in a table leads to its place.
+    // A time in a table links to its place in the chart.
     browser.run("document.querySelector('#faults a[data-from]').click()");
     let (from, to) = view(&browser);
     assert!(
@@ -368,8 +368,8 @@ fn edges_are_drawn_where_they_happened() {
     let page = Page::of(&contents(&run));
     let browser = Browser::start(1200, 900);
     open(&browser, &page);
-    // Along the middle of the only row: where anything is painted, as shares of the trace's width. The grid is gone
-    // once two rows above are compared.
+    // Where anything is painted along the middle of the only row, as fractions of the trace's width.
+    // Comparing two rows above each other removes the grid.
     let found = browser.run(
         "const canvas = document.getElementById('canvas');
          const { left, width } = painting(null);
@@ -451,8 +451,8 @@ fn paper_gets_every_row_in_light_colours() {
     assert_quiet(&browser);
 }
 
-/// Screenshots for people, into the folder that `TICKBUS_SCREENSHOTS` names; of the page that `TICKBUS_REPORT`
-/// names, or a sample.
+/// Screenshots for people, in the folder named by `TICKBUS_SCREENSHOTS`; of the page named by
+/// `TICKBUS_REPORT`, or of a sample.
 #[test]
 fn screenshots_are_taken_at_every_size() {
     let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);

@@ -1,9 +1,9 @@
-//! Runs to be looked at.
+//! Sample runs.
 
 use tickbus::report::{Kind, Mark, MarkKind, Run};
 use tickbus::time::Nanos;
 
-/// A number that looks like chance, the same in every run.
+/// Pseudo-random numbers, the same in every run.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -26,7 +26,7 @@ pub(crate) fn mark(at: i64, until: Option<i64>, kind: MarkKind, text: &str) -> M
     }
 }
 
-/// A machine of 24 bools, 7 positions and a step that moves for so many ticks of a millisecond.
+/// A machine with 24 bools, 7 positions and a step, which runs for `ticks` ticks of a millisecond.
 #[expect(clippy::cast_precision_loss, reason = "small numbers")]
 pub(crate) fn machine(ticks: i64, budget: usize) -> Run {
     let mut run = Run::new(budget);
@@ -48,7 +48,7 @@ pub(crate) fn machine(ticks: i64, budget: usize) -> Run {
             run.change(number, now, f64::from(u8::from(*open)));
         }
         for axis in 0..7_u8 {
-            // An INT of 0 to 27648 that is 0 to 250 mm, as a sensor with some noise sees it.
+            // An INT from 0 to 27648 for 0 to 250 mm, as from a noisy sensor.
             let phase = tick as f64 / (200.0 * f64::from(axis + 1));
             let raw = (13_824.0 + 13_000.0 * phase.sin() + random.below(9) as f64).round();
             run.change(24 + usize::from(axis), now, raw * 250.0 / 27_648.0);

@@ -1,4 +1,4 @@
-//! A headless Chromium, spoken to by the W3C's `WebDriver` protocol through chromedriver.
+//! A headless Chromium, controlled by the W3C `WebDriver` protocol through chromedriver.
 
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -8,17 +8,17 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-/// A browser of its own, which ends with this.
+/// A browser, which ends when this is dropped.
 pub(crate) struct Browser {
     driver: Child,
     port: u16,
     session: String,
-    /// What they leave behind in the folder for temporary files.
+    /// Holds whatever they leave in the folder for temporary files.
     _folder: tempfile::TempDir,
 }
 
 impl Browser {
-    /// Starts one, in a window of so many CSS pixels.
+    /// Starts a browser with a window of this many CSS pixels.
     pub(crate) fn start(width: u32, height: u32) -> Self {
         let folder = tempfile::tempdir().expect("there is room for a browser");
         let started = Command::new("chromedriver")
@@ -49,7 +49,7 @@ impl Browser {
         };
         let arguments = [
             "--headless=new".to_owned(),
-            // As root, and in containers, there is no sandbox.
+            // As root, and in containers, the sandbox does not work.
             "--no-sandbox".to_owned(),
             "--disable-dev-shm-usage".to_owned(),
             "--force-device-scale-factor=1".to_owned(),
@@ -68,7 +68,7 @@ impl Browser {
             .as_str()
             .expect("a session has a name")
             .clone_into(&mut browser.session);
-        // Headless windows have a frame all the same, unless their size is said like this.
+        // Headless windows have a frame even so, unless their size is set like this.
         let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 640});
         browser.devtools("Emulation.setDeviceMetricsOverride", &metrics);
         browser
@@ -80,7 +80,7 @@ impl Browser {
         self.command("url", &json!({"url": format!("file://{}", file.display())}));
     }
 
-    /// Runs a function's body in the page, which may wait, and gives what it returns.
+    /// Runs a function body in the page, which may wait, and returns its result.
     pub(crate) fn run(&self, body: &str) -> Value {
         let script = format!(
             "const done = arguments[arguments.length - 1];\
@@ -98,7 +98,7 @@ impl Browser {
         self.run(&body);
     }
 
-    /// Types into what has the focus.
+    /// Types into the focused element.
     pub(crate) fn keys(&self, keys: &str) {
         let strokes = keys.chars().flat_map(|key| {
             let key = key.to_string();
@@ -114,7 +114,7 @@ impl Browser {
         );
     }
 
-    /// Does what pointers, wheels and keys do, as the protocol has it.
+    /// Performs actions of pointers, wheels and keys, as defined in the protocol.
     pub(crate) fn act(&self, actions: &Value) {
         self.command("actions", &json!({"actions": actions}));
     }
@@ -127,7 +127,7 @@ impl Browser {
         )
     }
 
-    /// What the page has complained about.
+    /// The errors and warnings logged by the page.
     pub(crate) fn complaints(&self) -> Vec<String> {
         let log = self.command("se/log", &json!({"type": "browser"}));
         let entries = log.as_array().expect("a log is a list").iter();
@@ -188,7 +188,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Also when a test has failed: a driver that is killed leaves its browser behind.
+        // Also after a failed test: killing the driver would leave its browser behind.
         if !self.session.is_empty() {
             let session = format!("/session/{}", self.session);
             let _ = self.answer("DELETE", &session, &json!({}));

@@ -1,13 +1,13 @@
-//! A codec that goes bit by bit and computes with integers alone, to compare the plan with.
+//! A codec that works bit by bit and computes only with integers, to check the plan against.
 //!
-//! It shares no formula with the plan but the scale's own: (value − offset) / gain and
-//! raw × gain + offset.
+//! It shares no formula with the plan except the scale's own: (value − offset) / gain and raw × gain +
+//! offset.
 
 use std::cmp::Ordering;
 
 use tickbus::signal::{Area, ByteOrder, Conversions, DataType, Signal, SignalTable, Slot};
 
-/// How many bits of the frame a type takes.
+/// The number of bits that a type occupies in the frame.
 pub(crate) fn bits(data_type: DataType) -> usize {
     match format!("{data_type:?}").to_uppercase().as_str() {
         "BOOL" => 1,
@@ -18,7 +18,7 @@ pub(crate) fn bits(data_type: DataType) -> usize {
     }
 }
 
-/// Whether a signal's slot holds an integer and not a double.
+/// Whether a signal's slot holds an integer rather than a double.
 pub(crate) fn is_integer_slot(signal: &Signal) -> bool {
     let wide = [DataType::Lword, DataType::Lint, DataType::Ulint];
     wide.contains(&signal.data_type) && signal.scale.is_none()
@@ -88,13 +88,13 @@ impl<'a> Oracle<'a> {
     }
 }
 
-/// Where the bits of a signal stand, the one of value 2^0 first.
+/// The places of a signal's bits, starting with the one of value 2^0.
 fn places(signal: &Signal) -> Vec<(usize, u8)> {
     let count = bits(signal.data_type);
     if count == 1 {
         return vec![(signal.byte, signal.bit)];
     }
-    // Spell out in which order the bytes come, the most significant being A.
+    // Spells out the order of the bytes; A is the most significant one.
     let letters: Vec<usize> = (0..count / 8).collect();
     let pair = if count == 8 { 1 } else { 2 };
     let mut words: Vec<Vec<usize>> = letters.chunks(pair).map(<[usize]>::to_vec).collect();
@@ -180,7 +180,7 @@ fn is_infinite(double: u64) -> bool {
     double << 1 == 0x7FF << 53
 }
 
-/// A finite double as sign, and integer times a power of two.
+/// A finite double as sign, integer mantissa and power of two.
 fn parts(double: u64) -> (bool, u128, i32) {
     let exponent = i32::try_from(double >> 52 & 0x7FF).expect("eleven bits");
     let fraction = u128::from(double & ((1 << 52) - 1));
@@ -233,7 +233,7 @@ fn real(raw: f64, value_is_infinite: bool) -> (u64, bool) {
         };
     }
     let (_, mantissa, exponent) = parts(double);
-    // The REAL's unit in the last place: 2^-149 for the smallest, else by the leading bit.
+    // The REAL's unit in the last place: 2^-149 for the smallest, otherwise from the leading bit.
     let leading =
         i32::try_from(128 - mantissa.leading_zeros()).expect("at most 128") - 1 + exponent;
     let unit = (leading - 23).max(-149);
@@ -251,12 +251,12 @@ fn real(raw: f64, value_is_infinite: bool) -> (u64, bool) {
             Ordering::Greater => floor + 1,
         }
     };
-    // Beyond the greatest REAL, even by less than half a unit, is beyond.
+    // Anything greater than the greatest REAL, even by less than half a unit.
     let beyond = leading > 127 || (leading == 127 && mantissa > 0xFF_FFFF << shift.max(0));
     if beyond {
         return (sign | MAX, true);
     }
-    // Counting REALs upwards from zero is counting their bit patterns.
+    // Counting REALs upwards from zero counts their bit patterns.
     let binade = u64::try_from(unit + 149).expect("not negative");
     let steps = u64::try_from(steps).expect("at most 25 bits");
     (sign | ((binade << 23) + steps), false)

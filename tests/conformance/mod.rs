@@ -48,8 +48,8 @@ pub fn exchanges_whole_images_only(bus: &impl Bus) {
     });
 }
 
-/// Pulses of one tick arrive, whatever the ratio of tick to cycle: several ticks in a cycle, or several cycles
-/// in a tick.
+/// Pulses of one tick arrive, with any ratio of tick to cycle: several ticks per cycle, or several cycles per
+/// tick.
 pub fn keeps_edges_both_ways(bus: &impl Bus) {
     for (ticks, cycles) in [(1, 1), (3, 1), (10, 1), (1, 3), (1, 10)] {
         let mut rig = Rig::new(bus);
@@ -90,8 +90,8 @@ pub fn keeps_edges_both_ways(bus: &impl Bus) {
     }
 }
 
-/// A simulation that receives, computes and sends: its answer goes out with the tick that brought the
-/// question, no pulse is lost, and age and watchdog are those of any other tick.
+/// A simulation that receives, computes and sends: its answer is sent in the tick that received the question,
+/// no pulse is lost, and age and watchdog work as in any other tick.
 pub fn answers_within_the_tick(bus: &impl Bus) {
     let mut rig = Rig::with(bus, "watchdog = \"500ms\"");
     rig.connect();
@@ -176,7 +176,7 @@ pub fn keeps_events_in_order(bus: &impl Bus) {
     assert_eq!(rig.device.statistic("events_lost"), "0");
 }
 
-/// Nothing from the peer: stale, fail-safe values; and back, by the injected clock alone.
+/// Silence from the peer: stale, fail-safe values; and recovery, all by the injected clock.
 pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     let clock = Manual::new();
     let mut device = End::open(&config(bus, "device", ""), &clock);
@@ -247,7 +247,7 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     assert_eq!(rig.device.statistic("link.running"), "2");
 }
 
-/// The peer breaks the rules: the line says what it did, nothing of it is believed, and an honest peer is
+/// The peer violates the protocol: the line reports how, none of its data are used, and an honest peer is
 /// served afterwards.
 pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
     let clock = Manual::new();
@@ -270,7 +270,7 @@ pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
     rig.connect();
 }
 
-/// The simulation stops ticking: the PLC gets the fail-safe values, and the true ones afterwards.
+/// The simulation stops ticking: the PLC gets the fail-safe values, and the true ones when it ticks again.
 pub fn the_watchdog_bites_when_the_simulation_stops(bus: &impl Bus) {
     let mut rig = Rig::with(bus, "watchdog = \"50ms\"");
     rig.connect();
@@ -291,9 +291,9 @@ pub fn the_watchdog_bites_when_the_simulation_stops(bus: &impl Bus) {
     });
 }
 
-/// Peers that die and return, again and again: each is served, and nothing piles up.
+/// Peers die and return, again and again: each is served, and no resources accumulate.
 ///
-/// Resources are counted, so this runs in a process of its own: `test` is the calling test's name.
+/// Resources are counted, so this runs in a separate process: `test` is the calling test's name.
 pub fn survives_200_peers(bus: &impl Bus, test: &str) {
     const LIVES: u32 = 200;
     const WARM_UP: u32 = 20;
@@ -329,7 +329,7 @@ pub fn survives_200_peers(bus: &impl Bus, test: &str) {
     assert_eq!(before, Some(after), "something piles up");
 }
 
-/// Closing waits for no deadline and no peer, in the midst of the traffic.
+/// Closing in the midst of traffic does not wait for any deadline or peer.
 pub fn closes_while_busy(bus: &impl Bus) {
     for first in ["device", "controller"] {
         let mut rig = Rig::new(bus);
@@ -362,7 +362,7 @@ pub fn closes_while_busy(bus: &impl Bus) {
     }
 }
 
-/// Mistakes in the bus's own table are told at their line, with what would be right.
+/// Mistakes in the bus's own table are reported at their line, with the remedy.
 pub fn refuses_bad_configuration(bus: &impl Bus) {
     let wrong = bus.wrong();
     assert!(!wrong.is_empty());
@@ -407,7 +407,8 @@ pub fn keeps_several_instances_apart(bus: &impl Bus, other: &impl Bus) {
     }
 }
 
-/// Each end sees by a signal of the other one whether that one works: the PLC by a heartbeat of the simulation.
+/// Each end detects by a signal of the other one whether that works: the PLC by a heartbeat of the
+/// simulation.
 pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
     let within = "within = \"100ms\"";
     let watched = format!(
@@ -455,14 +456,14 @@ pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
     });
 }
 
-/// The clock stands still, and yet closing ends every thread.
+/// Closing ends every thread even though the clock stands still.
 pub fn closes_while_its_peer_is_silent(bus: &impl Bus) {
     let clock = Manual::new();
     let config = Config::parse("driver.cfg", &config(bus, "device", "")).expect("a right file");
     Driver::open(config, clock).expect("opens").close();
 }
 
-/// Instantiates the suite: a name, and an expression that makes a bus nobody else uses.
+/// Instantiates the suite: a name, and an expression that makes a bus used by nothing else.
 #[macro_export]
 macro_rules! conformance {
     ($name:ident, $bus:expr) => {

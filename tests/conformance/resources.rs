@@ -1,4 +1,4 @@
-//! Threads, descriptors and memory of the process, to be counted.
+//! Counts threads, descriptors and memory of the process.
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -14,7 +14,7 @@ struct Counting;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-// SAFETY: all calls are handed on to the system's allocator, as they came.
+// SAFETY: all calls are passed on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LIVE.fetch_add(layout.size(), Ordering::Relaxed);
@@ -38,7 +38,7 @@ pub struct Resources {
     bytes: usize,
 }
 
-/// Words of a reason may differ in length from one moment to the next.
+/// The texts of reasons may vary in length.
 const SLACK: usize = 4096;
 
 impl PartialEq for Resources {
@@ -64,14 +64,14 @@ impl Resources {
         }
     }
 
-    /// What the process holds once nothing changes any more, while `pass` lets time pass.
+    /// What the process holds once that is stable, while `pass` lets time pass.
     pub fn settled(mut pass: impl FnMut()) -> Self {
         let limit = Instant::now() + Duration::from_secs(10);
         let mut last = Self::now();
         let mut same = 0;
         while same < 20 && Instant::now() < limit {
             pass();
-            // A thread that something else than the clock has woken needs the processor, too.
+            // Threads woken by something other than the clock also need the processor.
             std::thread::sleep(Duration::from_millis(1));
             let now = Self::now();
             same = if now == last { same + 1 } else { 0 };
@@ -81,8 +81,8 @@ impl Resources {
     }
 }
 
-/// Whether this process runs the test called `test` (its module path) and nothing else. If not, it has run it
-/// in a process of its own by now, and that has passed.
+/// Whether this process runs only the test called `test` (its module path). If not, the test has been run in
+/// a separate process, and has passed.
 pub fn alone(test: &str) -> bool {
     const MARK: &str = "TICKBUS_TEST_ALONE";
     if std::env::var_os(MARK).is_some() {

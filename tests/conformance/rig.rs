@@ -1,4 +1,4 @@
-//! The fixture: a Device and a Controller at two ends of a bus, on one manual clock.
+//! The fixture: a Device and a Controller at the two ends of a bus, sharing one manual clock.
 
 pub use tickbus_test_log as logged;
 
@@ -11,7 +11,7 @@ use tickbus::fieldbus::Link;
 use tickbus::signal::Slot;
 use tickbus::time::{Clock, Manual, Nanos};
 
-/// The signals that both ends share; `{fieldbus}` is the bus's own table.
+/// The signals at both ends; `{fieldbus}` is replaced by the bus's own table.
 pub const SIGNALS: &str = r#"
 [[signal]]
 name    = "run"
@@ -50,7 +50,7 @@ type      = "INT"
 pub struct End {
     pub driver: Driver,
     pub slots: Vec<Slot>,
-    /// Looks after the log, once the driver is closed.
+    /// Checks the log when the driver is closed.
     pub _logged: logged::Watch,
 }
 
@@ -120,15 +120,15 @@ impl End {
     }
 }
 
-/// A bus as the suite needs to know it.
+/// A bus, with everything the suite needs to know about it.
 pub trait Bus {
     /// The `[fieldbus]` table of the end with `role`, without `role` and timing.
     fn fieldbus(&self, role: &str) -> String;
 
-    /// Starts a peer of a Device that is about to open, which does not keep to the protocol.
+    /// Starts a peer that violates the protocol, for a Device that is about to open.
     fn liar(&self, clock: &Arc<Manual>) -> Liar;
 
-    /// `[fieldbus]` tables that are wrong, each with a word of the complaint.
+    /// Wrong `[fieldbus]` tables, each with a word of the complaint.
     fn wrong(&self) -> Vec<(&'static str, &'static str)>;
 
     /// `[[fault]]` sections of both ends.
@@ -140,7 +140,7 @@ pub trait Bus {
 /// A peer that lies; dropping it ends it.
 pub struct Liar {
     pub _peer: Box<dyn std::any::Any>,
-    /// What the Device says to it: the cause, and words of the reason.
+    /// What the Device reports about it: the cause, and words of the reason.
     pub cause: &'static str,
     pub words: &'static str,
 }
@@ -191,7 +191,7 @@ impl Rig {
         });
     }
 
-    /// Until both ends have fresh data.
+    /// Lets cycles pass until both ends have fresh data.
     #[track_caller]
     pub fn connect(&mut self) {
         let (mut device, mut controller) = (false, false);
@@ -203,8 +203,8 @@ impl Rig {
     }
 }
 
-/// Lets one bus cycle pass, for `ends` ends that have a bus thread each: none is left behind by the clock,
-/// unless it waits for something else.
+/// Lets one bus cycle pass for `ends` ends that have a bus thread each: the clock does not advance past a
+/// thread, unless that waits for something else.
 pub fn pass(clock: &Manual, ends: usize) {
     clock.advance(CYCLE);
     let limit = Instant::now() + Duration::from_millis(20);
@@ -213,7 +213,7 @@ pub fn pass(clock: &Manual, ends: usize) {
     }
 }
 
-/// Looks again and again, giving the bus threads the processor, until `done` holds.
+/// Polls until `done` holds, yielding the processor to the bus threads.
 #[track_caller]
 pub fn await_that(what: &str, mut done: impl FnMut() -> bool) {
     let limit = Instant::now() + Duration::from_secs(20);

@@ -1,6 +1,6 @@
-//! A small machine that does what Structured Text says, as another project's parser reads it.
+//! A small interpreter of Structured Text, as parsed by another project's parser.
 //!
-//! The parser, iecst, knows no literals with a type: `WORD#16#00FF` is read as `16#00FF`.
+//! The parser, iecst, does not support typed literals: `WORD#16#00FF` is read as `16#00FF`.
 
 use std::collections::HashMap;
 
@@ -11,18 +11,18 @@ use tickbus::signal::DataType;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value {
     Bool(bool),
-    /// An integer or a bit string of a type; `None` is a literal's.
+    /// An integer or a bit string of a type; `None` for a literal.
     Whole(Option<DataType>, i128),
     Real(f32),
 }
 
 impl Value {
-    /// A value of a type from its bits.
+    /// A value of a type, from its bits.
     pub(crate) fn of_bits(data_type: DataType, bits: u64) -> Self {
         match data_type {
             DataType::Bool => Self::Bool(bits != 0),
             DataType::Real => Self::Real(f32::from_bits(u32::try_from(bits).expect("32 bits"))),
-            // The sources have the bits of it.
+            // The sources handle an LREAL as its bits.
             DataType::Lreal => Self::Whole(Some(DataType::Lword), bits.into()),
             other => Self::Whole(Some(other), wrapped(other, bits.into())),
         }
@@ -48,7 +48,7 @@ impl Value {
     }
 }
 
-/// What remains of a number in a type.
+/// A number reduced to the range of a type.
 fn wrapped(data_type: DataType, value: i128) -> i128 {
     let bits = data_type.width().bits();
     let low = value & ((1_i128 << bits) - 1);
@@ -59,7 +59,7 @@ fn wrapped(data_type: DataType, value: i128) -> i128 {
     }
 }
 
-/// Variables by their paths, such as `io.In[3]`, and functions.
+/// Variables by path, such as `io.In[3]`, and functions.
 #[derive(Default)]
 pub(crate) struct Machine {
     pub(crate) variables: HashMap<String, Value>,

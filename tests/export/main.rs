@@ -1,4 +1,4 @@
-//! `tickbus export`: golden files, and properties of what it makes for any signal table.
+//! `tickbus export`: golden files, and properties of the exports of arbitrary signal tables.
 #![allow(missing_docs, reason = "tests")]
 
 mod machine;
@@ -46,9 +46,9 @@ fn files(folder: &Path) -> Vec<(String, String)> {
     files
 }
 
-/// Each driver.cfg in `tests/export/right` has its files in `NAME-EDITOR`, for every editor; where it is refused, the
-/// folder has `refused.txt` instead. With the environment variable `BLESS` set, they are written there: read the
-/// difference before you commit it.
+/// Each driver.cfg in `tests/export/right` has its exports in `NAME-EDITOR`, for every editor; if it is
+/// refused, that folder has `refused.txt` instead. If the environment variable `BLESS` is set, they are
+/// rewritten: review the difference before committing it.
 #[test]
 fn exports_are_their_golden_files() {
     let right = repository().join("tests/export/right");

@@ -1,11 +1,11 @@
-//! Reads `PLCopen` XML back into Structured Text: what a person would see in the editor.
+//! Converts `PLCopen` XML back to Structured Text, as the editor would show it.
 
 use std::collections::VecDeque;
 
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-/// An element with what is in it.
+/// An element with its content.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Element {
     pub(crate) name: String,
@@ -15,7 +15,7 @@ pub(crate) struct Element {
 }
 
 impl Element {
-    /// The element of a document that holds all others.
+    /// The root element of a document.
     pub(crate) fn of_document(text: &str) -> Self {
         let mut reader = Reader::from_str(text);
         let mut open = VecDeque::from([Self::default()]);
@@ -95,7 +95,7 @@ impl Element {
             .1
     }
 
-    /// The declaration that a variable is, with its comment.
+    /// A variable as a declaration, with its comment.
     fn declaration(&self) -> String {
         let name = self.attribute("name");
         let comment = self

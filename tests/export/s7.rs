@@ -1,4 +1,4 @@
-//! The sources for S7, under the eyes of a reader that lays structures out by itself.
+//! The sources for S7, checked by a reader that computes structure layouts itself.
 
 use std::collections::{HashMap, HashSet};
 
@@ -10,7 +10,7 @@ use tickbus::signal::{Area, ByteOrder, DataType};
 use crate::machine::{Machine, Value, units};
 use crate::tables;
 
-/// A structure as S7 lays it out with standard access.
+/// A structure in S7's standard-access layout.
 #[derive(Debug, Default)]
 struct Structure {
     /// Path, offset in bits, type.
@@ -18,7 +18,7 @@ struct Structure {
     bytes: usize,
 }
 
-/// All structures of a source, by name, laid out by the rules of S7 alone: no offset is read from a comment.
+/// All structures of a source, by name, laid out only by the rules of S7: offsets in comments are not used.
 fn structures(source: &str) -> HashMap<String, Structure> {
     let mut all: HashMap<String, Structure> = HashMap::new();
     let mut lines = source.lines();
@@ -83,7 +83,7 @@ fn source_for(config: &Config, target: Target, which: &str) -> String {
     file.unwrap_or_else(|| panic!("{which}")).text
 }
 
-/// Each signal with its area and the bit at which it begins in the record of that area.
+/// Each signal with its area and its first bit in the record of that area.
 fn expected(config: &Config) -> Vec<(Area, usize, &tickbus::signal::Signal)> {
     let table = &config.table;
     let start = |area, station: usize| {
@@ -102,7 +102,8 @@ fn expected(config: &Config) -> Vec<(Area, usize, &tickbus::signal::Signal)> {
         .collect()
 }
 
-/// Asserts that S7 lays each signal where the bus has it, once, and that the copies go between the right places.
+/// Asserts that each signal is placed once, at its bus offset, and that values are copied between the right
+/// places.
 fn assert_laid(config: &Config, target: Target) {
     let data = source_for(config, target, "data");
     let structures = structures(&data);
@@ -230,7 +231,7 @@ proptest! {
         assert_laid(&config, Target::S71200);
     }
 
-    /// `LWord`, `LInt`, `ULInt` do not exist there, and an `LReal` has no address.
+    /// An S7-1200 has no `LWord`, `LInt` and `ULInt`, and an `LReal` cannot be addressed.
     #[test]
     fn nothing_of_64_bits_is_in_the_sources_for_an_s7_1200(config in tables::any_table()) {
         for file in export(&config, Target::S71200).expect("sources").files {
@@ -239,7 +240,7 @@ proptest! {
             }
             for line in file.text.split("\r\n") {
                 let code = line.split_once("//").map_or(line, |(code, _)| code);
-                // Names and comments of tags are the user's.
+                // Names and comments of tags are chosen by the user.
                 let code = if file.name.contains(".sdf") { code.split(',').nth(2).unwrap_or_default() } else { code };
                 for word in ["LWord", "LInt", "LReal", "LWORD", "LINT", "LREAL"] {
                     let found = code.split(|c: char| !c.is_ascii_alphanumeric()).any(|piece| piece == word);
@@ -254,7 +255,7 @@ proptest! {
         prop_assert_eq!(export(&config, Target::S71500), export(&config.clone(), Target::S71500));
     }
 
-    /// Identifiers are ASCII, comments stay in their line, and quotation marks come in pairs outside of them.
+    /// Identifiers are ASCII, comments stay on their line, and quotation marks outside them are paired.
     #[test]
     fn every_line_is_one_that_scl_can_read(config in tables::any_table()) {
         for which in ["data", "link", "copy"] {
@@ -268,8 +269,8 @@ proptest! {
     }
 }
 
-/// The statements of the link block that decide when a record goes out, run with OB1 taking `scan` milliseconds, and a job of
-/// `TSEND_C` `busy` calls: when each record was asked for.
+/// Runs the statements of the link block that decide when a record is sent, with an OB1 of `scan`
+/// milliseconds and a `TSEND_C` that is busy for `busy` calls; returns when each record was requested.
 fn sent_at(scan: i128, busy: u32, until: i128) -> Vec<i128> {
     let config = tables::parse(
         "cycle = \"10ms\"",
@@ -322,7 +323,7 @@ fn sent_at(scan: i128, busy: u32, until: i128) -> Vec<i128> {
             .variables
             .insert("Clock.ET".to_owned(), Value::Whole(None, now));
         machine.run(&before.body);
-        // TSEND_C begins a job on a rising edge of REQ, and is busy for some calls.
+        // TSEND_C starts a job on a rising edge of REQ, and is busy for some calls.
         let asks = machine.variables["Is_asked"] == Value::Bool(true);
         left = if asks && !asked {
             busy
@@ -355,14 +356,14 @@ fn the_socket_block_keeps_its_cycle_whatever_ob1_takes() {
             );
         }
     }
-    // Slower than that, it sends in every other call, and never stands still.
+    // If OB1 is slower, it sends in every other call, and never stops.
     let sent = sent_at(20, 1, 10_000);
     assert!((249..=250).contains(&sent.len()), "{}", sent.len());
 }
 
 #[test]
 fn a_long_pause_of_the_plc_is_not_made_up_for_in_a_burst() {
-    // 25 ms a call: each is late by more than a whole cycle.
+    // 25 ms per call: each record is late by more than a whole cycle.
     let sent = sent_at(25, 0, 1_000);
     assert!(
         sent.windows(2).all(|pair| pair[1] - pair[0] >= 25),
@@ -438,7 +439,7 @@ fn no_put_and_no_get_is_longer_than_the_cpu_takes_and_both_ends_have_the_same_le
     }
 }
 
-/// What the control block declares beside `Simulated` is set by the link block, on every bus.
+/// Everything that the control block declares, except `Simulated`, is set by the link block, on every bus.
 #[test]
 fn no_member_of_the_control_block_is_one_that_nothing_sets() {
     for kind in [
@@ -479,7 +480,7 @@ fn no_member_of_the_control_block_is_one_that_nothing_sets() {
     }
 }
 
-/// A heartbeat of the driver is watched by the PLC on every bus, and a signal that `alive` names is counted up.
+/// On every bus the PLC watches heartbeats of the driver, and counts up the signals named in `alive`.
 #[test]
 fn signs_of_life_are_watched_and_given_on_every_bus() {
     for kind in ["socket", "s7-client"] {
@@ -525,8 +526,8 @@ fn signs_of_life_are_watched_and_given_on_every_bus() {
     }
 }
 
-/// With its own memory as the place of the images the CPU has in %I what the simulation has written there: zeros from a data
-/// block must not go over it.
+/// If the CPU's own inputs and outputs are the place of the images, %I contains what the simulation has
+/// written: it must not be overwritten with zeros from a data block.
 #[test]
 fn what_the_simulation_reads_and_writes_in_the_cpu_itself_is_not_copied() {
     let config = Config::parse(

@@ -1,4 +1,4 @@
-//! The sources in Structured Text, run by a machine of our own from the syntax tree of another project's parser.
+//! The sources in Structured Text, run by our interpreter on the syntax tree of another project's parser.
 
 use proptest::prelude::*;
 use tickbus::driver_cfg::Config;
@@ -35,7 +35,7 @@ fn bytes(config: &Config, area: Area) -> usize {
         .sum()
 }
 
-/// Where each byte of a signal's value lies, the least significant one first.
+/// The bytes of a signal's value, least significant first.
 fn lies(byte: usize, signal: &Signal) -> impl Iterator<Item = usize> + use<'_> {
     let size = signal.data_type.size_bytes();
     (0..size).map(move |significance| byte + signal.order.byte_position(size, significance))
@@ -51,7 +51,7 @@ fn bits_of(record: &[u8], byte: usize, signal: &Signal) -> u64 {
         .sum()
 }
 
-/// The names that a list of declarations gives, in its order: those of the signals of an area.
+/// The names in a list of declarations, in order: those of an area's signals.
 fn names(declarations: &str, area: Area) -> Vec<String> {
     let of_area = declarations
         .lines()
@@ -76,8 +76,8 @@ fn file(config: &Config, target: Target, ending: &str) -> String {
     file.map(|file| file.text).unwrap_or_default()
 }
 
-/// Runs the statements of `unit` over registers called by `register`, with variables called by `variable`: what comes in is
-/// what lies in the record, and what goes out lies where the bus has it.
+/// Runs the statements of `unit` with registers called by `register` and variables called by `variable`:
+/// inputs must have the record's values, and outputs must be at their places in the record.
 fn assert_copied(
     config: &Config,
     record: &[u8],
@@ -166,10 +166,10 @@ proptest! {
         config in tables::any_table(),
         record in prop::collection::vec(any::<u8>(), 1300),
     ) {
-        // A pointer is nothing that the machine knows: the functions are those in arithmetic.
+        // The interpreter does not support pointers, so the functions are those using arithmetic.
         for target in [Target::Codesys, Target::TwinCat] {
             let (declarations, units) = plcopen::structured_text(&file(&config, target, ".xml"));
-            // What is said to libraries of the editors stands before the inputs and after the outputs.
+            // Calls of the editors' libraries precede the inputs and follow the outputs.
             let text = |name: &str| {
                 let (_, text) = units.iter().find(|(unit, _)| unit == name).expect("the program");
                 let (head, _) = text.split_once('\n').expect("a head");
@@ -191,8 +191,8 @@ proptest! {
         }
     }
 
-    /// REAL and its bits, by the arithmetic for compilers that cannot overlay memory: equal for all numbers in full
-    /// precision.
+    /// REAL and its bits, by the arithmetic for compilers that cannot overlay memory: exact for all normal
+    /// numbers.
     #[test]
     fn the_arithmetic_of_reals_gives_their_bits_and_back(bits in any::<u32>()) {
         let number = f32::from_bits(bits);
@@ -208,7 +208,7 @@ proptest! {
     }
 }
 
-/// The functions that the export for `OpenPLC` brings along.
+/// The functions included in the export for `OpenPLC`.
 fn portable_functions() -> String {
     let text = "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"modbus-server\"\n\
                 [[signal]]\nname = \"r\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";
@@ -221,13 +221,13 @@ fn portable_functions() -> String {
         .to_owned()
 }
 
-/// The record with its REALs made numbers in full precision: what the arithmetic is for.
+/// Replaces the REALs in a record by normal numbers, for which the arithmetic is meant.
 fn calmed(config: &Config, mut record: Vec<u8>) -> Vec<u8> {
     for area in [Area::Input, Area::Output] {
         for (byte, signal) in placed(config, area) {
             if signal.data_type == DataType::Real {
                 let top: Vec<usize> = lies(byte, signal).collect();
-                // Exponents from 64 to 127 and odd bits below.
+                // Exponents from 64 to 127, and some bits below.
                 record[top[3]] = record[top[3]] & 0x9F | 0x20;
             }
         }
@@ -248,7 +248,7 @@ fn the_program_for_openplc_copies_between_registers_and_variables() {
         .map(|byte: u8| byte.wrapping_mul(29).wrapping_add(64))
         .collect();
     let record = calmed(&config, record);
-    // One program does both: what it takes in goes to variables of its own.
+    // A single program does both: it copies inputs to local variables.
     let (begin, end) = source
         .split_once("(* Your program goes here")
         .expect("a place for the program");

@@ -1,4 +1,4 @@
-//! Signal tables to export: any that a driver.cfg can have.
+//! Arbitrary signal tables to export.
 
 use std::fmt::Write as _;
 
@@ -31,7 +31,7 @@ const TYPES: [(&str, char, usize); 15] = [
     ("LREAL", 'L', 8),
 ];
 
-/// A table whose signals follow each other with gaps, in both areas of up to three stations.
+/// A table of adjacent signals with gaps, in both areas of up to three stations.
 pub(crate) fn any_table() -> impl Strategy<Value = Config> {
     let names = prop_oneof![
         "[a-c ]{0,3}",
@@ -76,7 +76,7 @@ pub(crate) fn any_table() -> impl Strategy<Value = Config> {
                 *at += size * 8;
                 address
             };
-            // A name of its own, without blanks around it.
+            // A unique name without surrounding blanks.
             let name: String = name.chars().filter(|c| !c.is_control()).collect();
             let name = format!("{} {number}", name.trim())
                 .trim()

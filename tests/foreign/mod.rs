@@ -1,7 +1,7 @@
-//! A harness for tests whose other end is a program that somebody else wrote.
+//! A harness for tests in which the other end is third-party software.
 //!
-//! Where such a program is not installed, its test is skipped, and says so by name and reason, which the harness
-//! of Rust cannot do at run time. A test target that uses this one says `harness = false` in Cargo.toml.
+//! If such a program is not installed, its test is skipped and reported by name and reason, which Rust's
+//! harness cannot do at run time. A test target that uses this one sets `harness = false` in Cargo.toml.
 //! `make test` installs the programs (`tools/peers`).
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
@@ -10,14 +10,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
 
-/// The program at the other end is not there; the text says which, and how to get it.
+/// The program at the other end is not installed; the text says which one, and how to get it.
 #[derive(Debug)]
 pub struct Absent(pub String);
 
 /// A test panics when it fails.
 pub type Test = fn() -> Result<(), Absent>;
 
-/// Runs the tests that the command line asks for, one after the other.
+/// Runs the tests selected on the command line, one after another.
 pub fn main(tests: &[(&str, Test)]) -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.iter().any(|argument| argument == "--list") {
@@ -69,7 +69,7 @@ fn words(panic: &(dyn Any + Send)) -> &str {
         .unwrap_or("it panicked")
 }
 
-/// A Python that has all of `modules`: that of the environment `name` under target/peers, or the system's.
+/// A Python with all of `modules`: from the environment `name` under target/peers, or the system's.
 pub fn python_with(name: &str, modules: &[&str]) -> Result<Command, Absent> {
     let own =
         PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("target/peers/{name}/bin/python"));
@@ -89,7 +89,7 @@ pub fn python_with(name: &str, modules: &[&str]) -> Result<Command, Absent> {
     )))
 }
 
-/// A command that the Debian package `package` brings.
+/// A command from the Debian package `package`.
 pub fn command(name: &str, package: &str) -> Result<Command, Absent> {
     let found = Command::new(name)
         .arg("--version")

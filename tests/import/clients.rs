@@ -1,4 +1,4 @@
-//! Lists of clients, PLC4X and KEPServer: their addresses go to `[fieldbus.at]`.
+//! Tag lists of clients, PLC4X and KEPServer: their addresses go to `[fieldbus.at]`.
 
 use tickbus::driver_cfg::Config;
 use tickbus::import::{Client, Reading, import};
@@ -152,7 +152,7 @@ fn wrong_addresses_types_and_directions_of_a_client_are_told_with_their_places()
     );
 }
 
-/// The places and texts of what is left out when the wrong lines are.
+/// The positions and messages of lines that are left out when wrong lines may be.
 fn left_out(text: &str) -> Vec<String> {
     let reading = Reading {
         lenient: true,
@@ -185,7 +185,7 @@ fn a_type_that_contradicts_its_address_is_told_at_its_cell() {
             "{told:?}"
         );
     }
-    // What is no type is a comment.
+    // If it is not a type, it is a comment.
     assert_eq!(
         signals(&read("Level;holding-register:21:UINT;in the tank\n")).len(),
         1

@@ -1,4 +1,4 @@
-//! `tickbus import`: tables that editors write, what is told of wrong ones, and the way back from an export.
+//! `tickbus import`: tables written by editors, messages about wrong ones, and the round trip from an export.
 #![allow(missing_docs, reason = "tests")]
 
 mod clients;
@@ -37,7 +37,7 @@ fn read(text: &str) -> Imported {
         .unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
-/// Name, address and type of each signal of the driver.cfg that `imported` is.
+/// Name, address and type of each signal in the driver.cfg of `imported`.
 fn signals(imported: &Imported) -> Vec<(String, String, String)> {
     let config = Config::parse("driver.cfg", &imported.text)
         .unwrap_or_else(|m| panic!("{m}\n{}", imported.text));
@@ -126,7 +126,8 @@ fn the_list_of_a_real_project_is_read_and_the_rest_of_it_is_told() {
     assert_eq!(names, ["Start", "Motor \"left\"; slow"]);
 }
 
-/// Each `NAME.csv` in `tests/import/wrong` has its mistakes in `NAME.txt`. With `BLESS` set, they are written there.
+/// Each `NAME.csv` in `tests/import/wrong` has its mistakes in `NAME.txt`. If `BLESS` is set, they are
+/// rewritten.
 #[test]
 fn every_wrong_table_has_exactly_its_mistakes() {
     let folder = repository().join("tests/import/wrong");
@@ -177,7 +178,7 @@ fn the_driver_cfg_goes_to_a_file_that_is_not_there_and_check_finds_it_right() {
     let folder = tempfile::tempdir().expect("a folder");
     let table = folder.path().join("Förderer.csv");
     let out = folder.path().join("driver.cfg");
-    // As a German Excel saves it.
+    // As saved by a German Excel.
     fs::write(
         &table,
         b"Name;Adresse;Datentyp;Kommentar\r\nF\xF6rderer l\xE4uft;%E0.0;Bool;Lichtschranke\r\n",
@@ -210,7 +211,7 @@ fn what_an_export_lists_is_read_as_the_same_table() {
     assert_same(&rig);
 }
 
-/// The symbols of `config`'s exports, as CSV and as SDF, make the same signals; in the order in which they lie.
+/// The symbols in `config`'s exports, as CSV and as SDF, give the same signals, in address order.
 fn assert_same(config: &Config) {
     for target in [Target::OpenPlc, Target::S71500] {
         assert_same_of(config, target);
@@ -263,7 +264,7 @@ proptest! {
         }
     }
 
-    /// Whatever the bytes are: no panic, and what is read is a driver.cfg without mistakes.
+    /// Arbitrary bytes cause no panic, and what is read is a driver.cfg without mistakes.
     #[test]
     fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         assert_sound(&bytes);

@@ -142,7 +142,7 @@ fn broken_foreign_and_malicious_xml_is_refused_with_its_place() {
     assert!(told("<Document/>").contains("the root element \"Document\""));
     let laughs = "<?xml version=\"1.0\"?><!DOCTYPE p [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><project>&b;</project>";
     assert!(told(laughs).contains("cannot be read"), "{}", told(laughs));
-    // Deeper than any stack.
+    // Nested more deeply than any stack allows.
     let deep = format!(
         "<project>{}{}</project>",
         "<a>".repeat(200_000),

@@ -1,4 +1,4 @@
-//! Workbooks, as TIA Portal writes them, and such as lie.
+//! Workbooks as written by TIA Portal, and malicious ones.
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
@@ -9,7 +9,7 @@ use zip::write::SimpleFileOptions;
 
 use crate::signals;
 
-/// A workbook of these parts.
+/// A zip archive of these parts.
 fn zipped(parts: &[(&str, &[u8])]) -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in parts {
@@ -20,7 +20,7 @@ fn zipped(parts: &[(&str, &[u8])]) -> Vec<u8> {
     zip.finish().expect("a zip").into_inner()
 }
 
-/// A workbook with sheets of this XML, by their names, and these shared texts.
+/// A workbook with these sheets (name and XML) and shared texts.
 fn workbook(sheets: &[(&str, String)], shared: &str) -> Vec<u8> {
     let (mut list, mut relations) = (String::new(), String::new());
     for (number, (name, _)) in sheets.iter().enumerate() {
@@ -70,7 +70,7 @@ fn workbook(sheets: &[(&str, String)], shared: &str) -> Vec<u8> {
     zipped(&parts)
 }
 
-/// Rows of texts from row `first` on.
+/// Rows of text, starting at row `first`.
 fn rows(first: usize, table: &[&[&str]]) -> String {
     let mut xml = String::new();
     for (row, cells) in table.iter().enumerate() {
@@ -190,11 +190,11 @@ fn mistakes_in_a_sheet_have_its_name_row_and_column() {
 
 #[test]
 fn workbooks_that_lie_are_refused_before_they_take_memory() {
-    // One cell, far away.
+    // A single cell at the far corner.
     let far = "<row r=\"1048576\"><c r=\"XFD1048576\" t=\"inlineStr\"><is><t>x</t></is></c></row>";
     let told = read(&workbook(&[("a", far.to_owned())], NO_TEXTS)).expect_err("too far");
     assert!(told.contains("row 1048576, column 16384"), "{told}");
-    // Room for a million million texts.
+    // States a huge number of texts.
     let lie = NO_TEXTS.replace("uniqueCount=\"0\"", "uniqueCount = '1000000000000'");
     let told = read(&workbook(&[("a", rows(1, TIA))], &lie)).expect_err("a lie");
     assert!(

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use tickbus::plc::{Hosted, Program, Scan};
 use tickbus::time::Nanos;
 
-/// Compiles C files of tests/plc, with those of plc/glue that are named, to a shared object in `folder`.
+/// Compiles C files in tests/plc, with the named ones of plc/glue, to a shared object in `folder`.
 pub(crate) fn compile(folder: &Path, sources: &[&str], switches: &[&str]) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let path = folder.join("program.so");
@@ -34,7 +34,7 @@ pub(crate) fn compile(folder: &Path, sources: &[&str], switches: &[&str]) -> Pat
     path
 }
 
-/// The program that is written by hand, with the glue.
+/// The hand-written program, with the glue.
 pub(crate) fn by_hand(folder: &Path, switches: &[&str]) -> PathBuf {
     compile(
         folder,

@@ -1,4 +1,4 @@
-//! PLC programs of the user's own: compiled here by cc from C that has iec2c's interface, loaded, and run.
+//! Users' own PLC programs: C code with iec2c's interface, compiled here by cc, loaded, and run.
 #![allow(missing_docs, reason = "tests")]
 
 mod fixture;
@@ -125,7 +125,7 @@ fn many_instances_of_one_file_share_nothing() {
             cpu.scan();
         }
     }
-    // One that is gone takes nothing with it.
+    // Dropping one does not affect the others.
     drop(cpus.remove(0));
     let threads: Vec<_> = cpus
         .into_iter()
@@ -553,7 +553,7 @@ fn a_loop_that_never_ends_is_a_fault_of_the_program() {
             &[],
             "plc: failed reason=the PLC program has been in one scan for ",
         ),
-        // Told to stop before that is noticed.
+        // Stopped before the hang is detected.
         (
             &["--duration", "500ms"],
             "plc: failed reason=the PLC program's scan did not end within 3s",
@@ -576,7 +576,7 @@ fn a_loop_that_never_ends_is_a_fault_of_the_program() {
 #[test]
 #[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
 fn no_copy_is_left_behind() {
-    // A folder for temporary files of its own needs a process of its own.
+    // Its own folder for temporary files requires a separate process.
     let folder = folder();
     by_hand(folder.path(), &[]);
     driver_cfg(
@@ -613,7 +613,7 @@ fn no_copy_is_left_behind() {
     assert!(error.contains("set TMPDIR"), "{error}");
 }
 
-/// The glue is shipped as it is, so it must compile as it is, for every type that iec2c can locate.
+/// The glue is shipped as source, so it must compile unchanged for every type that iec2c can locate.
 #[test]
 #[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
 fn the_glue_takes_every_type_and_the_loader_names_those_that_have_no_place() {
@@ -670,7 +670,7 @@ fn the_glue_takes_every_type_and_the_loader_names_those_that_have_no_place() {
     }
 }
 
-/// Nobody wants to keep them apart: the C header and its mirror here.
+/// The C header and its mirror here must not diverge.
 #[test]
 fn the_version_of_the_header_is_the_one_that_is_spoken() {
     let header = include_str!("../../plc/glue/tickbus_plc.h");

@@ -1,4 +1,4 @@
-//! Two programs and the plant between them, scanned every 10 ms.
+//! Two programs and the plant between them, each scanned every 10 ms.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -58,7 +58,7 @@ pub(crate) struct Line {
     ends: [End; 2],
     pub(crate) plant: Plant,
     pub(crate) now: Nanos,
-    /// Whether each PLC hears of the machine, and the machine of it.
+    /// Whether each PLC receives data from the machine, and vice versa.
     pub(crate) alive: [bool; 2],
     /// The simulation stands still.
     pub(crate) frozen: bool,
@@ -77,7 +77,7 @@ impl Line {
         }
     }
 
-    /// The simulation is ended and started again.
+    /// Ends the simulation and starts it again.
     pub(crate) fn restart(&mut self) {
         self.plant = Plant::new([&self.ends[0].config, &self.ends[1].config]);
     }
@@ -86,7 +86,7 @@ impl Line {
         self.ends[end].program.report().expect("it has one")
     }
 
-    /// How many axes of a PLC are enabled.
+    /// The number of enabled axes of a PLC.
     pub(crate) fn enabled(&self, end: usize) -> usize {
         let axes = &self.ends[end].config.axes;
         let on = |byte: usize, bit: u8| self.ends[end].outputs[byte] & (1 << bit) != 0;
@@ -115,7 +115,7 @@ impl Line {
             if alive {
                 end.decode.decode(&end.outputs, &mut end.slots);
             } else {
-                // What the driver delivers when the data are stale.
+                // The driver delivers these values when the data are stale.
                 end.decode.fail_safe(&mut end.slots);
             }
             if !self.frozen {
@@ -131,7 +131,7 @@ impl Line {
         }
     }
 
-    /// How many scans take so long.
+    /// The number of scans in this time.
     fn scans(seconds: f64) -> u32 {
         #[expect(
             clippy::cast_possible_truncation,
@@ -148,7 +148,7 @@ impl Line {
         }
     }
 
-    /// Scans until something is so, for some seconds at most.
+    /// Scans until `is` holds, for at most `seconds`.
     #[track_caller]
     pub(crate) fn until(&mut self, what: &str, seconds: f64, is: impl Fn(&Self) -> bool) {
         let mut left = Self::scans(seconds);
@@ -168,7 +168,7 @@ impl Line {
 }
 
 impl End {
-    /// Where the axes stand, for whoever has to find out why nothing moves.
+    /// The positions of the axes, for finding out why nothing moves.
     fn program_text(&self) -> Vec<String> {
         let value = |axis: &tickbus::axis::Axis, field| {
             axis.slot(field).map_or(0.0, |slot| self.slots[slot].real())

@@ -1,4 +1,4 @@
-//! The programs "charger" and "lathe" against a small peeling line in Rust, byte by byte, on simulation time.
+//! The programs "charger" and "lathe" against a small peeling line in Rust, byte by byte, in simulation time.
 
 mod line;
 mod plant;
@@ -6,7 +6,7 @@ mod plant;
 use line::Line;
 use tickbus::plc::Report;
 
-/// The number behind `key=` in a report.
+/// The number after `key=` in a report.
 fn told(report: &dyn Report, key: &str) -> f64 {
     let mut text = String::new();
     report.write(&mut text);
@@ -17,7 +17,7 @@ fn told(report: &dyn Report, key: &str) -> f64 {
     line.parse().expect("a number")
 }
 
-/// The same as a count.
+/// The same, as a count.
 fn counted(report: &dyn Report, key: &str) -> u32 {
     let number = told(report, key);
     (0..1_000)
@@ -54,7 +54,7 @@ fn an_acknowledge_gives_many_commands_a_second_where_holding_gives_two() {
     println!("hold:\n{}acknowledge:\n{}", held.summary(), quick.summary());
     assert!(told(&*held, rotation) <= 2.0);
     assert!(told(&*quick, rotation) >= 10.0, "{}", quick.summary());
-    // What the rate is good for: the speed of the veneer.
+    // The purpose of the command rate: a constant speed of the veneer.
     let error = "peeler.speed_error_rms_percent";
     assert!(
         told(&*held, error) > 2.0 * told(&*quick, error),
@@ -130,7 +130,7 @@ fn a_line_that_stands_still_waits_and_goes_on() {
     );
 }
 
-/// What a program says to options or a table that it cannot use.
+/// A program's error about options or a table that it cannot use.
 fn refusal(name: &str, options: &[(&str, &str)]) -> String {
     let options: Vec<(String, String)> = options
         .iter()
@@ -198,7 +198,7 @@ fn a_program_is_done_after_its_blocks() {
     assert!(!line.report(0).is_done(), "the charger was asked for none");
 }
 
-/// Three troubles one after the other, at random moments; what is held by two must not be let go by both.
+/// Three disturbances one after another, at random times; what two hold must not be released by both.
 #[test]
 fn troubles_at_random_moments_lose_no_block() {
     let mut random = 0x2545_F491_u32;
@@ -238,7 +238,7 @@ fn troubles_at_random_moments_lose_no_block() {
     }
 }
 
-/// Both PLCs are gone while either holds the block: whoever comes back first must not rely on the other.
+/// Both PLCs are gone while both hold the block: the first to return must not rely on the other.
 #[test]
 fn a_block_in_two_hands_is_dropped_by_neither_when_both_plcs_come_back() {
     for away in [[1.0_f64, 1.0], [1.0, 3.0], [3.0, 1.0]] {

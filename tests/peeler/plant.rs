@@ -1,5 +1,5 @@
-//! A small peeling line: ideal drives, and blocks that are where they were put. It panics when a block falls, or
-//! something runs into something.
+//! A small peeling line: ideal drives, and blocks that stay where they were put. It panics when a block
+//! falls, or on a collision.
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -8,7 +8,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 
 const TICK: f64 = 0.01;
-/// Half the length of a block: where everything stands that holds it at its ends.
+/// Half the length of a block: the position of everything that holds it at its ends.
 const HALF: f64 = 650.0;
 const CORE: f64 = 41.0;
 
@@ -31,13 +31,13 @@ pub(crate) struct Side {
     told: Vec<Feedback>,
 }
 
-/// The signals beside the axes, by their places in the two tables.
+/// The signals other than axes, by their indices in the two tables.
 #[derive(Debug)]
 struct Places {
     blocks: [usize; 8],
     distances: [usize; 2],
     time: usize,
-    /// From which side to which, and where on either.
+    /// From which side to which, and the indices on both sides.
     wires: [(usize, usize, [usize; 2]); 4],
 }
 
@@ -89,7 +89,7 @@ pub(crate) struct Plant {
     pub(crate) veneer: f64,
 }
 
-/// Where each axis stands when the machine is switched on.
+/// The positions of the axes when the machine is switched on.
 const BEGINNINGS: [&[f64]; 2] = [
     &[
         30.0, 500.0, 690.0, 700.0, 280.0, 10.0, 300.0, 0.0, 850.0, 800.0, 800.0, 0.0,
@@ -146,8 +146,8 @@ impl Plant {
         (self.at(0, axis) - position).abs() < 1.0
     }
 
-    /// One tick: moves the axes as the slots demand, moves the blocks with them, and fills the slots with what the
-    /// sensors show.
+    /// One tick: moves the axes as commanded in the slots, moves the blocks with them, and fills the slots
+    /// with the sensors' values.
     pub(crate) fn step(&mut self, mut slots: [&mut [Slot]; 2], configs: [&Config; 2]) {
         self.time += TICK;
         for side in 0..2 {
@@ -157,7 +157,7 @@ impl Plant {
                 let drive = &mut self.sides[side].drives[number];
                 let mut told = drive.step(TICK, &demand, follows, stop);
                 if side == 0 && (number == 2 || number == 3) {
-                    // The tips press against the block, and get no further.
+                    // The tips press against the block, and stop there.
                     told.position = told.position.max(stop);
                 }
                 self.sides[side].told[number] = told;
@@ -172,7 +172,7 @@ impl Plant {
         self.wires(&mut slots);
     }
 
-    /// What an axis follows, and what keeps it from closing.
+    /// The position that an axis follows, and the one that stops it from closing.
     fn surroundings(&self, side: usize, axis: usize, demand: &Demand) -> (f64, f64) {
         let knife = self.at(1, 3);
         let offset = demand.motion.position;
@@ -301,7 +301,7 @@ impl Plant {
         if spindles.iter().any(|tip| *tip > HALF + 10.0) {
             let block = self.held.take().expect("it is there");
             if std::mem::take(&mut self.shared) {
-                // The clamps have it still.
+                // The clamps still hold it.
                 return;
             }
             assert!(
@@ -309,7 +309,7 @@ impl Plant {
                 "the core falls onto a closed core drop"
             );
             assert!(turns.abs() < 1e-6, "the core is thrown");
-            // A block that was given up half-way goes to the cores, too.
+            // A block that was given up half-way is also dropped with the cores.
             assert!(block.radius() < CORE || self.sides[1].told[3].position > 100.0);
             self.cores += 1;
         }
@@ -344,7 +344,7 @@ impl Plant {
         slots[self.places.time] = Slot::from_real(self.time);
     }
 
-    /// What goes from one PLC to the other.
+    /// The wires from one PLC to the other.
     fn wires(&self, slots: &mut [&mut [Slot]; 2]) {
         for (from, to, [source, target]) in self.places.wires {
             slots[to][target] = slots[from][source];

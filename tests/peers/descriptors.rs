@@ -1,7 +1,7 @@
-//! How many sockets this process may have.
+//! The number of sockets that this process may have.
 #![allow(unreachable_pub, reason = "a benchmark uses it, too")]
 
-/// Raises the limit of open files as far as it goes; gives how many there may be.
+/// Raises the limit of open files as far as possible; returns the limit.
 #[cfg(unix)]
 pub fn raise() -> usize {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -20,7 +20,7 @@ pub fn raise() -> usize {
     })
 }
 
-/// Nobody counts them.
+/// There is no limit to raise.
 #[cfg(not(unix))]
 pub fn raise() -> usize {
     usize::MAX

@@ -1,4 +1,4 @@
-//! A pipe that is full, and that nobody reads.
+//! A full pipe that is not read.
 #![cfg(unix)]
 #![allow(unreachable_pub, reason = "a benchmark uses it, too")]
 
@@ -6,7 +6,7 @@ use std::io::{ErrorKind, PipeReader, PipeWriter, Write as _};
 
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 
-/// Both ends of a pipe that takes no further byte: who writes to it waits until somebody reads.
+/// Both ends of a full pipe: a write blocks until it is read.
 pub fn full_pipe() -> (PipeReader, PipeWriter) {
     let (reader, mut writer) = std::io::pipe().expect("a pipe");
     let flags = fcntl_getfl(&writer).expect("it is open");

@@ -1,4 +1,4 @@
-//! What tests with foreign ends share: addresses of their own, and ways to begin and end a connection.
+//! Shared by tests with foreign ends: unique addresses, and ways to open and close connections.
 #![allow(dead_code, reason = "each test uses a part of it")]
 
 use std::io::{ErrorKind, Read};
@@ -12,11 +12,11 @@ use tickbus::time::{Manual, Nanos};
 
 use crate::conformance::rig::{End, await_that, pass};
 
-/// An address on this machine that nobody else uses.
+/// An address on this machine that no other test uses.
 pub fn own_address() -> SocketAddr {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     let ip = if cfg!(target_os = "linux") {
-        // All of 127.0.0.0/8 is this machine: a host for each process and test.
+        // All of 127.0.0.0/8 is this machine: one host per process and test.
         let host = std::process::id().wrapping_mul(64) + NEXT.fetch_add(1, Ordering::Relaxed);
         let [_, x, y, z] = host.to_be_bytes();
         Ipv4Addr::new(127, x, y, z.clamp(1, 254))
@@ -27,13 +27,13 @@ pub fn own_address() -> SocketAddr {
     listener.local_addr().expect("it is bound")
 }
 
-/// Closes in good order: with nothing left unread, which would make the system reset the connection.
+/// Closes properly: with unread bytes, the system would reset the connection.
 pub fn leave(mut stream: TcpStream) {
     let _ = stream.shutdown(Shutdown::Write);
     while matches!(stream.read(&mut [0; 4096]), Ok(count) if count > 0) {}
 }
 
-/// A thread that is told to end, and waited for.
+/// A thread that is told to end, and joined.
 pub struct Ending {
     pub over: Arc<AtomicBool>,
     pub thread: Option<JoinHandle<()>>,
@@ -57,7 +57,7 @@ pub fn client(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// Whether the other end has closed; what had come before is thrown away.
+/// Whether the other end has closed; data received before that are discarded.
 pub fn is_closed(stream: &TcpStream) -> bool {
     stream.set_nonblocking(true).expect("a TCP option");
     let mut reader = stream;
@@ -73,7 +73,7 @@ pub fn is_closed(stream: &TcpStream) -> bool {
     closed
 }
 
-/// An end of the bus with foreign peers, and the clock that only it waits on.
+/// An end of the bus with foreign peers, and a clock on which no other end waits.
 pub struct Alone {
     pub clock: Arc<Manual>,
     pub end: End,
@@ -86,7 +86,7 @@ impl Alone {
         Self { clock, end }
     }
 
-    /// Where it listens, by its statistics.
+    /// The address that it listens on, from its statistics.
     pub fn address(&self) -> SocketAddr {
         let mut address = None;
         await_that("it listens", || {
@@ -108,7 +108,7 @@ impl Alone {
         });
     }
 
-    /// Until the line's reason has these words; gives the name of its cause.
+    /// Lets cycles pass until the line's reason has these words; returns the name of its cause.
     #[track_caller]
     pub fn until_reason(&mut self, words: &str) -> &'static str {
         let mut cause = "";
@@ -137,7 +137,7 @@ impl Alone {
         });
     }
 
-    /// How long the clock has run.
+    /// The time on the clock.
     pub fn now(&self) -> Nanos {
         use tickbus::time::Clock as _;
         self.clock.now()

@@ -10,7 +10,7 @@ use tickbus::time::Manual;
 use crate::conformance::rig::{Bus, Liar, logged};
 use crate::peers::{Ending, leave, own_address};
 
-/// Modbus TCP at an address of its own.
+/// Modbus TCP at an address used by one test only.
 pub struct Tcp {
     pub address: SocketAddr,
     /// The role of the end that serves.
@@ -41,8 +41,8 @@ impl Bus for Tcp {
         if role == self.server {
             return format!("kind = \"modbus-server\"\naddress = \"{address}\"");
         }
-        // A driver of the suite is called as its role. Its clock does not wait for a server that has not got the
-        // processor, hence the long time-out.
+        // A driver of the suite is named after its role. Its clock does not wait for a server that has not
+        // been scheduled, hence the long time-out.
         format!(
             "kind = \"modbus-client\"\naddress = \"{address}\"\nwrite_to = \"tickbus {}\"\n\
              timeout = \"1h\"",
@@ -50,7 +50,7 @@ impl Bus for Tcp {
         )
     }
 
-    /// Half a telegram from a client, or half an answer from a server, and then no more.
+    /// Half a telegram from a client, or half an answer from a server, and nothing more.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
         logged::expect("nothing is written into the PLC \"modbus device at ");
         let over = Arc::new(AtomicBool::new(false));
@@ -151,14 +151,14 @@ impl Bus for Tcp {
     }
 }
 
-/// Asks for holding registers, but for the last bytes of the request.
+/// Requests holding registers, but omits the last bytes of the request.
 fn ask_half(mut stream: TcpStream) {
     let whole = request(1, 1, &[3, 0, 0, 0, 1]);
     let _ = stream.write_all(&whole[..9]);
     leave(stream);
 }
 
-/// Answers whatever is asked with one register, none asked for so little.
+/// Answers every request with one register, fewer than were requested.
 fn answer_with_too_little(mut stream: TcpStream) {
     let _ = stream.set_nonblocking(false);
     let mut request = [0; 260];

@@ -1,4 +1,4 @@
-//! A PLC that is a Modbus server, by hand: four tables apart, and the habits of devices as they are.
+//! A hand-written PLC that is a Modbus server: four separate tables, and the quirks of real devices.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -15,7 +15,7 @@ pub enum Habit {
     HangsUp,
 }
 
-/// How the unit with this number treats a function.
+/// How the unit with this number handles a function.
 pub type Habits = fn(unit: u8, function: u8) -> Habit;
 
 /// Its memory, the same for all units: coils, discrete inputs, input registers, holding registers.
@@ -25,7 +25,7 @@ pub struct Memory {
     pub registers: [Vec<u16>; 2],
     /// Unit and function of each request.
     pub asked: Vec<(u8, u8)>,
-    /// What registers became by function 22, one after the other.
+    /// The results of function 22 on registers, one after another.
     pub masked: Vec<u16>,
 }
 
@@ -37,7 +37,7 @@ pub struct Plc {
 }
 
 impl Plc {
-    /// Every register is 0xA5A5 and every other bit is on, as far as nobody writes it.
+    /// Initially every register is 0xA5A5, and every other bit is on.
     pub fn start(habits: Habits) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("it is bound");
@@ -73,7 +73,7 @@ impl Plc {
     }
 }
 
-/// The driver has to be closed before.
+/// The driver must be closed first.
 impl Drop for Plc {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! OPC UA's foreign ends: asyncua in a process of its own, and the device that meets it.
+//! Third-party OPC UA: asyncua in a separate process, and the device that talks to it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpListener};
@@ -53,7 +53,7 @@ address = "%IL8"
 type    = "ULINT"
 "#;
 
-/// A program of Python, spoken to by lines.
+/// A Python program, controlled by lines of text.
 pub struct Peer {
     pub child: Child,
     pub stdin: Option<ChildStdin>,
@@ -61,7 +61,7 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// Starts it; gives the first line that it says, too.
+    /// Starts it; also returns the first line of its output.
     pub fn start(script: &str, asked: &Value) -> Result<(Self, String), Absent> {
         let script = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("tests/peers")
@@ -103,7 +103,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // The end of its stdin is the end of it.
+        // It ends with its stdin.
         drop(self.stdin.take());
         let _ = self.child.wait();
     }

@@ -1,4 +1,4 @@
-//! asyncua as a client of the server: who counts for what, and who is let in.
+//! asyncua as a client of the server: which clients count as peers, and which are admitted.
 
 use serde_json::{Value, json};
 use tickbus::fieldbus::LinkState;
@@ -43,14 +43,14 @@ fn status(client: &mut Peer, node: &str) -> Value {
     client.ask(&json!({"read": node}))["status"].take()
 }
 
-/// Two PLCs write a station each, and one dies: its station grows old, that of the other does not.
+/// Two PLCs write one station each, and one dies: only its station's data grow old.
 pub fn ages_apart() -> Result<(), Absent> {
     let folder = tempfile::tempdir().expect("a folder");
     let mut device = Device::open_with(folder, "opcua-server", OPEN, STATIONS);
     let (mut one, mut other) = (client(&device)?, client(&device)?);
     for (client, node) in [(&mut one, "A speed"), (&mut other, "B speed")] {
         client.ask(&json!({"write": {node: ["Int16", 70]}}));
-        // What a client has just written is good, however long nobody had been heard of.
+        // A value just written by a client has good quality, however long there had been silence.
         for _ in 0..20 {
             assert_eq!(status(client, node), json!("Good"));
         }
@@ -58,7 +58,7 @@ pub fn ages_apart() -> Result<(), Absent> {
     device.until("both values", |end| {
         end.get("A speed") == 7.0 && end.get("B speed") == 70.0
     });
-    // What was written shows in engineering units, too.
+    // The written value also appears in engineering units.
     let scaled = one.ask(&json!({"read": "A speed.scaled"}));
     assert_eq!(
         (&scaled["value"], &scaled["status"]),
@@ -82,8 +82,8 @@ pub fn ages_apart() -> Result<(), Absent> {
     Ok(())
 }
 
-/// However many items others leave behind, a client that only reads stays connected. The server begins anew when
-/// nobody is there, and newcomers do not notice.
+/// However many items others leave behind, a client that only reads stays connected. The server is recreated
+/// when no client is connected, and new clients do not notice.
 pub fn undisturbed() -> Result<(), Absent> {
     let mut device = Device::open("opcua-server", OPEN);
     let mut reader = client(&device)?;
@@ -107,7 +107,7 @@ pub fn undisturbed() -> Result<(), Absent> {
     drop(reader);
     let mut rounds = 0;
     while !begun(&device) {
-        // Those who come just now are served, by the one or the other.
+        // Clients that connect at this moment are served, by the old or the new server.
         let mut newcomer = client(&device)?;
         read(&mut newcomer);
         rounds += 1;
@@ -125,7 +125,7 @@ pub fn undisturbed() -> Result<(), Absent> {
     Ok(())
 }
 
-/// The structure `ServerStatus`, and the URLs that are announced.
+/// The structure `ServerStatus`, and the announced URLs.
 pub fn tells_of_itself() -> Result<(), Absent> {
     let device = Device::open(
         "opcua-server",
@@ -146,7 +146,7 @@ pub fn tells_of_itself() -> Result<(), Absent> {
     Ok(())
 }
 
-/// A client with a trusted certificate that says it is another application than the certificate's.
+/// A client with a trusted certificate that claims to be another application than the certificate's.
 pub fn impostor() -> Result<(), Absent> {
     logged::expect("a client with an unknown certificate was turned away");
     logged::expect("a client gets no values, as its certificate is not its own");

@@ -1,6 +1,7 @@
-//! Files for Wireshark from the bytes of TCP conversations that a test recorded, and what tshark says of them.
+//! Capture files for Wireshark, made from the bytes of TCP conversations that a test has recorded, and
+//! tshark's analysis of them.
 //!
-//! The bytes are wrapped as Ethernet, IP and TCP would have carried them: no right is needed to capture anything.
+//! The bytes are wrapped in TCP, IP and Ethernet headers: no capture privileges are needed.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::io::{self, Read, Write};
@@ -9,14 +10,14 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::{Arc, Mutex};
 
-/// Who said something.
+/// The sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum From {
     Client,
     Server,
 }
 
-/// What the two ends of one TCP connection said, in order.
+/// The data sent by both ends of a TCP connection, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Conversation(pub Vec<(From, Vec<u8>)>);
 
@@ -33,7 +34,7 @@ pub fn write(path: &Path, port: u16, conversations: &[Conversation]) -> io::Resu
     // Microseconds, version 2.4, no time zone, whole packets, Ethernet.
     for word in [0xA1B2_C3D4_u32, 0x0002_0004, 0, 0, 65_535, 1] {
         let bytes = match word {
-            // Two halves in the byte order of the file.
+            // Two 16-bit fields in the file's byte order.
             0x0002_0004 => [2, 0, 4, 0],
             word => word.to_le_bytes(),
         };
@@ -109,7 +110,7 @@ impl Line<'_> {
         for number in [self.next[own], acknowledged] {
             packet.extend_from_slice(&number.to_be_bytes());
         }
-        // The checksum of TCP is not looked at unless Wireshark is told to.
+        // Wireshark does not check the TCP checksum by default.
         packet.extend_from_slice(&[0x50, flags, 0xFF, 0xFF, 0, 0, 0, 0]);
         packet.extend_from_slice(bytes);
         let counted =
@@ -133,10 +134,10 @@ fn checksum(header: &[u8]) -> u16 {
     !u16::try_from((folded & 0xFFFF) + (folded >> 16)).expect("folded twice")
 }
 
-/// Stands between clients and a server at `server`, and takes down what they say.
+/// A proxy between clients and a server at `server` that records their data.
 #[derive(Debug)]
 pub struct Tap {
-    /// Where clients find it.
+    /// The address for clients.
     pub address: SocketAddr,
     conversations: Arc<Mutex<Vec<Conversation>>>,
 }
@@ -147,7 +148,7 @@ impl Tap {
         let address = listener.local_addr().expect("it is bound");
         let conversations = Arc::<Mutex<Vec<Conversation>>>::default();
         let taken = Arc::clone(&conversations);
-        // It ends with the process: nobody waits for it.
+        // Not joined: it ends with the process.
         std::thread::spawn(move || {
             while let Ok((client, _)) = listener.accept() {
                 let server = TcpStream::connect(server).expect("the server listens");
@@ -177,7 +178,7 @@ impl Tap {
         }
     }
 
-    /// What was said until now.
+    /// Everything recorded so far.
     pub fn conversations(&self) -> Vec<Conversation> {
         self.conversations.lock().expect("nobody panics").clone()
     }
@@ -193,7 +194,7 @@ fn carry(
     let mut buffer = [0; 4096];
     while let Ok(count @ 1..) = stream.read(&mut buffer) {
         let bytes = buffer[..count].to_vec();
-        // Before it is passed on, so that the answer comes behind the question.
+        // Recorded before it is passed on, so that the answer comes after the request.
         taken.lock().expect("nobody panics")[index]
             .0
             .push((from, bytes));
@@ -204,13 +205,13 @@ fn carry(
     let _ = to.shutdown(std::net::Shutdown::Write);
 }
 
-/// What tshark prints for each packet of a file, by the fields asked for, one line a packet.
+/// tshark's output for each packet of a file: the requested fields, one line per packet.
 ///
 /// `decode` names ports and their protocols, such as `tcp.port==1102,tpkt`.
 ///
 /// # Panics
 ///
-/// When tshark does not run.
+/// When tshark cannot be run.
 pub fn tshark(
     mut tshark: Command,
     file: &Path,

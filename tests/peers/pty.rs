@@ -1,4 +1,4 @@
-//! A serial line without hardware: two pseudo-terminals, and a thread that carries what is written into one of
+//! A serial line without hardware: two pseudo-terminals, and a thread that copies what is written to one of
 //! them to the other.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
@@ -75,7 +75,7 @@ fn end() -> End {
     let name = ptsname(&master, Vec::new()).expect("it has a name");
     let name = PathBuf::from(name.into_string().expect("ASCII"));
     let kept = open(&name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).expect("its other end");
-    // As it is made it would send back what it is sent.
+    // By default a terminal echoes its input.
     let mut attributes = tcgetattr(&kept).expect("it is a terminal");
     attributes.make_raw();
     tcsetattr(&kept, OptionalActions::Now, &attributes).expect("it is a terminal");
@@ -102,7 +102,7 @@ fn carry(masters: &mut [File; 2]) {
     for (from, ready) in ready.into_iter().enumerate() {
         let mut bytes = [0; 1024];
         if ready && let Ok(count) = masters[from].read(&mut bytes) {
-            // A line that is full loses what is sent, as real ones do.
+            // When the line is full, data are lost, as on a real one.
             let _ = masters[1 - from].write_all(&bytes[..count]);
         }
     }

@@ -1,4 +1,4 @@
-//! Ends of the S7 buses: pairs of ours, and a client that speaks by hand.
+//! Ends of the S7 buses: pairs of ours, and a hand-written client.
 #![allow(dead_code, reason = "each test uses a part of it")]
 
 use std::io::{ErrorKind, Read, Write};
@@ -13,7 +13,7 @@ use tickbus::time::Manual;
 use crate::conformance::rig::{Bus, Liar, logged};
 use crate::peers::{leave, own_address};
 
-/// A server and a client of ours, at an address of their own.
+/// A server and a client of ours, at an address used by one test only.
 pub struct Pair {
     pub address: SocketAddr,
     /// The role of the end that serves.
@@ -33,7 +33,7 @@ impl Pair {
         }
     }
 
-    /// The images lie in data blocks, not at their beginnings.
+    /// The images are in data blocks, but not at their beginnings.
     pub fn with_blocks(self) -> Self {
         Self {
             blocks: true,
@@ -44,7 +44,7 @@ impl Pair {
 
 impl Bus for Pair {
     fn fieldbus(&self, role: &str) -> String {
-        // A server that is late, or none, is not asked for its state again.
+        // A slow or absent server is not asked for its state again.
         logged::expect("does not say whether it is in RUN");
         let Self {
             address,
@@ -70,7 +70,7 @@ impl Bus for Pair {
         )
     }
 
-    /// A client, or a server, that begins well and then sends what no S7 is.
+    /// A client, or a server, that starts properly and then sends something that is not S7.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
         let over = Arc::new(AtomicBool::new(false));
         let address = self.address;
@@ -162,9 +162,9 @@ impl Bus for Pair {
     }
 }
 
-/// Connects, or lets connect, and breaks the rules then.
+/// Connects, or accepts a connection, and then violates the protocol.
 fn lie(mut stream: TcpStream, serves: bool) {
-    // If the other end is quicker to go, so be it.
+    // The other end may have closed first.
     let _ = stream.set_nonblocking(false);
     let _ = stream.set_read_timeout(Some(Duration::from_secs(20)));
     if serves {
@@ -173,12 +173,12 @@ fn lie(mut stream: TcpStream, serves: bool) {
     } else {
         let _ = stream.write_all(&CONNECT);
     }
-    // All ones would be a good speed, were they believed.
+    // All ones would be a valid speed, if accepted.
     let _ = stream.write_all(&packet(&[0x11; 20]));
     leave(stream);
 }
 
-/// A thread that is told to end, and waited for.
+/// A thread that is told to end, and joined.
 struct Ending {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -193,7 +193,7 @@ impl Drop for Ending {
     }
 }
 
-/// Asks for a connection with rack 0, slot 1.
+/// A connect request to rack 0, slot 1.
 pub const CONNECT: [u8; 22] = [
     3, 0, 0, 22, 17, 0xE0, 0, 0, 0, 1, 0, 0xC1, 2, 1, 0, 0xC2, 2, 1, 1, 0xC0, 1, 10,
 ];
@@ -218,7 +218,7 @@ pub fn job(parameters: &[u8], data: &[u8]) -> Vec<u8> {
     packet(&[&header[..], parameters, data].concat())
 }
 
-/// The address of so many bytes of an area: 0x81 for inputs, 0x82 for outputs, 0x83 for flags, 0x84 for a block.
+/// The address of `count` bytes in an area: 0x81 inputs, 0x82 outputs, 0x83 flags, 0x84 a data block.
 pub fn address(area: u8, block: u16, byte: usize, count: usize) -> Vec<u8> {
     let [b0, b1] = block.to_be_bytes();
     let [c0, c1] = u16::try_from(count).expect("short").to_be_bytes();
@@ -226,12 +226,12 @@ pub fn address(area: u8, block: u16, byte: usize, count: usize) -> Vec<u8> {
     vec![0x12, 10, 0x10, 2, c0, c1, b0, b1, area, a0, a1, a2]
 }
 
-/// A packet that asks to read these bytes.
+/// A packet with a request to read these bytes.
 pub fn request(area: u8, byte: usize, count: usize) -> Vec<u8> {
     job(&[&[4, 1][..], &address(area, 0, byte, count)].concat(), &[])
 }
 
-/// A packet that asks to write these bytes.
+/// A packet with a request to write these bytes.
 pub fn command(area: u8, byte: usize, bytes: &[u8]) -> Vec<u8> {
     let [high, low] = u16::try_from(bytes.len() * 8).expect("short").to_be_bytes();
     let data = [&[0, 4, high, low][..], bytes].concat();
@@ -239,16 +239,16 @@ pub fn command(area: u8, byte: usize, bytes: &[u8]) -> Vec<u8> {
     job(&[&[5, 1][..], &address].concat(), &data)
 }
 
-/// A client that speaks by hand.
+/// A hand-written client.
 pub struct Client(pub TcpStream);
 
 impl Client {
-    /// One that has connected and agreed upon units of 480 bytes.
+    /// A client that has connected and negotiated a PDU length of 480 bytes.
     pub fn new(address: SocketAddr) -> Self {
         Self::in_slot(address, 1)
     }
 
-    /// The same, that means the CPU in this slot.
+    /// As [`new`](Self::new), for the CPU in this slot.
     pub fn in_slot(address: SocketAddr, slot: u8) -> Self {
         let mut client = Self::silent(address);
         let mut connect = CONNECT;
@@ -259,7 +259,7 @@ impl Client {
         client
     }
 
-    /// One that has said nothing yet.
+    /// A client that has not sent anything yet.
     pub fn silent(address: SocketAddr) -> Self {
         let stream = TcpStream::connect(address).expect("somebody listens");
         stream.set_nodelay(true).expect("a TCP option");
@@ -272,7 +272,7 @@ impl Client {
         self.0.write_all(bytes).expect("the server reads");
     }
 
-    /// The next packet; none when the server closes the connection.
+    /// The next packet; `None` when the server closes the connection.
     pub fn receive(&mut self) -> Option<Vec<u8>> {
         let mut packet = vec![0; 4];
         match self.0.read_exact(&mut packet) {
@@ -302,7 +302,7 @@ impl Client {
     /// Reads bytes.
     pub fn read(&mut self, area: u8, byte: usize, count: usize) -> Vec<u8> {
         let answer = self.ask(&request(area, byte, count));
-        // Packet, header, parameters, and the item's code.
+        // After packet header, PDU header and parameters: the item's return code.
         assert_eq!(answer[7 + 12 + 2], 0xFF, "{answer:02x?}");
         answer[7 + 12 + 2 + 4..].to_vec()
     }
@@ -314,23 +314,23 @@ impl Client {
     }
 }
 
-/// A CPU by hand: its blocks, its state, and what it was asked.
+/// A hand-written CPU: its blocks, its state, and the requests it has received.
 #[derive(Default)]
 pub struct Cpu {
-    /// Blocks that are there; each of their bytes is their number.
+    /// Its data blocks; each of their bytes is the block's number.
     pub blocks: Vec<u8>,
-    /// What its list 0x0424 says; none where it refuses the list.
+    /// The state in its list 0x0424; `None` to refuse the list.
     pub state: Option<u8>,
-    /// How often it was asked for that list.
+    /// How many times this list was requested.
     pub asked: u32,
-    /// How many more questions for that list it refuses.
+    /// How many more requests for this list it refuses.
     pub refuses: u32,
-    /// Whether it hangs up when it is asked for any list.
+    /// Whether it closes the connection when any list is requested.
     pub hangs_up: bool,
 }
 
 impl Cpu {
-    /// Serves one client after the other, for as long as there are any.
+    /// Serves one client after another, as long as there are any.
     pub fn serve(listener: TcpListener, cpu: Arc<Mutex<Self>>) {
         std::thread::spawn(move || {
             while let Ok((stream, _)) = listener.accept() {
@@ -346,7 +346,7 @@ impl Cpu {
         });
     }
 
-    /// The answer to a packet; `None` to hang up.
+    /// The answer to a packet; `None` to close the connection.
     fn answer(&mut self, request: &[u8]) -> Option<Vec<u8>> {
         if request[5] == 0xE0 {
             return Some(CONFIRM.to_vec());

@@ -1,4 +1,4 @@
-//! Foreign ends of a socket bus: TCP by the standard library, records by hand.
+//! Foreign ends of a socket bus: TCP from the standard library, hand-written records.
 
 use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -9,13 +9,13 @@ use tickbus::time::Manual;
 use crate::conformance::rig::{Bus, Liar, config};
 use crate::peers::{Alone, Ending, leave, own_address};
 
-/// The size of a record of the conformance suite's signals, either way.
+/// The size of a record of the conformance suite's signals, in both directions.
 pub const RECORD: usize = 6;
 
-/// A socket bus at an address of its own.
+/// A socket bus at an address used by one test only.
 pub struct Tcp {
     pub address: SocketAddr,
-    /// Further lines in the `[fieldbus]` table of either end.
+    /// Further lines in the `[fieldbus]` tables of the two ends.
     pub device: &'static str,
     pub controller: &'static str,
 }
@@ -103,15 +103,15 @@ impl Bus for Tcp {
     }
 }
 
-/// Sends half a record, and leaves in good order.
+/// Sends half a record, and closes properly.
 fn lie(mut stream: TcpStream) {
-    // All zeros would be a good speed, were they believed. If the other end is quicker to go, so be it.
+    // All zeros would be a valid speed, if accepted. The other end may have closed first.
     let _ = stream.set_nonblocking(false);
     let _ = stream.write_all(&[0; RECORD / 2]);
     leave(stream);
 }
 
-/// A Device that listens on a port which the system chooses, without a peer.
+/// A Device that listens on a port chosen by the system, without a peer.
 pub fn device(further: &str) -> (Alone, SocketAddr) {
     let bus = Tcp {
         address: (Ipv4Addr::LOCALHOST, 0).into(),
@@ -123,7 +123,7 @@ pub fn device(further: &str) -> (Alone, SocketAddr) {
     (alone, address)
 }
 
-/// What a PLC sends: `run`, `speed`, `echo`.
+/// A record from a PLC: `run`, `speed`, `echo`.
 pub fn record(speed: i16) -> [u8; RECORD] {
     let [high, low] = speed.to_be_bytes();
     [0, 0, high, low, high, low]

@@ -1,4 +1,4 @@
-//! Libraries to be built, and drivers on them.
+//! Builds plug-in libraries, and drivers that use them.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -18,7 +18,8 @@ use crate::conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that, logged
 /// The command that helper processes run.
 pub(crate) const HELPER: &str = env!("CARGO_BIN_EXE_tickbus");
 
-/// Builds `source` as a shared library, and gives its path. Another test process may do the same.
+/// Builds `source` as a shared library, and returns its path. Other test processes may do the same
+/// concurrently.
 pub(crate) fn build(source: impl AsRef<Path>, switches: &[&str], name: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
@@ -63,7 +64,7 @@ pub(crate) fn misbehaving() -> &'static Path {
     BUILT.get_or_init(|| build("tests/plugins/misbehave.c", &[], "libmisbehave.so"))
 }
 
-/// An address that nobody else has: all of 127.0.0.0/8 is this computer.
+/// A unique address: all of 127.0.0.0/8 is this computer.
 pub(crate) fn address() -> String {
     static NEXT: AtomicU32 = AtomicU32::new(1);
     let next = NEXT.fetch_add(1, Ordering::Relaxed);
@@ -73,10 +74,10 @@ pub(crate) fn address() -> String {
     format!("127.{high}.{low}.{next}:{}", 20_040 + top)
 }
 
-/// A busy computer lets helper processes wait for long.
+/// On a busy computer helper processes are slow.
 pub(crate) const PATIENT: &str = "open_timeout = \"1h\"\ncall_timeout = \"1h\"\n";
 
-/// The UDP example, between two drivers.
+/// The UDP example, connecting two drivers.
 pub(crate) struct Udp {
     address: String,
     isolated: bool,
@@ -118,7 +119,7 @@ impl Bus for Udp {
             let mut request: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
             request.extend_from_slice(&[1; 12]);
             while stopped.try_recv() == Err(TryRecvError::Empty) {
-                // Nobody listens before the device has opened.
+                // There is no listener until the device has opened.
                 let _ = socket.send_to(&request, &device);
                 std::thread::yield_now();
             }
@@ -153,7 +154,7 @@ impl Bus for Udp {
     }
 }
 
-/// A driver on the misbehaving library; what it writes to `%I` comes back on `%Q`.
+/// A driver with the misbehaving library; what it writes to `%I` comes back on `%Q`.
 pub(crate) struct Misbehaving {
     pub(crate) folder: TempDir,
     pub(crate) library: PathBuf,
@@ -167,7 +168,7 @@ pub(crate) struct Misbehaving {
 impl Misbehaving {
     pub(crate) fn new(isolated: bool, options: &str) -> Self {
         if isolated {
-            // A library that misbehaves, and a machine that is busy.
+            // The library misbehaves on purpose, and the machine may be busy.
             logged::expect("the helper process has not ended by itself");
         }
         Self {
@@ -179,7 +180,7 @@ impl Misbehaving {
         }
     }
 
-    /// Misbehaves once only.
+    /// Misbehaves only once.
     pub(crate) fn once(isolated: bool, options: &str) -> Self {
         let mut this = Self::new(isolated, options);
         let once = this.file("once");
@@ -187,7 +188,7 @@ impl Misbehaving {
         this
     }
 
-    /// A library of its own, which no other test has loaded.
+    /// A separate copy of the library, which no other test has loaded.
     pub(crate) fn with_own_library(mut self) -> Self {
         let copy = self.file("libown.so");
         fs::copy(misbehaving(), &copy).expect("copied");
@@ -201,7 +202,7 @@ impl Misbehaving {
 
     pub(crate) fn text(&self) -> String {
         let (library, isolation) = (self.library.display(), isolation(self.isolated));
-        // The pause is long enough for a test to see the failure before it.
+        // The pause is long enough for the test to see the failure before the next attempt.
         format!(
             "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"plugin\"\ncycle = \"1ms\"\n\
              max_age = \"300ms\"\nreconnect = [\"1s\"]\nlibrary = \"{library}\"\n\
@@ -215,7 +216,7 @@ impl Misbehaving {
     }
 }
 
-/// Lets time pass until the line is in `state` for `cause`; gives the reason.
+/// Lets time pass until the line is in `state` for `cause`; returns the reason.
 #[track_caller]
 pub(crate) fn until(end: &End, clock: &Manual, state: &str, cause: &str) -> String {
     until_by(CYCLE, end, clock, state, cause)
@@ -233,7 +234,7 @@ pub(crate) fn until_by(step: Nanos, end: &End, clock: &Manual, state: &str, caus
     reason
 }
 
-/// Lets time pass until what is sent has come back.
+/// Lets time pass until the sent value has come back.
 #[track_caller]
 pub(crate) fn until_it_echoes(end: &mut End, clock: &Manual, value: f64) {
     end.set("position", value);

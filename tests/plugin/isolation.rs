@@ -1,4 +1,4 @@
-//! Libraries in helper processes: what happens to the one does not happen to the other.
+//! Libraries in helper processes: a failure of the one does not affect the other.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -36,7 +36,7 @@ fn a_crash_ends_the_helper_alone_and_the_line_comes_back() {
     }
 }
 
-/// The process of the helper that runs now.
+/// The process id of the current helper.
 fn helper_of(end: &End) -> u32 {
     process(&end.statistic("helper"))
 }
@@ -46,12 +46,12 @@ fn process(fact: &str) -> u32 {
     number.parse().expect("a number")
 }
 
-/// Whether a process is there, be it as a zombie.
+/// Whether a process exists, even as a zombie.
 fn exists(process: u32) -> bool {
     Path::new(&format!("/proc/{process}")).exists()
 }
 
-/// Whether a process that is no child of ours has ended; who reaps it is not our business.
+/// Whether a process that is not our child has ended; another process reaps it.
 fn has_ended(process: u32) -> bool {
     fs::read_to_string(format!("/proc/{process}/stat"))
         .ok()
@@ -113,7 +113,7 @@ fn closing_does_not_wait_for_an_exchange() {
     assert!(!exists(helper));
 }
 
-/// A helper that is not tickbus: a shell script, with the line to the host as its stdin.
+/// The reason with a shell script as the helper, whose stdin is the socket to the host.
 #[track_caller]
 fn reason_with_helper(script: &str, cause: &str) -> String {
     let mut plugin = Misbehaving::new(false, "");
@@ -156,7 +156,7 @@ fn a_helper_that_is_not_this_tickbus_is_told_so() {
     );
 }
 
-/// `tickbus mirror` over a plug-in in a helper, as a process of its own.
+/// `tickbus mirror` with a plug-in in a helper, as a separate process.
 struct Mirror {
     child: Child,
     lines: std::io::Lines<BufReader<std::process::ChildStdout>>,
@@ -177,7 +177,7 @@ impl Mirror {
         Self { child, lines }
     }
 
-    /// The value of the next line on stdout with this key.
+    /// The value in the next line on stdout with this key.
     fn next(&mut self, key: &str) -> String {
         let start = format!("{key}=");
         let mut values = self.lines.by_ref().map_while(Result::ok);

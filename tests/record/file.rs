@@ -1,4 +1,4 @@
-//! Which file is recorded to, and what becomes of it.
+//! Which file is recorded to, and what happens to it.
 
 use super::*;
 
@@ -68,7 +68,7 @@ fn a_file_is_recorded_to_by_one_driver_and_must_be_possible() {
     Run::open(&folder, &rig(RIG, "run.vcd")).driver.close();
     let error = folder.refusal(&rig(RIG, "nowhere/run.vcd"));
     assert!(error.contains("the recording cannot be made: "), "{error}");
-    // Switched off, it takes no file at all.
+    // When disabled, it does not touch any file.
     let off = rig(RIG, "off.vcd").replace("[record]", "[record]\nwhen = \"never\"");
     Run::open(&folder, &off).driver.close();
     assert!(!folder.path("off.vcd").exists());
@@ -91,7 +91,7 @@ fn the_statistics_tell_what_is_recorded() {
     }
 }
 
-/// `tickbus mirror` on a line where nobody is, recording to `file`.
+/// `tickbus mirror` on a line without a peer, recording to `file`.
 #[cfg(unix)]
 fn mirror(folder: &Folder, file: &str) -> std::process::Child {
     let text = rig("", "")
@@ -126,7 +126,7 @@ fn the_commands_record_and_a_file_is_whole_however_they_end() {
         let folder = Folder::new();
         let mut child = mirror(&folder, "run.vcd");
         let limit = std::time::Instant::now() + std::time::Duration::from_secs(20);
-        // Some ticks are in the file, and more on their way.
+        // Some ticks are in the file, and more are pending.
         while !fs::read_to_string(folder.path("run.vcd")).is_ok_and(|text| text.contains("#20")) {
             assert!(std::time::Instant::now() < limit, "{:?}", child.try_wait());
             std::thread::yield_now();
@@ -175,7 +175,7 @@ fn a_recording_that_cannot_be_made_is_wrong_input() {
     }
 }
 
-/// A file that is replayed, by another name, by a link, and by another driver.
+/// A file being replayed is recognised under another name, by a link, and by another driver.
 #[test]
 fn nothing_is_recorded_over_what_is_replayed() {
     let folder = Folder::new();
@@ -218,7 +218,7 @@ fn nothing_is_recorded_over_what_is_replayed() {
     recording.driver.close();
 }
 
-/// Recorded in the plant, replayed in a test: the same driver.cfg.
+/// Recorded in the plant and replayed in a test, with the same driver.cfg.
 #[test]
 fn a_test_that_replays_the_plant_s_recording_leaves_it_as_it_is() {
     let folder = Folder::new();

@@ -1,6 +1,6 @@
-//! Commands that a PLC gives by their number: the table is on the simulator's side.
+//! Commands that a PLC gives by number: their table is on the simulator's side.
 
-/// What a command makes an axis do, as the bits of its command structure say it.
+/// What a command makes an axis do, encoded in the bits of its command structure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// Moves to the target position. No bit.
@@ -17,7 +17,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// All of them, with their names in a driver.cfg.
+    /// All modes, with their names in a driver.cfg.
     pub const ALL: [(&'static str, Self); 5] = [
         ("position", Self::Position),
         ("speed", Self::Speed),
@@ -46,20 +46,20 @@ impl Mode {
 /// The numbers of a command: `TargetPosition`, `Speed`, `Acceleration`, `Deceleration` and `Torque`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion<T> {
-    /// Where to; with tracking the offset.
+    /// The target; with tracking, the offset.
     pub position: T,
-    /// How fast at most.
+    /// The highest speed.
     pub speed: T,
-    /// How fast to get there.
+    /// The acceleration.
     pub acceleration: T,
-    /// How fast to stop.
+    /// The deceleration.
     pub deceleration: T,
-    /// The pressure; to a knife carriage the thickness of the veneer.
+    /// The pressure; for a knife carriage, the thickness of the veneer.
     pub torque: T,
 }
 
 impl Motion<f64> {
-    /// Whether all of them are numbers, and none is infinite.
+    /// Whether none of them is NaN or infinite.
     pub fn is_finite(&self) -> bool {
         let all = [
             self.position,
@@ -75,10 +75,10 @@ impl Motion<f64> {
 /// One command of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
-    /// What the PLC calls it; never 0, which is no command.
+    /// Its number in the PLC; never 0, which means no command.
     pub number: u16,
-    /// What it makes the axis do.
+    /// What the axis does.
     pub mode: Mode,
-    /// Its numbers. Those that are not stated come from the PLC.
+    /// Its numbers. Those that are `None` come from the PLC.
     pub motion: Motion<Option<f64>>,
 }

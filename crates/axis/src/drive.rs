@@ -1,11 +1,11 @@
-//! What a command means to an axis: one drive, stepped through time.
+//! What a command means to an axis: one simulated drive, stepped through time.
 
 use super::{Kind, Limits, Motion, Profile};
 
-/// How near to its target an axis counts as there, in its unit.
+/// The tolerance within which a target counts as reached, in the unit of the axis.
 const THERE: f64 = 1e-9;
 
-/// What the PLC asks of an axis.
+/// What the PLC commands an axis to do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -16,7 +16,7 @@ pub struct Demand {
     pub execute: bool,
     /// Follow; on an axis of kind `torque`: close.
     pub tracking: bool,
-    /// On an axis of kind `torque`: open. Of no sense on others.
+    /// On an axis of kind `torque`: open. No meaning on others.
     pub torque_control: bool,
     /// Run.
     pub speed_control: bool,
@@ -31,28 +31,28 @@ pub struct Demand {
 /// What an axis tells the PLC.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Feedback {
-    /// The axis is doing well.
+    /// The axis has no fault.
     pub healthy: bool,
     /// The target of the last command is reached.
     pub in_position: bool,
-    /// Where it is.
+    /// The actual position.
     pub position: f64,
-    /// How fast it moves, with its sign.
+    /// The actual speed, with its sign.
     pub speed: f64,
-    /// Bit 0 ready (enabled and healthy), 1 moving, 2 in position, 3 at the lower limit, 4 at the upper one, 5 runs at a
-    /// speed, 6 tracking, 7 opening or closing.
+    /// Bit 0 ready (enabled and healthy), 1 moving, 2 in position, 3 at the lower limit, 4 at the upper
+    /// limit, 5 running at a speed, 6 tracking, 7 opening or closing.
     pub status: u16,
-    /// 0, or why the last command was not followed: one of the codes of this type.
+    /// 0, or why the last command was refused: one of the codes of this type.
     pub error: u16,
 }
 
 impl Feedback {
-    /// The target was beyond the limits; the axis went as far as it could.
+    /// The target was beyond the limits; the axis moved as far as it could.
     pub const BEYOND: u16 = 1;
-    /// The command makes no sense: numbers without a speed or an acceleration, or bits that this kind of axis does not
-    /// have, or that contradict one another.
+    /// The command makes no sense: numbers without a speed or an acceleration, bits that this kind of axis
+    /// does not have, or contradictory bits.
     pub const NONSENSE: u16 = 2;
-    /// The axis is broken.
+    /// The axis has a fault.
     pub const UNHEALTHY: u16 = 4;
     /// Execute rose without Enable.
     pub const NOT_ENABLED: u16 = 7;
@@ -60,21 +60,21 @@ impl Feedback {
 
 /// One simulated axis with an ideal drive.
 ///
-/// A command begins with the rising edge of `Execute` while `Enable` is on. A move that begins at a standstill follows
-/// its [`Profile`]; one that takes over from another motion brakes and turns as fast as it may, without a limit of
-/// jerk.
+/// A command begins with the rising edge of `Execute` while `Enable` is on. A move from standstill follows
+/// its [`Profile`]; one that interrupts another motion brakes and reverses as fast as its limits permit,
+/// without a limit of jerk.
 #[derive(Clone, Debug)]
 pub struct Drive {
     kind: Kind,
     limits: Option<[f64; 2]>,
-    /// A test breaks it by this.
+    /// Tests clear it to simulate a fault.
     pub healthy: bool,
     position: f64,
     speed: f64,
     in_position: bool,
     executed: bool,
     doing: Doing,
-    /// The numbers of the command that is active.
+    /// The numbers of the active command.
     motion: Motion<f64>,
     error: u16,
 }
@@ -82,7 +82,7 @@ pub struct Drive {
 #[derive(Clone, Debug)]
 enum Doing {
     Nothing,
-    /// Follows a profile, from a position in a direction, since so many seconds.
+    /// Follows a profile, from a position in a direction, for `since` seconds so far.
     Profile {
         profile: Box<Profile>,
         from: f64,
@@ -90,7 +90,7 @@ enum Doing {
         since: f64,
         target: f64,
     },
-    /// Goes to a target from any speed.
+    /// Moves to a target from any speed.
     Chase {
         target: f64,
     },
@@ -103,7 +103,7 @@ enum Doing {
     Follow,
 }
 
-/// How fast an axis opens and closes that is moved by its pressure alone.
+/// The speed at which an axis that is moved by pressure alone opens and closes.
 const SQUEEZE: f64 = 400.0;
 
 impl Drive {
@@ -123,8 +123,8 @@ impl Drive {
         }
     }
 
-    /// Goes on for `seconds` as `demand` says; `follows` is what an axis that tracks has to be at, and `stop` keeps
-    /// one that closes from going below it.
+    /// Advances by `seconds` as `demand` says; `follows` is the position that a tracking axis has to follow,
+    /// and `stop` the position that a closing axis cannot pass.
     pub fn step(&mut self, seconds: f64, demand: &Demand, follows: f64, stop: f64) -> Feedback {
         let rises = demand.execute && !self.executed;
         self.executed = demand.execute;
@@ -156,7 +156,7 @@ impl Drive {
         self.feedback(true)
     }
 
-    /// Takes a new command.
+    /// Accepts a new command.
     fn begin(&mut self, demand: &Demand) {
         self.in_position = false;
         self.error = 0;
@@ -171,10 +171,10 @@ impl Drive {
         let is_torque = self.kind == Kind::Torque;
         let impossible = demand.torque_control && (!is_torque || demand.tracking);
         let moves = !demand.torque_control && !demand.tracking;
-        // A REAL from the wire may be no number, or infinite: the axis would never be anywhere again.
+        // A REAL from the wire may be NaN or infinite: the position would never be valid again.
         if impossible || !motion.is_finite() || (moves && !limits.make_sense()) {
             self.error = Feedback::NONSENSE;
-            // It brakes as the command before said.
+            // It brakes with the deceleration of the previous command.
             self.doing = Doing::Run { speed: 0.0 };
             return;
         }
@@ -236,7 +236,7 @@ impl Drive {
                 let target = *target;
                 let way = target - self.position;
                 let brake = self.motion.deceleration.abs();
-                // As fast as it may be and still come to a halt there.
+                // The highest speed from which it can still stop at the target.
                 let safe = (2.0 * brake * way.abs())
                     .sqrt()
                     .min(self.motion.speed.abs());
@@ -287,7 +287,7 @@ impl Drive {
         } else {
             self.motion.deceleration
         };
-        // Where a command has no rate, as one that tracks need not, it is at once.
+        // A command without a rate, as tracking may have, changes the speed at once.
         let most = if rate.abs() > 0.0 {
             rate.abs() * seconds
         } else {
@@ -345,7 +345,7 @@ mod tests {
         }
     }
 
-    /// Steps until the axis is in position; gives the seconds that it took.
+    /// Steps until the axis is in position; gives the seconds that this took.
     fn arrives(drive: &mut Drive, demand: &Demand) -> f64 {
         for step in 1..10_000 {
             if drive.step(SCAN, demand, 0.0, 0.0).in_position {

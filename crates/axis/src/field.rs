@@ -10,7 +10,7 @@ pub const COMMAND_BYTES: usize = 30;
 /// Size of a feedback structure, in `%I`.
 pub const FEEDBACK_BYTES: usize = 10;
 
-/// Size of a feedback structure with diagnostics, or with the number of the last command that was done.
+/// Size of a feedback structure with diagnostics, or with the number of the last completed command.
 pub const EXTENDED_FEEDBACK_BYTES: usize = 16;
 
 /// One field of the structures of an axis.
@@ -26,62 +26,62 @@ pub enum Field {
     SpeedControl,
     /// `%Q` bit: without it the axis does not move.
     Enable,
-    /// `%Q` REAL: where to.
+    /// `%Q` REAL: the target.
     TargetPosition,
-    /// `%Q` REAL: how fast at most.
+    /// `%Q` REAL: the highest speed.
     Speed,
-    /// `%Q` REAL: how fast to get there.
+    /// `%Q` REAL: the acceleration.
     Acceleration,
-    /// `%Q` REAL: how fast to stop.
+    /// `%Q` REAL: the deceleration.
     Deceleration,
     /// `%Q` REAL: torque, pressure, or thickness of the veneer.
     Torque,
-    /// `%Q` UINT, in the first reserved REAL: which command of the simulator's table.
+    /// `%Q` UINT, in the first reserved REAL: the number of a command in the simulator's table.
     CommandNumber,
-    /// `%Q` REAL, the second reserved one: how fast the acceleration may change.
+    /// `%Q` REAL, in the second reserved one: the rate of change of the acceleration.
     Jerk,
-    /// `%I` bit: the axis is doing well. The thesis calls it Enable, as the command's bit.
+    /// `%I` bit: the axis has no fault. The thesis calls it Enable, like the command's bit.
     Healthy,
     /// `%I` bit: the target of the last command is reached.
     InPosition,
-    /// `%I` bit, a reserved one: the machine has taken the command, so that Execute may fall.
+    /// `%I` bit, a reserved one: the machine has accepted the command, so that Execute may fall.
     Acknowledge,
-    /// `%I` REAL: where the axis is.
+    /// `%I` REAL: the actual position.
     ActualPosition,
-    /// `%I` REAL: how fast it moves, with its sign.
+    /// `%I` REAL: the actual speed, with its sign.
     ActualSpeed,
     /// `%I` WORD, extended: what the axis is doing.
     Status,
-    /// `%I` WORD, extended: what is wrong with it.
+    /// `%I` WORD, extended: the fault or error of the axis.
     Error,
-    /// `%I` UINT, extended: the number of the command that was done last.
+    /// `%I` UINT, extended: the number of the last completed command.
     CommandDone,
 }
 
-/// What a field carries, and so how its value scales.
+/// What a field carries, which decides how its value scales.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
-    /// A bit, by its number in its byte.
+    /// A bit, by its number within its byte.
     Bit(u8),
     /// A position: scale and offset.
     Position,
     /// A speed with a sign.
     Velocity,
-    /// The size of a speed, acceleration or jerk: the power of the second in its unit.
+    /// An unsigned speed, acceleration or jerk: the power of the second in its unit.
     Magnitude(u8),
-    /// A number as it stands.
+    /// A number without scale.
     Torque,
-    /// A whole number of 16 bits.
+    /// An unsigned 16-bit number.
     Number,
     /// 16 bits.
     Word,
 }
 
 impl Field {
-    /// How many there are.
+    /// The number of fields.
     pub const COUNT: usize = 20;
 
-    /// All of them, in the order of their addresses, commands first.
+    /// All fields, in the order of their addresses, commands first.
     pub const ALL: [Self; Self::COUNT] = [
         Self::Execute,
         Self::Tracking,
@@ -110,7 +110,7 @@ impl Field {
         self as usize
     }
 
-    /// What its signal is called behind the axis' name and a dot.
+    /// The part of its signal's name after the axis' name and a dot.
     pub const fn name(self, kind: Kind) -> &'static str {
         match (self, kind) {
             (Self::Tracking, Kind::Torque) => "Close",

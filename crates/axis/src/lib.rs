@@ -1,9 +1,9 @@
-//! Axes of a simulated machine: each a structure of commands from the PLC and one of feedback to it.
+//! Axes of a simulated machine: each has a command structure from the PLC and a feedback structure to it.
 //!
-//! An `[[axis]]` table of a driver.cfg stands for some fifteen signals, whose places [`Field`] knows. What a
-//! machine has to do on every tick beside its own model, so that the PLC gets more than these bits and
-//! numbers, is the work of [`Reflexes`]. [`Profile`] and [`Drive`] are motion as such: how a move goes on over time,
-//! and what a command means to an axis.
+//! An `[[axis]]` table of a driver.cfg expands into about fifteen signals, whose addresses [`Field`] knows.
+//! [`Reflexes`] does the routine work of a machine on every tick: acknowledging commands, looking them up by
+//! number, end switches. [`Profile`] and [`Drive`] are the motion itself: how a move proceeds over time, and
+//! what a command means to an axis.
 
 mod command;
 mod drive;
@@ -22,7 +22,7 @@ pub use field::{COMMAND_BYTES, EXTENDED_FEEDBACK_BYTES, FEEDBACK_BYTES, Field};
 pub use profile::{Limits, Profile};
 pub use reflexes::{Reflexes, UNKNOWN_COMMAND};
 
-/// What an axis is for: which commands make sense to it, and what two of its bits are called.
+/// What an axis is for: decides which commands make sense, and the names of two of its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// Moves to positions.
@@ -37,7 +37,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them, with their names in a driver.cfg.
+    /// All kinds, with their names in a driver.cfg.
     pub const ALL: [(&'static str, Self); 4] = [
         ("position", Self::Position),
         ("speed", Self::Speed),
@@ -55,15 +55,15 @@ impl Kind {
 /// One `[[axis]]` of a driver.cfg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// Its name, the beginning of the names of its signals.
+    /// Its name, the first part of the names of its signals.
     pub name: String,
-    /// What it is for.
+    /// Its kind.
     pub kind: Kind,
     /// Unit of its position, for people.
     pub unit: Option<String>,
-    /// Least and greatest position, in its unit.
+    /// Lowest and highest position, in its unit.
     pub limits: Option<[f64; 2]>,
-    /// Whether positions on the wire count from the other end.
+    /// Whether positions on the wire are counted from the opposite end.
     pub inverted: bool,
     /// Offset of its command structure in `%Q`.
     pub command: usize,
@@ -71,31 +71,31 @@ pub struct Axis {
     pub feedback: usize,
     /// Size of its feedback structure.
     pub feedback_bytes: usize,
-    /// The commands that the PLC gives by their number.
+    /// The commands that the PLC gives by number.
     pub commands: Vec<Command>,
     /// Its end switches.
     pub switches: Vec<Switch>,
-    /// Where each field stands in the table of signals, by [`Field::index`].
+    /// The index of each field's signal in the signal table, by [`Field::index`].
     slots: [Option<usize>; Field::COUNT],
 }
 
-/// An end switch: a bit that the driver makes from the position.
+/// An end switch: a bit that the driver derives from the position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
     /// Name of its signal.
     pub name: String,
     /// The position at which it trips, in the unit of the axis.
     pub at: f64,
-    /// Whether it is on above that position, or below.
+    /// Whether it is on above that position, rather than below.
     pub above: bool,
-    /// How far the axis has to come back before it is off again, in the unit of the axis.
+    /// How far the axis has to move back before it switches off, in the unit of the axis.
     pub hysteresis: f64,
-    /// Where its signal stands in the table.
+    /// The index of its signal in the signal table.
     slot: usize,
 }
 
 impl Axis {
-    /// Where a field stands among the signals of its driver; `None` for fields that this axis does not have.
+    /// The index of a field's signal in the signal table; `None` for fields that this axis does not have.
     pub fn slot(&self, field: Field) -> Option<usize> {
         self.slots[field.index()]
     }
@@ -107,7 +107,7 @@ impl Axis {
 }
 
 impl Axis {
-    /// What the PLC asks of it, as it stands in the slots of a machine.
+    /// What the PLC commands, read from a machine's slots.
     pub fn demand(&self, slots: &[Slot]) -> Demand {
         let value = |field| self.slot(field).map_or(0.0, |slot| slots[slot].real());
         let on = |field| value(field) != 0.0;
@@ -128,7 +128,7 @@ impl Axis {
         }
     }
 
-    /// Puts what it tells the PLC into the slots of a machine.
+    /// Writes the feedback to a machine's slots.
     pub fn tell(&self, told: &Feedback, slots: &mut [Slot]) {
         let bit = |on: bool| f64::from(u8::from(on));
         for (field, value) in [
@@ -146,9 +146,9 @@ impl Axis {
     }
 }
 
-/// Finds the signals of `axes` in the table that was made of them.
+/// Finds the signals of `axes` in the signal table that was made from them.
 ///
-/// What is not found is left as not there: then the driver.cfg has mistakes, and nobody will use it.
+/// A signal that is missing stays `None`: the driver.cfg then has mistakes and will not be used.
 pub fn resolve(axes: &mut [Axis], table: &SignalTable) {
     let places: HashMap<&str, usize> = (table.signals.iter().enumerate())
         .map(|(place, signal)| (signal.name.as_str(), place))

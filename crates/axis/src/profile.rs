@@ -1,6 +1,6 @@
-//! Profiles of motion: from standstill to standstill over a distance.
+//! Motion profiles: from standstill to standstill over a distance.
 
-/// What a move may not exceed.
+/// The limits of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// The highest speed.
@@ -9,11 +9,11 @@ pub struct Limits {
     pub acceleration: f64,
     /// The highest deceleration.
     pub deceleration: f64,
-    /// How fast the acceleration may change; `None` lets it jump, as the simulator of 2018 did.
+    /// The highest rate of change of the acceleration; `None` lets it jump, as the simulator of 2018 did.
     pub jerk: Option<f64>,
 }
 
-/// Where a move is at some time.
+/// The state of a move at some time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
     /// The distance covered.
@@ -26,15 +26,15 @@ pub struct State {
 
 /// A move over a distance, from standstill to standstill.
 ///
-/// Without a limit of jerk its speed over time is a trapezoid, or a triangle where the distance is too short to get
-/// to full speed; with one it is an S-curve.
+/// Without a limit of jerk the speed over time is a trapezoid, or a triangle if the distance is too short for
+/// full speed; with one it is an S-curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     distance: f64,
     pieces: [Piece; PIECES],
 }
 
-/// Up to constant acceleration, at it, and back to none; the same for slowing down; and steady speed in between.
+/// Rising, constant and falling acceleration; constant speed; and the same three for the deceleration.
 const PIECES: usize = 7;
 
 /// A stretch of time with constant jerk.
@@ -61,14 +61,14 @@ impl Piece {
     }
 }
 
-/// The change between standstill and a speed.
+/// The transition between standstill and a speed.
 #[derive(Clone, Copy, Debug)]
 struct Ramp {
-    /// How long the acceleration changes, once up and once down again.
+    /// How long the acceleration takes to build up, and again to fall to zero.
     bends: f64,
-    /// How long it stays.
+    /// How long the acceleration is constant.
     stays: f64,
-    /// The acceleration that it gets to.
+    /// The highest acceleration.
     peak: f64,
 }
 
@@ -96,7 +96,7 @@ impl Ramp {
 }
 
 impl Limits {
-    /// Whether all of them are numbers above zero.
+    /// Whether all of them are finite and positive.
     pub fn make_sense(&self) -> bool {
         let all = [
             self.speed,
@@ -114,10 +114,10 @@ impl Limits {
         )
     }
 
-    /// The distance that it takes to get to `speed` and to a halt again.
+    /// The distance needed to reach `speed` and stop again.
     fn least_distance(&self, speed: f64) -> f64 {
         let (up, down) = self.ramps(speed);
-        // Either ramp is symmetric, so that its mean speed is half of the highest.
+        // Each ramp is symmetric, so that its mean speed is half of the highest.
         speed / 2.0 * (up.lasts() + down.lasts())
     }
 
@@ -130,8 +130,8 @@ impl Limits {
             let (a, b) = (self.acceleration, self.deceleration);
             return (2.0 * distance * a * b / (a + b)).sqrt();
         }
-        // The distance grows with the speed, by another law on each side of three corners. Halving finds it to the
-        // last bit in about as many steps as a double has bits.
+        // The distance grows monotonically with the speed, by a different formula in each of four ranges.
+        // Bisection finds the speed to the last bit in about as many steps as a double has bits.
         let (mut low, mut high) = (0.0, self.speed);
         for _ in 0..64 {
             let middle = f64::midpoint(low, high);
@@ -187,7 +187,7 @@ impl Profile {
         self.pieces.iter().map(|piece| piece.lasts).sum()
     }
 
-    /// Where the move is so many seconds after its beginning: at its beginning before it, at its end behind it.
+    /// The state `time` seconds after the beginning; before it and after the end, the state at that end.
     pub fn at(&self, time: f64) -> State {
         let mut left = time.max(0.0);
         for piece in &self.pieces {
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    /// The move that the thesis of 2018 shows.
+    /// The move that the thesis of 2018 documents.
     const CAPTURED: Limits = Limits {
         speed: 8_000.0,
         acceleration: 15_000.0,
@@ -255,13 +255,13 @@ mod tests {
 
     #[test]
     fn an_s_curve_takes_longer_by_the_time_of_its_bends() {
-        // v / a + a / j for either ramp, and the rest at full speed.
+        // v / a + a / j for each ramp, and the rest at full speed.
         let s = limits(100.0, 200.0, 400.0, Some(2_000.0));
         let profile = Profile::new(1_000.0, &s).expect("a move");
         let ramps = (0.5 + 0.1) + (0.25 + 0.2);
         let expected = ramps + (1_000.0 - 50.0 * ramps) / 100.0;
         assert!((profile.duration() - expected).abs() < 1e-9);
-        // Too slow a speed to get to the acceleration: twice √(v / j).
+        // The speed is too low to reach the highest acceleration: twice √(v / j).
         let slow = limits(5.0, 200.0, 200.0, Some(2_000.0));
         let profile = Profile::new(0.5, &slow).expect("a move");
         let ramp = 2.0 * (5.0_f64 / 2_000.0).sqrt();
@@ -314,7 +314,7 @@ mod tests {
                 }
                 before = state;
             }
-            // The last piece ends where the move does, without a jump.
+            // The last piece ends at the target, without a jump.
             let last = profile.at(end * (1.0 - 1e-9));
             prop_assert!((last.distance - distance).abs() <= 1e-5 * distance.max(1.0));
         }

@@ -1,15 +1,16 @@
-//! What a machine's side does on every tick for its axes, beside the machine's own model.
+//! What the machine's side does on every tick for its axes, apart from the machine's own model.
 
 use super::{Axis, Command, Field, Mode};
 use tickbus_image::signal::Slot;
 
-/// What the word `Error` says while the PLC asks for a command that the table does not have.
+/// The value of the word `Error` while the PLC asks for a command that is not in the table.
 pub const UNKNOWN_COMMAND: u16 = 3;
 
 /// The reflexes of all axes of a driver in the role Device: acknowledging, commands by number, end switches.
 ///
-/// They work on slots, between the simulation and the codec, so that a simulation knows nothing of them: a
-/// command that came as a number stands in the slots as if the PLC had sent all of it. They allocate nothing.
+/// They work on slots, between the simulation and the codec, so that a simulation need not know about them: a
+/// command given by number appears in the slots as if the PLC had sent all of its values. They allocate
+/// nothing.
 #[derive(Debug)]
 pub struct Reflexes {
     axes: Box<[Reflex]>,
@@ -18,7 +19,7 @@ pub struct Reflexes {
 #[derive(Debug)]
 struct Reflex {
     execute: usize,
-    /// Whether the simulation has been given `Execute`.
+    /// Whether the simulation has seen `Execute`.
     delivered: bool,
     acknowledge: Option<usize>,
     numbers: Option<Numbers>,
@@ -35,11 +36,11 @@ struct Numbers {
     in_position: usize,
     bits: [usize; 3],
     values: [usize; 5],
-    /// The command that the simulation is at.
+    /// The command that the simulation is executing.
     pending: Option<u16>,
-    /// What the PLC asks for is not in the table.
+    /// The requested command is not in the table.
     unknown: bool,
-    /// The simulation's own error, while that stands in its place.
+    /// The simulation's own error, while another one is in its slot.
     error_of_simulation: Option<Slot>,
 }
 
@@ -58,7 +59,7 @@ const fn level(on: bool) -> Slot {
 }
 
 impl Reflexes {
-    /// The reflexes that `axes` ask for; `None` when they ask for none.
+    /// The reflexes that `axes` need; `None` if they need none.
     pub fn new(axes: &[Axis]) -> Option<Self> {
         let axes: Box<[Reflex]> = axes.iter().filter_map(Reflex::new).collect();
         (!axes.is_empty()).then_some(Self { axes })
@@ -71,7 +72,7 @@ impl Reflexes {
         }
     }
 
-    /// After they were encoded: what was sent in the place of a value of the simulation is no more.
+    /// After they were encoded: restores the values of the simulation that were replaced for sending.
     pub fn sent(&mut self, slots: &mut [Slot]) {
         for axis in &mut self.axes {
             if let Some(numbers) = &mut axis.numbers {
@@ -145,7 +146,7 @@ impl Reflex {
         }
         for switch in &mut self.switches {
             let position = slots[switch.position].real();
-            // Beyond the trip point as a distance: on from 0, off from minus the hysteresis.
+            // The distance beyond the trip point: it switches on at 0, and off below minus the hysteresis.
             let beyond = if switch.above {
                 position - switch.at
             } else {
@@ -173,7 +174,7 @@ impl Reflex {
 }
 
 impl Numbers {
-    /// Puts the command that the PLC names in the place of what it sent.
+    /// Replaces what the PLC sent by the command whose number it names.
     fn received(&mut self, slots: &mut [Slot], execute: usize) {
         self.unknown = false;
         let number = slots[self.number].real();
@@ -207,7 +208,7 @@ impl Numbers {
         }
     }
 
-    /// The simulation is given a new command.
+    /// A new command for the simulation.
     fn begin(&mut self, slots: &[Slot]) {
         let number = slots[self.number].real();
         #[expect(
@@ -231,7 +232,7 @@ impl Numbers {
         }
     }
 
-    /// The simulation finds its own error again.
+    /// Restores the simulation's own error.
     fn sent(&mut self, slots: &mut [Slot]) {
         if let (Some(error), Some(own)) = (self.error, self.error_of_simulation.take()) {
             slots[error] = own;

@@ -19,24 +19,25 @@ use tickbus_image::signal::{
     AREA_LIMIT, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot,
 };
 
-/// What the name of a field adds to that of its axis, at most.
+/// The longest name of a field, with the dot, in characters.
 const FIELD_NAME: usize = 16;
 
 /// The longest unit, in characters; "mm" becomes "mm/s³".
 const UNIT_LIMIT: usize = 36;
 
-/// The most commands of one axis, and the most end switches.
+/// The most commands, and the most end switches, of one axis.
 const LIST_LIMIT: usize = 1000;
 
-/// What the axis tables before this one have taken up.
+/// The bytes that the preceding axis tables occupy.
 #[derive(Debug, Default)]
 pub struct Places<'a> {
-    /// By the name of the station: the first free bytes of `%Q` and of `%I`.
+    /// By name of the station: the first free bytes of `%Q` and of `%I`.
     free: HashMap<&'a str, (usize, usize)>,
 }
 
 impl<'a> Places<'a> {
-    /// Takes room for the two structures of an axis: where its table says, or behind the axis before it.
+    /// Allocates the two structures of an axis: at the offsets of its table, or right behind the preceding
+    /// axis.
     fn take(
         &mut self,
         station: Option<&Value<'a>>,
@@ -58,17 +59,17 @@ impl<'a> Places<'a> {
 /// One `[[axis]]` table, read.
 #[derive(Debug)]
 pub struct Read<'a> {
-    /// The axis. Its signals are not yet [resolved](super::resolve).
+    /// The axis. Its signals are not [resolved](super::resolve) yet.
     pub axis: Axis,
-    /// Its signals, in the order of their addresses, with those of its end switches behind them.
+    /// Its signals, in the order of their addresses, followed by those of its end switches.
     pub sections: Vec<Section<'a>>,
 }
 
-/// How the numbers of an axis become raw ones.
+/// The scaling of an axis' numbers.
 #[derive(Clone, Copy, Debug)]
 struct Scales {
     scale: Option<Scale>,
-    /// Where the axis is inverted: the sum of its limits.
+    /// Of an inverted axis: the sum of its limits.
     mirror: Option<f64>,
 }
 
@@ -213,10 +214,10 @@ pub fn read<'a>(
     Some(Read { axis, sections })
 }
 
-/// What the sections of all fields of one axis have in common.
+/// What the sections of all fields of one axis share.
 struct Structures<'t, 'a> {
     name: &'t Value<'a>,
-    /// Where `command_offset` and `feedback_offset` stand.
+    /// The values of `command_offset` and `feedback_offset`.
     offsets: &'t [Option<Value<'a>>; 2],
     station: Option<&'t Value<'a>>,
     number: usize,
@@ -256,7 +257,7 @@ fn is_short(name: &str, value: &Value<'_>) -> bool {
     short
 }
 
-/// Whether structures that reach up to `end` are within their areas.
+/// Whether a structure that ends at `end` fits into its area.
 fn fits(end: usize, name: &str, value: &Value<'_>) -> bool {
     if end > AREA_LIMIT {
         value.wrong(
@@ -294,7 +295,7 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
             Quantity::Torque if axis.kind == Kind::Torque => Some("%".to_owned()),
             _ => None,
         },
-        // Either may be shorter than a tick, or than a bus cycle.
+        // Their pulses may be shorter than a tick or a bus cycle.
         latch: matches!(field, Field::Execute | Field::Acknowledge).then_some(Latch::Rising),
         hold: Nanos::ZERO,
         fail_safe: scale.map_or_else(Slot::default, |scale| Slot::from_real(scale.offset)),
@@ -335,7 +336,7 @@ fn offset_of(value: Option<&Value<'_>>, free: usize, bytes: usize) -> Option<usi
     usize::try_from(offset).ok()
 }
 
-/// Tells where a position lies outside of the limits.
+/// Reports a position outside the limits.
 fn check_within(value: &Value<'_>, position: f64, limits: Option<[f64; 2]>) {
     if let Some([low, high]) = limits
         && !(low..=high).contains(&position)

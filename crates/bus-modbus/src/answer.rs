@@ -1,7 +1,8 @@
-//! The server's half of the codec: a request's PDU in, its effect on the tables, the answer's PDU out.
+//! The server's half of the codec: takes a request's PDU, reads or writes the tables, and makes the answer's
+//! PDU.
 //!
-//! The checks and their order are those of the state diagrams in the Modbus Application Protocol V1.1b3:
-//! function, quantity and value, address.
+//! The checks and their order follow the state diagrams of the Modbus Application Protocol V1.1b3: function,
+//! quantity and value, address.
 
 use std::ops::Range;
 
@@ -13,11 +14,11 @@ use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
 /// What a request did.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Done {
-    /// The bits of the frame that clients write which it wrote.
+    /// The bits written, in the frame that clients write.
     pub wrote: Option<Range<usize>>,
-    /// The bits of the frame that this end writes which the answer carries.
+    /// The bits that the answer carries, of the frame that this end writes.
     pub read: Option<Range<usize>>,
-    /// Why it was refused, if it was; then it did nothing.
+    /// Why the request was refused, if so; it then had no effect.
     pub refused: Option<Exception>,
 }
 
@@ -25,7 +26,7 @@ pub struct Done {
 ///
 /// # Panics
 ///
-/// When the PDU has not even a function code: that is the framing's business.
+/// When the PDU is empty: the framing must check that.
 pub fn answer(
     pdu: &[u8],
     tables: &mut Tables<'_>,
@@ -135,7 +136,7 @@ fn act(
     }
 }
 
-/// All of the data as words.
+/// The data as words.
 fn words<const N: usize>(data: &[u8]) -> Result<[usize; N], Exception> {
     if data.len() != 2 * N {
         return Err(Exception::ILLEGAL_DATA_VALUE);
@@ -147,7 +148,7 @@ fn word(data: &[u8], at: usize) -> usize {
     usize::from(u16::from_be_bytes([data[at], data[at + 1]]))
 }
 
-/// The data of a request that writes several elements: which, and as many bytes of values as it counts.
+/// The data of a request that writes several elements: which elements, and their values.
 fn many(data: &[u8]) -> Result<(Span, &[u8]), Exception> {
     let Some((head, values)) = data.split_first_chunk::<5>() else {
         return Err(Exception::ILLEGAL_DATA_VALUE);
@@ -177,7 +178,7 @@ fn read(
     })
 }
 
-/// Appends elements behind the number of their bytes.
+/// Appends elements, preceded by their byte count.
 fn read_counted(
     table: Table,
     span: Span,
@@ -231,7 +232,7 @@ fn read_write(
     if !fits || counted != writes.count * 2 || values.len() != counted {
         return Err(Exception::ILLEGAL_DATA_VALUE);
     }
-    // Nothing is written when there is nothing to read.
+    // Nothing must be written if the read cannot be done.
     tables.check_read(Table::HoldingRegisters, reads)?;
     let wrote = write_registers(writes, values, tables)?;
     let read = read_counted(Table::HoldingRegisters, reads, tables, reply)?;

@@ -1,4 +1,4 @@
-//! Function codes and exception codes, as the Modbus Application Protocol V1.1b3 numbers them.
+//! Function codes and exception codes of the Modbus Application Protocol V1.1b3.
 
 use std::fmt;
 
@@ -16,10 +16,10 @@ pub(super) const READ_REGISTERS: usize = 125;
 pub(super) const WRITE_BITS: usize = 1968;
 /// Most registers that one request writes.
 pub(super) const WRITE_REGISTERS: usize = 123;
-/// Most registers that a request writes which reads others, too.
+/// Most registers that a request writes which also reads.
 pub(super) const READ_WRITE_REGISTERS: usize = 121;
 
-/// A function that both ends know here.
+/// A function that is implemented at both ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Function {
@@ -43,12 +43,12 @@ pub enum Function {
     MaskWriteRegister = 22,
     /// Write registers, then read registers.
     ReadWriteRegisters = 23,
-    /// Encapsulated interface; of its kinds here the reading of the device identification alone.
+    /// Encapsulated interface; only its kind 14, reading the device identification.
     DeviceIdentification = 43,
 }
 
 impl Function {
-    /// All of them.
+    /// All functions.
     pub const ALL: [Self; 11] = [
         Self::ReadCoils,
         Self::ReadDiscreteInputs,
@@ -63,19 +63,19 @@ impl Function {
         Self::DeviceIdentification,
     ];
 
-    /// Its number in the first byte of a PDU.
+    /// Its code, the first byte of a PDU.
     pub const fn code(self) -> u8 {
         self as u8
     }
 
-    /// The function with this number.
+    /// The function with this code.
     pub fn of(code: u8) -> Option<Self> {
         Self::ALL
             .into_iter()
             .find(|function| function.code() == code)
     }
 
-    /// Whether it changes the server's tables: what a broadcast may ask for.
+    /// Whether it changes the server's tables: only such functions may be broadcast.
     pub const fn writes(self) -> bool {
         matches!(
             self,
@@ -94,24 +94,24 @@ impl Function {
 pub struct Exception(pub u8);
 
 impl Exception {
-    /// The function code is not known.
+    /// The function code is unknown.
     pub const ILLEGAL_FUNCTION: Self = Self(1);
-    /// The place, or the last of the places asked for, is not there.
+    /// The address, or the last one of a range, does not exist.
     pub const ILLEGAL_DATA_ADDRESS: Self = Self(2);
     /// A quantity or value that the function does not allow, or a request of the wrong length.
     pub const ILLEGAL_DATA_VALUE: Self = Self(3);
-    /// The server failed at it.
+    /// The server failed to do it.
     pub const SERVER_DEVICE_FAILURE: Self = Self(4);
-    /// It will take its time.
+    /// Accepted, but it will take time.
     pub const ACKNOWLEDGE: Self = Self(5);
-    /// It is busy; the same may be asked again.
+    /// It is busy; the request may be repeated.
     pub const SERVER_DEVICE_BUSY: Self = Self(6);
-    /// A gateway has no way to the unit.
+    /// The gateway has no path to the unit.
     pub const GATEWAY_PATH_UNAVAILABLE: Self = Self(0x0A);
     /// The unit behind a gateway does not answer.
     pub const GATEWAY_TARGET_FAILED: Self = Self(0x0B);
 
-    /// Whether the server has found fault with the request itself, so that it will refuse it for ever.
+    /// Whether the request itself is at fault, so that the server will always refuse it.
     pub const fn is_about_the_request(self) -> bool {
         matches!(
             self,
@@ -119,7 +119,7 @@ impl Exception {
         )
     }
 
-    /// Whether the server, or the gateway before it, may do the same a little later.
+    /// Whether the same request may succeed a little later.
     pub const fn passes(self) -> bool {
         matches!(
             self,
@@ -130,7 +130,7 @@ impl Exception {
         )
     }
 
-    /// Its name in the standard; empty where that has none.
+    /// Its name in the standard; empty if it has none.
     pub const fn name(self) -> &'static str {
         match self {
             Self::ILLEGAL_FUNCTION => "illegal function",

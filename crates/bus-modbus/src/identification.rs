@@ -1,29 +1,29 @@
-//! What a device says of itself: function 43, kind 14.
+//! The device identification: function 43, kind 14.
 
 use super::{Exception, PDU_LIMIT};
 
 /// The kind of encapsulated interface that reads the device identification.
 pub(super) const READ_DEVICE_IDENTIFICATION: u8 = 14;
 
-/// The three objects that every device has, as a stream and one by one.
+/// Basic identification, as a stream and object by object.
 const CONFORMITY: u8 = 0x81;
 
-/// The first bytes of an answer: function, kind, access, conformity, more follows, next object, number of objects.
+/// The header of an answer: function, kind, access, conformity, more follows, next object, number of objects.
 const HEADER: usize = 7;
 
-/// The longest text of an object, such that it fits into an answer.
+/// The longest text of an object that fits into an answer.
 const TEXT_LIMIT: usize = PDU_LIMIT - HEADER - 2;
 
-/// What came of what a device says of itself.
+/// The result of taking an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Taken {
-    /// All of it.
+    /// The identification is complete.
     Whole,
-    /// All up to this object.
+    /// The next answer starts with this object.
     MoreFrom(u8),
 }
 
-/// What a device says of itself.
+/// The identification of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identification {
     /// Vendor's name, product code, and major and minor revision.
@@ -31,9 +31,10 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// What the driver called `name` says.
+    /// The identification of the driver called `name`.
     ///
-    /// It gives no revision: who is allowed to write to this driver shall not lose that by an update of tickbus.
+    /// It contains no revision: a client that may write to this driver must not lose that by an update of
+    /// tickbus.
     pub fn of_driver(name: &str) -> Self {
         let ascii = |c: char| if matches!(c, ' '..='~') { c } else { '?' };
         let name = name.chars().map(ascii).take(TEXT_LIMIT).collect();
@@ -42,18 +43,18 @@ impl Identification {
         }
     }
 
-    /// All of it in one line: vendor, product, revision.
+    /// The identification in one line: vendor, product, revision.
     pub fn line(&self) -> String {
         let texts = self.objects.iter().map(|text| text.trim());
         let texts: Vec<&str> = texts.filter(|text| !text.is_empty()).collect();
         texts.join(" ")
     }
 
-    /// Answers a request, of which `data` is what follows the function code.
+    /// Answers a request; `data` follows its function code.
     ///
     /// # Errors
     ///
-    /// The kind of interface is another one, the way of access is none, or there is no such object.
+    /// The kind of interface is another one, the access is invalid, or there is no such object.
     pub(super) fn answer(&self, data: &[u8], reply: &mut Vec<u8>) -> Result<(), Exception> {
         let (&kind, data) = data.split_first().ok_or(Exception::ILLEGAL_DATA_VALUE)?;
         if kind != READ_DEVICE_IDENTIFICATION {
@@ -64,7 +65,7 @@ impl Identification {
         };
         let first = usize::from(object);
         let single = match access {
-            // Whoever asks for more than there is gets what there is.
+            // A request for more than the basic objects gets these.
             1..=3 => false,
             4 => true,
             _ => return Err(Exception::ILLEGAL_DATA_VALUE),
@@ -72,7 +73,7 @@ impl Identification {
         let first = match (first < self.objects.len(), single) {
             (true, _) => first,
             (false, true) => return Err(Exception::ILLEGAL_DATA_ADDRESS),
-            // A stream from an object that is not there begins at the beginning.
+            // A stream from an object that does not exist starts at the first one.
             (false, false) => 0,
         };
         let wanted = if single {
@@ -94,7 +95,7 @@ impl Identification {
         for (id, text) in (0_u8..).zip(&self.objects).skip(first).take(wanted) {
             let text = &text.as_bytes()[..text.len().min(TEXT_LIMIT)];
             if reply.len() - begin + 2 + text.len() > PDU_LIMIT {
-                // More follows, from this one on.
+                // More follows, starting with this one.
                 reply[begin + 4..begin + 6].copy_from_slice(&[0xFF, id]);
                 break;
             }
@@ -107,8 +108,7 @@ impl Identification {
         Ok(())
     }
 
-    /// Takes over the objects of an answer, of which `data` is what follows the function code. `None` when the
-    /// answer is malformed.
+    /// Takes the objects of an answer; `data` follows its function code. `None` if the answer is malformed.
     pub(super) fn take(&mut self, data: &[u8]) -> Option<Taken> {
         let &[
             READ_DEVICE_IDENTIFICATION,
@@ -128,7 +128,7 @@ impl Identification {
             let (text, after) = after.split_at_checked(usize::from(length))?;
             rest = after;
             if let Some(object) = self.objects.get_mut(usize::from(id)) {
-                // One line of printable characters, whatever the device says.
+                // One line of printable characters, whatever the device sends.
                 let printable = |byte: &u8| {
                     if matches!(byte, b' '..=b'~') {
                         char::from(*byte)
@@ -147,7 +147,7 @@ impl Identification {
     }
 }
 
-/// How long an answer's PDU is, as far as that can be told from its beginning.
+/// The length of the PDU of an answer that starts like this, as soon as it can be told.
 pub(super) fn length(beginning: &[u8]) -> Option<usize> {
     if beginning.first()? & super::function::EXCEPTION_BIT != 0 {
         return Some(2);

@@ -1,7 +1,8 @@
-//! Modbus: over TCP and, as RTU, over a serial line; as server and as client.
+//! Modbus over TCP and, as RTU, over a serial line; server and client.
 //!
-//! The codec knows no port and no image: [`answer()`] is a server's half, a request in and an answer out against
-//! [`Tables`]; [`Query`] is a client's half. [`mbap`] and [`rtu`] put telegrams around it.
+//! The codec knows no port and no image: [`answer()`] is the server's half, which takes a request and makes
+//! the answer using [`Tables`]; [`Query`] is the client's half. [`mbap`] and [`rtu`] frame their PDUs as
+//! telegrams.
 
 mod answer;
 mod client;
@@ -34,11 +35,11 @@ pub use stations::Stations;
 pub use table::{Span, Table, put_bits, take_bits};
 pub use tables::{Map, Side, Tables};
 
-/// The holding register at which `%I` begins among those of a PLC or of a machine that is a server, unless a driver.cfg
-/// says otherwise: behind the outputs of all but the largest, and where `OpenPLC` has its memory words.
+/// The default holding register at which `%I` begins in a server, PLC or machine: behind the outputs except
+/// for very large ones, and where `OpenPLC` has its memory words.
 const INPUTS: usize = 1024;
 
-/// This system's serial ports are not used yet.
+/// Serial ports are not supported on this system yet.
 #[cfg(not(unix))]
 fn no_serial_port() -> tickbus_fieldbus::BusError {
     tickbus_fieldbus::BusError::Link(

@@ -1,4 +1,4 @@
-//! What a driver.cfg says of the line: a TCP address, or a serial port.
+//! The line in a driver.cfg: a TCP address or a serial port.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ use super::rtu;
 /// The longest name of a serial port, in characters.
 const DEVICE_LIMIT: usize = 1000;
 
-/// Speeds that a serial port may have, in bits per second.
+/// The range of serial speeds, in bits per second.
 const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
 
 /// The line to the other end.
@@ -24,16 +24,16 @@ pub enum Line {
     Serial(Serial),
 }
 
-/// A serial port, and how it is set.
+/// A serial port and its settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Serial {
     /// The system's name of the port.
     pub device: String,
-    /// How it is set.
+    /// Its settings.
     pub settings: SerialSettings,
     /// The silence that ends a telegram.
     pub silence: Nanos,
-    /// Whether what is sent comes back, and is to be dropped.
+    /// Whether the line echoes what is sent, so that the echo must be dropped.
     pub echo: bool,
 }
 
@@ -50,14 +50,14 @@ impl fmt::Display for Line {
 }
 
 impl Serial {
-    /// The echo that is to be dropped, if there is one.
+    /// The echo to be dropped, if there is one.
     pub(super) fn new_echo(&self) -> Option<rtu::Echo> {
         self.echo.then(|| rtu::Echo::new(self.settings.baud))
     }
 }
 
 impl Line {
-    /// Takes another address than the driver.cfg names, if `check` has nothing against it.
+    /// Replaces the address of the driver.cfg, if `check` accepts the new one.
     pub fn set_address(
         &mut self,
         address: &str,
@@ -70,8 +70,8 @@ impl Line {
         Ok(())
     }
 
-    /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without any of them it is
-    /// `address`. `check` has its say about what the driver.cfg states.
+    /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without
+    /// any of these, the default address. `check` checks an address stated in the driver.cfg.
     pub(super) fn read(
         table: &mut Table<'_>,
         address: Address,
@@ -156,7 +156,7 @@ fn read_settings(
     let parity = parity.map_or(Some(Parity::Even), |value| {
         value.choice("parities", &parities)
     });
-    // The standard's characters have eleven bits: without a parity there are two stop bits.
+    // A character has eleven bits in the standard: without parity there are two stop bits.
     let two_by_default = parity == Some(Parity::None);
     let two_stop_bits = stop_bits.map_or(Some(two_by_default), |value| {
         value.whole(1..=2).map(|bits| bits == 2)

@@ -1,4 +1,4 @@
-//! The header of Modbus TCP, around a PDU.
+//! The header of Modbus TCP, in front of a PDU.
 
 use super::PDU_LIMIT;
 
@@ -11,21 +11,21 @@ pub const ADU_LIMIT: usize = HEADER + PDU_LIMIT;
 /// One telegram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Telegram<'a> {
-    /// What the client calls it; the answer has the same.
+    /// Chosen by the client, repeated in the answer.
     pub transaction: u16,
-    /// Which unit is meant.
+    /// The addressed unit.
     pub unit: u8,
     /// Function code and data; never empty, at most [`PDU_LIMIT`] bytes.
     pub pdu: &'a [u8],
 }
 
-/// Why bytes are no telegram.
+/// Why bytes are not a telegram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoTelegram {
-    /// The protocol is not that of Modbus.
+    /// The protocol identifier is not that of Modbus.
     #[error("its header has the protocol {0}, and Modbus is 0; check that it speaks Modbus TCP")]
     Protocol(u16),
-    /// The length is none that a telegram can have.
+    /// No telegram can have this length.
     #[error(
         "its header has the length {0}, and from 2 to 254 are possible; check that it speaks Modbus TCP"
     )]
@@ -33,11 +33,11 @@ pub enum NoTelegram {
 }
 
 impl<'a> Telegram<'a> {
-    /// The telegram that `bytes` begin with, and how long it is; `None` when they are not all there yet.
+    /// The telegram at the start of `bytes`, and its length; `None` if it is not complete yet.
     ///
     /// # Errors
     ///
-    /// However they go on, they are no telegram.
+    /// The bytes cannot become a telegram.
     pub fn parse(bytes: &'a [u8]) -> Result<Option<(Self, usize)>, NoTelegram> {
         let word = |at: usize| {
             let pair = bytes.get(at..at + 2)?;
@@ -67,7 +67,7 @@ impl<'a> Telegram<'a> {
     }
 }
 
-/// Appends a telegram, whose PDU `write` appends; nothing if it appends nothing.
+/// Appends a telegram, whose PDU `write` appends; appends nothing if `write` does not.
 pub fn append<R>(
     transaction: u16,
     unit: u8,

@@ -1,4 +1,4 @@
-//! Places in the tables as people write them.
+//! Addresses of elements as people write them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,9 +9,9 @@ use super::table::{ADDRESSES, Table};
 
 /// An element of a table.
 ///
-/// Written either as an offset on the wire, which counts from 0 (`offset:20`, or with its table
-/// `holding-register offset:20`), or as a number, which counts from 1: `holding-register:21`, `4x00021`,
-/// `400021` and `40021` are the same element.
+/// Written as a wire offset, which counts from 0 (`offset:20`, or with its table `holding-register
+/// offset:20`), or as a number, which counts from 1: `holding-register:21`, `4x00021`, `400021` and `40021`
+/// are the same element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Place {
     /// Its table.
@@ -20,11 +20,11 @@ pub struct Place {
     pub offset: usize,
 }
 
-/// What to write for a place.
+/// The remedy where a place should be written.
 pub(super) const SHAPE: &str = "write \"offset:20\", which counts from 0, or \"holding-register:21\", \
                                 \"4x00021\" or \"400021\", which count from 1";
 
-/// Why a text is no place.
+/// Why a text is not a place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; {right}")]
 pub struct PlaceError {
@@ -35,18 +35,18 @@ pub struct PlaceError {
 }
 
 impl Place {
-    /// Reads a place; one that names no table is in `table`.
+    /// Reads a place; without a table in the text, it is in `table`.
     ///
     /// # Errors
     ///
-    /// The text is no place.
+    /// The text is not a place.
     pub fn parse(text: &str, table: Table) -> Result<Self, PlaceError> {
         let wrong = |what: String| PlaceError {
             what,
             right: SHAPE.to_owned(),
         };
         let none = || wrong(format!("\"{}\" is no place in a table", shown(text)));
-        // An offset, or a number from 1, and the digits of it.
+        // The table, the number that counting starts at, and the digits.
         let (table, from, digits) = if let Some((head, digits)) = text.rsplit_once("offset:") {
             let table = match head.strip_suffix(' ') {
                 Some(name) => named(name).ok_or_else(none)?,
@@ -62,7 +62,7 @@ impl Place {
             let digits = letters.as_str();
             match digits.strip_prefix('x') {
                 Some(digits) => (table, 1, digits),
-                // Without its letter a number has all of its digits.
+                // Without a table letter, a number must be complete.
                 None if matches!(digits.len(), 4 | 5) => (table, 1, digits),
                 None => return Err(none()),
             }
@@ -92,7 +92,7 @@ fn numbered(digit: char) -> Option<Table> {
     Table::ALL.into_iter().find(|table| table.digit() == digit)
 }
 
-/// A place that names its table.
+/// Reads a place that names its table.
 impl FromStr for Place {
     type Err = PlaceError;
 
@@ -108,7 +108,7 @@ impl FromStr for Place {
     }
 }
 
-/// Both ways to write it.
+/// Writes both notations.
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { table, offset } = *self;

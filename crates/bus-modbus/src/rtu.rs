@@ -1,4 +1,4 @@
-//! Modbus RTU: telegrams that a silence ends, with a checksum.
+//! Modbus RTU: telegrams with a checksum, delimited by silence.
 
 use super::PDU_LIMIT;
 use tickbus_base::time::Nanos;
@@ -12,13 +12,13 @@ pub const ADU_LIMIT: usize = 1 + PDU_LIMIT + CHECKSUM;
 /// The shortest: unit, function code, checksum.
 const SHORTEST: usize = 4;
 
-/// Bits of one character: start, eight, parity or a second stop, stop.
+/// Bits of one character: start, eight data, parity or a second stop, stop.
 const CHARACTER: i64 = 11;
 
-/// Above so many bits per second the silence is as at that speed.
+/// Above this speed, in bits per second, the silence is constant.
 const FASTEST: u32 = 19_200;
 
-/// The silence between two telegrams there.
+/// The silence between two telegrams above that speed.
 const LEAST_SILENCE: Nanos = Nanos::from_micros(1_750);
 
 /// The silence that ends a telegram: 3.5 characters, and above 19,200 bits per second 1.75 ms.
@@ -30,12 +30,12 @@ pub fn silence(baud: u32) -> Nanos {
     Nanos(7 * half_character)
 }
 
-/// How long one character takes.
+/// Duration of one character.
 pub fn character(baud: u32) -> Nanos {
     Nanos(CHARACTER * 1_000_000_000 / i64::from(baud.max(1)))
 }
 
-/// The checksum over the bytes of a telegram, as it is sent: the low byte first.
+/// The checksum of a telegram's bytes in wire order: low byte first.
 pub fn checksum(bytes: &[u8]) -> [u8; 2] {
     let mut crc = 0xFFFF_u16;
     for byte in bytes {
@@ -51,7 +51,7 @@ pub fn checksum(bytes: &[u8]) -> [u8; 2] {
     crc.to_le_bytes()
 }
 
-/// Appends a telegram, whose PDU `write` appends; nothing if it appends nothing.
+/// Appends a telegram, whose PDU `write` appends; appends nothing if `write` does not.
 pub fn append<R>(unit: u8, bytes: &mut Vec<u8>, write: impl FnOnce(&mut Vec<u8>) -> R) -> R {
     let begin = bytes.len();
     bytes.push(unit);
@@ -65,7 +65,7 @@ pub fn append<R>(unit: u8, bytes: &mut Vec<u8>, write: impl FnOnce(&mut Vec<u8>)
     result
 }
 
-/// Unit and PDU of a whole telegram; `None` when its length or its checksum is wrong.
+/// Unit and PDU of a complete telegram; `None` if its length or its checksum is wrong.
 pub fn parse(telegram: &[u8]) -> Option<(u8, &[u8])> {
     if !(SHORTEST..=ADU_LIMIT).contains(&telegram.len()) {
         return None;
@@ -74,19 +74,19 @@ pub fn parse(telegram: &[u8]) -> Option<(u8, &[u8])> {
     (checksum(body) == *sum).then(|| (body[0], &body[1..]))
 }
 
-/// Cuts what comes over a line into telegrams, by the silence between them.
+/// Splits the bytes on a line into telegrams, by the silence between them.
 #[derive(Debug)]
 pub struct Framer {
     silence: Nanos,
     bytes: Vec<u8>,
-    /// Longer than any telegram: whatever follows, it is none.
+    /// Longer than any telegram: the rest cannot be one either.
     overlong: bool,
-    /// When the last byte came.
+    /// When the last byte arrived.
     last: Option<Nanos>,
 }
 
 impl Framer {
-    /// A framer for telegrams with this silence between them.
+    /// A framer with this silence between telegrams.
     pub fn new(silence: Nanos) -> Self {
         Self {
             silence,
@@ -96,7 +96,7 @@ impl Framer {
         }
     }
 
-    /// These bytes came at `now`. What has been ended by silence before that must have been
+    /// These bytes arrived at `now`. A telegram that silence has ended before must have been
     /// [taken](Self::take).
     pub fn arrived(&mut self, now: Nanos, bytes: &[u8]) {
         if bytes.is_empty() {
@@ -109,7 +109,7 @@ impl Framer {
             .extend_from_slice(&bytes[..bytes.len().min(room)]);
     }
 
-    /// Until when to wait for the silence; [`Nanos::MAX`] when nothing has come.
+    /// Until when to wait for silence; [`Nanos::MAX`] if nothing has arrived.
     pub fn deadline(&self) -> Nanos {
         self.last.map_or(Nanos::MAX, |last| last + self.silence)
     }
@@ -119,8 +119,8 @@ impl Framer {
         self.last.is_none_or(|last| now >= last + self.silence)
     }
 
-    /// If silence has ended a telegram by `now`, hands it to `take`; `None` in its place when it was longer than
-    /// any telegram is.
+    /// If silence has ended a telegram by `now`, passes it to `take`; or `None` if it was longer than any
+    /// telegram.
     pub fn take<R>(&mut self, now: Nanos, take: impl FnOnce(Option<&[u8]>) -> R) -> Option<R> {
         if self.last.is_none() || !self.is_silent(now) {
             return None;
@@ -137,21 +137,21 @@ impl Framer {
     }
 }
 
-/// What a line that echoes gives back of what was sent, such as a two-wire adapter whose receiver stays on.
+/// The echo of sent bytes, as of a two-wire adapter whose receiver stays enabled.
 #[derive(Debug)]
 pub struct Echo {
-    /// How long one character takes.
+    /// Duration of one character.
     character: Nanos,
     expected: Vec<u8>,
-    /// When the rest of it will not come any more.
+    /// After this the rest of it will not arrive.
     until: Nanos,
 }
 
 impl Echo {
-    /// How much later than the line needs an echo may come: adapters keep what they receive for up to 16 ms.
+    /// The tolerated delay of an echo: adapters buffer received bytes for up to 16 ms.
     const SLACK: Nanos = Nanos::from_millis(50);
 
-    /// The echo of a line with this speed.
+    /// The echo of a line at this speed.
     pub fn new(baud: u32) -> Self {
         Self {
             character: character(baud),
@@ -170,8 +170,8 @@ impl Echo {
         self.until = now + self.character.times(characters) + Self::SLACK;
     }
 
-    /// How many of the bytes that came at `now` are the echo of what was sent. What differs from that is none, and
-    /// what comes behind it neither.
+    /// How many of the bytes that arrived at `now` are the echo of sent ones. The first byte that differs
+    /// ends the echo.
     pub fn strip(&mut self, now: Nanos, bytes: &[u8]) -> usize {
         if now > self.until {
             self.expected.clear();
@@ -193,13 +193,13 @@ impl Echo {
 mod tests {
     use super::*;
 
-    /// A request that reads two holding registers of unit 1, known from many manuals.
+    /// A request for two holding registers of unit 1, found in many manuals.
     const READ: [u8; 8] = [1, 3, 0, 0, 0, 2, 0xC4, 0x0B];
 
     #[test]
     fn the_checksum_is_the_one_of_the_standard() {
         assert_eq!(checksum(&READ[..6]), READ[6..]);
-        // The standard's own worked example.
+        // The standard's worked example.
         assert_eq!(checksum(&[0x02, 0x07]), [0x41, 0x12]);
         let mut bytes = Vec::new();
         append(1, &mut bytes, |pdu| pdu.extend([3, 0, 0, 0, 2]));

@@ -13,7 +13,7 @@ use super::line::Serial;
 ///
 /// # Errors
 ///
-/// It is not there, is none, or cannot be set so.
+/// It does not exist, is not a serial port, or does not support the settings.
 pub(super) fn open(line: &Serial) -> Result<SerialPort, BusError> {
     SerialPort::open(Path::new(&line.device), line.settings).map_err(|error| {
         let right = match error.kind() {

@@ -1,4 +1,4 @@
-//! Where signals lie, for people: both ways to count, side by side.
+//! Descriptions of the line and of signals' places for people, in both notations.
 
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
@@ -6,7 +6,7 @@ use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 use super::{Block, ClientOptions, Place, Query, ServerOptions, Side, Table};
 
 impl ServerOptions {
-    /// What the line is and does, with the signals of `signals`.
+    /// What the line is and does, given the signal table.
     pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
         parts.extend(self.stations.shown(None));
@@ -25,7 +25,7 @@ impl ServerOptions {
             parts.push(format!("%I also from {} on", Place { table, offset }));
         }
         if outputs > 0 && self.input == Side::Sends {
-            // Whoever expects %I there sees plausible numbers: what he wrote himself.
+            // A client that expects %I there would read plausible numbers: the outputs that it wrote itself.
             parts.push(format!(
                 "{} and the {} behind it are %Q: read, they give back what was written last",
                 Place { table, offset: 0 },
@@ -38,7 +38,7 @@ impl ServerOptions {
         parts
     }
 
-    /// Where a signal lies.
+    /// The place of a signal.
     pub fn place(&self, signal: &Signal) -> String {
         let is_bit = signal.data_type == DataType::Bool;
         let table = match (signal.area, is_bit) {
@@ -58,7 +58,7 @@ impl ServerOptions {
 }
 
 impl ClientOptions {
-    /// What the line is and does, for the end with `role` and the signals of `table`.
+    /// What the line is and does, for the end with `role`, given the signal table.
     pub fn shown(&self, role: Role, table: &SignalTable) -> Vec<String> {
         let (writes, reads) = role.areas();
         let mut parts = vec![format!("asks {}", self.line)];
@@ -94,7 +94,7 @@ impl ClientOptions {
         parts
     }
 
-    /// The requests of a cycle, a line for each.
+    /// The requests of a cycle, one per line.
     pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
         let mut lines = Vec::new();
         for station in 0..table.stations.len() {
@@ -126,7 +126,7 @@ impl ClientOptions {
         lines
     }
 
-    /// Where a signal of a station with areas of so many bytes lies.
+    /// The place of a signal in a station with areas of `bytes` bytes.
     pub fn place(&self, signal: &Signal, bytes: usize) -> String {
         if let Some(spot) = self.at.get(&signal.name) {
             return spot.to_string();
@@ -138,7 +138,7 @@ impl ClientOptions {
     }
 }
 
-/// Where a signal lies whose first byte is in `block`.
+/// The place of a signal whose first byte is in `block`.
 fn place_in(block: Block, signal: &Signal) -> String {
     let byte = signal.byte - block.byte;
     let table = block.table;

@@ -1,4 +1,4 @@
-//! Places of single signals, as `[fieldbus.at]` and the tag lists of other programs write them.
+//! Places of single signals, as written in `[fieldbus.at]` and in the tag lists of other programs.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,13 +10,13 @@ use super::{Place, PlaceError, Table};
 
 /// An element of a table, or a bit of a register.
 ///
-/// Beside what a [`Place`] may be, these are read: a bit of a register as KEPServer writes it (`400021.5`; bit 0 is the
-/// lowest), the markers of IEC 61131-3 in the way of Schneider and CODESYS (`%MW20` is the holding register with
-/// the offset 20, `%MW20.5` its bit 5, `%M5` the coil with the offset 5), and behind any of them a type as PLC4X writes
-/// it (`holding-register:21:REAL`).
+/// In addition to the notations of a [`Place`], these are read: a bit of a register as in KEPServer
+/// (`400021.5`; bit 0 is the lowest), the memory words and bits of IEC 61131-3 as in Schneider and CODESYS
+/// (`%MW20` is the holding register at offset 20, `%MW20.5` its bit 5, `%M5` the coil at offset 5), each
+/// optionally followed by a type as in PLC4X (`holding-register:21:REAL`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Spot {
-    /// The element, or the first one.
+    /// The element, or the first of several.
     pub place: Place,
     /// The bit of the register, from 0 for the lowest to 15.
     pub bit: Option<u8>,
@@ -49,7 +49,7 @@ impl FromStr for Spot {
                 "write a signal for each element; they are read in one request all the same",
             ));
         }
-        // What follows the last colon is a type where it begins with a letter, and a number else.
+        // After the last colon is a type if it starts with a letter, otherwise a number.
         let (rest, data_type) = match text.rsplit_once(':') {
             Some((rest, name)) if name.starts_with(|c: char| c.is_ascii_alphabetic()) => {
                 let data_type = name.parse::<DataType>().map_err(|error| {
@@ -64,7 +64,7 @@ impl FromStr for Spot {
         };
         let (rest, bit) = match rest.rsplit_once('.') {
             None => (rest, None),
-            // "DB10.DBW0" is no register with a bit.
+            // "DB10.DBW0" is not a register with a bit.
             Some((_, digits)) if digits.starts_with(|c: char| c.is_ascii_alphabetic()) => {
                 return Err(wrong(
                     format!("\"{}\" is no place in a table", shown(text)),
@@ -122,7 +122,7 @@ impl FromStr for Spot {
     }
 }
 
-/// The place of `%MW20` or `%M5`, without the percent sign; `None` if it is neither.
+/// The place of `%MW20` or `%M5`, without the percent sign; `None` for any other text.
 fn read_marker(marker: &str) -> Option<Result<Place, PlaceError>> {
     let rest = marker.strip_prefix('M')?;
     let (table, digits) = match rest.strip_prefix('W') {
@@ -133,7 +133,7 @@ fn read_marker(marker: &str) -> Option<Result<Place, PlaceError>> {
     is_number.then(|| Place::parse(&format!("offset:{digits}"), table))
 }
 
-/// Both ways to write its element, and the bit.
+/// Writes the element in both notations, and the bit.
 impl fmt::Display for Spot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.place.fmt(f)?;

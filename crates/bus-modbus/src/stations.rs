@@ -1,22 +1,22 @@
-//! Which unit each station is: what driver.cfg says in `[fieldbus]` and in its `[[station]]` tables.
+//! The units of the stations, from `[fieldbus]` and the `[[station]]` tables.
 
 use tickbus_base::toml_text::{Table, Value};
 
-/// The longest identity that is written down.
+/// The longest identity, in characters.
 const IDENTITY_LIMIT: usize = 1000;
 
-/// The numbers that units of a line may have.
+/// The range of unit numbers on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Units {
     /// All that fit into a byte.
     Tcp,
-    /// On a serial line 0 is everyone and those above 247 are reserved.
+    /// On a serial line 0 is the broadcast, and numbers above 247 are reserved.
     Serial,
-    /// The same, by a server: it has to know which requests of the line are meant for it.
+    /// As `Serial`, for a server: it has to know which requests on the line are addressed to it.
     ServedOnSerial,
 }
 
-/// What a driver.cfg says of one station, or of all of them.
+/// The keys of one station, or of all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Keys {
     /// Its unit.
@@ -29,21 +29,21 @@ pub(super) struct Keys {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stations {
     units: Units,
-    /// What stands in `[fieldbus]`.
+    /// The keys in `[fieldbus]`.
     common: Keys,
-    /// What stands in the `[[station]]` tables; empty where there are none.
+    /// The keys in the `[[station]]` tables, with their offsets; empty if there are none.
     own: Vec<(Keys, usize)>,
 }
 
 impl Stations {
-    /// Reads what `[fieldbus]` says.
+    /// Reads the unit in `[fieldbus]`.
     pub(super) fn read(units: Units, unit: Option<&Value<'_>>) -> Option<Self> {
         let stated = unit.map(|value| read_unit(units, value));
         let unit = match stated {
             None => None,
             Some(stated) => Some(stated?),
         };
-        // The first number that a station can have.
+        // The lowest number of a unit.
         let unit = unit.or((units == Units::ServedOnSerial).then_some(1));
         Some(Self {
             units,
@@ -55,12 +55,12 @@ impl Stations {
         })
     }
 
-    /// Sets the identity that stands in `[fieldbus]`.
+    /// Sets the identity stated in `[fieldbus]`.
     pub(super) fn allow(&mut self, write_to: Option<String>) {
         self.common.write_to = write_to;
     }
 
-    /// Reads the keys of the next of `count` `[[station]]` tables; `write_to` is one where this end may write.
+    /// Reads the keys of the next of `count` `[[station]]` tables; `write_to` only if this end may write.
     pub fn read_station(&mut self, count: usize, guarded: bool, table: &mut Table<'_>) {
         let unit = if count > 1 {
             table.require(
@@ -93,13 +93,13 @@ impl Stations {
         self.own.push((keys, line));
     }
 
-    /// The unit of a station; `None` for one that is any.
+    /// The unit of a station; `None` if any number is accepted.
     pub fn unit(&self, station: usize) -> Option<u8> {
         let own = self.own.get(station).and_then(|(keys, _)| keys.unit);
         own.or(self.common.unit)
     }
 
-    /// The units, for people; `default` is that of a station without one. `None` where any is right.
+    /// The units as text; `default` is that of a station without one. `None` if any number is accepted.
     pub fn shown(&self, default: Option<u8>) -> Option<String> {
         let stations = 0..self.own.len().max(1);
         let units = stations.map(|station| Some(self.unit(station).or(default)?.to_string()));

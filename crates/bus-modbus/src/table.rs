@@ -1,4 +1,4 @@
-//! The four tables, and how their elements lie in bytes.
+//! The four tables, and the arrangement of their elements in bytes.
 
 use std::fmt;
 
@@ -15,11 +15,11 @@ pub enum Table {
     HoldingRegisters,
 }
 
-/// Elements that a 16-bit address reaches.
+/// The number of elements that a 16-bit address reaches.
 pub(super) const ADDRESSES: usize = 0x1_0000;
 
 impl Table {
-    /// All of them.
+    /// All tables.
     pub const ALL: [Self; 4] = [
         Self::Coils,
         Self::DiscreteInputs,
@@ -27,7 +27,7 @@ impl Table {
         Self::HoldingRegisters,
     ];
 
-    /// What one of its elements is called, as addresses spell it.
+    /// The name of one of its elements, as addresses spell it.
     pub const fn element(self) -> &'static str {
         match self {
             Self::Coils => "coil",
@@ -37,7 +37,7 @@ impl Table {
         }
     }
 
-    /// The digit that numbers of its elements begin with.
+    /// The first digit of its elements' numbers.
     pub const fn digit(self) -> char {
         match self {
             Self::Coils => '0',
@@ -47,7 +47,7 @@ impl Table {
         }
     }
 
-    /// Whether its elements are bits; else they are words of 16.
+    /// Whether its elements are bits; otherwise they are 16-bit words.
     pub const fn is_bits(self) -> bool {
         matches!(self, Self::Coils | Self::DiscreteInputs)
     }
@@ -62,8 +62,8 @@ impl Table {
         if self.is_bits() { 1 } else { 16 }
     }
 
-    /// Elements that so many bytes of an image make. A last byte alone is half a register, and there for
-    /// the asking.
+    /// The number of elements for this many bytes of an image. A single last byte makes half a register,
+    /// which can be requested.
     pub const fn elements(self, bytes: usize) -> usize {
         if self.is_bits() {
             bytes * 8
@@ -84,17 +84,17 @@ impl fmt::Display for Table {
     }
 }
 
-/// Elements in a row, from a wire offset on.
+/// Consecutive elements, from a wire offset on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Span {
     /// Offset of the first, from 0.
     pub first: usize,
-    /// How many.
+    /// The number of elements.
     pub count: usize,
 }
 
 impl Span {
-    /// The offset behind the last.
+    /// The offset just beyond the last.
     pub const fn end(self) -> usize {
         self.first + self.count
     }
@@ -109,18 +109,18 @@ impl fmt::Display for Span {
     }
 }
 
-/// Copies `count` bits that begin at bit `from` of `source` to the beginning of `target`; unused bits of the
-/// last byte become zero.
+/// Copies `count` bits from bit `from` of `source` on to the beginning of `target`; unused bits of the last
+/// byte become zero.
 ///
 /// # Panics
 ///
-/// When either is too short for them.
+/// When either slice is too short.
 pub fn take_bits(source: &[u8], from: usize, count: usize, target: &mut [u8]) {
     let (byte, shift) = (from / 8, from % 8);
     let bytes = count.div_ceil(8);
     for (index, target) in target[..bytes].iter_mut().enumerate() {
         let low = source[byte + index] >> shift;
-        // The last bits may end within the byte before.
+        // The last bits may end within the current byte.
         let high = match source.get(byte + index + 1) {
             Some(next) if shift > 0 => next << (8 - shift),
             _ => 0,
@@ -132,21 +132,21 @@ pub fn take_bits(source: &[u8], from: usize, count: usize, target: &mut [u8]) {
     }
 }
 
-/// Copies the first `count` bits of `source` to those that begin at bit `to` of `target`; all others stay.
+/// Copies the first `count` bits of `source` to bit `to` of `target` and on; other bits do not change.
 ///
 /// # Panics
 ///
-/// When either is too short for them.
+/// When either slice is too short.
 pub fn put_bits(source: &[u8], count: usize, target: &mut [u8], to: usize) {
     copy_bits(source, 0, count, target, to);
 }
 
-/// Copies `count` bits that begin at bit `from` of `source` to those that begin at bit `to` of `target`; all others
-/// stay.
+/// Copies `count` bits from bit `from` of `source` on to bit `to` of `target` and on; other bits do not
+/// change.
 ///
 /// # Panics
 ///
-/// When either is too short for them.
+/// When either slice is too short.
 pub(super) fn copy_bits(source: &[u8], from: usize, count: usize, target: &mut [u8], to: usize) {
     if (from | to | count).is_multiple_of(8) {
         target[to / 8..(to + count) / 8].copy_from_slice(&source[from / 8..(from + count) / 8]);

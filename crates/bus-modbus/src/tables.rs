@@ -1,33 +1,33 @@
-//! The four tables of one unit, over the two areas of its process image.
+//! The four tables of one unit, mapped to the two areas of its process image.
 
 use std::ops::Range;
 
 use super::table::{ADDRESSES, Span, Table};
 use super::{Exception, take_bits};
 
-/// Which of the two frames of a unit.
+/// One of the two frames of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Side {
-    /// The one that this end writes: a client only reads it.
+    /// The frame that this end writes, and clients only read.
     Sends,
-    /// The one that clients write.
+    /// The frame that clients write.
     Holds,
 }
 
-/// Where the two frames lie in the tables.
+/// The mapping of the two frames to the tables.
 ///
-/// Discrete inputs and input registers are `%I`, coils and holding registers `%Q`, each from 0 on. Beside that
-/// `%I` may lie in the tables that can be written, too: from a register on, and from the coil on that is its
-/// first bit.
+/// Discrete inputs and input registers are `%I`, coils and holding registers `%Q`, each starting at 0. In
+/// addition `%I` may be repeated in the writable tables: from the register `window` on, and from the coil
+/// that is the first bit of that register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Map {
-    /// The frame of `%I`; that of `%Q` is the other one.
+    /// The frame of `%I`; `%Q` is the other one.
     pub input: Side,
-    /// The holding register at which `%I` begins once more.
+    /// The holding register at which `%I` is repeated.
     pub window: Option<usize>,
 }
 
-/// A place in a frame, in bits.
+/// Bits of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
     side: Side,
@@ -37,12 +37,12 @@ struct Place {
 /// The tables of one unit at one moment.
 #[derive(Debug)]
 pub struct Tables<'a> {
-    /// Where the frames lie.
+    /// The mapping of the frames.
     pub map: Map,
     /// The frame that this end writes.
     pub sends: &'a [u8],
-    /// The frame that clients write; where its size is odd, with one byte more, which makes the last register
-    /// whole.
+    /// The frame that clients write; if its size is odd, with an additional byte that completes the last
+    /// register.
     pub holds: &'a mut [u8],
     /// The size of that frame.
     pub holds_len: usize,
@@ -56,18 +56,18 @@ impl Tables<'_> {
         }
     }
 
-    /// Where elements in a row lie.
+    /// The bits of consecutive elements.
     fn place(&self, table: Table, span: Span) -> Result<Place, Exception> {
         let input = self.map.input;
         let output = match input {
             Side::Sends => Side::Holds,
             Side::Holds => Side::Sends,
         };
-        // No address reaches beyond, however long the frame is.
+        // No address reaches further, however long the frame is.
         if span.end() > ADDRESSES {
             return Err(Exception::ILLEGAL_DATA_ADDRESS);
         }
-        // Where there is no window, it begins where no address reaches.
+        // Without a window, one that no address reaches.
         let window = self.map.window.unwrap_or(ADDRESSES);
         let windows = if table.is_writable() {
             [(0, output), (window, input)]
@@ -85,20 +85,20 @@ impl Tables<'_> {
         Err(Exception::ILLEGAL_DATA_ADDRESS)
     }
 
-    /// Whether elements in a row are there to be read.
+    /// Checks that consecutive elements can be read.
     ///
     /// # Errors
     ///
-    /// They are not.
+    /// They do not exist.
     pub fn check_read(&self, table: Table, span: Span) -> Result<(), Exception> {
         self.place(table, span).map(|_| ())
     }
 
-    /// Whether elements in a row are there to be written.
+    /// Checks that consecutive elements can be written.
     ///
     /// # Errors
     ///
-    /// They are not, or are this end's own.
+    /// They do not exist, or are in the frame that this end writes.
     pub fn check_write(&self, table: Table, span: Span) -> Result<(), Exception> {
         match self.place(table, span)?.side {
             Side::Holds => Ok(()),
@@ -106,12 +106,12 @@ impl Tables<'_> {
         }
     }
 
-    /// Appends elements in a row to `reply`: bits from the lowest on, registers with the high byte first. Gives
-    /// their bits of the frame that this end writes, if it was that.
+    /// Appends consecutive elements to `reply`: bits from the lowest on, registers with the high byte first.
+    /// If they are in the frame that this end writes, returns their bits in it.
     ///
     /// # Errors
     ///
-    /// They are not there.
+    /// They do not exist.
     pub fn read(
         &self,
         table: Table,
@@ -139,11 +139,12 @@ impl Tables<'_> {
         Ok((side == Side::Sends).then_some(read))
     }
 
-    /// Lets `write` change the frame, given the bit at which elements in a row begin; gives all their bits.
+    /// Lets `write` change the frame, given the bit at which consecutive elements begin; returns all their
+    /// bits.
     ///
     /// # Errors
     ///
-    /// They are not there, or are this end's own.
+    /// They do not exist, or are in the frame that this end writes.
     pub fn write(
         &mut self,
         table: Table,

@@ -1,4 +1,4 @@
-//! Whose certificate it is: the ApplicationUri among its alternative names.
+//! Checks whose certificate it is: the ApplicationUri must be among its alternative names.
 
 use opcua::crypto::X509;
 use x509_cert::Certificate;
@@ -6,12 +6,12 @@ use x509_cert::der::Decode as _;
 use x509_cert::ext::pkix::SubjectAltName;
 use x509_cert::ext::pkix::name::GeneralName;
 
-/// Checks that a certificate is that of the application called `uri`: one of its alternative names is that URI,
-/// wherever it stands among the names of hosts (OPC 10000-6, 6.2.2).
+/// Checks that a certificate belongs to the application `uri`: one of its alternative names is that URI, in
+/// any position among the host names (OPC 10000-6, 6.2.2).
 ///
 /// # Errors
 ///
-/// Whose it is instead.
+/// The application that it belongs to instead.
 pub(super) fn check(certificate: &X509, uri: &str) -> Result<(), String> {
     let der = certificate
         .to_der()
@@ -46,7 +46,7 @@ fn uris(der: &[u8]) -> Result<Vec<String>, String> {
 mod tests {
     use super::*;
 
-    /// As node-opcua makes them, by openssl: `DNS:vm, IP:127.0.0.1, URI:urn:vm:NodeOPCUA-Server`.
+    /// As made by node-opcua with openssl: `DNS:vm, IP:127.0.0.1, URI:urn:vm:NodeOPCUA-Server`.
     const HOST_FIRST: &[u8] = include_bytes!("../../../tests/peers/host-first.der");
 
     #[test]

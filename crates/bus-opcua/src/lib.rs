@@ -1,7 +1,7 @@
 //! OPC UA: a client of a PLC that is a server, and a server for PLCs that are clients.
 //!
-//! What a driver.cfg says to them is read by every build. The buses themselves stand on the crate
-//! `async-opcua` and are built with the cargo feature `opcua` alone.
+//! Every build reads their options in a driver.cfg. The buses themselves use the crate `async-opcua` and are
+//! only built with the cargo feature `opcua`.
 
 mod node;
 mod options;

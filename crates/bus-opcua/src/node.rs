@@ -1,45 +1,45 @@
-//! Node ids as a driver.cfg writes them.
+//! Node ids as written in a driver.cfg.
 
 use std::fmt;
 use std::str::FromStr;
 
 use tickbus_base::toml_text::shown;
 
-/// What is right where a node id is expected.
+/// The remedy where a node id is expected.
 const SHAPE: &str = "write one such as \"ns=2;s=Motor.Speed\", \"ns=3;i=1001\" or \
                      \"nsu=http://example.com/plc;s=Motor.Speed\"";
 
-/// The name of a node: its namespace, and what it is called there.
+/// The name of a node: its namespace and identifier.
 ///
-/// Written as OPC UA writes them, `ns=2;s=Motor.Speed`. The namespace is a number, 0 where none stands, or
-/// its URI behind `nsu=`, which is looked up in the server: numbers may change when a server is extended.
+/// Written in the notation of OPC UA, `ns=2;s=Motor.Speed`. The namespace is a number, 0 if omitted, or its
+/// URI after `nsu=`, which is looked up in the server: numbers may change when a server is extended.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct NodeName {
     /// The namespace.
     pub namespace: Namespace,
-    /// The name within the namespace.
+    /// The identifier within the namespace.
     pub identifier: Identifier,
 }
 
 /// A namespace of a server.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Namespace {
-    /// By its number in the server's list.
+    /// By its index in the server's list.
     Index(u16),
-    /// By its URI, which has a number in the server's list.
+    /// By its URI, which is looked up in the server's list.
     Uri(String),
 }
 
-/// What a node is called in its namespace.
+/// The identifier of a node within its namespace.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Identifier {
-    /// A text, `s=`; from its first character to its last, so also with quotes and semicolons in it.
+    /// A string, `s=`; everything up to the end, quotes and semicolons included.
     Text(String),
     /// A number, `i=`.
     Number(u32),
 }
 
-/// Why a text is no node id.
+/// Why a text is not a node id.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; {right}")]
 pub struct NodeNameError {
@@ -93,7 +93,7 @@ impl FromStr for NodeName {
     }
 }
 
-/// Digits alone: `parse` would let a sign through.
+/// Digits only: `parse` would accept a sign.
 fn number<N: FromStr>(digits: &str) -> Option<N> {
     let plain = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
     digits.parse().ok().filter(|_| plain)
@@ -113,23 +113,23 @@ impl fmt::Display for NodeName {
     }
 }
 
-/// How the node id of a signal is made from its name: `{name}` and `{station}` stand for those.
+/// The pattern that makes a signal's node id from its name: `{name}` and `{station}` are replaced.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern(pub(super) String);
 
 impl Pattern {
-    /// The place of the signal's name.
+    /// The placeholder for the signal's name.
     pub(super) const NAME: &'static str = "{name}";
-    /// The place of its station's name.
+    /// The placeholder for its station's name.
     pub(super) const STATION: &'static str = "{station}";
 
     /// The node of the signal called `name` of the station called `station`.
     ///
     /// # Errors
     ///
-    /// What comes out is no node id.
+    /// The result is not a node id.
     pub fn node(&self, name: &str, station: &str) -> Result<NodeName, NodeNameError> {
-        // One pass: a name may have braces of its own.
+        // In one pass, because a name may contain braces.
         let mut text = String::new();
         let mut rest = &*self.0;
         while let Some(at) = rest.find('{') {

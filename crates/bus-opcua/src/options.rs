@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the two OPC UA buses.
+//! The options of the two OPC UA buses in a driver.cfg.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -15,13 +15,13 @@ use super::{NodeName, NodeNameError, Pattern, Url, UrlError};
 /// The longest `write_to`, in characters.
 const IDENTITY_LIMIT: usize = 1000;
 
-/// The shortest publishing and sampling interval: both are whole milliseconds at best.
+/// The shortest publishing and sampling interval: servers count both in milliseconds.
 const SHORTEST: Nanos = Nanos::from_millis(1);
 
-/// Where a server listens, unless a driver.cfg says otherwise: on this machine alone.
+/// The default address of a server: reachable only from this machine.
 const ADDRESS: Address = Address::local(super::url::PORT);
 
-/// What a driver.cfg says to a client.
+/// The options of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClientOptions {
     /// The server.
@@ -32,17 +32,17 @@ pub struct ClientOptions {
     pub credentials: Credentials,
     /// How often the server reports changes; `None` leaves it to the cycle. At least 1 ms.
     pub publishing_interval: Option<Nanos>,
-    /// How often the server looks for changes; `None` leaves it to the publishing interval.
+    /// How often the server samples values; `None` leaves it to the publishing interval.
     pub sampling_interval: Option<Nanos>,
-    /// The nodes of signals that have one of their own, by the signals' names.
+    /// The nodes of signals with their own node id, by the signals' names.
     pub nodes: BTreeMap<String, Node>,
-    /// How the node ids of all other signals are made.
+    /// The pattern for the node ids of all other signals.
     pub node_pattern: Pattern,
-    /// The identity of the one server that is written to.
+    /// The identity of the only server that may be written to.
     pub write_to: Option<String>,
-    /// Whether every change that the server reports is an event, beside the image.
+    /// Whether every change reported by the server is an event, in addition to the image.
     pub events: bool,
-    /// Where the table stands in the text.
+    /// The offset of the table in the text.
     at: usize,
 }
 
@@ -51,31 +51,31 @@ pub struct ClientOptions {
 pub struct Node {
     /// Its name.
     pub name: NodeName,
-    /// Where it stands in the text.
+    /// Its offset in the text.
     at: usize,
 }
 
-/// What a driver.cfg says to a server.
+/// The options of a server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServerOptions {
-    /// Where it listens; port 0 lets the system choose one.
+    /// The address to listen on; with port 0 the system chooses one.
     pub address: Address,
-    /// The host that it announces to clients; `None` for the one that it listens at, or the computer's name.
+    /// The host name announced to clients; `None` for the address to listen on, or the computer's name.
     pub host: Option<String>,
-    /// How messages may be protected; never empty.
+    /// The permitted protections of messages; never empty.
     pub security: Vec<Policy>,
     /// Certificates, and the user that may log in.
     pub credentials: Credentials,
-    /// Whether everybody may log in.
+    /// Whether anonymous logins are permitted.
     pub anonymous: bool,
-    /// Whether every change that a client makes is reported as an event, beside the image.
+    /// Whether every change by a client is reported as an event, in addition to the image.
     pub events: bool,
-    /// Whether every write is one, changed or not.
+    /// Whether every write is reported, changed or not.
     pub every_write: bool,
 }
 
 impl ClientOptions {
-    /// Takes another address than the driver.cfg names, as a URL or as `HOST:PORT`.
+    /// Replaces the address of the driver.cfg, by a URL or `HOST:PORT`.
     ///
     /// # Errors
     ///
@@ -161,7 +161,7 @@ impl ClientOptions {
 }
 
 impl ClientOptions {
-    /// What it says, in words for people.
+    /// The options as text for people.
     pub fn summary(&self) -> Vec<String> {
         let mut parts = vec![format!("connects to {}", self.url)];
         parts.push(protection(&[self.security], self.credentials.mode));
@@ -185,7 +185,7 @@ impl ClientOptions {
     ///
     /// # Errors
     ///
-    /// What is made of its name is no node id.
+    /// The pattern and its name do not give a node id.
     pub(super) fn node(
         &self,
         signal: &Signal,
@@ -197,14 +197,14 @@ impl ClientOptions {
         self.node_pattern.node(&signal.name, &station.name)
     }
 
-    /// The node of a signal of `station`, in words for people.
+    /// The node of a signal of `station` as text.
     pub fn place(&self, signal: &Signal, station: &Station) -> String {
-        // A node id that is none was reported.
+        // An invalid node id was reported earlier.
         let node = self.node(signal, station);
         node.map_or_else(|_| String::new(), |node| shown(&node.to_string()))
     }
 
-    /// Takes the lines of `[fieldbus.at]`, node ids, and reports those that are none.
+    /// Takes the lines of `[fieldbus.at]`, which are node ids, and reports invalid ones.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         for line in lines {
             let name = &table.signals[line.signal].name;
@@ -223,7 +223,7 @@ impl ClientOptions {
         }
     }
 
-    /// Reports nodes of signals that are not there, and nodes that several signals have.
+    /// Reports nodes of signals that do not exist, and nodes shared by several signals.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         let names: Vec<&str> = table.signals.iter().map(|signal| &*signal.name).collect();
         for (name, node) in &self.nodes {
@@ -263,11 +263,11 @@ impl ClientOptions {
 }
 
 impl ServerOptions {
-    /// Takes another address than the driver.cfg names.
+    /// Replaces the address of the driver.cfg.
     ///
     /// # Errors
     ///
-    /// The text is no address.
+    /// The text is not an address.
     pub fn set_address(&mut self, address: &str) -> Result<(), String> {
         self.address = address
             .parse()
@@ -275,7 +275,7 @@ impl ServerOptions {
         Ok(())
     }
 
-    /// What it says, in words for people.
+    /// The options as text for people.
     pub fn summary(&self) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.address)];
         if let Some(host) = &self.host {
@@ -342,7 +342,7 @@ impl ServerOptions {
 fn read_host(value: &Value<'_>) -> Option<String> {
     let right = "write this computer's address, such as \"192.168.0.5\", or a name that every client can look up";
     let text = value.text(right)?;
-    // Any port makes an address of it.
+    // With a port appended it must be an address.
     match format!("{text}:{}", super::url::PORT).parse::<Address>() {
         Ok(Address {
             host: Host::Ip(ip), ..
@@ -358,7 +358,7 @@ fn read_host(value: &Value<'_>) -> Option<String> {
     }
 }
 
-/// How messages are, or may be, protected.
+/// How messages are, or may be, protected, as text.
 fn protection(policies: &[Policy], mode: Mode) -> String {
     let names: Vec<String> = (policies.iter())
         .map(|policy| match policy {
@@ -441,7 +441,7 @@ fn read_pattern(value: &Value<'_>) -> Option<Pattern> {
         );
         return None;
     }
-    // A name of letters alone: what is wrong now is the pattern's own fault.
+    // With a plain name, a mistake can only be the pattern's.
     if let Err(error) = pattern.node("name", "station") {
         value.wrong(error.what, error.right);
         return None;

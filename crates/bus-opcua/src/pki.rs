@@ -1,6 +1,6 @@
-//! Certificates: one's own, and those of peers.
+//! Certificates: the driver's own, and those of peers.
 //!
-//! A folder has all of them, for all drivers that name it:
+//! All are in one folder, for all drivers that name it:
 //!
 //! ```text
 //! pki/own/tickbus-4711.der      the certificate of the driver with id 4711: for peers to trust
@@ -22,40 +22,40 @@ use tickbus_fieldbus::BusError;
 
 use super::{Credentials, Line, Login, Policy, Secret, Trust, application};
 
-/// What all programs of this project say they are.
+/// The product name of all programs of this project.
 pub(super) const PRODUCT: &str = "tickbus";
 /// The URI of the product.
 pub(super) const PRODUCT_URI: &str = "urn:tickbus";
 
-/// Size of the own key, in bits: every policy takes it.
+/// Size of the driver's key, in bits: accepted by every policy.
 const KEY_BITS: u32 = 2048;
 
-/// For how long the own certificate is good, in days.
+/// Validity of the driver's certificate, in days.
 const DAYS: u32 = 3650;
 
-/// Certificates and names of one driver.
+/// The certificates and names of one driver.
 #[derive(Clone, Debug)]
 pub(super) struct Pki {
     /// The folder, absolute.
     pub(super) folder: PathBuf,
-    /// The own certificate and its key, within the folder.
+    /// The driver's certificate and its key, within the folder.
     pub(super) certificate: PathBuf,
     pub(super) key: PathBuf,
-    /// What the application is called for people.
+    /// The application name, for people.
     pub(super) application: String,
-    /// What it is called for programs.
+    /// The application URI, for programs.
     pub(super) uri: String,
     pub(super) trust: Trust,
-    /// A host that the own certificate names, too.
+    /// A host that the driver's certificate names as well.
     pub(super) host: Option<String>,
-    /// By which certificates are judged.
+    /// The clock against which certificates are checked.
     pub(super) wall: WallClock,
     directory: PathBuf,
     login: Option<Login>,
 }
 
 impl Pki {
-    /// Those of the driver of `line`.
+    /// The certificates and names of the driver of `line`.
     pub(super) fn new(credentials: &Credentials, line: Line<'_>) -> Self {
         let folder = line.directory.join(&credentials.pki);
         Self {
@@ -72,11 +72,11 @@ impl Pki {
         }
     }
 
-    /// Makes what is not there yet: the folders, the own certificate and its key.
+    /// Creates what is missing: the folders, the driver's certificate and its key.
     ///
     /// # Errors
     ///
-    /// They cannot be made, or what is there is not of this application or out of date.
+    /// They cannot be created, or the existing certificate is another application's or has expired.
     pub(super) fn prepare(&self) -> Result<(), BusError> {
         let cannot = |error: io::Error| {
             let folder = self.folder.display();
@@ -141,7 +141,7 @@ impl Pki {
         )))
     }
 
-    /// Whether the certificate of a server that calls itself `uri` is believed.
+    /// Checks whether the certificate of the server `uri` is trusted.
     ///
     /// # Errors
     ///
@@ -159,7 +159,7 @@ impl Pki {
         };
         let mut store = CertificateStore::new(&self.folder);
         store.set_trust_unknown_certs(self.trust == Trust::Any);
-        // That it is the one which was put there says more than the names in it.
+        // Only the file itself is compared: that it was put there says more than the names in it.
         store.set_skip_verify_certs(true);
         let policy = security_policy(policy);
         let name = CertificateStore::cert_file_name(&certificate);
@@ -192,7 +192,7 @@ impl Pki {
         }
     }
 
-    /// Whether a certificate is good today, and that of the application called `uri`.
+    /// Checks that a certificate is valid today, and belongs to the application `uri`.
     fn examine(&self, certificate: &X509, uri: &str) -> Result<(), String> {
         certificate
             .is_time_valid(&date((self.wall)()).as_chrono())
@@ -233,7 +233,7 @@ impl Pki {
     }
 }
 
-/// What the crate calls a policy.
+/// The crate's name for a policy.
 pub(super) fn security_policy(policy: Policy) -> SecurityPolicy {
     match policy {
         Policy::None => SecurityPolicy::None,
@@ -243,9 +243,9 @@ pub(super) fn security_policy(policy: Policy) -> SecurityPolicy {
     }
 }
 
-/// What the driver called `name` is called among all applications.
+/// The application URI of the driver called `name`.
 ///
-/// The name of the machine is no part of it: the other end can be set up before this one runs.
+/// The machine's name is not part of it, so that the other end can be configured before this one runs.
 fn application_uri(name: &str) -> String {
     use std::fmt::Write as _;
 
@@ -261,14 +261,14 @@ fn application_uri(name: &str) -> String {
     uri
 }
 
-/// The time of day, as OPC UA counts it.
+/// The time of day in OPC UA's format.
 pub(super) fn date(since_1970: Duration) -> DateTime {
     let seconds = i64::try_from(since_1970.as_secs()).ok();
     let time = seconds.and_then(|s| DateTimeUtc::from_timestamp(s, since_1970.subsec_nanos()));
     time.map_or_else(DateTime::endtimes, DateTime::from)
 }
 
-/// What is said of a service that ended with `status`.
+/// The meaning of a service's `status`.
 pub(super) fn meaning(status: StatusCode) -> String {
     let name = status.sub_code().name();
     match status.sub_code().description() {

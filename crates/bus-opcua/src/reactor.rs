@@ -1,4 +1,4 @@
-//! An async runtime that has no thread of its own: a bus thread runs it whenever it waits.
+//! An async runtime without a thread of its own: a bus thread runs it whenever it waits.
 
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,24 +10,24 @@ use tokio::sync::Notify;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::BusError;
 
-/// Runs tasks on the thread of its bus, while that waits for its deadline, its [`Stop`] or for news.
+/// Runs tasks on the thread of its bus while that waits for its deadline, its [`Stop`] or news.
 ///
-/// Deadlines are those of the driver's clock. What the tasks themselves wait for, such as the time-outs of
-/// OPC UA, is real time: the protocol's own clock cannot be handed in.
+/// Deadlines are on the driver's clock. The tasks themselves wait in real time, such as for time-outs of OPC
+/// UA: no clock can be injected into that crate.
 ///
-/// While it lives it is the waker of its token.
+/// While it exists it is the waker of its token.
 #[derive(Debug)]
 pub(super) struct Reactor {
-    /// There until it is dropped.
+    /// `Some` until it is dropped.
     runtime: Option<Runtime>,
     wake: Arc<Notify>,
     stop: Stop,
 }
 
-/// How a future that was driven ended.
+/// How driving a future ended.
 #[derive(Debug)]
 pub(super) enum Driven<T> {
-    /// It has come to its end.
+    /// It is complete.
     Done(T),
     /// The deadline came first.
     Late,
@@ -40,7 +40,7 @@ impl Reactor {
     ///
     /// # Errors
     ///
-    /// The system refused what it waits with.
+    /// The system refused the resources for waiting.
     pub(super) fn new(stop: &Stop) -> Result<Self, BusError> {
         let runtime = Builder::new_current_thread()
             .enable_io()
@@ -66,7 +66,7 @@ impl Reactor {
         self.runtime.as_ref().expect("it is dropped last")
     }
 
-    /// A list of news that ends waits.
+    /// A queue for news; an entry ends the wait.
     pub(super) fn inbox<T>(&self) -> Inbox<T> {
         Inbox {
             news: Arc::default(),
@@ -74,25 +74,25 @@ impl Reactor {
         }
     }
 
-    /// Calls `make`, which may start tasks of its own.
+    /// Calls `make`, which may start tasks.
     pub(super) fn within<T>(&self, make: impl FnOnce() -> T) -> T {
         let _context = self.runtime().enter();
         make()
     }
 
-    /// How many tasks have not ended yet.
+    /// The number of tasks that have not ended.
     pub(super) fn tasks(&self) -> usize {
         self.runtime().metrics().num_alive_tasks()
     }
 
-    /// Lets a task run during waits.
+    /// Starts a task that runs during waits.
     pub(super) fn spawn(&self, task: impl Future<Output = ()> + Send + 'static) {
-        // Nobody waits for its end: it ends with the runtime at the latest.
+        // Not awaited: it ends with the runtime at the latest.
         drop(self.runtime().spawn(task));
     }
 
-    /// Waits until `deadline` has come on `clock`, news have come, or the token was stopped or woken. It
-    /// may end early.
+    /// Waits until `deadline` has come on `clock`, news have arrived, or the token is stopped or woken. It
+    /// may return early.
     pub(super) fn wait(&self, clock: &dyn Clock, deadline: Nanos) {
         clock.wait_with(deadline, &self.stop, &mut |patience| {
             let patience = self.patience(patience);
@@ -100,7 +100,7 @@ impl Reactor {
         });
     }
 
-    /// Runs `future` until it ends, `deadline` has come on `clock`, or the token was stopped.
+    /// Runs `future` until it completes, `deadline` has come on `clock`, or the token is stopped.
     pub(super) fn drive<T>(
         &self,
         clock: &dyn Clock,
@@ -132,15 +132,15 @@ impl Reactor {
         }
     }
 
-    /// Runs `future` for taking leave, in real time and not for long: the clock may stand still.
+    /// Runs `future` to close something, in real time and with a limit: the driver's clock may stand still.
     pub(super) fn farewell(&self, limit: Duration, future: impl Future) {
         self.runtime().block_on(async {
-            // Who does not answer is left without.
+            // A peer that does not answer is not waited for any longer.
             let _ = tokio::time::timeout(limit, future).await;
         });
     }
 
-    /// A token that was roused before this wait would not rouse it again.
+    /// A token that was woken before this wait would not wake it again.
     fn patience(&self, patience: Option<Duration>) -> Option<Duration> {
         if self.stop.is_roused() {
             Some(Duration::ZERO)
@@ -152,7 +152,7 @@ impl Reactor {
     async fn pause(&self, patience: Option<Duration>) {
         match patience {
             None => self.wake.notified().await,
-            // The timer would take a millisecond for it; tasks that are ready, and sockets, get their turn.
+            // The timer would take a millisecond; ready tasks and sockets must get their turn without it.
             Some(Duration::ZERO) => tokio::task::yield_now().await,
             Some(span) => drop(tokio::time::timeout(span, self.wake.notified()).await),
         }
@@ -163,13 +163,13 @@ impl Drop for Reactor {
     fn drop(&mut self) {
         self.stop.set_waker(None);
         if let Some(runtime) = self.runtime.take() {
-            // Waits for nothing: tasks end where they stand.
+            // Does not wait: tasks are dropped where they are.
             runtime.shutdown_background();
         }
     }
 }
 
-/// News from tasks to the bus that waits.
+/// News from tasks to the waiting bus.
 #[derive(Debug)]
 pub(super) struct Inbox<T> {
     news: Arc<Mutex<Vec<T>>>,
@@ -186,7 +186,7 @@ impl<T> Clone for Inbox<T> {
 }
 
 impl<T> Inbox<T> {
-    /// Adds news, and ends the wait.
+    /// Adds one entry, and ends the wait.
     pub(super) fn push(&self, news: T) {
         self.lock().push(news);
         self.wake.notify_one();
@@ -197,14 +197,14 @@ impl<T> Inbox<T> {
         news.into_iter().for_each(|news| self.push(news));
     }
 
-    /// Takes all news, oldest first, by changing places with the empty `taken`.
+    /// Takes all entries, oldest first, by swapping with the empty `taken`.
     pub(super) fn take(&self, taken: &mut Vec<T>) {
         taken.clear();
         std::mem::swap(&mut *self.lock(), taken);
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<T>> {
-        // A list is whole between any two of its changes.
+        // The list is consistent after every change, so a poisoned lock is safe to use.
         self.news.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,30 +1,30 @@
-//! The folder of certificates that were turned away.
+//! The folder of rejected certificates.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// How many certificates the folder keeps: a peer may show ever new ones without logging in.
+/// How many certificates the folder keeps: a peer can present new ones without limit, before any login.
 const KEPT: usize = 50;
 
-/// The folder, as it was at the last look.
+/// The folder as of the last look.
 #[derive(Debug)]
 pub(super) struct Rejects {
     folder: PathBuf,
     known: BTreeSet<String>,
 }
 
-/// What a look has shown.
+/// The result of a look.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Found {
-    /// The files that came since the last look, and are kept.
+    /// The files added since the last look that are kept.
     pub(super) files: Vec<String>,
-    /// How many came in all.
+    /// The number of certificates added.
     pub(super) count: usize,
 }
 
 impl Rejects {
-    /// The folder as it is now, after a first clearing.
+    /// The folder as it is, after removing surplus certificates.
     pub(super) fn new(folder: PathBuf) -> Self {
         let mut rejects = Self {
             folder,
@@ -34,13 +34,13 @@ impl Rejects {
         rejects
     }
 
-    /// Looks what has come. Of more than [`KEPT`] certificates the oldest are deleted.
+    /// Looks for new certificates. Keeps the latest [`KEPT`] and deletes older ones.
     pub(super) fn look(&mut self) -> Found {
         let mut files = list(&self.folder);
         let is_new = |name: &&String| !self.known.contains(*name);
         let count = files.iter().filter(is_new).count();
         for name in files.drain(KEPT.min(files.len())..) {
-            // One that stays is met again at the next look.
+            // A file that cannot be deleted is found again at the next look.
             let _ = fs::remove_file(self.folder.join(name));
         }
         let kept: BTreeSet<String> = files.into_iter().collect();
@@ -50,7 +50,7 @@ impl Rejects {
     }
 }
 
-/// Certificates of a folder, the newest first.
+/// The certificates in a folder, newest first.
 fn list(folder: &Path) -> Vec<String> {
     let files = fs::read_dir(folder).into_iter().flatten().flatten();
     let dated = files.filter_map(|file| {

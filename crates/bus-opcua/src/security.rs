@@ -1,4 +1,4 @@
-//! What a driver.cfg says of encryption, certificates and logins: the same for both ends.
+//! Encryption, certificates and logins in a driver.cfg: the same keys for both ends.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Table, Value};
 /// The longest path, name or password, in characters.
 const TEXT_LIMIT: usize = 1000;
 
-/// The folder of certificates where a driver.cfg names none.
+/// The default folder of certificates.
 const PKI: &str = "pki";
 
 /// How messages are encrypted and signed.
@@ -15,7 +15,7 @@ const PKI: &str = "pki";
 pub enum Policy {
     /// Not at all.
     None,
-    /// `Basic256Sha256`: what nearly every server has.
+    /// `Basic256Sha256`: supported by nearly every server.
     Basic256Sha256,
     /// `Aes128_Sha256_RsaOaep`.
     Aes128Sha256RsaOaep,
@@ -24,7 +24,7 @@ pub enum Policy {
 }
 
 impl Policy {
-    /// All of them, by the names that OPC UA gives them.
+    /// All policies, by their names in OPC UA.
     pub const NAMES: [(&'static str, Self); 4] = [
         ("None", Self::None),
         ("Basic256Sha256", Self::Basic256Sha256),
@@ -32,14 +32,14 @@ impl Policy {
         ("Aes256_Sha256_RsaPss", Self::Aes256Sha256RsaPss),
     ];
 
-    /// Those that protect.
+    /// The policies that protect messages.
     pub const SECURE: [Self; 3] = [
         Self::Basic256Sha256,
         Self::Aes128Sha256RsaOaep,
         Self::Aes256Sha256RsaPss,
     ];
 
-    /// The name that OPC UA gives it.
+    /// Its name in OPC UA.
     pub fn name(self) -> &'static str {
         let mut names = Self::NAMES.iter();
         names
@@ -48,10 +48,10 @@ impl Policy {
     }
 }
 
-/// How much of that is done to messages.
+/// The message security mode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// Signed, and readable by everybody.
+    /// Signed, but readable by everyone.
     Sign,
     /// Signed and encrypted.
     #[default]
@@ -64,7 +64,7 @@ impl Mode {
         ("SignAndEncrypt", Self::SignAndEncrypt),
     ];
 
-    /// The name that OPC UA gives it.
+    /// Its name in OPC UA.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Sign => "Sign",
@@ -73,26 +73,26 @@ impl Mode {
     }
 }
 
-/// Whose certificates are believed.
+/// Which certificates are trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Trust {
     /// Those in the folder `trusted`.
     #[default]
     Listed,
-    /// Everybody's; each is filed in the folder `trusted`.
+    /// All; each is stored in the folder `trusted`.
     Any,
 }
 
-/// A user and where the password is.
+/// A user, and where to find the password.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Login {
     /// The user's name.
     pub user: String,
-    /// Where the password is.
+    /// Where to find the password.
     pub password: Secret,
 }
 
-/// Where a password is.
+/// Where to find a password.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Secret {
     /// In the first line of a file; relative to the folder of the driver.cfg.
@@ -103,7 +103,7 @@ pub enum Secret {
     Clear(String),
 }
 
-/// Without the password: options go into logs.
+/// Omits the password: options are logged.
 impl std::fmt::Debug for Secret {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -114,7 +114,7 @@ impl std::fmt::Debug for Secret {
     }
 }
 
-/// The keys of a driver.cfg that both ends have, as they stand there.
+/// The keys that both ends have, as written in the driver.cfg.
 pub(super) struct Keys<'a> {
     pub(super) security: Option<Value<'a>>,
     mode: Option<Value<'a>>,
@@ -125,24 +125,24 @@ pub(super) struct Keys<'a> {
     whole: bool,
 }
 
-/// A mistake was taken down.
+/// A mistake was reported.
 struct Reported;
 
-/// What those keys say.
+/// The values of those keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Credentials {
-    /// How much is done to messages that are protected at all.
+    /// The mode of messages that are protected.
     pub mode: Mode,
     /// The user, if there is one.
     pub login: Option<Login>,
     /// The folder of certificates; relative to the folder of the driver.cfg.
     pub pki: PathBuf,
-    /// Whose certificates are believed.
+    /// Which certificates are trusted.
     pub trust: Trust,
 }
 
 impl<'a> Keys<'a> {
-    /// Takes them from the table.
+    /// Takes the keys from the table.
     pub(super) fn take(table: &mut Table<'a>) -> Self {
         Self {
             security: table.take("security"),
@@ -156,12 +156,12 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// Whether a user is named, rightly or wrongly.
+    /// Whether a user is named, with or without mistakes.
     pub(super) fn has_user(&self) -> bool {
         self.user.is_some()
     }
 
-    /// Reads all but `security`.
+    /// Reads all keys except `security`.
     pub(super) fn read(&self) -> Option<Credentials> {
         let mode = self.mode.as_ref().map_or(Some(Mode::default()), |value| {
             value.choice("security modes", &Mode::NAMES)
@@ -182,7 +182,7 @@ impl<'a> Keys<'a> {
         })
     }
 
-    /// The user with the password, if there is one; an error has been reported.
+    /// The user and the password, if a user is named; errors have been reported.
     fn login(&self) -> Result<Option<Login>, Reported> {
         let user = self.user.as_ref().map(|value| {
             let user = value.label(TEXT_LIMIT, "write the name of the user")?;

@@ -1,4 +1,4 @@
-//! Where a server is, as a URL.
+//! The URL of a server.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,16 +11,16 @@ pub(super) const PORT: u16 = 4840;
 
 const SCHEME: &str = "opc.tcp://";
 
-/// The URL of a server: `opc.tcp://HOST:PORT/PATH`, where port 4840 and the path may be left out.
+/// The URL of a server: `opc.tcp://HOST:PORT/PATH`; port (4840) and path are optional.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Url {
     /// Host and port.
     pub address: Address,
-    /// What follows them, with its slash; empty for nothing.
+    /// The path with its slash; empty if there is none.
     pub path: String,
 }
 
-/// Why a text is no URL of a server.
+/// Why a text is not the URL of a server.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; {right}")]
 pub struct UrlError {
@@ -58,7 +58,7 @@ impl FromStr for Url {
         if path.contains(odd) {
             return refuse(format!("the url \"{}\" has an odd path", shown(text)));
         }
-        // The last colon of a bare IPv6 address is not that of a port.
+        // In a bare IPv6 address the last colon does not precede a port.
         let has_port = host
             .rsplit_once(':')
             .is_some_and(|(_, after)| !after.contains(']'));

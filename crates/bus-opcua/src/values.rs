@@ -1,24 +1,24 @@
-//! Between the frames of the image and the values of OPC UA.
+//! Converts between frames of the image and OPC UA values.
 
 use opcua::types::{DataTypeId, Variant, VariantScalarTypeId};
 
 use tickbus_image::signal::{Area, DataType, Plan, Signal, SignalTable, Slot, Width};
 
-/// The signals of one area of all stations, as values of OPC UA.
+/// The signals of one area of all stations, as OPC UA values.
 ///
-/// What stands on the wire is what stands in the frame: the raw value, without its scale.
+/// The value on the wire is the raw one in the frame, without its scale.
 #[derive(Debug)]
 pub(super) struct Values {
-    /// A plan for each station.
+    /// One plan per station.
     plans: Vec<Plan>,
     /// The bits of each signal of the table, as unsigned numbers.
     bits: Vec<Slot>,
-    /// Positions of the area's signals in the table, station by station.
+    /// The indices of the area's signals in the table, by station.
     signals: Vec<Vec<usize>>,
 }
 
 impl Values {
-    /// Those of `area`.
+    /// The values of `area`.
     pub(super) fn new(table: &SignalTable, area: Area) -> Self {
         let table = bits_of(table);
         let stations = 0..table.stations.len();
@@ -38,17 +38,17 @@ impl Values {
         }
     }
 
-    /// The area's signals of a station, by their positions in the table.
+    /// The area's signals of a station, as indices in the table.
     pub(super) fn signals(&self, station: usize) -> &[usize] {
         &self.signals[station]
     }
 
-    /// Takes over the values of a frame.
+    /// Reads the values of a frame.
     pub(super) fn take(&mut self, station: usize, frame: &[u8]) {
         self.plans[station].decode(frame, &mut self.bits);
     }
 
-    /// Writes the values into a frame; what no signal covers becomes zero.
+    /// Writes the values to a frame; bits that no signal covers become zero.
     pub(super) fn give(&self, station: usize, frame: &mut [u8]) {
         self.plans[station].encode(&self.bits, frame);
     }
@@ -64,8 +64,8 @@ impl Values {
     }
 }
 
-/// The table with every signal as the unsigned number that its bits are: so a plan carries all types
-/// unbent, NaN too.
+/// The table with every signal as an unsigned integer of the same size: so a plan preserves the bits of all
+/// types, NaN included.
 fn bits_of(table: &SignalTable) -> SignalTable {
     let signals = table.signals.iter().map(|signal| Signal {
         data_type: match signal.data_type.width() {
@@ -85,7 +85,7 @@ fn bits_of(table: &SignalTable) -> SignalTable {
     }
 }
 
-/// What OPC UA calls a type.
+/// The OPC UA type of a data type.
 pub(super) fn scalar(data_type: DataType) -> VariantScalarTypeId {
     match data_type {
         DataType::Bool => VariantScalarTypeId::Boolean,
@@ -119,7 +119,7 @@ pub(super) fn data_type_id(data_type: DataType) -> DataTypeId {
     }
 }
 
-/// The value that the bits of a signal are.
+/// A signal's bits as an OPC UA value.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

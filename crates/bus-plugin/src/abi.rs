@@ -1,4 +1,4 @@
-//! The mirror of `include/tickbus_fieldbus.h`: the same structs, numbers and functions.
+//! Mirrors `include/tickbus_fieldbus.h`: the same structs, constants and functions.
 
 use std::ffi::c_char;
 use std::marker::{PhantomData, PhantomPinned};
@@ -6,17 +6,17 @@ use std::marker::{PhantomData, PhantomPinned};
 /// The version of the interface.
 pub(super) const VERSION: u32 = 1;
 
-/// What `tickbus_open` returns when all is well.
+/// The result of a successful `tickbus_open`.
 pub(super) const OK: i32 = 0;
 
-/// What `tickbus_exchange` returns, summed up.
+/// The flags that `tickbus_exchange` returns, combined.
 pub(super) mod flag {
     pub(crate) const TAKEN: i32 = 1;
     pub(crate) const FRESH: i32 = 2;
     pub(crate) const ALIVE: i32 = 4;
 }
 
-/// What `tickbus_open` and `tickbus_exchange` return when they fail.
+/// The errors that `tickbus_open` and `tickbus_exchange` return.
 pub(super) mod error {
     pub(crate) const LINK: i32 = -1;
     pub(crate) const PROTOCOL: i32 = -2;
@@ -72,7 +72,7 @@ pub(super) struct Layout {
     pub(super) stations: *const *const Station,
 }
 
-/// `tickbus_bus`, of which only the library knows what it is.
+/// `tickbus_bus`, which only the library can look into.
 #[repr(C)]
 #[derive(Debug)]
 pub(super) struct Bus {
@@ -80,7 +80,7 @@ pub(super) struct Bus {
     _marker: PhantomData<(*mut u8, PhantomPinned)>,
 }
 
-/// The size of a struct, as its first member says it.
+/// The size of a struct, for its first member.
 pub(super) fn size_of<T>() -> u32 {
     u32::try_from(std::mem::size_of::<T>()).expect("structs are small")
 }
@@ -93,7 +93,7 @@ mod tests {
     use std::path::Path;
     use std::process::Command;
 
-    /// Each name in C with what it is here.
+    /// Each constant's name in C and its value here.
     fn numbers() -> Vec<(String, i64)> {
         macro_rules! members {
             ($list:ident, $c:literal, $rust:ty, $($member:ident)*) => {

@@ -1,25 +1,25 @@
-//! What a helper tells its host.
+//! Messages from a helper to its host.
 
 use super::Outcome;
 use super::wire::{Fields, Letter, Message, WireError};
 use tickbus_fieldbus::BusError;
 
-/// The longest text of an answer, in bytes.
+/// The longest text in an answer, in bytes.
 const TEXT_LIMIT: usize = 8000;
 
-/// What a helper tells its host.
+/// A message from a helper to its host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// It is there. Comes first and unasked.
+    /// It is there. Sent first, without a request.
     Hello {
         /// The version of its tickbus; both ends must have the same.
         version: String,
     },
     /// The library is loaded and its bus is open.
     Opened,
-    /// The exchange is done; what was received lies in the shared memory.
+    /// The exchange is complete; what was received is in the shared memory.
     Done(Outcome),
-    /// The library failed at what was asked last.
+    /// The last request failed in the library.
     Failed(BusError),
 }
 
@@ -43,7 +43,7 @@ impl Answer {
         .seal()
     }
 
-    /// What it is, for messages.
+    /// Its name in messages.
     pub(super) const fn name(&self) -> &'static str {
         match self {
             Self::Hello { .. } => "a hello",
@@ -54,7 +54,7 @@ impl Answer {
     }
 }
 
-/// As much of a text as an answer takes, in whole characters.
+/// As much of a text as an answer can hold, in whole characters.
 fn shortened(text: &str) -> &str {
     let mut end = text.len().min(TEXT_LIMIT);
     while !text.is_char_boundary(end) {
@@ -116,7 +116,7 @@ mod tests {
         ]
     }
 
-    /// All messages in `bytes`, handed in by pieces of `piece` bytes.
+    /// All messages in `bytes`, passed in pieces of `piece` bytes.
     fn read(bytes: &[u8], piece: usize) -> Result<Vec<Answer>, WireError> {
         let (mut inbox, mut found) = (Inbox::new(), Vec::new());
         for piece in bytes.chunks(piece) {

@@ -1,12 +1,12 @@
-//! The bus cycles of a plug-in, whoever calls the library.
+//! The bus cycles of a plug-in, with or without a helper process.
 
 use super::outcome::Outcome;
 use super::setup::Setup;
 use tickbus_base::time::{Nanos, Pace, Stop};
 use tickbus_fieldbus::{BusError, Port};
 
-/// A call that comes back later than this after its time-out is counted as slow: by as much a busy system
-/// delays any thread.
+/// A call that returns later than this after its time-out counts as slow: a busy system delays any thread by
+/// as much.
 const LATENESS: Nanos = Nanos::from_millis(10);
 
 /// Makes single exchanges.
@@ -14,14 +14,14 @@ pub(super) trait Exchange {
     /// The bytes to send in the next exchange.
     fn input(&mut self) -> &mut [u8];
 
-    /// Makes one exchange; `None` when it was stopped while it waited.
+    /// Makes one exchange; `None` if it was stopped while it waited.
     fn exchange(&mut self, port: &Port, stop: &Stop) -> Result<Option<Outcome>, BusError>;
 
-    /// The bytes that the last exchange received, if its outcome was fresh.
+    /// The bytes received by the last exchange, if its outcome was fresh.
     fn output(&self) -> &[u8];
 }
 
-/// Exchanges every cycle until `stop` says so.
+/// Exchanges every cycle until `stop`.
 pub(super) fn serve(
     line: &mut impl Exchange,
     setup: &Setup,
@@ -33,7 +33,7 @@ pub(super) fn serve(
     let mut pace = Pace::new(port.clock().now(), setup.cycle());
     while !stop.is_stopped() {
         let now = port.clock().now();
-        // A call sends and receives at once: where nothing is to be sent, there is none.
+        // A call sends and receives at once: if sending is suppressed, there is no call.
         if pace.take(now) && port.sends(now) {
             match cycle(line, setup, now, port, stop) {
                 Ok(Some(outcome)) if outcome.is_alive() && !is_running => {

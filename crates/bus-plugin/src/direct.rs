@@ -1,4 +1,4 @@
-//! The plug-in bus that calls the library on the bus thread itself.
+//! The plug-in bus that calls the library on the bus thread.
 
 use std::sync::Arc;
 
@@ -16,11 +16,11 @@ pub(super) struct Direct {
     setup: Setup,
     limits: Limits,
     calls: Calls,
-    /// Stays loaded from one attempt to the next: many a library bears being loaded once only.
+    /// Stays loaded between attempts: many libraries cannot be loaded twice in a process.
     library: Option<Library>,
 }
 
-/// What the statistics call the calls.
+/// The names of the calls in the statistics.
 #[derive(Debug)]
 struct Calls {
     load: Arc<str>,
@@ -49,15 +49,15 @@ impl Direct {
     }
 }
 
-/// How often somebody looks after a call that is under way.
+/// How often a call in progress is checked.
 const LOOK: Nanos = Nanos::from_millis(250);
 
 impl Free for Direct {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let cannot =
             |error: std::io::Error| BusError::Link(format!("the system refused a thread: {error}"));
-        // A call that does not return cannot say so itself. Its watch lives in the system's own time, whatever
-        // clock the driver has, and is left behind with the bus thread if that is.
+        // A call that does not return cannot report itself. Its watchdog uses the system's time, whatever
+        // clock the driver has, and is left behind with the bus thread if need be.
         let real = Monotonic::shared();
         let (watch, over) = (port.call_watch(), Stop::new());
         std::thread::scope(|scope| {
@@ -76,12 +76,12 @@ impl Free for Direct {
     }
 
     fn close_timeout(&self) -> Nanos {
-        // A call that is under way may use its time first.
+        // A call in progress may use its time first.
         self.setup.timeout() + self.limits.close
     }
 }
 
-/// Ends the watch, also when the bus panics.
+/// Ends the watchdog even if the bus panics.
 struct StopOnDrop<'a>(&'a Stop);
 
 impl Drop for StopOnDrop<'_> {
@@ -110,7 +110,7 @@ impl Direct {
         let ended = cycle::serve(&mut line, setup, port, stop);
         port.calling(&calls.close, limits.close, || drop(line));
         if stop.is_stopped() {
-            // Here, where somebody looks after the time: unloading runs code of the library, too.
+            // Here, while the watchdog is running: unloading also runs code of the library.
             let library = self.library.take();
             port.calling(&calls.unload, limits.close, || drop(library));
         }

@@ -1,7 +1,7 @@
-//! The helper process: `tickbus plugin-helper`, which calls a library for its host.
+//! The helper process: `tickbus plugin-helper`, which calls a library on behalf of its host.
 //!
-//! The host gives it two things in place of stdin and stdout: a socket for messages, and the file of the
-//! memory that both share. Both are moved out of the library's way first.
+//! The host passes two things in place of stdin and stdout: a socket for messages, and the file of the shared
+//! memory. Both are moved to other descriptors first, out of the library's way.
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -23,11 +23,11 @@ use tickbus_base::os::{SharedMemory, flush_log};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
 
-/// Serves the host at the other end of stdin until that ends.
+/// Serves the host on stdin until it ends.
 ///
 /// # Errors
 ///
-/// Nobody has started this process as a helper, or the host has gone away.
+/// This process was not started as a helper, or the host has gone.
 pub fn serve() -> io::Result<()> {
     let (mut host, memory) = Host::take_over()?;
     host.tell(&Answer::Hello {
@@ -50,12 +50,12 @@ pub fn serve() -> io::Result<()> {
     exchange(&mut host, &setup, &memory, bus)
 }
 
-/// Bytes of the memory that host and helper share: `in`, then `out` at the next whole word.
+/// Size of the shared memory: `in`, then `out` from the next whole word on.
 pub(super) fn memory_bytes(setup: &Setup) -> usize {
     out_word(setup) * size_of::<u64>() + setup.rx()
 }
 
-/// The word at which `out` begins in the shared memory.
+/// The first word of `out` in the shared memory.
 pub(super) fn out_word(setup: &Setup) -> usize {
     SharedMemory::words_for(setup.tx())
 }
@@ -85,15 +85,15 @@ fn exchange(
     Ok(())
 }
 
-/// The host, as its helper sees it.
+/// The host as its helper sees it.
 struct Host {
     line: UnixStream,
     inbox: Inbox,
 }
 
 impl Host {
-    /// Moves the socket and the memory's file away from stdin and stdout. Then a library that reads finds
-    /// nothing, and what it prints goes to stderr.
+    /// Moves the socket and the memory's file away from stdin and stdout. A library that then reads from
+    /// stdin finds nothing, and what it prints goes to stderr.
     fn take_over() -> io::Result<(Self, OwnedFd)> {
         let line = io::stdin().as_fd().try_clone_to_owned()?;
         let memory = io::stdout().as_fd().try_clone_to_owned()?;
@@ -114,7 +114,7 @@ impl Host {
         self.line.write_all(&answer.write())
     }
 
-    /// What the host asks next; `None` when it asks to end.
+    /// The host's next request; `None` if it asks the helper to end.
     fn next<M: Message>(&mut self) -> io::Result<Option<M>> {
         loop {
             if let Some(message) = self.inbox.take().map_err(io::Error::other)? {
@@ -130,7 +130,7 @@ impl Host {
         }
     }
 
-    /// Says why there is no bus, and waits for the host to end this.
+    /// Reports why there is no bus, and waits for the host to end this process.
     fn refuse(&mut self, error: BusError) -> io::Result<()> {
         self.tell(&Answer::Failed(error))?;
         while self.next::<Request>()?.is_some() {}
@@ -138,21 +138,21 @@ impl Host {
     }
 }
 
-/// Ends this process when its host has gone away and the library does not let it end within `grace`:
-/// nobody else would. Dropping what it gives calls that off.
+/// Kills this process if its host has gone and the library does not let it end within `grace`: nothing else
+/// would. Dropping the returned sender cancels that.
 fn guard(line: &UnixStream, grace: Duration) -> io::Result<mpsc::Sender<()>> {
     let line = line.try_clone()?;
     let (ended, end) = mpsc::channel();
     std::thread::Builder::new()
         .name("guard".to_owned())
         .spawn(move || {
-            // Nothing is asked for, so only the loss of the other end wakes it.
+            // No event is requested, so only the loss of the other end wakes it.
             let mut watched = [PollFd::new(&line, PollFlags::empty())];
             while poll(&mut watched, None).is_err() {}
             if end.recv_timeout(grace) == Err(mpsc::RecvTimeoutError::Timeout) {
                 log::error!("the host has gone away, and the library does not end: ending it");
                 flush_log(Nanos::from_millis(100));
-                // Nothing gentler is sure to work against a library that hangs.
+                // Nothing less is certain to work against a library that hangs.
                 let _ = kill_process(getpid(), Signal::KILL);
             }
         })?;

@@ -1,4 +1,4 @@
-//! The plug-in bus whose library lives in a helper process.
+//! The plug-in bus whose library runs in a helper process.
 
 #[cfg(target_vendor = "apple")]
 use std::io::Write as _;
@@ -25,17 +25,17 @@ use tickbus_base::os::{Interest, Poller, SharedMemory, Source};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::{BusError, Free, Port};
 
-/// How long a helper that is ended by force may take to end.
+/// How long a helper may take to end after it was killed.
 const END: Nanos = Nanos::from_secs(1);
 
-/// Has a helper process call the library.
+/// Lets a helper process call the library.
 #[derive(Debug)]
 pub(super) struct Isolated {
     setup: Setup,
     limits: Limits,
     program: PathBuf,
     name: String,
-    /// What the statistics call the calls.
+    /// The name of the calls in the statistics.
     exchange: Arc<str>,
     close: Arc<str>,
 }
@@ -81,12 +81,12 @@ impl Free for Isolated {
     }
 
     fn close_timeout(&self) -> Nanos {
-        // The library has its time to close; after that there is the helper to be ended.
+        // First the library has its time to close, then the helper is killed.
         self.setup.timeout() + self.limits.close + END
     }
 }
 
-/// An open bus in a helper.
+/// A bus that is open in a helper.
 struct Line<'a> {
     helper: Helper,
     setup: &'a Setup,
@@ -124,16 +124,16 @@ impl Exchange for Line<'_> {
     }
 }
 
-/// What a helper is doing while its host waits.
+/// What the host is waiting for.
 #[derive(Clone, Copy, Debug)]
 enum Waiting {
-    /// Starting.
+    /// For the helper to start.
     ForHello,
-    /// Calling this function of the library.
+    /// For this function of the library to return.
     For(&'static str),
 }
 
-/// A helper process; dropping it ends it, first by asking.
+/// A helper process; dropping it asks it to end, and kills it if it does not.
 #[derive(Debug)]
 struct Helper {
     child: Child,
@@ -141,7 +141,7 @@ struct Helper {
     inbox: Inbox,
     memory: SharedMemory,
     poller: Poller,
-    /// The system's own time, in which the helper lives whatever clock the driver has.
+    /// The system's time, in which the helper runs whatever clock the driver has.
     clock: Arc<Monotonic>,
     program: PathBuf,
     library: String,
@@ -176,7 +176,7 @@ impl Helper {
         })
     }
 
-    /// Has the library loaded and opened; `false` when it was stopped meanwhile.
+    /// Makes it load the library and open the bus; `false` if it was stopped meanwhile.
     fn open(&mut self, bus: &Isolated, stop: &Stop) -> Result<bool, BusError> {
         let limit = bus.limits.open;
         match self.ask(None, Waiting::ForHello, limit, stop)? {
@@ -203,8 +203,8 @@ impl Helper {
         }
     }
 
-    /// Sends a request, if there is one, and waits for the answer; `None` when stopped. What the library
-    /// says against it is an error.
+    /// Sends a request, if any, and waits for the answer; `None` if stopped. A failure in the library is an
+    /// error.
     fn ask(
         &mut self,
         request: Option<&Request>,
@@ -252,7 +252,7 @@ impl Helper {
         }
     }
 
-    /// Sends as much as goes out at once, and gives the rest.
+    /// Sends as much as the socket accepts at once; returns the rest.
     fn send<'b>(&mut self, mut bytes: &'b [u8], what: Waiting) -> Result<&'b [u8], BusError> {
         while !bytes.is_empty() {
             match send_quietly(&self.line, bytes) {
@@ -282,9 +282,10 @@ impl Helper {
         }
     }
 
-    /// The helper has closed its end: it has died, or the library has closed what is not its own.
+    /// The helper's end of the socket is closed: the helper has died, or the library has closed a descriptor
+    /// that is not its own.
     fn lost(&mut self, what: Waiting, detail: &str) -> BusError {
-        // One that has died keeps its exit status, whatever is sent after it.
+        // If it has died already, it keeps its exit status.
         let _ = self.child.kill();
         let status = self.child.wait();
         let killed = Some(Signal::KILL.as_raw());
@@ -336,13 +337,13 @@ impl Helper {
         ))
     }
 
-    /// Asks the helper to end, and waits for that; `false` when it has not ended in time.
+    /// Asks the helper to end, and waits for that; `false` if it has not ended in time.
     fn ends_by_itself(&mut self) -> io::Result<bool> {
         self.line.shutdown(Shutdown::Write)?;
         self.line.set_nonblocking(false)?;
         let grace = self.grace.to_duration();
         self.line.set_read_timeout(Some(grace))?;
-        // At most the answer to what was asked last is still to come.
+        // At most the answer to the last request is still to come.
         for _ in 0..3 {
             match self.line.read(&mut [0; 4096]) {
                 Ok(0) => return Ok(true),
@@ -365,14 +366,14 @@ impl Drop for Helper {
                 self.grace
             );
         }
-        // One that has ended by itself has closed its line and is at its end; it keeps its status.
+        // If it has ended by itself, it keeps its exit status.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Writes to a socket whose other end may be gone, without the signal that would end a process for that:
-/// the process is not ours, and may not ignore it.
+/// Writes to a socket whose other end may be gone, without SIGPIPE: the process belongs to the host's
+/// application, which may not ignore that signal.
 #[cfg(not(target_vendor = "apple"))]
 fn send_quietly(line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
     Ok(rustix::net::send(
@@ -387,8 +388,8 @@ fn send_quietly(mut line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
     line.write(bytes)
 }
 
-/// Starts a helper with its line and its memory in place of stdin and stdout. What it prints goes to
-/// stderr, and Ctrl-C at the terminal goes to the host alone.
+/// Starts a helper with its socket and its memory in place of stdin and stdout. What it prints goes to
+/// stderr, and Ctrl-C at the terminal reaches only the host.
 fn spawn(program: &Path, line: OwnedFd, memory: OwnedFd) -> io::Result<Child> {
     Command::new(program)
         .arg("plugin-helper")
@@ -399,7 +400,7 @@ fn spawn(program: &Path, line: OwnedFd, memory: OwnedFd) -> io::Result<Child> {
         .spawn()
 }
 
-/// How a process ended, in words.
+/// How a process ended, as text.
 fn end_of(status: ExitStatus) -> String {
     let names = [
         (Signal::SEGV, "SIGSEGV"),

@@ -1,8 +1,8 @@
 //! The plug-in bus: a vendor's shared library behind the C interface of `include/tickbus_fieldbus.h`.
 //!
-//! `direct` calls the library on the bus thread. `isolated` has a helper process
-//! call it: the image lies in memory that both share, and short messages say whose turn it is. Either
-//! way the same loop (`cycle`) makes the bus cycles, and the same code (`library`) calls the library.
+//! `direct` calls the library on the bus thread. `isolated` lets a helper process call it: the image is in
+//! shared memory, and short messages pass the turn. In both cases the same loop (`cycle`) makes the bus
+//! cycles, and the same code (`library`) calls the library.
 
 mod abi;
 #[cfg(unix)]
@@ -39,11 +39,11 @@ pub use wire::{Fields, Inbox, Message, WireError};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Free;
 
-/// The version that host and helper must have in common.
+/// The version that host and helper must share.
 #[cfg(unix)]
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// How long calls into the library may last.
+/// How long library calls may last.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     /// Loading it, and opening the bus.
@@ -57,9 +57,9 @@ struct Limits {
 /// Why there is no such bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// Another driver.cfg would help: what was looked for, and what to do.
+    /// The driver.cfg must be changed: what was searched for, and what to do.
     Config(String),
-    /// This system does not have what the driver.cfg asks for.
+    /// This system does not support what the driver.cfg asks for.
     Unsupported(String),
 }
 
@@ -67,7 +67,7 @@ pub enum Refusal {
 ///
 /// # Errors
 ///
-/// The library's file is not there, or there is no helper for it: what was looked for, and what to do.
+/// The library's file does not exist, or there is no helper for it: what was searched for, and what to do.
 pub fn open(options: &Options, line: Line<'_>) -> Result<Box<dyn Free>, Refusal> {
     let library = absolute(line.directory, &options.library);
     if !library.is_file() {
@@ -109,9 +109,9 @@ fn isolated(_: &Options, _: &Path, _: Setup, _: Limits) -> Result<Box<dyn Free>,
     ))
 }
 
-/// A path of the driver.cfg, which begins at its folder.
+/// A path in the driver.cfg, relative to its folder.
 fn absolute(directory: &Path, path: &Path) -> PathBuf {
     let joined = directory.join(path);
-    // It fails where the current folder is gone; then the path is as good as it gets.
+    // Fails if the current folder was deleted; then the path stays relative.
     std::path::absolute(&joined).unwrap_or(joined)
 }

@@ -1,9 +1,8 @@
 //! A vendor's shared library behind safe functions.
 //!
-//! This is the one place of the plug-in bus where foreign code is called. What is checked of it is
-//! checked here: the symbols, the version, the return codes, the texts, and the bytes behind `out`.
-//! What cannot be checked (that it keeps its hands off the rest of the process) is what
-//! `isolated = true` is for.
+//! This is the only place where the plug-in bus calls foreign code. Whatever can be checked is checked here:
+//! the symbols, the version, the return codes, the texts, and the bytes behind `out`. What cannot be checked
+//! (that it does not damage the rest of the process) is what `isolated = true` is for.
 
 #![allow(unsafe_code, reason = "a vendor's library is loaded and called")]
 
@@ -17,10 +16,10 @@ use super::setup::Setup;
 use tickbus_base::os::{self, one_line};
 use tickbus_fieldbus::{BusError, Role};
 
-/// Bytes behind `out` that a library must leave alone.
+/// Bytes behind `out` that a library must not change.
 const GUARD: usize = 256;
 
-/// The longest text that is taken from a library, in bytes.
+/// The longest text accepted from a library, in bytes.
 const TEXT_LIMIT: usize = 1000;
 
 // The five functions of the header.
@@ -30,7 +29,7 @@ type Exchange = unsafe extern "C" fn(*mut abi::Bus, *const u8, *mut u8, u32) -> 
 type LastError = unsafe extern "C" fn(*mut abi::Bus) -> *const c_char;
 type Close = unsafe extern "C" fn(*mut abi::Bus);
 
-/// A loaded library with its functions, which are only good as long as it is loaded.
+/// A loaded library and its functions, which are valid only while it is loaded.
 #[derive(Debug)]
 pub(super) struct Library {
     open: Open,
@@ -47,7 +46,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// [`BusError::Link`] in the loader's words, or [`BusError::Protocol`] when it is no plug-in, or one
+    /// [`BusError::Link`] with the loader's message, or [`BusError::Protocol`] if it is not a plug-in, or one
     /// for another version.
     pub(super) fn load(path: &Path) -> Result<Self, BusError> {
         let name = path.file_name().unwrap_or(path.as_os_str());
@@ -59,7 +58,7 @@ impl Library {
             ))
         })?;
         let version: AbiVersion = symbol(&loaded, &name, "tickbus_abi_version")?;
-        // SAFETY: the header gives this symbol this type, and demands that it can be called first.
+        // SAFETY: the header declares this symbol with this type, and demands that it can be called first.
         let version = unsafe { version() };
         if version != abi::VERSION {
             return Err(BusError::Protocol(format!(
@@ -82,7 +81,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// What the library says, by its code.
+    /// What the library reports, by its code.
     pub(super) fn open(&self, setup: &Setup) -> Result<Bus<'_>, BusError> {
         let texts = Texts::new(setup);
         let options = texts.options();
@@ -129,7 +128,7 @@ impl Library {
         Ok(Bus {
             library: self,
             handle,
-            // At least one byte, so that a pointer to nothing is a pointer to memory all the same.
+            // At least one byte, so that the pointer is valid even if there is nothing to send.
             input: vec![0; setup.tx().max(1)].into(),
             tx: setup.tx(),
             output: (0..setup.rx())
@@ -161,7 +160,7 @@ impl Library {
     }
 }
 
-/// A function of the library, of the type that the header gives it.
+/// A function of the library, with the type declared by the header.
 fn symbol<T: Copy>(library: &os::Library, name: &str, symbol: &str) -> Result<T, BusError> {
     // SAFETY: `T` is the type of the mirror in `abi`, which a test compares with the header, for this
     // symbol. The caller keeps the library together with the function.
@@ -181,7 +180,7 @@ pub(super) struct Bus<'l> {
     handle: NonNull<abi::Bus>,
     input: Box<[u8]>,
     tx: usize,
-    /// What the library fills, and the guard behind it.
+    /// The buffer that the library fills, and the guard behind it.
     output: Box<[u8]>,
     rx: usize,
 }
@@ -192,16 +191,16 @@ impl Bus<'_> {
         &mut self.input[..self.tx]
     }
 
-    /// The bytes that the last exchange received, if its outcome was fresh.
+    /// The bytes received by the last exchange, if its outcome was fresh.
     pub(super) fn output(&self) -> &[u8] {
         &self.output[..self.rx]
     }
 
-    /// Makes one bus cycle.
+    /// Performs one bus cycle.
     ///
     /// # Errors
     ///
-    /// What the library says, by its code, or that it does not keep to the interface.
+    /// What the library reports, by its code, or that it violates the interface.
     pub(super) fn exchange(&mut self, timeout_ms: u32) -> Result<Outcome, BusError> {
         let (input, output) = (self.input.as_ptr(), self.output.as_mut_ptr());
         // SAFETY: the function is of the library that `self.library` keeps loaded, with the type of the header;
@@ -222,8 +221,8 @@ impl Bus<'_> {
         })
     }
 
-    /// Whether the bytes behind `out` are as they were. They are mended, so that the next exchange is
-    /// judged for itself.
+    /// Checks that the bytes behind `out` are unchanged, and restores them, so that the next exchange is
+    /// checked on its own.
     fn check_guard(&mut self) -> Result<(), BusError> {
         let behind = &mut self.output[self.rx..];
         let last = behind
@@ -253,7 +252,7 @@ impl Drop for Bus<'_> {
     }
 }
 
-/// What stands at byte `at` of the guard: no two neighbours alike, so that no plain fill looks like it.
+/// Byte `at` of the guard: adjacent bytes differ, so that no constant fill looks like it.
 fn guard(at: usize) -> u8 {
     u8::try_from((at * 37 + 0xA5) % 251).expect("below 251")
 }
@@ -262,7 +261,7 @@ fn count(number: usize) -> u32 {
     u32::try_from(number).expect("an image is far below 4 GiB")
 }
 
-/// The texts of a setup as C has them.
+/// The texts of a setup as C strings.
 struct Texts {
     name: CString,
     directory: CString,
@@ -273,7 +272,7 @@ struct Texts {
 impl Texts {
     fn new(setup: &Setup) -> Self {
         let c = |text: &str| {
-            // Reading the driver.cfg has refused every NUL.
+            // NUL characters were refused when the driver.cfg was read.
             CString::new(text.replace('\0', "")).expect("no NUL is left")
         };
         Self {
@@ -330,7 +329,7 @@ mod tests {
     use std::path::PathBuf;
     use std::process::Command;
 
-    /// A folder with the misbehaving plug-in in it.
+    /// A folder that contains the misbehaving plug-in.
     struct Plugin(tempfile::TempDir);
 
     impl Plugin {

@@ -1,4 +1,4 @@
-//! Finding the tickbus command, to start helper processes with.
+//! Finds the tickbus command for starting helper processes.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -8,22 +8,22 @@ use tickbus_base::os;
 /// The variable that names the command.
 const VARIABLE: &str = "TICKBUS_HELPER";
 
-/// A place to look at: what people call it, and the file, or why there is none.
+/// A place to look in: its description, and the file, or why there is none.
 type Place = (&'static str, Result<PathBuf, String>);
 
 /// The tickbus command.
 ///
-/// `named` is what the driver.cfg in the folder `directory` says. Without it the process itself is no good: it
-/// may be a Java VM.
+/// `named` is the key in the driver.cfg in the folder `directory`. Without it, the executable of this process
+/// cannot be used: it may be a Java VM.
 ///
 /// # Errors
 ///
-/// Every place that was looked at, and what to do.
+/// Every place that was searched, and what to do.
 pub(super) fn helper(named: Option<PathBuf>, directory: &Path) -> Result<PathBuf, String> {
     search(places(named, directory))
 }
 
-/// What is named counts alone: another program than the one that was asked for would be no help.
+/// A named command is the only candidate: running any other one would not be what was asked for.
 fn places(named: Option<PathBuf>, directory: &Path) -> Vec<Place> {
     if let Some(path) = named {
         return vec![("`helper` in the driver.cfg", Ok(path))];

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the plug-in bus.
+//! The options of the plug-in bus in a driver.cfg.
 
 use std::path::PathBuf;
 
@@ -11,15 +11,15 @@ const OPTION_LIMIT: usize = 100;
 /// The longest key or value of `options`, in bytes.
 const TEXT_LIMIT: usize = 4000;
 
-/// The longest time-out: the library is given it in milliseconds that fit into an `int32_t`.
+/// The longest time-out: the library gets it as milliseconds in an `int32_t`.
 const TIMEOUT_LIMIT: Nanos = Nanos::from_secs(24 * 3600);
 
-/// What a driver.cfg says to the plug-in bus.
+/// The options of the plug-in bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The library's file, as it is written: relative to the folder of the driver.cfg.
+    /// The library's file as written: relative to the folder of the driver.cfg.
     pub library: PathBuf,
-    /// What the library itself is told, as pairs of key and value, sorted by key.
+    /// The options for the library itself, as key-value pairs sorted by key.
     pub options: Vec<(String, String)>,
     /// How long one exchange may wait for the peer; `None` leaves it to the cycle. Positive.
     pub timeout: Option<Nanos>,
@@ -29,12 +29,12 @@ pub struct Options {
     pub call_timeout: Nanos,
     /// How long closing waits for the library. Positive.
     pub close_timeout: Nanos,
-    /// Whether the library runs in a process of its own.
+    /// Whether the library runs in a separate process.
     pub isolated: bool,
-    /// The tickbus command to start that process with; `None` looks for it. Relative to the folder of
-    /// the driver.cfg.
+    /// The tickbus command for starting that process; `None` searches for it. Relative to the folder of the
+    /// driver.cfg.
     pub helper: Option<PathBuf>,
-    /// Whether every change that the peer makes is reported as an event, beside the image.
+    /// Whether every change by the peer is reported as an event, in addition to the image.
     pub events: bool,
 }
 
@@ -136,7 +136,7 @@ fn read_options(value: &Value<'_>) -> Option<Vec<(String, String)>> {
     read
 }
 
-/// The text that the library is given for one option.
+/// The text that the library gets for one option.
 fn read_option(key: &str, value: &Value<'_>) -> Option<String> {
     let number = value.written();
     let text = if number.ends_with('…') {
@@ -154,7 +154,7 @@ fn read_option(key: &str, value: &Value<'_>) -> Option<String> {
             .text("write a text, a number, true or false")?
             .to_owned()
     };
-    // The library gets them as C strings, which end at the first NUL.
+    // The library gets C strings, which end at the first NUL.
     if let Some(odd) = [key, &text].into_iter().find(|part| part.contains('\0')) {
         value.wrong(
             format!("the option has a NUL character in it: \"{}\"", shown(odd)),

@@ -1,17 +1,17 @@
-//! What the numbers mean that a library returns.
+//! The meaning of the numbers that a library returns.
 
 use super::abi::{error, flag};
 use tickbus_fieldbus::BusError;
 
-/// What an exchange came to.
+/// The result of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome(u8);
 
 impl Outcome {
-    /// Nothing was heard of the peer.
+    /// Nothing was heard from the peer.
     pub const NOTHING: Self = Self(0);
 
-    /// The outcome with this sum of flags, if it is one.
+    /// The outcome with this combination of flags, if valid.
     pub fn from_code(code: i32) -> Option<Self> {
         let known = 0..=flag::TAKEN + flag::FRESH + flag::ALIVE;
         known
@@ -19,7 +19,7 @@ impl Outcome {
             .then(|| Self(u8::try_from(code).expect("below 8")))
     }
 
-    /// The sum of flags.
+    /// The combination of flags.
     pub fn code(self) -> u8 {
         self.0
     }
@@ -29,12 +29,12 @@ impl Outcome {
         i32::from(self.0) & flag::TAKEN != 0
     }
 
-    /// A new whole image has come.
+    /// A new whole image has arrived.
     pub fn is_fresh(self) -> bool {
         i32::from(self.0) & flag::FRESH != 0
     }
 
-    /// The peer showed life, in whatever way.
+    /// The peer gave any sign of life.
     pub fn is_alive(self) -> bool {
         self != Self::NOTHING
     }
@@ -56,7 +56,7 @@ impl Function {
     }
 }
 
-/// The error that `code` of the library called `name` stands for, with the library's own `text`.
+/// The error for `code` of the library called `name`, with the library's own `text`.
 pub(super) fn failure(name: &str, function: Function, code: i32, text: Option<&str>) -> BusError {
     let (kind, symbol, silent): (fn(String) -> BusError, _, _) = match code {
         error::LINK => (BusError::Link, "LINK", "check card, cable and peer"),

@@ -1,4 +1,4 @@
-//! What a host asks of its helper.
+//! Messages from a host to its helper.
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt as _;
@@ -10,16 +10,16 @@ use tickbus_fieldbus::Role;
 /// The most options or stations of a setup.
 const LIST_LIMIT: u32 = 10_000;
 
-/// What a host asks of its helper. The end of the stream asks it to close and end.
+/// A request from a host to its helper. The end of the stream asks it to close and end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Request {
-    /// Load the library and open its bus. Comes first.
+    /// Load the library and open its bus. Sent first.
     Open {
         setup: Setup,
-        /// How long the library may take to close, in milliseconds, when the host has gone away.
+        /// How long the library may take to close, in milliseconds, if the host has gone.
         grace_ms: u64,
     },
-    /// Exchange: what is to be sent lies in the shared memory.
+    /// Exchange: the bytes to send are in the shared memory.
     Exchange,
 }
 

@@ -1,4 +1,4 @@
-//! All that a library has to be told to open its bus.
+//! What a library needs to open its bus.
 
 use std::path::{Path, PathBuf};
 
@@ -7,21 +7,21 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{CYCLE, Role};
 use tickbus_image::signal::{Area, SignalTable};
 
-/// The least time-out of an exchange where a driver.cfg states none.
+/// The smallest default time-out of an exchange.
 const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);
 
-/// A driver, as its bus is told about it.
+/// What a bus needs to know about its driver.
 #[derive(Clone, Copy, Debug)]
 pub struct Line<'a> {
     /// The driver's name.
     pub name: &'a str,
-    /// Where its driver.cfg stands.
+    /// The folder of its driver.cfg.
     pub directory: &'a Path,
     /// Which end of the bus it is.
     pub role: Role,
     /// Its stations.
     pub table: &'a SignalTable,
-    /// The bus cycle, where the driver.cfg states one.
+    /// The bus cycle, if stated.
     pub cycle: Option<Nanos>,
     /// Data older than this are stale.
     pub max_age: Nanos,
@@ -38,22 +38,22 @@ pub struct Station {
     pub rx: u32,
 }
 
-/// All that a library has to be told to open its bus, and where it is.
+/// What a library needs to open its bus, and the library's file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setup {
     /// The library's file, absolute.
     pub library: PathBuf,
     /// The driver's name.
     pub name: String,
-    /// Where the driver.cfg stands.
+    /// The folder of the driver.cfg.
     pub directory: String,
     /// Which end of the bus this is.
     pub role: Role,
-    /// The library's own options, as pairs of key and value without NUL.
+    /// The library's own options, as key-value pairs without NUL.
     pub options: Vec<(String, String)>,
     /// The stations, in order; at least one.
     pub stations: Vec<Station>,
-    /// What an exchange is given, in milliseconds; at least 1.
+    /// The time-out of an exchange in milliseconds; at least 1.
     pub timeout_ms: u32,
     /// The bus cycle in nanoseconds.
     pub cycle_ns: u64,
@@ -91,13 +91,13 @@ impl Setup {
         }
     }
 
-    /// Bytes that one exchange sends.
+    /// Bytes sent by one exchange.
     pub(super) fn tx(&self) -> usize {
         let bytes = self.stations.iter().map(|station| station.tx as usize);
         bytes.sum()
     }
 
-    /// Bytes that one exchange receives.
+    /// Bytes received by one exchange.
     pub(super) fn rx(&self) -> usize {
         let bytes = self.stations.iter().map(|station| station.rx as usize);
         bytes.sum()

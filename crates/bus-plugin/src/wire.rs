@@ -1,24 +1,24 @@
-//! How host and helper write messages for each other: length, kind, fields.
+//! The format of messages between host and helper: length, kind, fields.
 //!
-//! A message is a 32-bit length, one byte that says its kind, and its fields; the length counts kind and
-//! fields. Numbers are little-endian, texts a 32-bit length and their bytes. Both ends are the same
-//! program on the same computer; what is checked is checked because a library may have damaged its helper.
+//! A message is a 32-bit length, one byte with its kind, and its fields; the length counts kind and fields.
+//! Numbers are little-endian; a text is a 32-bit length and its bytes. Both ends are the same program on the
+//! same computer; messages are checked because a library may have damaged its helper.
 
-/// Why bytes are no message.
+/// Why bytes are not a message.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum WireError {
-    /// The length is beyond what any message has.
+    /// The length exceeds that of any message.
     #[error("a message of {length} bytes, expected at most {most}")]
     TooLong {
-        /// The length that the message states.
+        /// The stated length.
         length: usize,
-        /// The most that is taken.
+        /// The longest accepted length.
         most: usize,
     },
-    /// There is no such kind of message.
+    /// The kind of message does not exist.
     #[error("a message of the unknown kind {0}")]
     Kind(u8),
-    /// The fields end too early, go on too long, or have values that they cannot have.
+    /// The fields end too early, are too long, or have invalid values.
     #[error("a message of kind {kind} with {what}")]
     Fields {
         /// The kind of message.
@@ -30,39 +30,39 @@ pub enum WireError {
 
 /// A message of one direction.
 pub trait Message: Sized {
-    /// The longest, in bytes of kind and fields.
+    /// The longest message: kind and fields, in bytes.
     const MOST: usize;
 
     /// Reads the fields of a message of this kind.
     ///
     /// # Errors
     ///
-    /// The kind is unknown or the fields are wrong.
+    /// The kind is unknown, or the fields are wrong.
     fn read(kind: u8, fields: &mut Fields<'_>) -> Result<Self, WireError>;
 }
 
-/// Cuts a stream of bytes into messages.
+/// Splits a stream of bytes into messages.
 #[derive(Debug, Default)]
 pub struct Inbox {
     bytes: Vec<u8>,
 }
 
 impl Inbox {
-    /// An inbox without bytes.
+    /// An empty inbox.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes bytes as they come.
+    /// Appends received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// The next whole message, if one has come.
+    /// The next whole message, if it has arrived.
     ///
     /// # Errors
     ///
-    /// The bytes are no message. There is no way to go on behind them.
+    /// The bytes are not a message. There is no way to continue after them.
     pub fn take<M: Message>(&mut self) -> Result<Option<M>, WireError> {
         let Some((length, rest)) = self.bytes.split_first_chunk::<4>() else {
             return Ok(None);
@@ -152,7 +152,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// A message as it is written, field by field.
+/// A message being written, field by field.
 #[derive(Debug)]
 pub(super) struct Letter(Vec<u8>);
 

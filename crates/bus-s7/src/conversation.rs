@@ -1,4 +1,4 @@
-//! A server's side of one connection, without I/O: packets in, packets out, over a memory that is handed in.
+//! The server's side of one connection, without I/O: packets in, packets out, on a memory that is passed in.
 
 use std::ops::Range;
 
@@ -10,28 +10,28 @@ use super::userdata::{self, Ask, Rest};
 use super::{Fault, Tsap};
 use tickbus_base::time::Nanos;
 
-/// So many jobs a client may have under way, at most; they are answered in order.
+/// The most jobs that a client may have pending; they are answered in order.
 const JOBS: u16 = 8;
 
-/// The transport size that is agreed to at most: 1024 bytes.
+/// The largest transport size agreed to: 1024 bytes.
 const LARGEST_TPDU: u8 = 10;
 
-/// This server's reference of every connection: there is one connection per socket.
+/// The server's reference, the same on every connection: a socket carries only one.
 const REFERENCE: u16 = 1;
 
-/// What the variables of a server are kept in.
+/// The variables of a server.
 ///
-/// A job reads and writes pieces one after the other and is one whole: what it reads belongs together, and what
-/// it wrote counts once [`done`](Self::done) is called.
+/// A job reads and writes pieces one after another, but is a unit: what it reads is consistent, and what it
+/// writes takes effect when [`done`](Self::done) is called.
 pub trait Memory {
-    /// Bytes of an object that a job reads. They go out in its answer.
+    /// Bytes of an object that a job reads. They are sent in its answer.
     ///
     /// # Errors
     ///
     /// The code of the item.
     fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code>;
 
-    /// A byte of an object of which a job reads one bit. That alone goes out in its answer.
+    /// A byte of an object of which a job reads one bit. Only this bit is sent in its answer.
     ///
     /// # Errors
     ///
@@ -55,14 +55,14 @@ pub trait Memory {
     /// The code of the item.
     fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, Code>;
 
-    /// A job is done, whatever it was.
+    /// A job has been processed, successfully or not.
     fn done(&mut self);
 
-    /// The data blocks that there are, with their lengths, in order of their numbers.
+    /// The data blocks and their lengths, in order of their numbers.
     fn blocks(&self) -> &[(u16, usize)];
 }
 
-/// One client's conversation.
+/// The conversation with one client.
 #[derive(Debug)]
 pub struct Conversation {
     phase: Phase,
@@ -71,19 +71,19 @@ pub struct Conversation {
     /// The longest unit.
     pdu: u16,
     called: Tsap,
-    /// The pieces of a message whose last one has not come.
+    /// Received pieces of an incomplete message.
     pieces: Vec<u8>,
-    /// What is still to be fetched of a list.
+    /// The part of a list that the client has not read yet.
     rest: Option<Rest>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// The client has to ask for a connection.
+    /// The client must request a connection.
     Opening,
-    /// It has one, and has to agree on the length of units.
+    /// It is connected, and must negotiate the PDU length.
     Connected,
-    /// Jobs are done.
+    /// It may send jobs.
     Agreed,
 }
 
@@ -101,17 +101,17 @@ impl Default for Conversation {
 }
 
 impl Conversation {
-    /// The end that the client asked for; empty before it has connected.
+    /// The TSAP that the client connected to; empty before that.
     pub fn called(&self) -> Tsap {
         self.called
     }
 
-    /// Takes the first packet in `bytes`, and appends the answer to `reply`: gives its length, or 0 when it is not
-    /// whole yet.
+    /// Processes the first packet in `bytes` and appends the answer to `reply`. Returns the packet's length,
+    /// or 0 if it is incomplete.
     ///
     /// # Errors
     ///
-    /// The client does not keep to the protocol, or ends the connection. Nothing more is to be sent.
+    /// The client violates the protocol, or ends the connection. Nothing more is to be sent.
     pub fn packet(
         &mut self,
         now: Nanos,
@@ -140,7 +140,7 @@ impl Conversation {
 
     fn connect(&mut self, request: &Connect<'_>, reply: &mut Vec<u8>) {
         let size = request.size.map(|size| size.min(LARGEST_TPDU));
-        // Without a size there is no limit, by RFC 1006.
+        // Without a size there is no limit, according to RFC 1006.
         self.size = size.unwrap_or(*transport::SIZES.end());
         self.called = Tsap::new(request.called);
         self.phase = Phase::Connected;
@@ -163,7 +163,7 @@ impl Conversation {
         reply: &mut Vec<u8>,
     ) -> Result<(), Fault> {
         if last && self.pieces.is_empty() {
-            // An empty message is a sign of life.
+            // An empty message is a keep-alive.
             return if bytes.is_empty() {
                 Ok(())
             } else {
@@ -226,7 +226,7 @@ impl Conversation {
         Ok(())
     }
 
-    /// Agrees on the length of units and the number of jobs.
+    /// Negotiates the PDU length and the number of pending jobs.
     fn agree(&mut self, pdu: &Pdu<'_>, facts: &Facts, reply: &mut Vec<u8>) -> Result<(), u16> {
         let [_, _, g0, g1, d0, d1, l0, l1] = *pdu.parameters else {
             return Err(error::LENGTHS);
@@ -252,7 +252,7 @@ impl Conversation {
         memory: &mut impl Memory,
         reply: &mut Vec<u8>,
     ) -> Result<(), u16> {
-        // There are clients who name not even a number of items, to see whether the server is alive.
+        // Some clients omit even the number of items, just to see whether the server is alive.
         let (count, addresses) = match pdu.parameters {
             [_] => (0, &[][..]),
             [_, count, addresses @ ..] => (*count, addresses),
@@ -295,7 +295,7 @@ fn read_item(item: &Item, memory: &mut impl Memory, reply: &mut Vec<u8>) -> Resu
     Ok(())
 }
 
-/// How long the answer to these items is, if all of them can be read.
+/// The length of the answer to these items if all of them can be read.
 fn answer_length(items: Addresses<'_>) -> usize {
     let mut length = super::pdu::ANSWER_HEADER + 2;
     for item in items {
@@ -339,7 +339,7 @@ fn write_item(item: &Item, bytes: &[u8], memory: &mut impl Memory) -> Result<(),
     Ok(())
 }
 
-/// Appends the answer to a job, or to a question about the system, that as a whole cannot be done.
+/// Appends the refusal of a whole job or userdata request.
 fn refuse(pdu: &Pdu<'_>, error: u16, reply: &mut Vec<u8>) {
     if pdu.kind == Kind::UserData {
         userdata::refuse(pdu, error, reply);

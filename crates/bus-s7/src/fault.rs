@@ -1,36 +1,36 @@
-//! How a peer can break the protocol, in words.
+//! How a peer can violate the protocol, in words.
 
 use super::pdu::LONGEST;
 use tickbus_fieldbus::BusError;
 
-/// Why a connection cannot go on.
+/// Why a connection cannot continue.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
-    /// The first byte of a packet is none of ISO on TCP.
+    /// The first byte of a packet is not that of ISO on TCP.
     #[error(
         "a packet of it begins with 0x{0:02X}, where ISO on TCP has 0x03; check that it is meant to speak S7 \
          with this address"
     )]
     NoIsoOnTcp(u8),
-    /// A packet has a length that none has.
+    /// The length of a packet is impossible.
     #[error("a packet of it is said to have {0} bytes, but ISO on TCP has 7 to 4096 here")]
     PacketLength(usize),
-    /// The header of a transport unit does not hold what it has to.
+    /// The header of a TPDU is invalid.
     #[error("the header of a transport unit of it (COTP) is malformed")]
     TransportHeader,
-    /// A transport unit that class 0 does not have.
+    /// A TPDU that class 0 does not have.
     #[error("it sent the transport unit 0x{0:02X}, which COTP of class 0 does not have")]
     TransportUnit(u8),
-    /// Another class of transport.
+    /// Another transport class.
     #[error("it asks for transport class {0}, but S7 has class 0")]
     TransportClass(u8),
-    /// Data before the connection was asked for.
+    /// Data before a connection was requested.
     #[error("it sent data before it asked for a transport connection")]
     NotConnected,
-    /// A second request, or a confirmation of nothing.
+    /// A second request, or a confirmation without a request.
     #[error("it asked for, or confirmed, a transport connection that stands already")]
     ConnectedTwice,
-    /// A message in pieces goes on and on, or in empty pieces.
+    /// A message in pieces that is too long, or has empty pieces.
     #[error(
         "it sent a message in pieces that is longer than the agreed {0} bytes, or has empty pieces"
     )]
@@ -38,7 +38,7 @@ pub enum Fault {
     /// Another protocol within ISO on TCP.
     #[error("a message of it begins with 0x{0:02X}, where S7 has 0x32")]
     NoS7(u8),
-    /// The newer protocol of the same maker.
+    /// S7CommPlus, the newer protocol of the same maker.
     #[error(
         "it speaks S7CommPlus, the protocol of TIA Portal and of symbolic access; here is PUT and GET \
          (S7 communication) with absolute addresses"
@@ -47,25 +47,25 @@ pub enum Fault {
     /// The lengths in the header do not add up.
     #[error("the lengths in a message of it do not add up")]
     Lengths,
-    /// A kind of unit that there is not.
+    /// The kind of PDU does not exist.
     #[error("it sent a message of kind {0}, which S7 does not have")]
     Kind(u8),
-    /// An answer to nothing.
+    /// An answer without a request.
     #[error("it sent an answer that nobody asked for")]
     NotAsked,
-    /// A question, where an answer is due.
+    /// A request where an answer is expected.
     #[error("it asks, where it has to answer")]
     Asks,
-    /// The transport connection was ended, or not granted.
+    /// The transport connection was ended or refused.
     #[error("it ended the transport connection (reason {0})")]
     Disconnected(u8),
-    /// The peer found a fault with what it was sent.
+    /// The peer rejected what it was sent.
     #[error("it rejected a transport unit (cause {0})")]
     Rejected(u8),
-    /// The agreed length leaves no room, or is more than was asked for.
+    /// The negotiated length leaves no room, or is more than was requested.
     #[error("it wants units of {0} bytes, but 64 to {LONGEST} were asked for")]
     Agreed(u16),
-    /// An answer is not one to what was asked.
+    /// An answer that does not match its request.
     #[error("its answer is not one to what was asked: {0}")]
     Answer(&'static str),
 }

@@ -1,20 +1,20 @@
-//! Variables: where they lie, how wide they are, and what a CPU says of each one that is asked for.
+//! Variables: their place and width, and the CPU's return code for each of them.
 
 use std::fmt;
 use std::ops::Range;
 
-/// Bytes of an item's address in the parameters of a job.
+/// Bytes of an item's address in a job's parameters.
 pub const ADDRESS: usize = 12;
 
-/// Bytes before an item's data: its code or 0, how the data are counted, and how many there are.
+/// Bytes before an item's data: return code (0 in a job), unit of the length, length.
 pub const DATA_HEADER: usize = 4;
 
-/// The variable specification that every item begins with.
+/// The variable specification at the start of every item.
 const SPECIFICATION: u8 = 0x12;
-/// The syntax of an address by area, byte and bit: the S7 "any" pointer.
+/// The syntax id of an address with area, byte and bit: the S7 "any" pointer.
 const ANY: u8 = 0x10;
 
-/// What data are counted in: see [`Element::counted`].
+/// The units of a data length: see [`Element::counted`].
 mod counted {
     pub(super) const BIT: u8 = 3;
     pub(super) const BYTE: u8 = 4;
@@ -23,7 +23,7 @@ mod counted {
     pub(super) const OCTETS: u8 = 9;
 }
 
-/// What a CPU keeps, by the area code of an address.
+/// An object in a CPU's memory, by the area code of an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Object {
     /// The inputs, `%I`.
@@ -58,7 +58,7 @@ impl fmt::Display for Object {
     }
 }
 
-/// What an item is made of.
+/// The type of an item's elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Element {
     /// One bit.
@@ -75,7 +75,7 @@ pub enum Element {
     DWord,
     /// Signed words of 32 bits.
     DInt,
-    /// Numbers with a fraction, of 32 bits.
+    /// Floating-point numbers of 32 bits.
     Real,
     /// Dates and times, by their width in bytes.
     Time(u8),
@@ -100,7 +100,7 @@ impl Element {
         })
     }
 
-    /// Width of one in bytes; a bit takes a byte on the wire.
+    /// Width of one element in bytes; a bit takes a byte on the wire.
     pub const fn width(self) -> usize {
         match self {
             Self::Bit | Self::Byte | Self::Char => 1,
@@ -110,7 +110,7 @@ impl Element {
         }
     }
 
-    /// The code of how data are counted, and the count for so many bytes.
+    /// The unit of the length, and the length of `bytes` bytes in it.
     fn counted(self, bytes: usize) -> (u8, u16) {
         let count = |count: usize| u16::try_from(count).expect("a unit holds far fewer");
         match self {
@@ -125,7 +125,7 @@ impl Element {
     }
 }
 
-/// What a CPU says of one item.
+/// The return code of one item.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Code(pub u8);
 
@@ -134,13 +134,13 @@ impl Code {
     pub const OK: Self = Self(0xFF);
     /// The item must not be written, or not by this client.
     pub const ACCESS: Self = Self(0x03);
-    /// The address is beyond the object, or is none.
+    /// The address is beyond the object, or invalid.
     pub const ADDRESS: Self = Self(0x05);
-    /// There is no such type.
+    /// The type does not exist.
     pub const TYPE: Self = Self(0x06);
-    /// Data and address are not of the same type or length.
+    /// Data and address differ in type or length.
     pub const INCONSISTENT: Self = Self(0x07);
-    /// There is no such object.
+    /// The object does not exist.
     pub const MISSING: Self = Self(0x0A);
 
     /// What it means, in words.
@@ -170,23 +170,23 @@ impl fmt::Display for Code {
     }
 }
 
-/// One variable, or several one after another.
+/// One variable, or several consecutive ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Item {
     /// Where it lies.
     pub object: Object,
-    /// Its first byte there.
+    /// Its first byte in the object.
     pub byte: usize,
-    /// Its bit of that byte; 0 for whole bytes.
+    /// Its bit within that byte; 0 for whole bytes.
     pub bit: u8,
-    /// What it is made of.
+    /// The type of its elements.
     pub element: Element,
-    /// How many of them. Positive, and 1 for bits.
+    /// The number of elements. Positive, and 1 for bits.
     pub count: u16,
 }
 
 impl Item {
-    /// So many bytes of an object.
+    /// Bytes of an object.
     pub fn bytes(object: Object, range: Range<usize>) -> Self {
         Self {
             object,
@@ -208,7 +208,7 @@ impl Item {
         }
     }
 
-    /// The bit that it is; none where it is made of bytes.
+    /// Its bit number; `None` if it consists of bytes.
     pub fn bit(&self) -> Option<u8> {
         (self.element == Element::Bit).then_some(self.bit)
     }
@@ -283,12 +283,12 @@ impl Item {
     }
 }
 
-/// The addresses in the parameters of a job, one after another.
+/// The addresses in a job's parameters, one after another.
 #[derive(Clone, Debug)]
 pub struct Addresses<'a>(&'a [u8]);
 
 impl<'a> Addresses<'a> {
-    /// Those of a job that names `count` of them.
+    /// The `count` addresses in `bytes`.
     pub fn new(count: u8, bytes: &'a [u8]) -> Option<Self> {
         let mut rest = bytes;
         for _ in 0..count {
@@ -314,22 +314,21 @@ impl Iterator for Addresses<'_> {
     }
 }
 
-/// What stands before the data of one item, and the data.
+/// The data of one item, and their return code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Datum<'a> {
-    /// What the CPU says of the item; nothing in a job that writes.
+    /// The return code; meaningless in a job that writes.
     pub code: Code,
     /// The item's data.
     pub bytes: &'a [u8],
 }
 
-/// The data of several items, one after another, each of which begins at an even place. Some peers fill up behind
-/// the last one, too.
+/// The data of several items, each padded to an even offset; some peers pad the last one as well.
 #[derive(Clone, Debug)]
 pub struct Data<'a>(&'a [u8]);
 
 impl<'a> Data<'a> {
-    /// Those of a unit with `count` items.
+    /// The data of `count` items.
     pub fn new(count: u8, bytes: &'a [u8]) -> Option<Self> {
         let mut all = Self(bytes);
         for _ in 0..count {
@@ -362,14 +361,14 @@ impl<'a> Iterator for Data<'a> {
     }
 }
 
-/// Appends the header of an item's data, of so many bytes.
+/// Appends the header for `bytes` bytes of an item's data.
 pub fn write_header(code: Code, element: Element, bytes: usize, out: &mut Vec<u8>) {
     let (counted, count) = element.counted(bytes);
     let [high, low] = count.to_be_bytes();
     out.extend_from_slice(&[code.0, counted, high, low]);
 }
 
-/// Appends what stands for the data of an item that cannot be read.
+/// Appends the data header of an item that cannot be read.
 pub fn write_refusal(code: Code, out: &mut Vec<u8>) {
     out.extend_from_slice(&[code.0, 0, 0, 0]);
 }

@@ -1,8 +1,8 @@
-//! S7 communication over ISO on TCP, as CPUs of the S7 family speak it with PUT and GET, panels and libraries.
+//! S7 communication over ISO on TCP, as spoken by CPUs of the S7 family (PUT and GET), panels and libraries.
 //!
-//! The core has no I/O: [`transport`] are the packets, [`pdu`] the units within them, [`item`] the variables,
-//! [`szl`] the system status lists. [`Conversation`] is a server's side of one connection, [`Dialog`] a client's. The
-//! buses [`S7Server`] and [`S7Client`] stand around them.
+//! The core has no I/O: [`transport`] has the packets, [`pdu`] the PDUs within them, [`item`] the variables,
+//! [`szl`] the system status lists. [`Conversation`] is a server's side of one connection, [`Dialog`] a
+//! client's. The buses [`S7Server`] and [`S7Client`] use them.
 
 mod client;
 mod conversation;
@@ -25,7 +25,7 @@ pub use server::{Block, S7Server, ServerOptions};
 pub use tsap::Tsap;
 pub use variable::Variable;
 
-/// Reads the longest unit that is to be agreed to.
+/// Reads the longest PDU length to agree to.
 fn read_pdu(value: &tickbus_base::toml_text::Value<'_>) -> Option<u16> {
     let range = i128::from(pdu::LEAST)..=i128::from(pdu::LONGEST);
     value
@@ -33,7 +33,7 @@ fn read_pdu(value: &tickbus_base::toml_text::Value<'_>) -> Option<u16> {
         .and_then(|length| u16::try_from(length).ok())
 }
 
-/// The bytes that a text of hexadecimal digits stands for; blanks are for people.
+/// The bytes written as hexadecimal digits; blanks are ignored.
 #[cfg(test)]
 pub(crate) fn hex(text: &str) -> Vec<u8> {
     let digits: Vec<u8> = text

@@ -2,17 +2,17 @@
 
 use super::Fault;
 
-/// The longest unit that a server of ours agrees to; the largest CPUs have as much.
+/// The longest PDU that our server agrees to, as of the largest CPUs.
 pub const LONGEST: u16 = 960;
 
-/// What the smallest CPUs have.
+/// The PDU length of the smallest CPUs.
 pub const LEAST: u16 = 240;
 
-/// The shortest one that leaves room for an item.
+/// The shortest PDU with room for an item.
 pub const SHORTEST: u16 = 64;
 
 const PROTOCOL: u8 = 0x32;
-/// The protocol of TIA Portal and of newer panels, which is another one.
+/// S7CommPlus, the protocol of TIA Portal and newer panels.
 const PLUS: u8 = 0x72;
 
 /// Bytes of the header of a job.
@@ -20,23 +20,23 @@ pub const JOB_HEADER: usize = 10;
 /// Bytes of the header of an answer, with an error.
 pub const ANSWER_HEADER: usize = 12;
 
-/// What a job asks for, and an answer repeats: the first byte of its parameters.
+/// Function codes: the first byte of the parameters of a job and its answer.
 pub mod function {
     /// Read variables.
     pub const READ: u8 = 0x04;
     /// Write variables.
     pub const WRITE: u8 = 0x05;
-    /// Agree on the length of units.
+    /// Negotiate the PDU length.
     pub const SETUP: u8 = 0xF0;
 }
 
 /// Errors of a whole job: class and code.
 pub mod error {
-    /// None.
+    /// No error.
     pub const NONE: u16 = 0;
     /// The server has no such function.
     pub const NO_FUNCTION: u16 = 0x8104;
-    /// The lengths in the unit do not go together, or it, or its answer, is longer than was agreed.
+    /// The lengths in the PDU are inconsistent, or it or its answer exceeds the negotiated length.
     pub const LENGTHS: u16 = 0x8500;
     /// There is no such block.
     pub const NO_BLOCK: u16 = 0xD209;
@@ -46,16 +46,16 @@ pub mod error {
     pub const NO_INDEX: u16 = 0xD402;
 }
 
-/// Which kind a unit is of.
+/// The kind of a PDU (ROSCTR).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A client asks.
+    /// A client's request.
     Job,
-    /// A server answers, without data.
+    /// A server's answer without data.
     Ack,
-    /// A server answers.
+    /// A server's answer.
     AckData,
-    /// Either of them, about the system.
+    /// Request or answer about the system.
     UserData,
 }
 
@@ -77,27 +77,27 @@ impl Kind {
     }
 }
 
-/// One unit.
+/// One PDU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pdu<'a> {
     /// Its kind.
     pub kind: Kind,
-    /// By which an answer finds its job.
+    /// Matches an answer to its job.
     pub reference: u16,
-    /// What is wrong with the job as a whole; of an answer.
+    /// In an answer: the error of the whole job.
     pub error: u16,
-    /// Which function, on which items.
+    /// The function, and its items.
     pub parameters: &'a [u8],
-    /// What they are made, or were.
+    /// The values of the items.
     pub data: &'a [u8],
 }
 
 impl<'a> Pdu<'a> {
-    /// Reads a whole message as one unit.
+    /// Reads a whole message as one PDU.
     ///
     /// # Errors
     ///
-    /// It is none, or its lengths do not add up.
+    /// It is not a PDU, or its lengths are inconsistent.
     pub fn read(message: &'a [u8]) -> Result<Self, Fault> {
         match message.first() {
             Some(&PROTOCOL) => {}
@@ -136,7 +136,7 @@ impl<'a> Pdu<'a> {
     }
 }
 
-/// A unit that is being appended to a buffer.
+/// A PDU that is being appended to a buffer.
 #[derive(Debug)]
 #[must_use = "its lengths are set at the end"]
 pub struct Draft {
@@ -146,7 +146,7 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Begins a unit at the end of `out`; parameters are to be appended.
+    /// Begins a PDU at the end of `out`; its parameters are to be appended.
     pub fn begin(kind: Kind, reference: u16, error: u16, out: &mut Vec<u8>) -> Self {
         let begin = out.len();
         let [r0, r1] = reference.to_be_bytes();
@@ -161,16 +161,16 @@ impl Draft {
         }
     }
 
-    /// The parameters are complete, and data follow.
+    /// Ends the parameters; data follow.
     pub fn data(&mut self, out: &[u8]) {
         self.parameters = Some(out.len() - self.body);
     }
 
-    /// The unit is complete.
+    /// Ends the PDU.
     ///
     /// # Panics
     ///
-    /// When it is longer than any unit can be.
+    /// When it is longer than any PDU can be.
     pub fn end(self, out: &mut [u8]) {
         let body = out.len() - self.body;
         let parameters = self.parameters.unwrap_or(body);

@@ -1,4 +1,4 @@
-//! Where an image begins in a CPU, as a driver.cfg writes it.
+//! The start of an image in a CPU, as written in a driver.cfg.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,15 +6,15 @@ use std::str::FromStr;
 use super::item::Object;
 use tickbus_base::toml_text::shown;
 
-/// The last byte that an address reaches.
+/// The last byte that can be addressed.
 pub(super) const LAST: usize = 65_535;
 
 /// The first byte of something in a CPU: `%QB0`, `%DB10.DBB4`, `DB10`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Start {
-    /// What it is a byte of.
+    /// The object.
     pub object: Object,
-    /// Its number there.
+    /// The byte's number in it.
     pub byte: usize,
 }
 
@@ -27,7 +27,7 @@ impl fmt::Display for Start {
     }
 }
 
-/// Reads `%QB0`, `%IB10`, `%MB100`, `%DB10.DBB4`, `%DB10.DBX4.0` and `DB10`; the percent sign may be left out.
+/// Reads `%QB0`, `%IB10`, `%MB100`, `%DB10.DBB4`, `%DB10.DBX4.0` and `DB10`; the percent sign is optional.
 impl FromStr for Start {
     type Err = String;
 

@@ -1,15 +1,15 @@
-//! System status lists (SZL): what a client asks a CPU for before anything else, and who that CPU is.
+//! System status lists (SZL): what clients read from a CPU before anything else, among it the CPU's identity.
 
 use super::pdu::error;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::PlcState;
 
-/// Who a CPU is, as its system status lists tell it.
+/// The identity of a CPU, as in its system status lists.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// Order number of the module, at most 20 characters.
     pub order: String,
-    /// Firmware: three numbers.
+    /// Firmware version: three numbers.
     pub firmware: [u8; 3],
     /// Name of the module, at most 24 characters.
     pub name: String,
@@ -20,7 +20,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// What a server of ours says of itself.
+    /// The identity that our server reports.
     pub fn of_driver(name: &str) -> Self {
         let number = |text: &str| text.parse().unwrap_or(0);
         Self {
@@ -35,7 +35,7 @@ impl Identity {
         }
     }
 
-    /// All of it in one line; empty when nothing is known.
+    /// The identity in one line; empty if nothing is known.
     pub fn line(&self) -> String {
         let parts = [&self.order, &self.name, &self.plant, &self.serial];
         let said: Vec<&str> = parts.iter().map(|part| part.trim()).collect();
@@ -44,21 +44,21 @@ impl Identity {
     }
 }
 
-/// What the lists of a server say.
+/// The contents of a server's lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Facts {
     /// Who it is.
     pub identity: Identity,
     /// The longest unit that it agrees to.
     pub pdu: u16,
-    /// How many clients it serves at once.
+    /// The number of clients served at the same time.
     pub clients: u16,
-    /// What its clock showed when the driver's showed zero, as the time since 1 January 1970.
+    /// What its clock read when the driver's clock read zero, as the time since 1 January 1970.
     pub epoch: Nanos,
 }
 
 impl Facts {
-    /// 1 January 1994: where the clock of a CPU begins that was never set.
+    /// 1 January 1994: where the clock of a CPU starts that was never set.
     pub const NEVER_SET: Nanos = Nanos::from_secs(8_766 * 86_400);
 
     /// The CPU's clock at `now`, as `DATE_AND_TIME`.
@@ -77,22 +77,22 @@ const COMPONENT: usize = 2 + LONG_NAME;
 /// Length of a record of list 0x0011.
 const MODULE: usize = 2 + ORDER + 6;
 
-/// Bytes before the records of a list: its id, its index, length of a record, number of records.
+/// Bytes before the records of a list: id, index, length of a record, number of records.
 const HEADER: usize = 8;
 
-/// The list that tells whether a CPU runs.
+/// The list with the operating state of a CPU.
 pub const STATE: u16 = 0x0424;
 
-/// Lists that a server of ours has.
+/// The lists of our server.
 const LISTS: [u16; 11] = [
     0x0000, 0x0011, 0x0111, 0x0019, 0x001C, 0x011C, 0x0074, 0x0131, 0x0132, 0x0232, STATE,
 ];
 
-/// Appends the list `id`, or its part `index`, as a CPU gives it at `now`.
+/// Appends the list `id`, or its part `index`, with the contents at `now`.
 ///
 /// # Errors
 ///
-/// The code for a list or an index that there is not.
+/// The error code for a list or an index that does not exist.
 pub fn write(id: u16, index: u16, facts: &Facts, now: Nanos, out: &mut Vec<u8>) -> Result<(), u16> {
     let records: Vec<Vec<u8>> = match id {
         0x0000 => LISTS.iter().map(|id| id.to_be_bytes().to_vec()).collect(),
@@ -101,7 +101,7 @@ pub fn write(id: u16, index: u16, facts: &Facts, now: Nanos, out: &mut Vec<u8>) 
         0x001C => components(&facts.identity),
         0x011C => one_of(components(&facts.identity), index)?,
         0x0019 | 0x0074 => leds(),
-        // Index 1 tells of communication in general, 3 of operating and monitoring, 4 of protection.
+        // Index 1 is about communication in general, 3 about operating and monitoring, 4 about protection.
         0x0131 if index <= 1 => vec![communication(facts)],
         0x0131 if index == 3 => vec![monitoring(facts)],
         0x0132 if index == 1 => vec![connections(facts)],
@@ -129,7 +129,7 @@ fn one_of(records: Vec<Vec<u8>>, index: u16) -> Result<Vec<Vec<u8>>, u16> {
     }
 }
 
-/// Order numbers and versions: of the module, its hardware, its firmware.
+/// Order numbers and versions of the module, its hardware and its firmware.
 fn modules(identity: &Identity) -> Vec<Vec<u8>> {
     let [major, minor, patch] = identity.firmware;
     let record = |index: u16, order: &str, version: [u8; 4]| {
@@ -146,7 +146,7 @@ fn modules(identity: &Identity) -> Vec<Vec<u8>> {
     ]
 }
 
-/// Names: of the station, the module, the plant; copyright, serial number, type.
+/// Names of station, module and plant; copyright, serial number, type.
 fn components(identity: &Identity) -> Vec<Vec<u8>> {
     let record = |(index, text_of, length): (u16, &str, usize)| {
         let mut record = index.to_be_bytes().to_vec();
@@ -166,7 +166,7 @@ fn components(identity: &Identity) -> Vec<Vec<u8>> {
     .to_vec()
 }
 
-/// Longest unit, number of connections, and two speeds of lines that there are not.
+/// PDU length, number of connections, and two bus speeds, which do not apply.
 fn communication(facts: &Facts) -> Vec<u8> {
     let mut record = vec![0, 1];
     record.extend_from_slice(&facts.pdu.to_be_bytes());
@@ -175,17 +175,18 @@ fn communication(facts: &Facts) -> Vec<u8> {
     record
 }
 
-/// What panels may ask for: to read once and to write once, and none of the cyclic services.
+/// What panels may request: reading once and writing once, but no cyclic services.
 fn monitoring(facts: &Facts) -> Vec<u8> {
     let mut record = vec![0, 3, 0b11, 0, 0, 0];
-    // Bytes that are read as a whole: those of one unit, without what stands around them.
+    // Bytes that are read consistently: the data of one PDU, without headers.
     let whole = facts.pdu.saturating_sub(18);
     record.extend_from_slice(&whole.to_be_bytes());
     record.resize(40, 0);
     record
 }
 
-/// One connection kept for a programming device and one for a panel, none of them in use, and how many are free.
+/// One connection reserved for a programming device and one for a panel, neither in use, and the number of
+/// free ones.
 fn connections(facts: &Facts) -> Vec<u8> {
     let mut record = Vec::new();
     for word in [1, 1, 1, 0, 0, 0, 0, facts.clients] {
@@ -195,7 +196,7 @@ fn connections(facts: &Facts) -> Vec<u8> {
     record
 }
 
-/// The lamps SF, RUN and STOP: number, whether it is on, whether it flashes.
+/// The LEDs SF, RUN and STOP: number, on, flashing.
 fn leds() -> Vec<Vec<u8>> {
     [[0, 1, 0, 0], [0, 4, 1, 0], [0, 5, 0, 0]]
         .map(Vec::from)
@@ -212,7 +213,7 @@ fn protection() -> Vec<u8> {
     record
 }
 
-/// The CPU runs, since its beginning.
+/// The CPU has been running since its start.
 fn running(clock: [u8; 8]) -> Vec<u8> {
     let mut record = vec![0x51, 0x44, 0xFF, 0x08, 0, 0, 0, 0, 0, 0, 0, 0];
     record.extend_from_slice(&clock);
@@ -223,7 +224,7 @@ fn running(clock: [u8; 8]) -> Vec<u8> {
 fn date_and_time(since: Nanos) -> [u8; 8] {
     let millis = (since.0 / 1_000_000).max(0);
     let (days, of_day) = (millis / 86_400_000, millis % 86_400_000);
-    // By Howard Hinnant's algorithm for civil dates; day 0 is 1 March of the year 0.
+    // Howard Hinnant's algorithm for civil dates; day 0 is 1 March of the year 0.
     let day = days + 719_468;
     let era = day / 146_097;
     let of_era = day % 146_097;
@@ -257,9 +258,9 @@ fn date_and_time(since: Nanos) -> [u8; 8] {
     ]
 }
 
-/// Whether a CPU runs, as its list 0x0424 says; `None` when it does not say.
+/// The operating state of a CPU in its list 0x0424; `None` if it is not stated.
 ///
-/// The fourth byte of the record has the state that was entered in its lower half, and the one before in the upper.
+/// The fourth byte of the record has the current state in its lower half, and the previous one in the upper.
 pub fn state(list: &[u8]) -> Option<PlcState> {
     let (header, record) = list.split_first_chunk::<HEADER>()?;
     let [_, _, _, entered, ..] = *record else {
@@ -269,19 +270,19 @@ pub fn state(list: &[u8]) -> Option<PlcState> {
         return None;
     }
     Some(match entered & 0x0F {
-        // It does not know.
+        // Unknown.
         0 => return None,
-        // RUN; of a redundant pair also RUN-R, LINK-UP and UPDATE, in which the program goes on.
+        // RUN; for a redundant pair also RUN-R, LINK-UP and UPDATE, in which the program is executed.
         0x8 | 0x9 | 0xB | 0xC => PlcState::Run,
-        // STOP in its kinds, STARTUP, HOLD, DEFECTIVE.
+        // The kinds of STOP, STARTUP, HOLD, DEFECTIVE.
         _ => PlcState::Stop,
     })
 }
 
-/// Takes what lists 0x0011 and 0x001C say into an identity. `list` begins with its id.
+/// Adds the contents of list 0x0011 or 0x001C to an identity. `list` starts with its id.
 ///
-/// What is not there, or not as it should be, stays as it is: CPUs differ, and some simulations of them even
-/// leave the lengths out.
+/// Fields that are missing or malformed do not change: CPUs differ, and some simulators even omit the
+/// lengths.
 pub fn learn(identity: &mut Identity, list: &[u8]) {
     let Some((header, records)) = list.split_first_chunk::<HEADER>() else {
         return;
@@ -300,7 +301,7 @@ pub fn learn(identity: &mut Identity, list: &[u8]) {
     };
     for (position, record) in records.chunks_exact(length).enumerate() {
         let field = |length: usize| printable(&record[2..2 + length.min(record.len() - 2)]);
-        // Those that leave their lengths out leave out the index, too.
+        // Simulators that omit the lengths omit the index as well.
         let index = match u16::from_be_bytes([record[0], record[1]]) {
             0 => position + 1,
             index => usize::from(index),
@@ -326,7 +327,7 @@ fn text(text: &str, length: usize, filling: u8, out: &mut Vec<u8>) {
     out.resize(end, filling);
 }
 
-/// As much of a text as fits into so many bytes.
+/// As much of a text as fits into `length` bytes.
 fn cut(text: &str, length: usize) -> &str {
     let mut end = length.min(text.len());
     while !text.is_char_boundary(end) {
@@ -335,7 +336,7 @@ fn cut(text: &str, length: usize) -> &str {
     &text[..end]
 }
 
-/// A field as one line for people.
+/// A field as one printable line.
 fn printable(field: &[u8]) -> String {
     let end = field
         .iter()

@@ -1,7 +1,7 @@
 //! ISO on TCP: packets (TPKT, RFC 1006) and the transport protocol of class 0 within them (COTP, ISO 8073).
 //!
-//! Both directions, without I/O. A packet is a TPKT header of four bytes with the length of the whole, and one
-//! transport data unit (TPDU).
+//! Both directions, without I/O. A packet is a TPKT header of four bytes, which has the total length, and one
+//! transport protocol data unit (TPDU).
 
 use super::Fault;
 
@@ -14,10 +14,10 @@ pub const TPKT: usize = 4;
 /// Bytes of a data TPDU before its data, packet header included.
 pub const DATA_HEADER: usize = TPKT + 3;
 
-/// The longest packet that is taken. Nothing that S7 sends is near it.
+/// The longest packet accepted. S7 packets are far shorter.
 pub const LONGEST_PACKET: usize = 4096;
 
-/// The longest name of a transport end (TSAP) in bytes.
+/// The longest TSAP, in bytes.
 pub const LONGEST_TSAP: usize = 32;
 
 const VERSION: u8 = 3;
@@ -27,34 +27,34 @@ const DISCONNECT_REQUEST: u8 = 0x80;
 const DISCONNECT_CONFIRM: u8 = 0xC0;
 const ERROR: u8 = 0x70;
 const DATA: u8 = 0xF0;
-/// In a data TPDU: it is the last one of its message.
+/// In a data TPDU: the last one of its message.
 const END: u8 = 0x80;
 
 const SIZE: u8 = 0xC0;
 const CALLING: u8 = 0xC1;
 const CALLED: u8 = 0xC2;
 
-/// What both ends say when they connect.
+/// The parameters of a connect request or confirmation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Connect<'a> {
-    /// The reference of the one who asks.
+    /// The reference of the sender.
     pub source: u16,
-    /// The reference of the one who is asked; 0 in a request.
+    /// The reference of the receiver; 0 in a request.
     pub destination: u16,
-    /// Power of two of the longest TPDU, if one is named.
+    /// Power of two of the longest TPDU, if stated.
     pub size: Option<u8>,
-    /// The end that asks.
+    /// The TSAP of the client.
     pub calling: &'a [u8],
-    /// The end that is asked for.
+    /// The TSAP of the server.
     pub called: &'a [u8],
 }
 
-/// One transport data unit.
+/// One TPDU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tpdu<'a> {
-    /// A client asks for a connection.
+    /// A client requests a connection.
     ConnectRequest(Connect<'a>),
-    /// A server grants it.
+    /// A server confirms it.
     ConnectConfirm(Connect<'a>),
     /// A message, or a piece of one.
     Data {
@@ -63,20 +63,20 @@ pub enum Tpdu<'a> {
         /// Its bytes.
         bytes: &'a [u8],
     },
-    /// The peer ends the connection, or declines to begin it; with its reason.
+    /// The peer ends the connection, or refuses it; with its reason.
     Disconnect(u8),
-    /// The peer found a fault with what it was sent; with the cause.
+    /// The peer rejected a TPDU; with the cause.
     Error(u8),
 }
 
-/// The powers of two that a TPDU's size may have: 128 to 8192 bytes.
+/// The powers of two that are valid as the size of a TPDU: 128 to 8192 bytes.
 pub const SIZES: std::ops::RangeInclusive<u8> = 7..=13;
 
-/// Reads the first packet in `bytes`: its length, and the unit in it. `None` when it is not whole yet.
+/// Reads the first packet in `bytes`: its length, and its TPDU. `None` if it is incomplete.
 ///
 /// # Errors
 ///
-/// The bytes are no ISO on TCP.
+/// The bytes are not ISO on TCP.
 pub fn read(bytes: &[u8]) -> Result<Option<(usize, Tpdu<'_>)>, Fault> {
     let Some(header) = bytes.first_chunk::<TPKT>() else {
         return match bytes.first() {
@@ -89,7 +89,7 @@ pub fn read(bytes: &[u8]) -> Result<Option<(usize, Tpdu<'_>)>, Fault> {
         return Err(Fault::NoIsoOnTcp(version));
     }
     let length = usize::from(u16::from_be_bytes([high, low]));
-    // The shortest unit is a data TPDU without data.
+    // The shortest TPDU is a data TPDU without data.
     if !(DATA_HEADER..=LONGEST_PACKET).contains(&length) {
         return Err(Fault::PacketLength(length));
     }
@@ -152,7 +152,7 @@ fn read_connect(fields: &[u8]) -> Result<Connect<'_>, Fault> {
             }
             (CALLING, name) => connect.calling = name,
             (CALLED, name) => connect.called = name,
-            // What a receiver does not know it ignores, by the standard.
+            // A receiver ignores unknown parameters, according to the standard.
             _ => {}
         }
     }
@@ -216,14 +216,14 @@ fn write_size(size: Option<u8>, out: &mut Vec<u8>) {
     }
 }
 
-/// Begins a packet with data at the end of `out`; [`end_data`] has to follow. Gives where it begins.
+/// Begins a data packet at the end of `out`; [`end_data`] must follow. Returns its offset.
 pub fn begin_data(out: &mut Vec<u8>) -> usize {
     out.extend_from_slice(&[VERSION, 0, 0, 0, 2, DATA, END]);
     out.len() - DATA_HEADER
 }
 
-/// Ends the packet that begins at `begin`, behind whose header the message has been appended. A message that is
-/// longer than a TPDU of 2^`size` bytes may be becomes several packets.
+/// Ends the packet at offset `begin`, after whose header the message has been appended. A message longer than
+/// a TPDU of 2^`size` bytes is split into several packets.
 pub fn end_data(begin: usize, size: u8, out: &mut Vec<u8>) {
     let most = (1 << size) - (DATA_HEADER - TPKT);
     let message = begin + DATA_HEADER;

@@ -1,4 +1,4 @@
-//! Names of transport ends: which CPU of a rack a client means.
+//! Names of transport ends (TSAP): which CPU of a rack a client connects to.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,10 +6,10 @@ use std::str::FromStr;
 use super::transport::LONGEST_TSAP;
 use tickbus_base::toml_text::shown;
 
-/// How a client is connected, as the first byte of a TSAP for a rack and slot says it.
+/// The kind of connection, the first byte of a TSAP with rack and slot.
 const PROGRAMMING_DEVICE: u8 = 1;
 
-/// The name of a transport end: a text of bytes, most often two.
+/// A TSAP: a string of bytes, usually two.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Tsap {
     length: u8,
@@ -17,7 +17,7 @@ pub struct Tsap {
 }
 
 impl Tsap {
-    /// The name made of these bytes, cut at the most that one has.
+    /// The TSAP with these bytes, truncated if too long.
     pub fn new(name: &[u8]) -> Self {
         let length = name.len().min(LONGEST_TSAP);
         let mut bytes = [0; LONGEST_TSAP];
@@ -28,7 +28,8 @@ impl Tsap {
         }
     }
 
-    /// The CPU in a slot of a rack, as programming devices and libraries name it: 0x01 and rack · 32 + slot.
+    /// The CPU in a rack and slot, as addressed by programming devices and libraries: 0x01 and rack · 32 +
+    /// slot.
     pub fn of_slot(rack: u8, slot: u8) -> Self {
         Self::new(&[PROGRAMMING_DEVICE, rack * 32 + slot])
     }
@@ -38,7 +39,7 @@ impl Tsap {
         &self.bytes[..usize::from(self.length)]
     }
 
-    /// Rack and slot, for a name that has them.
+    /// Rack and slot, if the TSAP has them.
     pub fn slot(&self) -> Option<(u8, u8)> {
         match self.as_bytes() {
             [_, place] => Some((place / 32, place % 32)),
@@ -69,7 +70,7 @@ impl fmt::Debug for Tsap {
     }
 }
 
-/// Reads a name as engineering tools show it: two hexadecimal numbers with a dot, such as `03.01`.
+/// Reads a TSAP as engineering tools show it: two hexadecimal numbers with a dot, such as `03.01`.
 impl FromStr for Tsap {
     type Err = String;
 
@@ -88,7 +89,7 @@ impl FromStr for Tsap {
     }
 }
 
-/// The racks that there are.
+/// The valid racks.
 pub(super) const RACK: std::ops::RangeInclusive<i128> = 0..=7;
 /// The slots of a rack.
 pub(super) const SLOT: std::ops::RangeInclusive<i128> = 0..=31;

@@ -1,4 +1,4 @@
-//! Questions about the system: status lists, the clock, which blocks there are.
+//! Userdata requests: status lists, the clock, and the list of blocks.
 
 use super::item::{self, Code};
 use super::pdu::{Draft, JOB_HEADER, Kind, Pdu, error};
@@ -8,7 +8,7 @@ use tickbus_base::time::Nanos;
 /// Bytes of the parameters of an answer.
 const PARAMETERS: usize = 12;
 
-/// What a question is about.
+/// The subjects of requests.
 mod group {
     pub(super) const BLOCKS: u8 = 3;
     pub(super) const LISTS: u8 = 4;
@@ -18,26 +18,26 @@ mod group {
 const REQUEST: u8 = 0x11;
 const RESPONSE: u8 = 0x12;
 
-/// The kinds of blocks that are counted, by their letters: OB, FB, FC, DB, SDB, SFC, SFB.
+/// The block types that are counted, by letter: OB, FB, FC, DB, SDB, SFC, SFB.
 const BLOCK_KINDS: [u8; 7] = [0x38, 0x45, 0x43, 0x41, 0x42, 0x44, 0x46];
 const DATA_BLOCK: u8 = 0x41;
-/// What data blocks are written in.
+/// The language code of data blocks.
 const LANGUAGE: u8 = 5;
 
-/// What an answer is made from.
+/// What answers are made from.
 #[derive(Debug)]
 pub(super) struct Ask<'a> {
-    /// When it was asked.
+    /// When the request arrived.
     pub now: Nanos,
-    /// What the lists say.
+    /// The contents of the lists.
     pub facts: &'a Facts,
-    /// The data blocks, with their lengths.
+    /// The data blocks and their lengths.
     pub blocks: &'a [(u16, usize)],
-    /// The longest unit.
+    /// The longest PDU.
     pub limit: usize,
 }
 
-/// What is still to be fetched of an answer that did not fit into one unit.
+/// The rest of an answer that did not fit into one PDU, for the client to read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Rest {
     sequence: u8,
@@ -46,7 +46,7 @@ pub(super) struct Rest {
     bytes: Vec<u8>,
 }
 
-/// One question, as its parameters have it.
+/// The parameters of one request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Question<'a> {
     group: u8,
@@ -61,11 +61,11 @@ impl<'a> Question<'a> {
         let [0, 1, 0x12, length, method, group, function, sequence, ..] = *pdu.parameters else {
             return None;
         };
-        // The upper half says that it is a question.
+        // The upper half marks a request.
         if pdu.parameters.len() != 4 + usize::from(length) || group >> 4 != 4 {
             return None;
         }
-        // Some clients state more bytes than follow: Apache PLC4X does in its first question.
+        // Some clients state more bytes than follow, such as Apache PLC4X in its first request.
         let data = match *pdu.data {
             [_, _, high, low, ref bytes @ ..] => {
                 let stated = usize::from(u16::from_be_bytes([high, low]));
@@ -88,7 +88,7 @@ impl<'a> Question<'a> {
     }
 }
 
-/// Appends the answer to a question.
+/// Appends the answer to a request.
 pub(super) fn answer(pdu: &Pdu<'_>, ask: &Ask<'_>, rest: &mut Option<Rest>, out: &mut Vec<u8>) {
     let Some(question) = Question::read(pdu) else {
         return refuse(pdu, error::LENGTHS, out);
@@ -101,7 +101,7 @@ pub(super) fn answer(pdu: &Pdu<'_>, ask: &Ask<'_>, rest: &mut Option<Rest>, out:
             None => Err(error::NO_FUNCTION),
         }
     } else {
-        // A new question ends the old one.
+        // A new request discards the rest of an earlier answer.
         let sequence = rest.take().map_or(0, |rest| rest.sequence);
         say(&question, ask).map(|bytes| Rest {
             sequence: sequence.checked_add(1).unwrap_or(1),
@@ -116,12 +116,12 @@ pub(super) fn answer(pdu: &Pdu<'_>, ask: &Ask<'_>, rest: &mut Option<Rest>, out:
     }
 }
 
-/// Appends as much of an answer as fits into a unit; gives the rest of it.
+/// Appends as much of an answer as fits into a PDU; returns the rest.
 fn write_piece(reference: u16, mut whole: Rest, limit: usize, out: &mut Vec<u8>) -> Option<Rest> {
     let room = limit - JOB_HEADER - PARAMETERS - item::DATA_HEADER;
     let later = whole.bytes.split_off(room.min(whole.bytes.len()));
     let more = !later.is_empty();
-    // An answer of one piece has no number.
+    // An answer in one piece has no sequence number.
     let numbered = more || whole.unit > 0;
     whole.unit = whole.unit.wrapping_add(1);
     let sequence = if numbered {
@@ -167,7 +167,7 @@ fn begin(
     draft
 }
 
-/// Appends the answer to a question that cannot be answered.
+/// Appends the refusal of a request.
 pub(super) fn refuse(pdu: &Pdu<'_>, error: u16, out: &mut Vec<u8>) {
     let of = match *pdu.parameters {
         [_, _, _, _, _, group, function, ..] => (group & 0x0F, function),
@@ -223,7 +223,7 @@ fn say(question: &Question<'_>, ask: &Ask<'_>) -> Result<Vec<u8>, u16> {
     Ok(out)
 }
 
-/// Appends what there is to be known of a data block.
+/// Appends the description of a data block.
 fn block((number, length): (u16, usize), out: &mut Vec<u8>) {
     const LOADED: u32 = 36;
     let [n0, n1] = number.to_be_bytes();
@@ -232,7 +232,7 @@ fn block((number, length): (u16, usize), out: &mut Vec<u8>) {
         b'0', DATA_BLOCK, 0, 0x4A, 0, 0, b'p', b'p', 1, 0, LANGUAGE, 0x0A,
     ]);
     out.extend_from_slice(&[n0, n1]);
-    // In the load memory it has a header, too.
+    // In load memory it also has a header.
     out.extend_from_slice(&(u32::from(length) + LOADED).to_be_bytes());
     // No protection, no dates, no interface.
     out.extend_from_slice(&[0; 22]);

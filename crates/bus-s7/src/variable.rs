@@ -1,4 +1,4 @@
-//! One variable of a CPU, in the spellings of programming and visualisation tools.
+//! One variable of a CPU, in the notations of programming and visualisation tools.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,30 +8,30 @@ use super::place::LAST;
 use tickbus_base::toml_text::shown;
 use tickbus_image::signal::{DataType, Signal, Width};
 
-/// The data block that the variable memory of a LOGO! is for those who read and write it.
+/// The data block as which clients access the variable memory of a LOGO!.
 const LOGO_V: Object = Object::Block(1);
 
 /// A variable as it is written in `[fieldbus.at]`: `%DB10.DBX0.3`, `DB10,REAL4`, `%MW20`, `V10.2`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variable {
-    /// What it lies in.
+    /// The object that contains it.
     pub object: Object,
-    /// Its first byte there.
+    /// Its first byte in the object.
     pub byte: usize,
-    /// Its bit of that byte; 0 for whole bytes.
+    /// Its bit within that byte; 0 for whole bytes.
     pub bit: u8,
-    /// How wide it is.
+    /// Its width.
     pub width: Width,
-    /// Its type, where it was stated.
+    /// Its type, if stated.
     pub data_type: Option<DataType>,
 }
 
 impl Variable {
-    /// Whether `signal` can lie here.
+    /// Checks that `signal` can have this place.
     ///
     /// # Errors
     ///
-    /// What does not go together, and what to write instead.
+    /// What does not match, and what to write instead.
     pub(super) fn check(&self, signal: &Signal) -> Result<(), (String, String)> {
         let own = signal.data_type;
         let bits = |count: usize| match count {
@@ -67,13 +67,13 @@ impl Variable {
         }
     }
 
-    /// Its bits within its object: the first, and how many.
+    /// Its bits within its object: the first, and their number.
     pub(super) fn bits(&self) -> (usize, usize) {
         (self.byte * 8 + usize::from(self.bit), self.width.bits())
     }
 }
 
-/// As TIA Portal writes it; a variable of 64 bits, for which that has no letter, as PLC4X does.
+/// Writes it as in TIA Portal; variables of 64 bits, for which that has no letter, as in PLC4X.
 impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
@@ -96,9 +96,10 @@ impl fmt::Display for Variable {
     }
 }
 
-/// Reads what STEP 7 and TIA Portal write (`%DB10.DBX0.3`, `%MW20`, `%I0.0`), with or without the percent sign;
-/// with a type behind it, as PLC4X writes (`%DB10.DBD4:REAL`, `%DB10:4:REAL`); with the type within it, as
-/// `KEPServer` and nodes7 write (`DB10,REAL4`, `DB10,X0.3`, `MR20`); and the variable memory of a LOGO! (`VW20`).
+/// Reads the notation of STEP 7 and TIA Portal (`%DB10.DBX0.3`, `%MW20`, `%I0.0`), with or without the
+/// percent sign; followed by a type, as in PLC4X (`%DB10.DBD4:REAL`, `%DB10:4:REAL`); with an embedded type,
+/// as in `KEPServer` and nodes7 (`DB10,REAL4`, `DB10,X0.3`, `MR20`); and the variable memory of a LOGO!
+/// (`VW20`).
 impl FromStr for Variable {
     type Err = String;
 
@@ -106,7 +107,7 @@ impl FromStr for Variable {
         let wrong = || format!("\"{}\" is no address in a CPU", shown(text));
         let upper = text.trim().to_ascii_uppercase();
         let bare = upper.strip_prefix('%').unwrap_or(&upper);
-        // The type, if it stands behind the address.
+        // The type, if it follows the address.
         let (bare, stated) = match bare.rsplit_once(':') {
             Some((bare, word)) => (bare, Some(kind(word).ok_or_else(wrong)?)),
             None => (bare, None),
@@ -135,13 +136,13 @@ impl FromStr for Variable {
         let is_number = !byte.is_empty() && byte.bytes().all(|byte| byte.is_ascii_digit());
         let byte = number(byte, LAST).ok_or_else(|| if is_number { beyond() } else { wrong() })?;
         let within = match (code, bit, stated) {
-            // No letter: a bit, or what the type says.
+            // Without a letter: a bit, or as the type says.
             ("", Some(_), None) => Kind::plain(Width::Bit),
             ("", _, Some(stated)) => stated,
             ("", None, None) => return Err(wrong()),
             (code, ..) => kind(code).ok_or_else(wrong)?,
         };
-        // A wide variable may be named by its first bit, as TIA Portal names those of 64 bits.
+        // A wide variable may be addressed by its first bit, as TIA Portal does for 64 bits.
         let Kind { width, data_type } = match stated {
             Some(stated) if within.width == stated.width || within.width == Width::Bit => stated,
             None => within,
@@ -171,7 +172,7 @@ impl FromStr for Variable {
     }
 }
 
-/// What a letter or a type says of a variable.
+/// What a letter or a type says about a variable.
 #[derive(Clone, Copy)]
 struct Kind {
     width: Width,
@@ -185,7 +186,7 @@ impl Kind {
     }
 }
 
-/// What a word says that is a letter of a size, or a type in one of its spellings.
+/// The meaning of a word: a size letter, or a type in one of its notations.
 fn kind(word: &str) -> Option<Kind> {
     let letter = match word {
         "X" | "BIT" => Some(Width::Bit),
@@ -212,7 +213,7 @@ fn kind(word: &str) -> Option<Kind> {
     })
 }
 
-/// The object that an address begins with, and the rest of it.
+/// The object at the start of an address, and the rest of it.
 fn split(text: &str) -> Option<(Object, &str)> {
     let Some((digits, rest)) = block(text) else {
         let object = match text.chars().next()? {
@@ -232,7 +233,7 @@ fn split(text: &str) -> Option<(Object, &str)> {
     Some((Object::Block(u16::try_from(block).ok()?), rest))
 }
 
-/// The digits behind `DB`, and what follows them.
+/// The digits after `DB`, and what follows them.
 fn block(text: &str) -> Option<(&str, &str)> {
     let block = text.strip_prefix("DB")?;
     let end = block.find(|c: char| !c.is_ascii_digit());
@@ -240,7 +241,7 @@ fn block(text: &str) -> Option<(&str, &str)> {
     (!digits.is_empty()).then_some((digits, rest))
 }
 
-/// A whole number without a sign, up to `last`.
+/// A number without a sign, at most `last`.
 fn number(digits: &str, last: usize) -> Option<usize> {
     let plain = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
     let number = plain.then(|| digits.parse().ok())?;

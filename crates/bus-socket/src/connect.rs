@@ -1,4 +1,4 @@
-//! The end that makes the connection.
+//! The end that connects.
 
 use tickbus_base::os::{Poller, Source};
 use tickbus_base::time::Stop;
@@ -8,11 +8,11 @@ use tickbus_fieldbus::{BusError, Port};
 use super::connection::Connection;
 use super::{Frames, Terms};
 
-/// Connects, and serves the connection until it ends or `stop` does.
+/// Connects, and serves the connection until it ends or `stop` comes.
 ///
 /// # Errors
 ///
-/// Nobody answers, or the connection ended.
+/// The peer does not answer, or the connection has ended.
 pub(super) fn connect(
     address: &Address,
     terms: Terms,

@@ -1,4 +1,4 @@
-//! One connection with its socket: carries bytes between the socket, the session and the port.
+//! One connection and its socket: transfers bytes between the socket, the session and the port.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -10,7 +10,7 @@ use tickbus_fieldbus::{BusError, Port};
 
 use super::{Frames, Session, Terms};
 
-/// So many times the socket is read at most before something else is looked at.
+/// At most this many reads per turn, before anything else is done.
 const READS: usize = 64;
 
 /// One connection.
@@ -19,14 +19,14 @@ pub(super) struct Connection {
     stream: TcpStream,
     peer: SocketAddr,
     session: Session,
-    /// Whether it was told that the peer is there.
+    /// Whether the peer's presence was reported.
     announced: bool,
-    /// How many skipped cycles the port knows of.
+    /// How many skipped cycles were reported to the port.
     skipped: u64,
 }
 
 impl Connection {
-    /// Takes over a connection that stands since now.
+    /// Takes over a connection that was established just now.
     pub(super) fn new(
         stream: TcpStream,
         peer: SocketAddr,
@@ -46,12 +46,12 @@ impl Connection {
         })
     }
 
-    /// Who is at the other end.
+    /// The peer's address.
     pub(super) fn peer(&self) -> SocketAddr {
         self.peer
     }
 
-    /// The socket, to wait for.
+    /// The socket to wait for.
     pub(super) fn stream(&self) -> &TcpStream {
         &self.stream
     }
@@ -70,18 +70,18 @@ impl Connection {
         self.session.deadline()
     }
 
-    /// For how long the peer has been silent, if that makes its data stale.
+    /// How long the peer has been silent, if its data are stale because of that.
     pub(super) fn stale_for(&self, now: Nanos) -> Option<Nanos> {
         self.session
             .is_stale(now)
             .then(|| self.session.silence(now))
     }
 
-    /// Does what there is to do: reads if `readable`, sends what is due, judges the time.
+    /// Does what is due: reads if `readable`, sends, checks the time-outs.
     ///
     /// # Errors
     ///
-    /// Why the connection cannot go on.
+    /// Why the connection has ended.
     pub(super) fn turn(
         &mut self,
         (readable, writable): (bool, bool),
@@ -100,11 +100,11 @@ impl Connection {
         Ok(())
     }
 
-    /// Reads all that has come.
+    /// Reads everything that has arrived.
     ///
     /// # Errors
     ///
-    /// The peer has closed, or the connection broke.
+    /// The peer has closed the connection, or it broke.
     pub(super) fn read_all(
         &mut self,
         port: &mut Port,
@@ -119,7 +119,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Reads once; tells whether there was anything.
+    /// Reads once; returns whether there was anything.
     fn read(&mut self, now: Nanos, port: &mut Port, frames: &mut Frames) -> Result<bool, BusError> {
         let count = match self.stream.read(self.session.space()) {
             Ok(0) => return Err(self.session.left().of(self.peer)),
@@ -136,7 +136,7 @@ impl Connection {
         Ok(true)
     }
 
-    /// Makes the records that are due, and writes as much as the system takes.
+    /// Makes the records that are due, and writes as much as the system accepts.
     fn send(
         &mut self,
         now: Nanos,
@@ -151,7 +151,7 @@ impl Connection {
                 let goes = self
                     .session
                     .made(now, |before, now| frames.differ(before, now));
-                // A look that sends nothing cannot be lost either.
+                // A check that sends nothing cannot be lost.
                 if goes && !port.sends_of(frames.stations(), now) {
                     self.session.lost();
                 }
@@ -174,7 +174,7 @@ impl Connection {
         }
     }
 
-    /// What is to be told of the connection, once: that the peer is there.
+    /// What to report about the connection, once: that the peer is there.
     pub(super) fn news(&mut self) -> Option<String> {
         if self.announced || !self.session.has_heard() {
             return None;
@@ -183,10 +183,10 @@ impl Connection {
         Some(format!("connected with {}", self.peer))
     }
 
-    /// Lets the port know how the connection is doing.
+    /// Reports the state of the connection to the port.
     fn report(&mut self, now: Nanos, port: &mut Port, frames: &Frames) {
         for station in frames.stations() {
-            // Who has nothing to say is alive for as long as the connection stands.
+            // A peer with nothing to send counts as alive as long as the connection is up.
             if port.sizes(station).1 == 0 {
                 port.touch(station, now);
             }

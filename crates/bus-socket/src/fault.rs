@@ -16,13 +16,13 @@ pub enum Fault {
     LeftAtOnce,
     /// The peer closed the connection in the middle of a record.
     LeftWithin(Partial),
-    /// A record was begun and not completed within the time given.
+    /// A record was not completed within the given time.
     Incomplete(Partial, Nanos),
-    /// A record was not taken whole by the peer within the time given.
+    /// The peer did not accept a whole record within the given time.
     NotReading(Partial, Nanos),
-    /// No whole record has come for the time given.
+    /// No whole record has arrived for the given time.
     Silent(Nanos),
-    /// Bytes came, although there is nothing to receive.
+    /// Bytes arrived, although nothing is to be received.
     Unasked,
 }
 

@@ -1,4 +1,4 @@
-//! How the frames of a connection's stations become records, and records frames.
+//! Converts the frames of a connection's stations to records and back.
 
 use std::ops::Range;
 
@@ -12,14 +12,14 @@ use super::parts::{Messages, Parts};
 #[derive(Debug)]
 pub(super) struct Frames {
     stations: Range<usize>,
-    /// Sizes of the frames that go out, and how each of them is compared.
+    /// Sizes of outgoing frames, and how each is compared.
     sent: Box<[(usize, DeadBands)]>,
-    /// Where a message has one axis and not the whole image.
+    /// `Some` if a message has one axis rather than the whole image.
     messages: Option<Messages>,
 }
 
 impl Frames {
-    /// Whole images of `stations`, one behind the other.
+    /// Whole images of `stations`, one after another.
     pub(super) fn new(table: &SignalTable, role: Role, stations: Range<usize>) -> Self {
         let (area, _) = role.areas();
         let sent = stations.clone().map(|index| {
@@ -33,7 +33,7 @@ impl Frames {
         }
     }
 
-    /// The parts of the one station, each in a message of its own: what goes out, and what comes in.
+    /// The parts of the single station, each in its own message: outgoing and incoming.
     pub(super) fn in_parts(self, sent: Parts, received: Parts) -> Self {
         Self {
             messages: Some(Messages::new(sent, received)),
@@ -46,7 +46,7 @@ impl Frames {
         self.stations.clone()
     }
 
-    /// Sizes of the records that go out and come in, in bytes.
+    /// Sizes of outgoing and incoming records, in bytes.
     pub(super) fn sizes(&self, port: &Port) -> (usize, usize) {
         if let Some(messages) = &self.messages {
             return messages.sizes();
@@ -55,18 +55,18 @@ impl Frames {
         sizes.fold((0, 0), |all, one| (all.0 + one.0, all.1 + one.1))
     }
 
-    /// A connection begins: nothing was sent and nothing was received on it.
+    /// A connection begins: nothing has been sent or received on it.
     pub(super) fn begin(&mut self) {
         if let Some(messages) = &mut self.messages {
             messages.begin();
         }
     }
 
-    /// Hands a record in that came at `now`.
+    /// Hands in a record that arrived at `now`.
     ///
     /// # Errors
     ///
-    /// The record is about a part that there is not; what is wrong with it.
+    /// The record has a part that does not exist; the text says so.
     pub(super) fn received(
         &mut self,
         now: Nanos,
@@ -86,7 +86,7 @@ impl Frames {
         Ok(())
     }
 
-    /// Makes the record of `now`.
+    /// Fills in the record for `now`.
     pub(super) fn fill(&mut self, now: Nanos, mut space: &mut [u8], port: &mut Port) {
         if let Some(messages) = &mut self.messages {
             messages.fill(port.outgoing(self.stations.start, now), space);
@@ -100,7 +100,7 @@ impl Frames {
         }
     }
 
-    /// Whether what was filled in last differs enough to be sent from what was sent `before`.
+    /// Whether the last filled record differs enough from the one sent `before` to be sent.
     pub(super) fn differ(&mut self, mut before: &[u8], mut now: &[u8]) -> bool {
         if let Some(messages) = &self.messages {
             return messages.is_news();
@@ -115,7 +115,7 @@ impl Frames {
         false
     }
 
-    /// The peer has the record, or will.
+    /// The peer has the record, or will have it.
     pub(super) fn sent(&mut self, port: &mut Port) {
         if let Some(messages) = &mut self.messages {
             for bytes in messages.sent() {

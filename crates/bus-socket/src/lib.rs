@@ -1,11 +1,11 @@
 //! Records of fixed size over TCP.
 //!
-//! A record is the frames of all stations of one direction, one after another, in the order of the
-//! driver.cfg: nothing before them, nothing behind them. So whoever can open a TCP connection can be
-//! the other end. An end that listens may do so at an address for each station; then a record is the frame of that
-//! station. And one whose image is axes may send them one by one, each in a message with its number.
+//! A record is the frames of all stations in one direction, one after another in the order of the driver.cfg,
+//! with no header and no trailer: any program that can open a TCP connection can be the other end. An end
+//! that listens may do so at a separate address for each station; a record is then the frame of that station.
+//! If the image consists of axes, they may be sent one at a time, each in a message with its number.
 //!
-//! [`Session`] is the whole of the protocol, without I/O; the rest carries its bytes.
+//! [`Session`] is the complete protocol, without I/O; the rest transfers its bytes.
 
 mod connect;
 mod connection;
@@ -31,18 +31,19 @@ pub use parts::Parts;
 pub use record::{Partial, Records};
 pub use session::{Sending, Session, Terms};
 
-/// The bus of kind `socket`: TCP connections, made by this end or by the other. There is one, or one for each station.
+/// The bus of kind `socket`: TCP connections, initiated by this end or the other; a single one, or one per
+/// station.
 #[derive(Debug)]
 pub struct Socket {
     options: Options,
     cycle: Nanos,
-    /// What goes over each connection, and the name of its station if it has one of its own.
+    /// The frames of each connection, and the name of its station if it has its own.
     lines: Vec<(String, Frames)>,
 }
 
 impl Socket {
-    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if one is
-    /// stated. `axes` are those of the table, in case that each has a message of its own.
+    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if stated.
+    /// `axes` are those of the table, in case each has its own message.
     pub fn new(
         options: &Options,
         table: &SignalTable,
@@ -95,7 +96,7 @@ impl Socket {
     }
 }
 
-/// Divides an area into its axes.
+/// Splits an area into its axes.
 fn divide(table: &SignalTable, area: Area, axes: &[Axis]) -> Parts {
     let structure = |axis: &Axis| match area {
         Area::Output => axis.command..axis.command + COMMAND_BYTES,

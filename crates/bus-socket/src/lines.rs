@@ -1,16 +1,16 @@
-//! Several connections of one driver: what the driver's one line tells of them.
+//! Several connections of one driver, combined into the driver's line.
 
 use std::fmt::Write as _;
 
 use tickbus_fieldbus::{BusError, Port};
 
-/// How each connection is doing, and what the line tells: it runs when all of them do.
+/// The state of each connection; the line is running when all of them are.
 #[derive(Debug)]
 pub(super) struct Lines(Vec<Line>);
 
 #[derive(Debug)]
 struct Line {
-    /// The name of the station; empty where there is one connection.
+    /// The name of the station; empty for a single connection.
     name: String,
     running: bool,
     reason: String,
@@ -26,7 +26,7 @@ impl Lines {
         Self(names.map(line).collect())
     }
 
-    /// The name of a station, as the beginning of what is told of it.
+    /// Prefixes a text about a line with its station's name.
     fn labelled(&self, line: usize, text: &str) -> String {
         let Line { name, .. } = &self.0[line];
         if name.is_empty() {
@@ -36,7 +36,7 @@ impl Lines {
         }
     }
 
-    /// All reasons, one behind the other.
+    /// All reasons, one after another.
     fn reason(&self) -> String {
         let mut text = String::new();
         for (line, Line { reason, .. }) in self.0.iter().enumerate() {

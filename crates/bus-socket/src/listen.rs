@@ -1,4 +1,4 @@
-//! The end that waits for connections: one peer at a time for each address that it listens on.
+//! The end that listens: at each address it serves one peer at a time.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -12,21 +12,21 @@ use super::connection::Connection;
 use super::lines::Lines;
 use super::{Frames, Terms};
 
-/// For how long nobody is accepted after the system gave no socket.
+/// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// What is served at one address.
+/// One address to listen on, and its stations.
 #[derive(Debug)]
 pub(super) struct Place<'a> {
     pub(super) address: &'a Address,
-    /// The name of its station; empty where one address serves all.
+    /// The name of its station; empty if one address serves all.
     pub(super) name: String,
     pub(super) terms: Terms,
     pub(super) frames: &'a mut Frames,
 }
 
-/// Serves one client after the other at each of the `places` until `stop`. The listeners stay while clients come
-/// and go.
+/// Serves one client after another at each of the `places` until `stop`. The listeners stay open while
+/// clients come and go.
 ///
 /// # Errors
 ///
@@ -66,7 +66,7 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
     Ok(())
 }
 
-/// Waits for all servers, and lets each do what there is to do.
+/// Waits for all servers, and lets each do what is due.
 fn turn(
     servers: &mut [Server<'_>],
     lines: &mut Lines,
@@ -74,7 +74,7 @@ fn turn(
     port: &mut Port,
 ) -> Result<(), BusError> {
     let now = port.clock().now();
-    // Frames that are held back are handed in on time, whether or not somebody is served.
+    // Held-back frames must be handed in on time, even without a client.
     let mut deadline = port.due();
     for server in &mut *servers {
         server.watch(now, set).map_err(|error| no_wait(&error))?;
@@ -101,7 +101,7 @@ fn turn(
 }
 
 struct Server<'a> {
-    /// Its number among the lines.
+    /// Its index among the lines.
     line: usize,
     listener: TcpListener,
     bound: SocketAddr,
@@ -109,20 +109,20 @@ struct Server<'a> {
     terms: Terms,
     frames: &'a mut Frames,
     served: Option<Connection>,
-    /// What the served connection is waited for, once it is; and whether the listener is.
+    /// What the set waits for on the connection, if there is one; and whether it waits for the listener.
     watched: Option<Interest>,
     hears: bool,
-    /// Until when nobody is accepted, after the system could not.
+    /// Until when no client is accepted, after the system had no socket.
     deaf_until: Nanos,
 }
 
 impl Server<'_> {
-    /// Its connection in the poll set; the next is its listener.
+    /// The key of its connection in the poll set; the listener's is the next one.
     fn key(&self) -> usize {
         2 * self.line
     }
 
-    /// Lets `set` wait for what there is to wait for.
+    /// Makes `set` wait for what this server needs.
     fn watch(&mut self, now: Nanos, set: &mut PollSet) -> io::Result<()> {
         let key = self.key();
         if let Some(served) = &self.served {
@@ -146,7 +146,7 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Ends the served connection.
+    /// Closes the current connection.
     fn part(&mut self, set: &mut PollSet) {
         if let Some(served) = self.served.take()
             && self.watched.take().is_some()
@@ -159,7 +159,7 @@ impl Server<'_> {
         now < self.deaf_until
     }
 
-    /// Lets the connection do what there is to do.
+    /// Lets the connection do what is due.
     fn serve(
         &mut self,
         ready: (bool, bool),
@@ -178,8 +178,8 @@ impl Server<'_> {
             lines.running(self.line, &news, port);
         }
         if turned.is_ok() && knocked {
-            // Whoever knocks may be the served one, back again: all of its farewell has to be
-            // read before the newcomer is judged.
+            // A new client may be the current one, which has reconnected: read the end of its old connection
+            // before judging the new one.
             turned = served.read_all(port, self.frames);
         }
         if let Err(error) = turned {
@@ -195,7 +195,7 @@ impl Server<'_> {
             Ok(accepted) => accepted,
             Err(error) if is_of_the_client(&error) => return,
             Err(error) => {
-                // Peers at other addresses are served on.
+                // Peers at other addresses are not affected.
                 not_accepted(&error, port);
                 self.deaf_until = now + PAUSE;
                 return;
@@ -225,13 +225,13 @@ impl Server<'_> {
                 self.frames.begin();
                 self.served = Some(connection);
             }
-            // Gone again before it was there.
+            // It left again at once.
             Err(error) => log::debug!("{error}"),
         }
     }
 }
 
-/// Tells that `peer`, whose connection is closed, was not served.
+/// Reports that `peer` was not served; its connection is closed.
 fn turn_away(peer: SocketAddr, served: SocketAddr, port: &Port) {
     port.count("socket.turned_away");
     port.log(

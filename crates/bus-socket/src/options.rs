@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the socket bus.
+//! The options of the socket bus in a driver.cfg.
 
 use tickbus_axis::Axis;
 use tickbus_base::time::Nanos;
@@ -9,58 +9,58 @@ use tickbus_image::signal::SignalTable;
 
 use super::Sending;
 
-/// The port where both ends meet, unless a driver.cfg says otherwise.
+/// The default port.
 const PORT: u16 = 20_030;
 
-/// Who waits for the connection, and who makes it.
+/// Which end listens, and which connects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TcpRole {
-    /// Waits for it.
+    /// Listens.
     Listen,
-    /// Makes it.
+    /// Connects.
     Connect,
 }
 
-/// What one record or message has.
+/// The content of a record or message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Message {
     /// The whole image of one direction.
     #[default]
     Image,
-    /// One axis, behind its number.
+    /// One axis, preceded by its number.
     Axis {
-        /// Where the file says so, as a byte offset.
+        /// The byte offset of that key in the file.
         at: usize,
     },
 }
 
-/// What a driver.cfg says to the socket bus.
+/// The options of the socket bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Where to listen, or what to connect to.
+    /// The address to listen on, or to connect to.
     pub address: Address,
-    /// Where to listen for the peer of each station; empty where one peer has them all.
+    /// The address to listen on for the peer of each station; empty if one peer has them all.
     pub stations: Vec<Address>,
-    /// How many `[[station]]` tables were read.
+    /// The number of `[[station]]` tables that were read.
     tables: usize,
-    /// What one record or message has.
+    /// The content of a record or message.
     pub message: Message,
-    /// Who makes the connection.
+    /// Whether this end listens or connects.
     pub tcp: TcpRole,
-    /// When a record goes out.
+    /// When a record is sent.
     pub sending: Sending,
-    /// On change: the least time between two records; zero for none.
+    /// On change: the shortest time between two records; zero for no limit.
     pub min_interval: Nanos,
-    /// Whether every change that the peer makes is reported as an event, beside the image.
+    /// Whether every change by the peer is reported as an event, in addition to the image.
     pub events: bool,
 }
 
 impl Options {
-    /// Takes another address than the driver.cfg names.
+    /// Replaces the address of the driver.cfg.
     ///
     /// # Errors
     ///
-    /// The text is no address, or none that this end can use.
+    /// The text is not an address, or one that this end cannot use.
     pub fn set_address(&mut self, address: &str) -> Result<(), String> {
         let address: Address = address
             .parse()
@@ -160,7 +160,7 @@ impl Options {
         self.stations.extend(Address::read(&value));
     }
 
-    /// Reports what does not go together with the stations and axes of the driver.
+    /// Reports conflicts with the stations and axes of the driver.
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         let Message::Axis { at } = self.message else {
             return;
@@ -184,7 +184,7 @@ impl Options {
     }
 }
 
-/// Checks that an address can be used in this TCP role.
+/// Checks that an address can be used when listening, or connecting.
 fn check_port(address: &Address, tcp: TcpRole) -> Result<(), AddressError> {
     match tcp {
         TcpRole::Listen => Ok(()),
@@ -192,7 +192,7 @@ fn check_port(address: &Address, tcp: TcpRole) -> Result<(), AddressError> {
     }
 }
 
-/// A machine waits for its PLC, as a PLC's periphery does.
+/// A machine listens for its PLC, like a PLC's I/O device.
 const fn default_tcp(role: Role) -> TcpRole {
     match role {
         Role::Device => TcpRole::Listen,

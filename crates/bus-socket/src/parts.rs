@@ -1,25 +1,25 @@
-//! One axis per message: an image that goes over the wire in parts.
+//! One axis per message: an image sent over the wire in parts.
 
 use std::ops::Range;
 
-/// Size of the number that every message begins with: which part it has.
+/// Size of the part number at the start of every message.
 const SELECTOR: usize = 2;
 
-/// How one area is divided into parts: each axis is one, by its number from 1; what belongs to no axis is part 0.
+/// How an area is split into parts: each axis is one, numbered from 1; everything else is part 0.
 ///
-/// A message is the number of the part as a big-endian UINT, then its bytes, then zeros up to the size that all
-/// messages of this direction have.
+/// A message is the part's number as a big-endian UINT, then its bytes, then zeros up to the common size of
+/// all messages in this direction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Parts {
-    /// By number: where the bytes of the part lie, in the order in which they follow one another.
+    /// By number: the ranges of the part's bytes, in order.
     pieces: Box<[Vec<Range<usize>>]>,
-    /// Bytes of the whole area.
+    /// Size of the whole area in bytes.
     area: usize,
     longest: usize,
 }
 
 impl Parts {
-    /// Divides an area of so many bytes; `axes` are the places of the structures.
+    /// Splits an area of `area` bytes; `axes` are the ranges of the structures.
     pub fn new(area: usize, axes: impl IntoIterator<Item = Range<usize>>) -> Self {
         let mut pieces: Vec<Vec<Range<usize>>> = vec![Vec::new()];
         let mut taken = vec![false; area];
@@ -43,7 +43,7 @@ impl Parts {
         }
     }
 
-    /// Size of a message; 0 where there is nothing to send.
+    /// Size of a message; 0 if there is nothing to send.
     pub fn message_bytes(&self) -> usize {
         if self.area == 0 {
             0
@@ -65,7 +65,7 @@ impl Parts {
         pieces.any(|piece| one[piece.clone()] != other[piece.clone()])
     }
 
-    /// Puts a part of `frame` into a message.
+    /// Copies a part of `frame` into a message.
     fn write(&self, part: usize, frame: &[u8], message: &mut [u8]) {
         let number = u16::try_from(part).expect("a driver has fewer axes");
         let (selector, mut bytes) = message.split_at_mut(SELECTOR);
@@ -78,7 +78,7 @@ impl Parts {
         bytes.fill(0);
     }
 
-    /// Takes the part that a message has over into `frame`.
+    /// Copies the part in a message into `frame`.
     fn read(&self, message: &[u8], frame: &mut [u8]) -> Result<(), String> {
         let (selector, mut bytes) = message.split_at(SELECTOR);
         let number = usize::from(u16::from_be_bytes([selector[0], selector[1]]));
@@ -108,13 +108,13 @@ impl Parts {
 pub(super) struct Messages {
     sends: Parts,
     receives: Parts,
-    /// The frame as it stands at the peer, and as the last message would leave it.
+    /// The frame as the peer has it, and as the last message would change it.
     there: Box<[u8]>,
-    /// Whether the peer has each part.
+    /// Whether the peer has received each part.
     known: Box<[bool]>,
-    /// The frame as far as its parts have come; those that have not are zeros.
+    /// The frame made of the parts received so far; the others are zeros.
     come: Box<[u8]>,
-    /// What the last message has: its part, those bytes, and whether the peer does not have them.
+    /// The last message: its part, its bytes, and whether they are new to the peer.
     part: usize,
     filled: Box<[u8]>,
     news: bool,
@@ -144,13 +144,13 @@ impl Messages {
         self.part = 0;
     }
 
-    /// The whole frame, after the part that this message has.
+    /// The whole frame after the part in this message.
     pub(super) fn received(&mut self, message: &[u8]) -> Result<&[u8], String> {
         self.receives.read(message, &mut self.come)?;
         Ok(&self.come)
     }
 
-    /// Makes a message of the part that is due: the next one that has changed, else the next one.
+    /// Makes a message of the part that is due: the next changed one, or else simply the next one.
     pub(super) fn fill(&mut self, frame: &[u8], message: &mut [u8]) {
         let count = self.sends.count();
         let next = || (1..=count).map(|step| (self.part + step) % count);
@@ -169,7 +169,7 @@ impl Messages {
         self.news
     }
 
-    /// The peer has the last message; gives the bytes of the frame that were in it.
+    /// The peer has the last message; returns the ranges of the frame in it.
     pub(super) fn sent(&mut self) -> &[Range<usize>] {
         let pieces = &self.sends.pieces[self.part];
         for piece in pieces {
@@ -184,7 +184,7 @@ impl Messages {
 mod tests {
     use super::*;
 
-    /// Two axes of 3 bytes with a byte between them and one behind.
+    /// Two axes of 3 bytes, with a byte between them and one after them.
     fn parts() -> Parts {
         Parts::new(8, [0..3, 4..7])
     }

@@ -1,30 +1,30 @@
-//! Records of one size, cut out of a stream of bytes.
+//! Splits a stream of bytes into records of one size.
 
 use std::fmt;
 
-/// About as many bytes are read at once, where a record is not larger.
+/// The approximate size of a read, if a record is not larger.
 const READ_BYTES: usize = 16 * 1024;
 
-/// Cuts a stream into records of one size, however the network cut it into pieces.
+/// Splits a stream into records of one size, however the network has segmented it.
 ///
-/// Bytes go in through [`space`](Self::space) and [`arrived`](Self::arrived), and come out by
-/// [`take`](Self::take) until that gives `None`. Nothing is allocated on the way.
+/// Bytes are put in through [`space`](Self::space) and [`arrived`](Self::arrived), and records are taken by
+/// [`take`](Self::take) until that returns `None`. Nothing is allocated in the process.
 #[derive(Debug)]
 pub struct Records {
     size: usize,
-    /// A whole number of records long, so that there is always space for one byte at least.
+    /// A whole number of records long, so that there is always space for at least one byte.
     buffer: Box<[u8]>,
-    /// The bytes that have arrived and are not taken yet.
+    /// The bytes that have arrived and have not been taken.
     start: usize,
     end: usize,
 }
 
-/// How much of a record has come.
+/// How much of a record has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Partial {
-    /// Bytes that have come.
+    /// Bytes that have arrived.
     pub have: usize,
-    /// Bytes that a record has.
+    /// Bytes of a record.
     pub of: usize,
 }
 
@@ -35,7 +35,7 @@ impl fmt::Display for Partial {
 }
 
 impl Records {
-    /// A decoder of records of `size` bytes. There are no records of no bytes: with a size of 0 all that
+    /// Splits a stream into records of `size` bytes. With a size of 0 there are no records: everything that
     /// arrives stays [`partial`](Self::partial).
     pub fn new(size: usize) -> Self {
         let at_once = READ_BYTES.checked_div(size).unwrap_or(1).max(1);
@@ -47,7 +47,7 @@ impl Records {
         }
     }
 
-    /// Where the next bytes of the stream go. Never empty once all records were taken.
+    /// Where to put the next bytes of the stream. Never empty once all records have been taken.
     pub fn space(&mut self) -> &mut [u8] {
         if self.start > 0 {
             self.buffer.copy_within(self.start..self.end, 0);
@@ -60,11 +60,11 @@ impl Records {
         &mut self.buffer[self.end..]
     }
 
-    /// So many bytes were put at the beginning of [`space`](Self::space).
+    /// `count` bytes were put at the beginning of [`space`](Self::space).
     ///
     /// # Panics
     ///
-    /// When there was no space for as many.
+    /// When there was not that much space.
     pub fn arrived(&mut self, count: usize) {
         let space = self.buffer.len() - self.end;
         assert!(
@@ -74,7 +74,7 @@ impl Records {
         self.end += count;
     }
 
-    /// The next whole record, if it has come.
+    /// The next whole record, if it has arrived.
     pub fn take(&mut self) -> Option<&[u8]> {
         if self.size == 0 || self.end - self.start < self.size {
             return None;
@@ -84,13 +84,13 @@ impl Records {
         Some(&self.buffer[record])
     }
 
-    /// How many bytes have arrived and are not taken yet.
+    /// How many bytes have arrived and have not been taken.
     pub fn waiting(&self) -> usize {
         self.end - self.start
     }
 
-    /// How much has come of a record that is not whole yet; `None` between two records, and while
-    /// whole ones wait to be taken.
+    /// How much of an incomplete record has arrived; `None` between two records, and while whole ones have
+    /// not been taken.
     pub fn partial(&self) -> Option<Partial> {
         let (have, of) = (self.waiting(), self.size);
         (have > 0 && (of == 0 || have < of)).then_some(Partial { have, of })
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Puts all of `bytes` in, in as many pieces as the space makes necessary; gives the records.
+    /// Puts in all of `bytes`, in pieces as the space requires; returns the records.
     fn feed(records: &mut Records, mut bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut whole = Vec::new();
         while !bytes.is_empty() {
@@ -173,7 +173,7 @@ mod tests {
         records.arrived(space + 1);
     }
 
-    /// A stream, and where the network cuts it.
+    /// A stream, and where the network segments it.
     fn cut_stream() -> impl Strategy<Value = (usize, Vec<u8>, Vec<usize>)> {
         let stream = proptest::collection::vec(any::<u8>(), 0..2_000);
         let cuts = proptest::collection::vec(1..700_usize, 1..40);
@@ -181,8 +181,8 @@ mod tests {
     }
 
     proptest! {
-        /// Any stream, cut anywhere (so also truncated anywhere): its whole records and no others, and
-        /// the rest is counted.
+        /// Any stream with any segmentation (and so with any truncation) gives its whole records and no
+        /// others, and the rest is counted.
         #[test]
         fn every_cutting_gives_the_same_records((size, stream, cuts) in cut_stream()) {
             let mut records = Records::new(size);
@@ -199,7 +199,7 @@ mod tests {
             prop_assert_eq!(records.partial(), (have > 0).then_some(Partial { have, of: size }));
         }
 
-        /// A bit that the network turned over changes that bit, and cannot shift a record.
+        /// A bit flipped by the network changes only that bit, and cannot shift a record.
         #[test]
         fn a_flipped_bit_stays_where_it_is(
             (size, mut stream, _) in cut_stream(), at in any::<usize>(), bit in 0..8_u8,

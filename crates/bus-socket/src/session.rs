@@ -1,93 +1,93 @@
-//! One connection, as a core without I/O: time and bytes are handed in, bytes and the next deadline
-//! come out.
+//! One connection, without I/O: time and received bytes go in, bytes to send and the next deadline come out.
 
 use tickbus_base::time::{Nanos, Pace};
 
 use super::{Fault, Partial, Records};
 
-/// After so many times `max_age` without a record a connection is given up.
+/// A connection is given up after this many times `max_age` without a record.
 const SILENCE: i64 = 4;
 
-/// So many times within `max_age` a record goes out, changed or not.
+/// A record is sent at least this many times within `max_age`, changed or not.
 const SIGNS_OF_LIFE: i64 = 3;
 
-/// When a record goes out.
+/// When a record is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Sending {
     /// At every cycle.
     #[default]
     Cyclic,
-    /// When the image has changed, looked at every cycle; and as a sign of life.
+    /// When the image has changed, checked at every cycle; and as a sign of life.
     OnChange,
-    /// One for each record that comes in.
+    /// In reply to each received record.
     Reply,
 }
 
-/// What both ends of a connection, or this one, have agreed upon.
+/// The parameters of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Terms {
-    /// When a record goes out.
+    /// When a record is sent.
     pub sending: Sending,
-    /// Time between two records, or between two looks for a change. Positive.
+    /// Time between two records, or between two checks for a change. Positive.
     pub cycle: Nanos,
-    /// On change: the least time between two records.
+    /// On change: the shortest time between two records.
     pub min_interval: Nanos,
     /// Data older than this are stale. Positive.
     pub max_age: Nanos,
-    /// Size of a record that comes in, in bytes; 0 when none do.
+    /// Size of an incoming record, in bytes; 0 if there are none.
     pub receives: usize,
-    /// Size of a record that goes out, in bytes; 0 when none do.
+    /// Size of an outgoing record, in bytes; 0 if there are none.
     pub sends: usize,
 }
 
-/// One connection, from its first moment to its end.
+/// One connection, from its beginning to its end.
 ///
-/// The owner of the socket, whenever it wakes: reads into [`space`](Self::space) and says so by
-/// [`arrived`](Self::arrived), takes all records by [`take`](Self::take), fills what
-/// [`due`](Self::due) gives and says so by [`made`](Self::made), writes [`to_write`](Self::to_write) and
-/// says how much the system took by [`wrote`](Self::wrote), and asks [`check`](Self::check) whether
-/// the connection may go on; then it waits for the socket until [`deadline`](Self::deadline). The clock is
-/// judged last, after all that had already come: a process that was held up blames nobody else for it.
+/// Whenever the owner of the socket wakes up, it reads into [`space`](Self::space) and reports that by
+/// [`arrived`](Self::arrived), takes all records by [`take`](Self::take), fills the buffer that
+/// [`due`](Self::due) returns and reports that by [`made`](Self::made), writes [`to_write`](Self::to_write)
+/// and reports how much the system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to
+/// see whether the connection may go on; then it waits for the socket until [`deadline`](Self::deadline).
+/// Time-outs are checked last, after everything that had already arrived: if this process was held up, the
+/// peer is not to blame.
 #[derive(Debug)]
 pub struct Session {
     terms: Terms,
     began: Nanos,
     inbox: Inbox,
     outbox: Outbox,
-    /// When records are due, or looks for a change.
+    /// When records, or checks for a change, are due.
     pace: Pace,
-    /// Records that came in and are not yet answered.
+    /// Received records that have not been answered.
     owed: u64,
     skipped: u64,
-    /// When the connection was last found in order.
+    /// When the connection last passed the check.
     checked: Nanos,
 }
 
 #[derive(Debug)]
 struct Inbox {
     records: Records,
-    /// When the last whole record came.
+    /// When the last whole record arrived.
     heard: Option<Nanos>,
-    /// When the record that is not whole yet was begun.
+    /// When the incomplete record began to arrive.
     incomplete_since: Option<Nanos>,
 }
 
-/// One record on its way out.
+/// One outgoing record.
 #[derive(Debug)]
 struct Outbox {
     record: Box<[u8]>,
-    /// How much of it the system has taken.
+    /// How much of it the system has accepted.
     written: usize,
-    /// Since when it has waited to be taken whole; `None` when there is nothing to send.
+    /// Since when it has been waiting to be accepted completely; `None` if there is nothing to send.
     waiting_since: Option<Nanos>,
     /// When the last record was made.
     made: Option<Nanos>,
-    /// The last record that the system took whole, for comparison.
+    /// The last record that the system accepted completely, for comparison.
     last: Box<[u8]>,
 }
 
 impl Session {
-    /// A connection that stands since `now`.
+    /// A connection established at `now`.
     pub fn new(terms: Terms, now: Nanos) -> Self {
         let compared = match terms.sending {
             Sending::OnChange => terms.sends,
@@ -115,21 +115,21 @@ impl Session {
         }
     }
 
-    /// After how long without a record a connection is given up.
+    /// How long a connection without records is kept.
     pub fn patience(max_age: Nanos) -> Nanos {
         max_age.times(SILENCE)
     }
 
-    /// Where the next bytes from the peer go; never empty when all records were taken.
+    /// Where to put the next bytes from the peer; never empty once all records have been taken.
     pub fn space(&mut self) -> &mut [u8] {
         self.inbox.records.space()
     }
 
-    /// So many bytes came, at `now`, and stand at the beginning of [`space`](Self::space).
+    /// `count` bytes arrived at `now`, and are at the beginning of [`space`](Self::space).
     ///
     /// # Panics
     ///
-    /// When there was no space for as many.
+    /// When there was not that much space.
     pub fn arrived(&mut self, now: Nanos, count: usize) {
         if count == 0 {
             return;
@@ -155,17 +155,17 @@ impl Session {
         }
     }
 
-    /// The next whole record of the peer.
+    /// The peer's next whole record.
     pub fn take(&mut self) -> Option<&[u8]> {
         let record = self.inbox.records.take()?;
         self.owed = self.owed.saturating_add(1);
         Some(record)
     }
 
-    /// Where to put the image, if a record is to be made at `now`; [`made`](Self::made) has to follow.
+    /// The buffer for the image, if a record is due at `now`; [`made`](Self::made) must follow.
     ///
-    /// While the system has not taken the whole of a record there is none to be made, or, if it has not
-    /// even taken a part, the newer one takes its place.
+    /// While the system has accepted only a part of a record, no other one is made; if it has accepted
+    /// nothing of it, the newer one replaces it.
     pub fn due(&mut self, now: Nanos) -> Option<&mut [u8]> {
         if self.terms.sends == 0 {
             return None;
@@ -189,10 +189,10 @@ impl Session {
         Some(&mut self.outbox.record)
     }
 
-    /// When a record is due next, or a look for a change.
+    /// When the next record, or the next check for a change, is due.
     fn next_send(&self) -> Nanos {
         match (self.terms.sending, self.outbox.made) {
-            // A record that waits is the sign of life, once the peer takes it.
+            // A waiting record will be the sign of life, once the peer accepts it.
             (Sending::OnChange, Some(made)) if self.outbox.waiting_since.is_none() => {
                 self.pace.due().min(made + self.sign_of_life())
             }
@@ -204,8 +204,8 @@ impl Session {
         Nanos((self.terms.max_age.0 / SIGNS_OF_LIFE).max(1))
     }
 
-    /// The image of `now` stands where [`due`](Self::due) wanted it. When changes decide, `differs` is
-    /// asked to compare the record that went out last with it. True if the record is to go out.
+    /// The image for `now` is in the buffer from [`due`](Self::due). When sending on change, `differs` is
+    /// called to compare it with the last record sent. Returns whether the record is to be sent.
     pub fn made(&mut self, now: Nanos, differs: impl FnOnce(&[u8], &[u8]) -> bool) -> bool {
         let life = self.sign_of_life();
         let outbox = &mut self.outbox;
@@ -224,7 +224,7 @@ impl Session {
         goes
     }
 
-    /// The record that was [made](Self::made) last gets lost on the way: it counts as sent, and the peer never has it.
+    /// The record last [made](Self::made) is lost on purpose: it counts as sent, but the peer never gets it.
     pub fn lost(&mut self) {
         let outbox = &mut self.outbox;
         if outbox.written == 0 && outbox.waiting_since.take().is_some() && !outbox.last.is_empty() {
@@ -232,7 +232,7 @@ impl Session {
         }
     }
 
-    /// What is to be written; empty when there is nothing to send.
+    /// The bytes to be written; empty if there are none.
     pub fn to_write(&self) -> &[u8] {
         match self.outbox.waiting_since {
             Some(_) => &self.outbox.record[self.outbox.written..],
@@ -240,12 +240,12 @@ impl Session {
         }
     }
 
-    /// The system took so many bytes of [`to_write`](Self::to_write); true when that was the rest of a
+    /// The system accepted `count` bytes of [`to_write`](Self::to_write); returns whether that completed a
     /// record.
     ///
     /// # Panics
     ///
-    /// When there were not as many.
+    /// When there were fewer bytes to write.
     pub fn wrote(&mut self, count: usize) -> bool {
         let rest = self.to_write().len();
         assert!(count <= rest, "{count} bytes were taken of {rest}");
@@ -262,11 +262,11 @@ impl Session {
         whole
     }
 
-    /// Whether the connection may go on at `now`.
+    /// Checks whether the connection may go on at `now`.
     ///
     /// # Errors
     ///
-    /// The peer leaves a record incomplete, does not read, or says nothing, for too long.
+    /// The peer leaves a record incomplete, does not read, or is silent for too long.
     pub fn check(&mut self, now: Nanos) -> Result<(), Fault> {
         let Terms {
             max_age,
@@ -293,7 +293,7 @@ impl Session {
         Ok(())
     }
 
-    /// How much has come of a record that is not whole yet.
+    /// How much of an incomplete record has arrived.
     pub fn partial(&self) -> Option<Partial> {
         self.inbox.records.partial()
     }
@@ -308,7 +308,7 @@ impl Session {
         }
     }
 
-    /// Until when the owner of the socket may wait, if nothing comes and nothing can be written.
+    /// Until when the owner of the socket may wait if nothing arrives and nothing can be written.
     pub fn deadline(&self) -> Nanos {
         let Terms {
             max_age,
@@ -320,7 +320,7 @@ impl Session {
         let mut deadline = Nanos::MAX;
         if sends > 0 {
             deadline = match sending {
-                // Records may have been taken after the last look for an answer to send.
+                // Records may have been taken since the last check for an answer to send.
                 Sending::Reply if self.owed > 0 && self.outbox.waiting_since.is_none() => {
                     return self.checked;
                 }
@@ -333,7 +333,7 @@ impl Session {
             deadline = deadline.min(since + max_age + Nanos(1));
         }
         if receives > 0 {
-            // First the line becomes stale, then it is given up.
+            // The line becomes stale first, and is given up later.
             let heard = self.inbox.heard.unwrap_or(self.began);
             let stale = heard + max_age + Nanos(1);
             let given_up = heard + Self::patience(max_age) + Nanos(1);
@@ -343,13 +343,13 @@ impl Session {
                 given_up
             });
         } else {
-            // Nothing comes, so that the connection stands has to be looked at again and again.
+            // Nothing is received, so the connection itself must be checked regularly.
             deadline = deadline.min(self.checked + self.sign_of_life());
         }
         deadline
     }
 
-    /// For how long nothing has been heard of the peer. One that has nothing to say is never silent.
+    /// How long the peer has been silent. A peer with nothing to send is never silent.
     pub fn silence(&self, now: Nanos) -> Nanos {
         if self.terms.receives == 0 {
             return Nanos::ZERO;
@@ -362,12 +362,12 @@ impl Session {
         self.silence(now) > self.terms.max_age
     }
 
-    /// Whether a whole record has come yet; a peer that has nothing to say has said it.
+    /// Whether a whole record has arrived; always true for a peer with nothing to send.
     pub fn has_heard(&self) -> bool {
         self.terms.receives == 0 || self.inbox.heard.is_some()
     }
 
-    /// Cycles at which the system had not yet taken the whole record of an earlier one.
+    /// Cycles skipped because the system had not accepted an earlier record completely.
     pub fn skipped(&self) -> u64 {
         self.skipped
     }

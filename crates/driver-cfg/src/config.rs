@@ -1,4 +1,4 @@
-//! The driver.cfg of one driver, read whole.
+//! A complete driver.cfg.
 
 use std::path::{Path, PathBuf};
 
@@ -19,10 +19,10 @@ const NAME_LIMIT: usize = 120;
 /// The longest path of a file, in characters.
 const PATH_LIMIT: usize = 1000;
 
-/// All that a driver.cfg says, checked.
+/// The checked contents of a driver.cfg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// The file that it came from.
+    /// The file that it was read from.
     pub path: PathBuf,
     /// The driver's id, unique among the drivers of a folder; positive.
     pub id: i32,
@@ -30,38 +30,38 @@ pub struct Config {
     pub name: String,
     /// Which end of the bus it is.
     pub role: Role,
-    /// What the numbers of the addresses in the file count; those in `table` count bytes.
+    /// What the numbers of addresses in the file count; the addresses in `table` count bytes.
     pub addressing: Addressing,
     /// Its stations and signals.
     pub table: SignalTable,
-    /// Its axes, whose signals are in `table` with all others.
+    /// Its axes; their signals are in `table` like all others.
     pub axes: Vec<Axis>,
     /// Cycle times and time-outs.
     pub timing: Timing,
-    /// What the bus itself needs to know.
+    /// The options of the bus.
     pub bus: Options,
-    /// Signals by which each end sees that the other one lives.
+    /// The signals by which each end knows that the other one is alive.
     pub life_signs: LifeSigns,
     /// Faults to inject at this end.
     pub faults: Vec<Fault>,
-    /// The file that has more of them; [`load`](Self::load) reads it.
+    /// The file with further faults; [`load`](Self::load) reads it.
     pub fault_file: Option<PathBuf>,
-    /// What is recorded, if anything is.
+    /// What to record, if anything.
     pub record: Option<record::Options>,
 }
 
-/// What a command line says about the end that its process is.
+/// What a command line says about its end of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asked {
-    /// Which end it is. A file that states no role serves both.
+    /// The end. A file without a role serves both.
     pub role: Role,
-    /// Whether another address will take the place of the file's; see
+    /// Whether the file's address will be replaced; see [`Options::set_address`].
     /// [`Options::set_address`].
     pub moved: bool,
 }
 
 impl Config {
-    /// The folder that relative paths in the driver.cfg begin at.
+    /// The folder to which paths in the driver.cfg are relative.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
@@ -70,16 +70,17 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// When the file cannot be read or is no text, or with every mistake that it has.
+    /// When the file cannot be read or is not UTF-8, or with every mistake in it.
     pub fn load(path: &Path) -> Result<Self, Mistakes> {
         Self::load_as(path, None)
     }
 
-    /// Reads the driver.cfg at `path` for a process of its own, with what its command line `asked` for.
+    /// Reads the driver.cfg at `path` for a separate process that serves the end `asked` for on its command
+    /// line.
     ///
     /// # Errors
     ///
-    /// As [`load`](Self::load); the file states the other role; or its bus never leaves the process.
+    /// As [`load`](Self::load); or the file states the other role; or its bus cannot leave the process.
     pub fn load_as(path: &Path, asked: Option<Asked>) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let mut config = Self::parse_at(path, &path.display().to_string(), &text, asked)?;
@@ -89,11 +90,11 @@ impl Config {
         Ok(config)
     }
 
-    /// Adds the faults that the file at `path` describes.
+    /// Adds the faults in the file at `path`.
     ///
     /// # Errors
     ///
-    /// When the file cannot be read, or with every mistake that it has.
+    /// When the file cannot be read, or with every mistake in it.
     pub fn add_faults(&mut self, path: &Path) -> Result<(), Mistakes> {
         let text = load_text(path)?;
         let file = path.display().to_string();
@@ -107,7 +108,7 @@ impl Config {
         Ok(())
     }
 
-    /// Reads the text of a driver.cfg; `file_name` is what its mistakes call it.
+    /// Reads the text of a driver.cfg; mistakes call it `file_name`.
     ///
     /// # Errors
     ///
@@ -116,7 +117,7 @@ impl Config {
         Self::parse_as(file_name, text, None)
     }
 
-    /// The same with what a command line `asked` for; see [`load_as`](Self::load_as).
+    /// As [`parse`](Self::parse), for the end `asked` for on a command line; see [`load_as`](Self::load_as).
     ///
     /// # Errors
     ///
@@ -125,7 +126,8 @@ impl Config {
         Self::parse_at(Path::new(file_name), file_name, text, asked)
     }
 
-    /// The same for a file at `path`, which need not be a text: `shown` is what mistakes call it.
+    /// As [`parse_as`](Self::parse_as), for a file at `path`, which need not be UTF-8: mistakes call it
+    /// `shown`.
     fn parse_at(
         path: &Path,
         shown: &str,
@@ -230,8 +232,8 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config
         .unwrap_or_default();
 
     let (driver, fieldbus) = (driver?, fieldbus?);
-    // A file that serves both ends has the faults of the machine's end: injected at both, they would
-    // happen twice.
+    // In a file that serves both ends the faults are the machine's: injected at both ends, they would happen
+    // twice.
     let (faults, fault_file) = if fieldbus.is_for_both && fieldbus.role == Role::Controller {
         (Vec::new(), None)
     } else {
@@ -303,7 +305,7 @@ struct FieldbusTable<'a> {
     life_signs: Written<'a>,
     timing: Option<Timing>,
     sizes: layout::Sizes<'a>,
-    /// `[fieldbus.at]`, to be read when the signals are.
+    /// `[fieldbus.at]`, which can only be read after the signals.
     at: Option<Value<'a>>,
     bus: Option<Options>,
 }
@@ -355,7 +357,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_
         }
         bus
     } else {
-        // Which keys are right cannot be told without the bus kind.
+        // Without the bus kind it is unknown which keys are valid.
         table.finish_open();
         None
     };
@@ -403,7 +405,7 @@ mod tests {
         Config::load_as(&path, Some(asked)).unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }
 
-    /// The rig's words as its builders counted them: each bit of the WORD, and its signal.
+    /// The rig's words in the numbering of its builders: each bit of the WORD, and its signal.
     const COMMAND_WORD: [(usize, &str); 13] = [
         (0, "IM1 index"),
         (1, "IM1 jog"),
@@ -454,7 +456,7 @@ mod tests {
                 // The word itself with this bit set, as a big-endian PLC sends it.
                 let frame = (1u16 << bit).to_be_bytes();
                 assert_eq!(usize::from(frame[signal.byte]), 1 << signal.bit, "{name}");
-                // With the bytes swapped the bit moves into the other byte.
+                // With swapped bytes the bit is in the other byte.
                 let swapped = ByteOrder::Dcba.bit_position(2, *bit);
                 assert_eq!(swapped, (bit / 8, bit % 8), "{name}");
                 assert_eq!(
@@ -551,7 +553,7 @@ mod tests {
                 "address = \"%QL0\"\ntype = \"LREAL\"\nfail_safe = -0.5",
                 Slot::from_real(-0.5),
             ),
-            // All bits zero, where nothing is stated: 4 mA, not an impossible 0.
+            // Without a fail-safe value, all bits zero: 4 mA, not an impossible 0 mA.
             (
                 "address = \"%QW0\"\nscale = { raw = [0, 27648], value = [4, 20] }",
                 Slot::from_real(4.0),

@@ -1,4 +1,4 @@
-//! Stations, and the rules that bind all signals of a driver.cfg together.
+//! Stations, and the rules that involve several signals of a driver.cfg.
 
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -13,13 +13,13 @@ use tickbus_image::signal::{AREA_LIMIT, Addressing, Area, SignalTable, Station};
 /// The most signals of one driver.
 pub(super) const SIGNAL_LIMIT: usize = 100_000;
 
-/// The most axes of one driver; each is some fifteen signals.
+/// The most axes of one driver; each has about fifteen signals.
 pub(super) const AXIS_LIMIT: usize = 2_000;
 
 /// The most stations of one driver.
 const STATION_LIMIT: usize = 256;
 
-/// The sizes of a station's areas, as far as they are stated.
+/// The sizes of a station's areas, where stated.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sizes<'a> {
     input: Option<Value<'a>>,
@@ -43,7 +43,7 @@ impl<'a> Sizes<'a> {
     }
 }
 
-/// A station as far as it is read.
+/// A `[[station]]` table, as far as it could be read.
 struct Declared<'a> {
     name: String,
     sizes: Sizes<'a>,
@@ -69,16 +69,15 @@ pub(super) fn read_signals<'a>(
             all.extend(axis.sections.into_iter().map(|section| (at, section)));
         }
     }
-    // Stable, so that the signals of one axis stay in their order.
+    // A stable sort, so that the signals of one axis stay in order.
     all.sort_by_key(|(at, _)| *at);
     (read, all.into_iter().map(|(_, section)| section).collect())
 }
 
-/// Lays the signals out over their stations and reports what does not go together.
+/// Lays out the signals over their stations and reports conflicts.
 ///
-/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`; `bus` reads its own keys out of the
-/// former. Answers with a table too
-/// when there were mistakes, as far as it makes sense.
+/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`; `bus` reads its own keys from the
+/// former. Returns a table even if there were mistakes, as far as that makes sense.
 pub(super) fn lay_out<'a>(
     mut sections: Vec<Section<'a>>,
     declared: Option<Vec<Table<'a>>>,
@@ -95,9 +94,9 @@ pub(super) fn lay_out<'a>(
         ),
         Some(tables) => read_stations(tables, &sizes, bus)?,
     };
-    // A signal whose station is not known is left out of the rules about places.
+    // A signal whose station is unknown is not checked against the areas.
     let mut placed = vec![true; sections.len()];
-    // The station of a table with many signals is looked up, and blamed, once.
+    // The station of a table with many signals is looked up, and reported, only once.
     let mut of_tables = HashMap::new();
     for (section, placed) in sections.iter_mut().zip(&mut placed) {
         let look_up = || station_of(section, &stations, certain);
@@ -131,7 +130,7 @@ pub(super) fn lay_out<'a>(
     Some(SignalTable { stations, signals })
 }
 
-/// Reads the `[[station]]` tables; the flag says whether their names are all known.
+/// Reads the `[[station]]` tables; the flag says whether all their names are known.
 fn read_stations<'a>(
     tables: Vec<Table<'a>>,
     of_fieldbus: &Sizes<'a>,
@@ -166,7 +165,7 @@ fn read_stations<'a>(
             bus.read_station(count, &mut table);
             table.finish();
         } else {
-            // Which keys are right cannot be told without the bus kind.
+            // Without the bus kind it is unknown which keys are valid.
             table.finish_open();
         }
         let label = name
@@ -241,7 +240,7 @@ fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -
     found
 }
 
-/// No name twice, whatever else is wrong with them; `what` they are, such as "signal".
+/// Reports duplicate names, whatever else is wrong with the tables; `what` is their noun, such as "signal".
 pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
     let mut first: HashMap<&str, Value<'_>> = HashMap::new();
     for table in tables {
@@ -265,7 +264,7 @@ pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
     }
 }
 
-/// No name that an edge count has, or that a signal of an axis has.
+/// Reports signals with the name of an edge count, or of a signal of an axis.
 fn check_names(sections: &[Section<'_>]) {
     let mut first: HashMap<&str, &Section<'_>> = HashMap::new();
     for section in sections {
@@ -273,7 +272,7 @@ fn check_names(sections: &[Section<'_>]) {
             continue;
         };
         let twins = section.structure.is_none() && taken.structure.is_none();
-        // Of a name that is made and one that is written, the latter is to be changed.
+        // If one name is derived and one written, the written one has to change.
         let (wrong, other) = if section.has_own_name() {
             (section, taken)
         } else {
@@ -311,12 +310,12 @@ fn check_names(sections: &[Section<'_>]) {
     }
 }
 
-/// The line to which a message about another signal points.
+/// The line that a message about another signal names.
 fn line_of(section: &Section<'_>) -> usize {
     section.name.as_ref().unwrap_or(&section.address).line()
 }
 
-/// The size of one area of the station that has the signals `here`: stated, or as far as they reach.
+/// The size of one area of the station that has the signals `here`: as stated, or as far as they reach.
 fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usize]) -> usize {
     let in_area = || {
         here.iter()
@@ -356,7 +355,7 @@ fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usiz
     stated
 }
 
-/// No bit belongs to two signals. Each signal is blamed once, the later of two in the file.
+/// No bit may belong to two signals. Each signal is reported once, as the later of two in the file.
 fn check_overlaps(sections: &[Section<'_>], placed: &[bool]) {
     let mut order: Vec<usize> = (0..sections.len())
         .filter(|number| placed[*number])
@@ -368,7 +367,7 @@ fn check_overlaps(sections: &[Section<'_>], placed: &[bool]) {
     let bits = |number: usize| sections[number].signal.address().bits();
     order.sort_by_key(|number| (group(*number), bits(*number).start, *number));
     let mut blamed = vec![false; sections.len()];
-    // An axis in the wrong place is one mistake in each area, not one per signal.
+    // An axis in the wrong place is one mistake per area, not one per signal.
     let mut told = HashSet::new();
     for one_area in order.chunk_by(|one, other| group(*one) == group(*other)) {
         let extent = one_area
@@ -396,7 +395,7 @@ fn check_overlaps(sections: &[Section<'_>], placed: &[bool]) {
 
 fn report_overlap(first: &Section<'_>, later: &Section<'_>, extent: usize) {
     let signal = &later.signal;
-    // A section copied as a whole is one mistake, which its name has told already.
+    // A section copied as a whole is one mistake, which its duplicate name has already reported.
     let copied = !signal.name.is_empty()
         && signal.name == first.signal.name
         && signal.address() == first.signal.address();

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the loopback bus.
+//! The options of the loopback bus in a driver.cfg.
 
 use std::path::{Path, PathBuf};
 
@@ -12,33 +12,33 @@ use tickbus_record as record;
 /// The longest name of a link, in characters.
 const LINK_LIMIT: usize = 120;
 
-/// When the bus runs.
+/// How the bus is clocked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// On a thread and a clock of its own.
+    /// By its own thread and clock.
     #[default]
     Free,
-    /// On the tick's thread, in simulation time.
+    /// By the ticking thread, in simulation time.
     Stepped,
 }
 
 impl Mode {
-    /// Each mode by its name in a driver.cfg.
+    /// The modes, by their names in a driver.cfg.
     pub const NAMES: [(&str, Self); 2] = [("free", Self::Free), ("stepped", Self::Stepped)];
 }
 
-/// Who is at the other end.
+/// What is at the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Peer {
     /// The driver that names the same link, in the other role.
     Link(String),
     /// A PLC program hosted in this process.
     Program {
-        /// Its name, or its path, which counts from the folder of the driver.cfg.
+        /// Its name, or its path relative to the folder of the driver.cfg.
         name: String,
-        /// Its options, as pairs of key and value.
+        /// Its options as key-value pairs.
         options: Vec<(String, String)>,
-        /// Its scan interval; none leaves it to the program. Positive.
+        /// Its scan interval; `None` leaves it to the program. Positive.
         scan: Option<Nanos>,
     },
     /// The recording in this file, relative to the folder of the driver.cfg: what its peer sent drives this
@@ -46,14 +46,14 @@ pub enum Peer {
     Replay(PathBuf),
 }
 
-/// What a driver.cfg says to the loopback bus.
+/// The options of the loopback bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// When the bus runs.
+    /// How the bus is clocked.
     pub mode: Mode,
-    /// Who is at the other end.
+    /// What is at the other end.
     pub peer: Peer,
-    /// Whether every change that the peer makes is reported as an event, beside the image.
+    /// Whether every change by the peer is reported as an event, in addition to the image.
     pub events: bool,
 }
 
@@ -84,7 +84,7 @@ impl Options {
                 "write mode = \"stepped\", or leave \"mode\" out",
             );
         }
-        // A recording knows no other mode.
+        // A recording can only be replayed in stepped mode.
         let mode = stated.unwrap_or(Some(if replay.is_some() {
             Mode::Stepped
         } else {
@@ -134,7 +134,7 @@ impl Options {
 }
 
 impl Peer {
-    /// Reads a hosted program with its options and its scan interval, for a machine at this end.
+    /// Reads the options of a hosted program, for a machine at this end.
     pub fn hosted(
         program: &Value<'_>,
         options: Option<Value<'_>>,
@@ -143,8 +143,8 @@ impl Peer {
         read_program(program, options, scan, Role::Device)
     }
 
-    /// The same for whoever wrote it down in `folder`, and not in that of the driver.cfg: the path of a
-    /// program of the user's own counts from there.
+    /// The same program for a text that is in `folder` and not in that of the driver.cfg: a path to a user's
+    /// own program is relative to that folder.
     #[must_use]
     pub fn seen_from(mut self, folder: &Path) -> Self {
         if let Self::Program { name, .. } = &mut self
@@ -173,7 +173,7 @@ fn read_program(
     let known = text.filter(|name| PROGRAMS.contains(name) || Hosted::is_path(name));
     let scan = match scan {
         Some(scan) => scan.duration().map(Some),
-        // A program of the user's own has it compiled in.
+        // In a user's own program it is compiled in.
         None if known.is_some_and(Hosted::is_path) => Some(None),
         None => Some(Some(INTERVAL)),
     };
@@ -196,7 +196,7 @@ fn read_program(
     })
 }
 
-/// The options of the program called `name`, each tried on the program itself.
+/// The options of the program called `name`, each checked by the program itself.
 fn read_options(table: &Table<'_>, name: &str) -> Option<Vec<(String, String)>> {
     let mut read = Some(Vec::new());
     for (key, value) in table.all() {

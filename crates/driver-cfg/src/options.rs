@@ -1,4 +1,4 @@
-//! The `[fieldbus]` table: which bus, and what it needs to know.
+//! The `[fieldbus]` table: which bus, and its options.
 
 use std::path::Path;
 
@@ -47,7 +47,7 @@ const BUILT: [&str; 9] = [
     "opcua-client",
 ];
 
-/// What the `[fieldbus]` table says to its bus, by bus kind.
+/// The bus options in the `[fieldbus]` table, by bus kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Options {
     /// `kind = "loopback"`: both ends in one process.
@@ -56,17 +56,17 @@ pub enum Options {
     Socket(socket::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
-    /// `kind = "modbus-server"`: clients of Modbus read and write the image.
+    /// `kind = "modbus-server"`: Modbus clients read and write the image.
     ModbusServer(modbus::ServerOptions),
     /// `kind = "modbus-client"`: reads and writes the tables of a Modbus server.
     ModbusClient(modbus::ClientOptions),
-    /// `kind = "s7-server"`: clients of S7 communication read and write the image.
+    /// `kind = "s7-server"`: S7 communication clients read and write the image.
     S7Server(s7::ServerOptions),
-    /// `kind = "s7-client"`: the memory of a CPU is read and written.
+    /// `kind = "s7-client"`: reads and writes the memory of a CPU.
     S7Client(s7::ClientOptions),
-    /// `kind = "opcua-client"`: a PLC that is an OPC UA server.
+    /// `kind = "opcua-client"`: for PLCs that are OPC UA servers.
     OpcuaClient(opcua::ClientOptions),
-    /// `kind = "opcua-server"`: a server for PLCs that are OPC UA clients.
+    /// `kind = "opcua-server"`: for PLCs that are OPC UA clients.
     OpcuaServer(opcua::ServerOptions),
 }
 
@@ -86,7 +86,7 @@ impl Options {
         }
     }
 
-    /// Whether every change that the peer makes is reported as an event, beside the image.
+    /// Whether every change by the peer is reported as an event, in addition to the image.
     pub const fn events(&self) -> bool {
         match self {
             Self::Loopback(options) => options.events,
@@ -101,7 +101,7 @@ impl Options {
         }
     }
 
-    /// The recording that stands in for the peer, as the driver.cfg names it.
+    /// The recording that replaces the peer, as named in the driver.cfg.
     pub fn replayed(&self) -> Option<&Path> {
         match self {
             Self::Loopback(loopback::Options {
@@ -112,7 +112,7 @@ impl Options {
         }
     }
 
-    /// The bus cycle where a driver.cfg states none; `None` for a bus whose peer gives the rhythm.
+    /// The default bus cycle; `None` for a bus whose peer sets the cycle.
     pub const fn cycle(&self) -> Option<Nanos> {
         match self {
             Self::Loopback(_) => Some(tickbus_fieldbus::loopback::CYCLE),
@@ -131,11 +131,11 @@ impl Options {
         matches!(self, Self::Loopback(_))
     }
 
-    /// Takes another address than the driver.cfg names, from a command line.
+    /// Replaces the address of the driver.cfg by one from a command line.
     ///
     /// # Errors
     ///
-    /// The bus has no address, or the text is none.
+    /// The bus has no address, or the text is not an address.
     pub fn set_address(&mut self, address: &str) -> Result<(), String> {
         match self {
             Self::Loopback(_) | Self::Plugin(_) => Err(format!(
@@ -154,7 +154,7 @@ impl Options {
         }
     }
 
-    /// Reads the keys that the bus has in the next of `count` `[[station]]` tables.
+    /// Reads the bus's keys from the next of `count` `[[station]]` tables.
     pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
         match self {
             Self::ModbusServer(options) => options.stations.read_station(count, false, table),
@@ -166,7 +166,7 @@ impl Options {
         }
     }
 
-    /// Where a signal of `station` lies, in the bus's own words; empty where those are its address.
+    /// The address of a signal of `station` in the bus's own terms; empty if that is its image address.
     pub fn place(&self, signal: &Signal, station: &Station) -> String {
         match self {
             Self::ModbusServer(options) => options.place(signal),
@@ -180,7 +180,7 @@ impl Options {
         }
     }
 
-    /// What a bus that polls asks for in each cycle, a line for each request; empty for others.
+    /// The requests of a polling bus in each cycle, one per line; empty for other buses.
     pub fn requests(&self, table: &SignalTable) -> Vec<String> {
         match self {
             Self::ModbusClient(options) => options.shown_requests(table),
@@ -189,8 +189,8 @@ impl Options {
         }
     }
 
-    /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
-    /// are none, and that the bus has no addresses of its own.
+    /// Takes the lines of `[fieldbus.at]`: the addresses of signals in the device. Reports invalid addresses,
+    /// or that the bus has no addresses of its own.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let kind = self.kind();
         if let Self::S7Client(options) = self {
@@ -207,7 +207,7 @@ impl Options {
         }
     }
 
-    /// Reports what does not go together with the stations, signals and axes of the driver.
+    /// Reports conflicts with the stations, signals and axes of the driver.
     pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         match self {
             Self::Socket(options) => options.fit(table, axes, collector),
@@ -220,10 +220,10 @@ impl Options {
         }
     }
 
-    /// Reads the keys of the bus kind that `kind` names, and reports their mistakes. `moved` says that another
-    /// address will take the place of the one that is read.
+    /// Reads the keys of the bus kind that `kind` names, and reports mistakes. `moved` says that the address
+    /// will be replaced.
     ///
-    /// The table is finished: what is left in it is unknown, unless the bus kind is.
+    /// The table is finished: keys left in it are unknown, unless the bus kind itself is.
     pub fn read(kind: &Value<'_>, role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
         let known = kind.text(&format!(
             "write the kind of bus in quotes, such as \"{}\"",

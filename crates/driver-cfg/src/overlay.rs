@@ -1,4 +1,4 @@
-//! Tables that stand instead of those of a driver.cfg: the same device, on another line.
+//! Tables that replace those of a driver.cfg: the same device on another line.
 
 use super::Config;
 use crate::{Options, loopback};
@@ -8,14 +8,14 @@ use tickbus_image::signal::SignalTable;
 use tickbus_record as record;
 
 impl Config {
-    /// The same driver with other tables: `text` is TOML as in a driver.cfg, and `origin` is what its
-    /// mistakes call it. So a test runs on the plant's own signal table, but on simulation time.
+    /// The same driver with other tables: `text` is TOML as in a driver.cfg; mistakes call it `origin`. For
+    /// example, a test uses the plant's own signal table, but in simulation time.
     ///
-    /// A `[fieldbus]` with a `kind` stands instead of the file's own, but for what belongs to the device and
-    /// not to the bus: sizes, cycle times, time-outs and signs of life stay. `[[station]]` tables bring what that bus
-    /// has to know of the file's stations, by their names. One without a `kind` changes only the `mode` of the
-    /// file's own loopback. A `[record]` stands instead of the file's own; a bus that replays a recording takes the
-    /// file's own away, which is that of the plant.
+    /// A `[fieldbus]` with a `kind` replaces the file's own, except for what belongs to the device and not to
+    /// the bus: sizes, cycle times, time-outs and life signs stay. `[[station]]` tables give what that bus
+    /// needs to know about the file's stations, by name. A `[fieldbus]` without a `kind` changes only the
+    /// `mode` of the file's own loopback. A `[record]` replaces the file's own; a bus that replays a
+    /// recording removes the file's own, which belongs to the plant.
     ///
     /// # Errors
     ///
@@ -101,7 +101,7 @@ fn read_fieldbus(
     None
 }
 
-/// Lets `bus` read what it has to know of each station of the driver, in their order.
+/// Lets `bus` read its keys for each station of the driver, in order.
 fn read_stations(
     bus: &mut Options,
     table: &SignalTable,
@@ -110,7 +110,7 @@ fn read_stations(
     collector: &Collector<'_>,
 ) {
     let names: Vec<&str> = table.stations.iter().map(|s| s.name.as_str()).collect();
-    // A file without [[station]] tables has one station, which has no name.
+    // A file without [[station]] tables has a single station without a name.
     let declared = names.iter().any(|name| !name.is_empty());
     let mut named: Vec<Option<Table<'_>>> = names.iter().map(|_| None).collect();
     for mut station in stations {

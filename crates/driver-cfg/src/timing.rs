@@ -3,7 +3,7 @@
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 
-/// Waits between attempts to reach the peer again, where a driver.cfg states none.
+/// The default pauses between attempts to reach the peer.
 pub(super) const RECONNECT: [Nanos; 6] = [
     Nanos::from_secs(1),
     Nanos::from_secs(2),
@@ -13,19 +13,19 @@ pub(super) const RECONNECT: [Nanos; 6] = [
     Nanos::from_secs(30),
 ];
 
-/// The least age at which data become stale, where a driver.cfg states none.
+/// The smallest default of `max_age`.
 pub(super) const LEAST_MAX_AGE: Nanos = Nanos::from_millis(250);
 
-/// The shortest bus cycle that an operating system keeps to.
+/// The shortest bus cycle that an operating system can keep.
 const LEAST_CYCLE: Nanos = Nanos::from_micros(50);
 
-/// The shortest `watchdog`: the pauses of a busy machine are no stop of the simulation.
+/// The shortest `watchdog`: pauses of a busy machine must not look like a stopped simulation.
 const LEAST_WATCHDOG: Nanos = Nanos::from_millis(10);
 
-/// The shortest pause of `reconnect`: each attempt is a line in the log.
+/// The shortest pause in `reconnect`: each attempt writes a line to the log.
 const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 
-/// The most waits in `reconnect`.
+/// The most pauses in `reconnect`.
 const RECONNECT_LIMIT: usize = 100;
 
 /// Cycle times and time-outs of a driver.
@@ -35,14 +35,13 @@ pub struct Timing {
     pub cycle: Option<Nanos>,
     /// Data from the peer that are older than this are stale. Positive.
     pub max_age: Nanos,
-    /// A simulation that has not ticked for longer than this has stopped; `None` never says so.
+    /// A simulation that has not ticked for longer than this has stopped; `None` disables the check.
     pub watchdog: Option<Nanos>,
-    /// Waits between attempts to reach the peer again; the last one repeats. Never empty, all
-    /// positive.
+    /// Pauses between attempts to reach the peer; the last one repeats. Never empty, all positive.
     pub reconnect: Vec<Nanos>,
 }
 
-/// Cycle times and time-outs as they stand in the file.
+/// Cycle times and time-outs as written in the file.
 pub(super) struct Spans<'a> {
     cycle: Option<Value<'a>>,
     max_age: Option<Value<'a>>,
@@ -62,7 +61,7 @@ impl<'a> Spans<'a> {
         }
     }
 
-    /// Reads them, for a bus whose cycle is `of_bus` where none is stated.
+    /// Reads them, for a bus whose default cycle is `of_bus`.
     pub(super) fn read(&self, of_bus: Option<Nanos>) -> Option<Timing> {
         let span = |value: &Option<Value<'_>>, least, why| match value {
             None => Some(None),

@@ -1,4 +1,4 @@
-//! From what a driver.cfg says to a bus, and to the PLC program behind it if one is hosted.
+//! Creates the bus that a driver.cfg describes, and the PLC program behind it if one is hosted.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use super::host::{HostTally, HostThread, Hosted, SteppedHost, Tally};
 use super::replay::{Replay, ReplayTally};
 use tickbus_driver_cfg::Config;
 
-/// What stands at the other end in this process: a PLC program, or a recording.
+/// What is at the other end, within this process: a PLC program or a recording.
 #[derive(Debug)]
 pub(super) enum Program {
     Thread(Box<HostThread>),
@@ -29,7 +29,7 @@ pub(super) enum Program {
     Replay(Arc<ReplayTally>),
 }
 
-/// What it has counted, to be read by any thread.
+/// The counters of such a program, readable from any thread.
 #[derive(Clone, Debug)]
 pub(super) enum ProgramTally {
     Thread(HostTally),
@@ -48,7 +48,7 @@ impl Program {
 }
 
 impl ProgramTally {
-    /// Appends what the program has counted, one `key=value` a line.
+    /// Appends the counters, one `key=value` per line.
     pub(super) fn write(&self, text: &mut String) {
         match self {
             Self::Thread(host) => host.write(text),
@@ -58,7 +58,7 @@ impl ProgramTally {
     }
 }
 
-/// Makes the bus that `config` names, and starts the program at its other end if it hosts one.
+/// Creates the bus that `config` names, and starts the hosted program at its other end, if any.
 pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
@@ -214,7 +214,7 @@ fn program_error(config: &Config, source: plc::ProgramError) -> DriverError {
     DriverError::Program { file, source }
 }
 
-/// Whether the program finds the image that it needs, at the end with `role`.
+/// Checks that the program, at the end with `role`, finds the image that it needs.
 pub(super) fn check_fit(
     config: &Config,
     program: &mut dyn plc::Program,

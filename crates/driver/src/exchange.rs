@@ -1,11 +1,11 @@
 //! The tick: the process image goes out and comes in, at once or in two halves.
 //!
-//! [`Driver::exchange`] sends, then receives, and the simulation computes until the next one.
-//! [`Driver::receive`] and [`Driver::send`] are the same two halves with the simulation's model between them,
-//! so that it answers within its tick.
+//! [`Driver::exchange`] sends, then receives; the simulation computes its answer until the next exchange.
+//! [`Driver::receive`] and [`Driver::send`] are the two halves in the other order, with the simulation's
+//! model between them, so that it answers within the same tick.
 //!
-//! Nothing here allocates, locks or calls the system, unless the bus is a stepped one. The clock is read, once in each
-//! call, where that is no system call.
+//! Nothing here allocates, locks or makes a system call, unless the bus is stepped. The clock is read once
+//! per call, where that is not a system call.
 
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::Moment;
@@ -17,7 +17,7 @@ use super::open::Line;
 use super::statistics::Samples;
 use super::{Code, Driver};
 
-/// What an exchange found.
+/// The result of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exchange {
     /// [`Code::Fresh`], [`Code::Unchanged`], [`Code::Stale`], or an error.
@@ -26,13 +26,13 @@ pub struct Exchange {
     pub sequence: u64,
     /// Age of the oldest station's data; [`Nanos::MAX`] when nothing ever arrived.
     pub age: Nanos,
-    /// Up to when the simulation may go on without the next exchange; the simulation's own time on
-    /// buses that do not step it.
+    /// The time up to which the simulation may run before the next exchange; on buses that do not step it,
+    /// the simulation's own time.
     pub granted: Nanos,
 }
 
 impl Exchange {
-    /// What is known before the first one.
+    /// The state before the first exchange.
     pub(super) const NONE: Self = Self {
         code: Code::Stale,
         sequence: 0,
@@ -41,22 +41,22 @@ impl Exchange {
     };
 }
 
-/// A tick that has begun and has not ended.
+/// A tick that has begun and not ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tick {
-    /// Simulation time, or the clock's since the first tick where the simulation tells none.
+    /// Simulation time; if the simulation gives none, the clock's time since the first tick.
     time: Nanos,
-    /// How long its calls have taken so far; looked after for the ticks of the sample.
+    /// The time spent in its calls so far; measured only for ticks in the sample.
     taken: Nanos,
 }
 
 impl Driver {
-    /// Exchanges the process image: takes the values that this end writes from `slots`, puts those that it
-    /// reads there. It is one tick.
+    /// Exchanges the process image, as one tick: sends this end's values from `slots`, and puts the received
+    /// values there.
     ///
-    /// `time` is the simulation's, and must not fall on a stepped bus. Without one, the time given last stands.
-    /// Where none was ever given, the time of a tick is the clock's since the first one; a stepped bus then goes on
-    /// to the time that it granted last.
+    /// `time` is the simulation's, and must not decrease on a stepped bus. With `None` the last given time is
+    /// kept. If none was ever given, the time of a tick is the clock's time since the first one; a stepped
+    /// bus then runs to the time that it granted last.
     ///
     /// # Panics
     ///
@@ -77,11 +77,11 @@ impl Driver {
         self.last
     }
 
-    /// Begins a tick with what has come in: puts the values that this end reads into `slots`. The simulation
-    /// computes, and answers with [`send`](Self::send) within the same tick.
+    /// Begins a tick by receiving: puts the received values into `slots`. The simulation computes its answer
+    /// and gives it to [`send`](Self::send) within the same tick.
     ///
-    /// `time` is as in [`exchange`](Self::exchange). A stepped bus runs the peer up to then, with what was sent in the
-    /// tick before. A tick whose answer is never sent ends when the next one begins.
+    /// `time` is as in [`exchange`](Self::exchange). A stepped bus runs the peer up to that time, with what
+    /// was sent in the previous tick. A tick without [`send`](Self::send) ends when the next one begins.
     ///
     /// # Panics
     ///
@@ -97,11 +97,11 @@ impl Driver {
         self.last
     }
 
-    /// Ends the tick that [`receive`](Self::receive) began: takes the values that this end writes from `slots`.
-    /// Gives what `receive` found, or an error. Where `receive` failed, nothing is sent.
+    /// Ends the tick that [`receive`](Self::receive) began: sends this end's values from `slots`. Returns
+    /// what `receive` found, or an error. If `receive` failed, nothing is sent.
     ///
-    /// To send again in the same tick hands the newer values over. That is no tick of its own: it is not counted,
-    /// and a recording has what was sent first.
+    /// Further calls in the same tick publish the newer values. They are not ticks: they are not counted, and
+    /// a recording has the values of the first call.
     ///
     /// # Panics
     ///
@@ -123,8 +123,9 @@ impl Driver {
         done
     }
 
-    /// Ends the tick that [`receive`](Self::receive) began and nobody answered, with what is in `slots`: a recording
-    /// has it then. To be called before the driver is closed; without such a tick it does nothing.
+    /// Ends a tick that [`receive`](Self::receive) began and that was not answered, with the values in
+    /// `slots`, so that a recording contains it. Call it before closing the driver; without such a tick it
+    /// does nothing.
     ///
     /// # Panics
     ///
@@ -142,7 +143,7 @@ impl Driver {
         );
     }
 
-    /// The time on the line: the clock's, or on a stepped bus that of the simulation.
+    /// The time on the line: the clock's, or the simulation's on a stepped bus.
     #[inline]
     fn now(&self) -> Nanos {
         match &self.line {
@@ -197,7 +198,7 @@ impl Driver {
         }
     }
 
-    /// The half that sends.
+    /// The sending half.
     fn put(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
         for beat in &mut self.beats {
             beat.beat(now, slots);
@@ -220,7 +221,7 @@ impl Driver {
         }
     }
 
-    /// The half that receives.
+    /// The receiving half.
     fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
         let granted = match &mut self.line {
             Line::Free(_) => Ok(self.tick.map_or(now, |tick| tick.time)),
@@ -253,7 +254,7 @@ impl Driver {
         granted.map(|_| ())
     }
 
-    /// What there is to say after a half: what was found last, or that the bus failed.
+    /// The result of a half: what was found last, or that the bus failed.
     fn judged(&self, done: Result<(), BusError>) -> Exchange {
         let Err(error) = done else {
             return self.last;
@@ -268,7 +269,7 @@ impl Driver {
         }
     }
 
-    /// Adds what a call that began at `begun` has taken to its tick, if that is one of the sample.
+    /// Adds the time since `begun` to the current tick, if that is in the sample.
     #[inline]
     fn lap(&mut self, begun: Nanos) {
         if let (true, Some(tick)) = (Samples::takes(self.counters.ticks), &mut self.tick) {
@@ -276,7 +277,7 @@ impl Driver {
         }
     }
 
-    /// Ends the tick that is under way, if there is one: counts it, and records it.
+    /// Ends the current tick, if there is one: counts and records it.
     fn end(&mut self, code: Code, slots: &[Slot]) {
         let Some(tick) = self.tick.take() else {
             return;

@@ -25,7 +25,7 @@ impl Driver {
             edges: &self.slots.edges,
         };
         let id = faults.add(fault, slots)?;
-        // So that the memory is there before the tick needs it.
+        // Adopted now, so that the tick need not allocate memory.
         if let super::open::Line::Stepped { port, .. } = &mut self.line {
             let now = port.clock().now();
             port.observe(now);
@@ -37,13 +37,13 @@ impl Driver {
     ///
     /// # Errors
     ///
-    /// With every mistake in the text; or too many faults wait or are active.
+    /// With every mistake in the text; or when too many faults wait or are active.
     pub fn inject_text(&mut self, text: &str) -> Result<u32, Mistakes> {
         let fault = faults::read_one(text, &self.config.table)?;
         self.inject_read(&fault)
     }
 
-    /// The same for a fault that was read already.
+    /// As [`inject_text`](Self::inject_text), for a fault that was already read.
     ///
     /// # Errors
     ///
@@ -55,17 +55,17 @@ impl Driver {
         })
     }
 
-    /// Ends a fault at the next exchange; false if there is none with this number.
+    /// Ends a fault at the next exchange; false if no fault has this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
         self.faults.as_mut().is_some_and(|faults| faults.end(id))
     }
 
-    /// Where the faults are told of, to be read by any thread.
+    /// Where the faults publish their state, readable from any thread.
     pub fn board(&self) -> &Arc<Board> {
         &self.board
     }
 
-    /// The injected faults, in the order of injection; those that are long over may be missing.
+    /// The injected faults in order of injection; those that ended long ago may be missing.
     pub fn injected_faults(&self) -> Vec<Injected> {
         self.board.list()
     }
@@ -79,9 +79,9 @@ pub(super) struct FrameFaults {
     writes: Plan,
     reads: Plan,
     slots: Vec<Slot>,
-    /// The inputs as they truly are.
+    /// The true inputs.
     truth: Box<[u8]>,
-    /// Frames with what is bent, to be taken over from.
+    /// Frames with the bent values, from which single signals are copied.
     sent: Box<[u8]>,
     received: Box<[u8]>,
     begun: Option<Nanos>,
@@ -89,8 +89,8 @@ pub(super) struct FrameFaults {
 }
 
 impl FrameFaults {
-    /// The faults of the first station of `table`, at the end that writes and reads these areas; `inputs` are
-    /// the bytes that its program sees before its first scan. `None` if there are no faults.
+    /// The faults of the first station of `table`, for an end that writes and reads these areas; `inputs` are
+    /// the bytes that its program sees before its first scan. `None` without faults.
     pub(super) fn new(
         list: &[Fault],
         table: &SignalTable,
@@ -131,7 +131,7 @@ impl FrameFaults {
         })
     }
 
-    /// A scan begins: the inputs are true again.
+    /// Begins a scan: restores the true inputs.
     pub(super) fn begin_scan(&mut self, now: Nanos, inputs: &mut [u8], outputs: &[u8]) {
         inputs.copy_from_slice(&self.truth);
         self.scans += 1;
@@ -144,7 +144,7 @@ impl FrameFaults {
         self.faults.begin_tick(moment, &mut self.slots);
     }
 
-    /// The inputs have been read: they are bent.
+    /// The inputs were read: bends them.
     pub(super) fn received(&mut self, inputs: &mut [u8]) {
         self.truth.copy_from_slice(inputs);
         if self.faults.active(false).next().is_none() {
@@ -158,7 +158,7 @@ impl FrameFaults {
         }
     }
 
-    /// The outputs are about to be sent: they are bent, and the program does not know it.
+    /// The outputs are about to be sent: bends them without the program's knowledge.
     pub(super) fn sending(&mut self, outputs: &mut [u8]) {
         if self.faults.active(true).next().is_none() {
             return;

@@ -1,4 +1,4 @@
-//! The frames of each end: which area it writes and reads, and what stands there at rest.
+//! The frames of each end: which area it writes and reads, and their fail-safe values.
 
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, SignalTable, fail_safe_frame};
@@ -12,7 +12,7 @@ pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usi
     }
 }
 
-/// What the image of the end with `role` is made of, per station.
+/// The streams of each station's image at the end with `role`.
 pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<Directions> {
     let (tx, rx) = role.areas();
     (0..table.stations.len())

@@ -1,4 +1,4 @@
-//! The heartbeat: a signal that counts while the simulation ticks, so that the PLC can see that it lives.
+//! The heartbeat: a signal that counts up as long as the simulation ticks, so that the PLC knows it is alive.
 
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::{Heartbeat, Role};
@@ -6,11 +6,11 @@ use tickbus_image::signal::{DataType, Plan, Signal, SignalTable, Slot};
 
 use tickbus_driver_cfg::Config;
 
-/// One heartbeat, as the tick makes it.
+/// One heartbeat within the tick.
 #[derive(Clone, Debug)]
 pub(super) struct Beat {
     slot: usize,
-    /// The highest count; after it comes 0.
+    /// The highest count; it wraps to 0 after this.
     last: u64,
     is_integer_slot: bool,
     every: Nanos,
@@ -35,7 +35,7 @@ impl Beat {
         }
     }
 
-    /// The heartbeats that the end with `role` gives.
+    /// The heartbeats that the end with `role` sends.
     pub(super) fn all(config: &Config, role: Role) -> Box<[Self]> {
         let beats = config.life_signs.beats(&config.table, role);
         beats
@@ -45,7 +45,7 @@ impl Beat {
             .collect()
     }
 
-    /// Counts up if it is time, in a tick at `now`, and puts the count where the tick takes its values from.
+    /// In a tick at `now`: counts up if due, and puts the count into its slot.
     pub(super) fn beat(&mut self, now: Nanos, slots: &mut [Slot]) {
         let every = self.every;
         if self
@@ -85,7 +85,7 @@ struct FrameBeat {
 }
 
 impl FrameBeats {
-    /// Those of the end with `role` in one of its stations.
+    /// The heartbeats that the end with `role` sends from one of its stations.
     pub(super) fn new(config: &Config, role: Role, station: usize) -> Self {
         let (writes, _) = role.areas();
         let beats = config.life_signs.beats(&config.table, role);
@@ -106,7 +106,7 @@ impl FrameBeats {
         Self(beats.collect())
     }
 
-    /// Counts up those whose time has come, in a scan at `now` that sends `frame`.
+    /// In a scan at `now`: counts up those that are due, and puts them into `frame`.
     pub(super) fn beat(&mut self, now: Nanos, frame: &mut [u8]) {
         for FrameBeat {
             beat,

@@ -35,33 +35,33 @@ pub struct Driver {
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
     pub(super) samples: Samples,
-    /// The clock's time, and the tick's, at the first tick.
+    /// The clock's time and the tick's time at the first tick.
     pub(super) first_now: Nanos,
     pub(super) first_time: Nanos,
-    /// Simulation time as it was given last.
+    /// The last simulation time given.
     pub(super) given: Option<Nanos>,
-    /// The tick that is under way.
+    /// The current tick, between its halves.
     pub(super) tick: Option<Tick>,
-    /// What the last tick found.
+    /// The result of the last tick.
     pub(super) last: Exchange,
-    /// Faults to inject; none for most drivers.
+    /// Injected faults; `None` for most drivers.
     pub(super) faults: Option<Box<Faults>>,
     pub(super) board: Arc<Board>,
-    /// What the axes need done on every tick; none for most drivers.
+    /// What the axes need done on every tick; `None` for most drivers.
     pub(super) reflexes: Option<Reflexes>,
-    /// The heartbeats of this end; none for most drivers.
+    /// The heartbeats of this end; empty for most drivers.
     pub(super) beats: Box<[Beat]>,
     events: Consumer,
     program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
 }
 
-/// Where the bus runs.
+/// How the bus runs.
 pub(super) enum Line {
-    /// On a thread of its own; dropping it ends that.
+    /// On its own thread; dropping this ends it.
     #[expect(dead_code, reason = "kept for its drop")]
     Free(BusThread),
-    /// On the tick, with simulation time as its time.
+    /// On the tick, in simulation time.
     Stepped {
         bus: Box<dyn Stepped>,
         port: Port,
@@ -86,27 +86,27 @@ pub enum DriverError {
         "the system refused a thread for the bus: {0}; close other programs or raise the limit"
     )]
     Thread(#[from] std::io::Error),
-    /// The hosted program does not exist, or does not take its options.
+    /// The hosted program does not exist, or rejects its options.
     #[error("{file}: {source}")]
     Program {
         /// The driver.cfg.
         file: String,
-        /// What is wrong with it.
+        /// The program's error.
         source: plc::ProgramError,
     },
-    /// What is to be recorded cannot be.
+    /// The recording cannot be started.
     #[error("{0}")]
     Recording(#[from] RecorderError),
-    /// What the program needs and what the signal table has do not fit.
+    /// The program and the signal table do not fit.
     #[error("{0}")]
     Config(String),
-    /// The driver.cfg is right, and asks for what this build or platform does not have.
+    /// The driver.cfg is correct, but asks for something that this build or platform does not have.
     #[error("{0}")]
     Unsupported(String),
 }
 
 impl DriverError {
-    /// Whether another driver.cfg would help, and the system is not to blame.
+    /// Whether the driver.cfg must be changed, rather than the system.
     pub fn is_wrong_input(&self) -> bool {
         matches!(self.code(), Code::BadConfig | Code::Unsupported)
     }
@@ -124,8 +124,8 @@ impl DriverError {
 }
 
 impl Driver {
-    /// Opens the driver that `config` describes. A free bus starts on a thread of its own and keeps
-    /// trying until its peer is there; opening does not wait for it.
+    /// Opens the driver that `config` describes. A free bus starts on its own thread and keeps trying until
+    /// its peer is there; opening does not wait for that.
     ///
     /// # Errors
     ///
@@ -139,7 +139,7 @@ impl Driver {
         let status = LinkStatus::of_stations(&config.name, config.timing.max_age, names);
         let (bus, program) = bus::open(&config, &clock)?;
         let slots = SlotMap::new(&config.table, config.role);
-        // On a stepped bus the tick may wait, so that no tick of it is dropped.
+        // On a stepped bus the tick may wait for the recorder, so that none of its ticks is dropped.
         let recorder = recorder(&config, &slots, matches!(bus, Bus::Stepped(_)))?;
         let simulation_time = Manual::new();
         let clock = match &bus {
@@ -206,7 +206,7 @@ impl Driver {
             last: Exchange::NONE,
             faults: None,
             board,
-            // They are the machine's: a PLC has its own.
+            // Only a machine has reflexes; a PLC program handles its axes itself.
             reflexes: (config.role == Role::Device)
                 .then(|| Reflexes::new(&config.axes))
                 .flatten(),
@@ -226,12 +226,12 @@ impl Driver {
         &self.config
     }
 
-    /// Where each value stands among the slots.
+    /// The arrangement of values in the slots.
     pub fn slots(&self) -> &SlotMap {
         &self.slots
     }
 
-    /// Slots as they are before the first exchange: every signal at its fail-safe value.
+    /// The slots before the first exchange: every signal at its fail-safe value.
     pub fn initial_slots(&self) -> Vec<Slot> {
         let mut slots = vec![Slot::default(); self.slots.count];
         for (slot, signal) in slots.iter_mut().zip(&self.config.table.signals) {
@@ -240,18 +240,18 @@ impl Driver {
         slots
     }
 
-    /// How the line is doing.
+    /// The state of the line.
     pub fn link(&self) -> Link {
         self.observe();
         self.status.link()
     }
 
-    /// What was counted, and how the line is doing, as one `key=value` per line.
+    /// The counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         self.snapshot().to_string()
     }
 
-    /// What the statistics are made of, copied: to be made text of when nothing waits for the driver.
+    /// A copy of the data for the statistics, to be formatted when the driver is no longer locked.
     pub fn snapshot(&self) -> Snapshot {
         let now = self.clock.now();
         let stations = self.stations.iter();
@@ -274,7 +274,7 @@ impl Driver {
         }
     }
 
-    /// Looks at the line from outside, where the bus may be unable to.
+    /// Checks the line from outside, in case the bus cannot.
     fn observe(&self) {
         let now = self.clock.now();
         let ages = self.stations.iter().map(|station| station.peer_age(now));
@@ -282,7 +282,7 @@ impl Driver {
         self.status.observe_call(now);
     }
 
-    /// Takes the oldest events, as many as fit; gives how many it took.
+    /// Takes the oldest events, as many as fit into `into`; returns their number.
     pub fn poll_events(&mut self, into: &mut [Event]) -> usize {
         let mut taken = 0;
         while let Some(place) = into.get_mut(taken) {
@@ -295,8 +295,8 @@ impl Driver {
         taken
     }
 
-    /// Closes the driver: stops its threads and waits for their end. Its last statistics go to the log. A tick that
-    /// is under way is recorded only if [`end_tick`](Self::end_tick) has ended it.
+    /// Closes the driver: stops its threads and waits for them to end. Logs its last statistics. A tick that
+    /// has begun is recorded only if [`end_tick`](Self::end_tick) has ended it.
     pub fn close(self) {
         self.board.tell(self.status.driver());
         if log::log_enabled!(log::Level::Info) {
@@ -310,7 +310,7 @@ impl Driver {
     }
 }
 
-/// Starts what `config` wants recorded.
+/// Starts the recording that `config` asks for.
 pub(super) fn recorder(
     config: &Config,
     slots: &SlotMap,

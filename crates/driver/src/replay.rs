@@ -1,5 +1,5 @@
-//! A recording as the other end of the line: what its peer sent drives this end, and what this end sends is
-//! compared with what it sent then.
+//! A recording as the other end of the line: what the recorded peer sent drives this end, and what this end
+//! sends is compared with what it sent in the recording.
 
 mod differences;
 mod station;
@@ -20,25 +20,25 @@ use tickbus_fieldbus::{BusError, Port, Stepped};
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_record::{Columns, Kind, Place, Recording, RecordingError, Tick};
 
-/// How many signals of another table are named in a message.
+/// The most missing signals that a message names.
 const NAMED: usize = 5;
 
-/// What a replay has found so far; readable from any thread.
+/// The results of a replay so far; readable from any thread.
 #[derive(Debug, Default)]
 pub(super) struct ReplayTally {
     file: String,
     /// Recorded ticks that were replayed.
     ticks: AtomicU64,
-    /// Recorded ticks that were compared: all, unless several fell on one tick of today.
+    /// Recorded ticks that were compared: all, unless several fell into one tick of this run.
     compared: AtomicU64,
     differences: AtomicU64,
-    /// Signals of this end that the recording does not have.
+    /// Signals of this end that are not in the recording.
     unknown: u64,
     ended: AtomicBool,
 }
 
 impl ReplayTally {
-    /// Appends what was found, one `key=value` a line.
+    /// Appends the results, one `key=value` per line.
     pub(super) fn write(&self, text: &mut String) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
         // Writing to a string cannot fail.
@@ -52,12 +52,12 @@ impl ReplayTally {
     }
 }
 
-/// Which column of the recording each signal is.
+/// Which columns of the recording belong to which signals.
 struct Map {
     /// Per signal of this driver.
     signals: Vec<Option<usize>>,
     edges: Vec<Option<usize>>,
-    /// Per station of this driver, where the recording has several.
+    /// Per station of this driver, if the recording has several.
     stations: Vec<Option<usize>>,
 }
 
@@ -66,34 +66,34 @@ pub(super) struct Replay {
     recording: Recording,
     map: Map,
     stations: Vec<Station>,
-    /// The tick that comes next, if there is one.
+    /// The next recorded tick, if there is one.
     next: Tick,
     more: bool,
-    /// Why there is none, if the recording is damaged.
+    /// Why there is no next tick, if the recording is damaged.
     broken: Option<RecordingError>,
-    /// The one that was replayed last.
+    /// The last replayed tick.
     present: Tick,
-    /// The slots of this driver as the recording has them.
+    /// This driver's slots with the recorded values.
     slots: Vec<Slot>,
-    /// When this end sent last.
+    /// When this end last sent.
     sent: Option<Nanos>,
-    /// The present tick is yet to be compared.
+    /// The current tick has not been compared yet.
     uncompared: bool,
-    /// Simulation time when the replay began, less that of the recording.
+    /// Simulation time at the start of the replay, minus that of the recording.
     offset: Option<Nanos>,
     max_age: Nanos,
     differences: Differences,
     tally: Arc<ReplayTally>,
-    /// No recorder of this process gets the file meanwhile.
+    /// Keeps recorders of this process from writing to the file.
     _place: Place,
 }
 
 impl Replay {
-    /// Opens the recording at `path`, which must have the signals of the driver's table.
+    /// Opens the recording at `path`, which must contain the signals of the driver's table.
     ///
     /// # Errors
     ///
-    /// The recording cannot be read, or is of another signal table.
+    /// The recording cannot be read, or has another signal table.
     pub(super) fn open(
         config: &Config,
         path: &Path,
@@ -160,11 +160,11 @@ impl Replay {
         self.more.then(|| self.next.time + offset)
     }
 
-    /// Takes over one recorded tick, and reads the one after it.
+    /// Applies the next recorded tick, and reads the one after it.
     fn advance(&mut self) {
         self.present.clone_from(&self.next);
         self.more = self.recording.next(&mut self.next).unwrap_or_else(|error| {
-            // The ticks before the damage are good.
+            // The ticks before the damage are valid.
             self.broken = Some(error);
             false
         });
@@ -176,7 +176,7 @@ impl Replay {
         self.tally.ticks.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Hands the frames of the present tick in, as the driver received them then.
+    /// Hands in the frames of the current tick, as the driver received them when it was recorded.
     fn deliver(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let next = self.more.then_some(&self.next);
         for (index, station) in self.stations.iter_mut().enumerate() {
@@ -195,17 +195,18 @@ impl Replay {
                     fed.map_err(BusError::Protocol)?;
                     port.touch(index, now);
                 }
-                // Older than it may be, so that this driver shows what that one showed.
+                // Just older than permitted, so that this driver shows stale as the recorded one did.
                 STALE => port.touch(index, now - self.max_age - Nanos(1)),
-                // An exchange that failed brought nothing.
+                // A failed exchange received nothing.
                 _ => {}
             }
         }
         Ok(())
     }
 
-    /// Compares what this end sends with what it sent then, once the present tick has both: a simulation that
-    /// exchanges has sent before it receives, one that answers within its tick sends afterwards.
+    /// Compares what this end sends with what it sent in the recording, once the current tick has both: a
+    /// simulation that exchanges has sent before it receives, one that answers within its tick sends
+    /// afterwards.
     fn compare(&mut self, now: Nanos) {
         if !self.uncompared || self.sent != Some(now) {
             return;
@@ -264,7 +265,7 @@ impl Stepped for Replay {
                 )));
             }
         } else if self.more && self.present.status != STALE {
-            // Between two recorded ticks the peer was there, too.
+            // The peer was also there between two recorded ticks.
             (0..self.stations.len()).for_each(|station| port.touch(station, now));
         }
         if let Some(due) = self.due(now) {
@@ -298,7 +299,7 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// The recording lacks signals that this end reads, or has them otherwise.
+    /// The recording lacks signals that this end reads, or has them with another type.
     fn new(config: &Config, columns: &Columns) -> Result<Self, String> {
         let (_, rx) = config.role.areas();
         let all = columns.columns.iter().enumerate();
@@ -356,7 +357,7 @@ impl Map {
     }
 }
 
-/// "did you mean" in the midst of a sentence; a list of all names would be too long for one.
+/// "did you mean" within a sentence, for which a list of all names would be too long.
 fn meant(near: &str) -> String {
     near.strip_prefix("did you mean ")
         .map(|name| format!(" (it has {})", name.trim_end_matches('?')))

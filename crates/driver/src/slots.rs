@@ -1,13 +1,13 @@
-//! Where values stand among the slots of an exchange.
+//! The arrangement of values in the slots of an exchange.
 
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::SignalTable;
 
-/// Where each value stands among the slots that an exchange works on.
+/// The arrangement of values in the slots that an exchange works on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SlotMap {
-    /// Slots in all: one per signal in the order of the table, then one per latched signal that
-    /// this end reads.
+    /// The number of slots: one per signal in the order of the table, then one per latched signal that this
+    /// end reads.
     pub count: usize,
     /// Per signal, the slot that counts its edges since the last exchange, as a double.
     pub edges: Vec<Option<usize>>,

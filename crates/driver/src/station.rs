@@ -13,7 +13,7 @@ pub(super) struct Station {
     decode: Plan,
     /// Whether the slots hold fail-safe values.
     pub(super) stale: bool,
-    /// What the last exchange found here.
+    /// The result of the last exchange for this station.
     pub(super) status: Code,
 }
 
@@ -42,7 +42,7 @@ impl Station {
         self.tick.peer_age(now)
     }
 
-    /// Whether the data count: the PLC runs, and what has to change does.
+    /// Whether the data are valid: the PLC runs its program, and signals that should change do.
     pub(super) fn is_valid(&self) -> bool {
         self.tick.is_valid()
     }
@@ -67,7 +67,7 @@ impl Station {
         self.receive_as(valid, (now, max_age), slots, map)
     }
 
-    /// Receives data that were `valid` a moment ago.
+    /// Receives data that were `valid` when it was asked.
     fn receive_as(
         &mut self,
         valid: bool,
@@ -85,7 +85,7 @@ impl Station {
         let mut arrival = self.tick.read(now, &mut receiver);
         let still_valid = valid && self.tick.is_valid();
         if valid && !still_valid {
-            // The PLC stopped in between, and this may be its first frame of STOP: it is read once more as that.
+            // The PLC stopped in between, and this may be its first frame in STOP: read it again as invalid.
             receiver.valid = false;
             self.tick.shown_instead();
             arrival = self.tick.read(now, &mut receiver);
@@ -100,12 +100,12 @@ impl Station {
     }
 }
 
-/// Puts what a station received into the slots.
+/// Puts a station's received values into the slots.
 struct Receiver<'a> {
     decode: &'a Plan,
     slots: &'a mut [Slot],
     map: &'a SlotMap,
-    /// Edges of data that do not count are not counted.
+    /// Edges of invalid data are not counted.
     valid: bool,
 }
 
@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(shown(bus, false, &[0, 8]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown(bus, false, &[1, 8]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown(bus, true, &[1, 9]), (false, 1.0, 9.0, 0.0));
-        // It stops, and its first frame comes, after the tick has asked whether it runs.
+        // It stops, and its first frame arrives, after the tick has asked whether it runs.
         bus.set_valid(false);
         bus.received(Nanos(3), &[0, 8]);
         station.receive_as(true, (Nanos(3), Nanos(10)), &mut slots, &map);

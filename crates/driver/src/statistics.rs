@@ -1,4 +1,4 @@
-//! What a driver counts.
+//! The counters of a driver.
 
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
@@ -21,11 +21,11 @@ pub struct Counters {
     pub fresh: u64,
     /// Exchanges that found the link alive, but no new cycle.
     pub unchanged: u64,
-    /// Exchanges that found nothing newer than the limit of age.
+    /// Exchanges that found no data younger than `max_age`.
     pub stale: u64,
     /// Exchanges that failed.
     pub failed: u64,
-    /// Values beyond the range of their type, sent as the nearest end of it.
+    /// Values beyond the range of their type, sent as its nearest limit.
     pub saturated: u64,
     /// NaN values, sent as the fail-safe value.
     pub not_a_number: u64,
@@ -66,15 +66,16 @@ impl fmt::Display for Counters {
     }
 }
 
-/// One tick in so many is timed: a second look at the clock takes half as long as a small exchange.
+/// One tick out of this many is timed: the second reading of the clock costs half as much as a small
+/// exchange.
 const SAMPLED: u64 = 32;
 
-/// Distributions over the ticks, from samples.
+/// Distributions over a sample of the ticks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Samples {
-    /// How long an exchange takes.
+    /// Duration of an exchange.
     exchange: Spans,
-    /// How old the data are that it delivers.
+    /// Age of the data that it delivers.
     age: Spans,
 }
 
@@ -85,7 +86,7 @@ impl Samples {
         tick.is_multiple_of(SAMPLED)
     }
 
-    /// Takes the sample of a tick whose calls took `span`, and delivered data of `age`; `Nanos::MAX` where there
+    /// Adds a tick to the sample: its calls took `span`, and delivered data of `age`; `Nanos::MAX` if there
     /// never were any.
     pub(super) fn add(&mut self, span: Nanos, age: Nanos) {
         self.exchange.record(span);
@@ -101,15 +102,15 @@ impl Samples {
     }
 }
 
-/// What the statistics of a driver are made of, at one moment.
+/// The data of a driver's statistics at one moment.
 ///
-/// To copy it takes a microsecond or two, to write it as text may take a hundred times as long: whoever has the driver to
-/// himself for the one gives it back before the other.
+/// Copying them takes a microsecond or two, formatting them may take a hundred times as long: a caller that
+/// has locked the driver releases it in between.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     pub(super) config: Arc<Config>,
     pub(super) counters: Counters,
-    /// Per station, how long ago its peer was heard of, whether its data count, and its bus cycles.
+    /// Per station: time since its peer was last heard from, whether its data are valid, and its bus cycles.
     pub(super) stations: Vec<(Nanos, bool, u64)>,
     pub(super) events_lost: u64,
     pub(super) now: Nanos,
@@ -121,7 +122,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Appends how old each station's data are and how many bus cycles it has sent; nothing where there is one.
+    /// Appends the age of each station's data and its number of bus cycles; nothing for a single station.
     fn write_stations(&self, text: &mut String) {
         if self.stations.len() < 2 {
             return;

@@ -3,7 +3,7 @@
 include!(concat!(env!("OUT_DIR"), "/status.rs"));
 
 impl Code {
-    /// The number that crosses the language border.
+    /// The number by which Java knows it.
     pub const fn code(self) -> i32 {
         self as i32
     }

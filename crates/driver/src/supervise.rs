@@ -1,4 +1,4 @@
-//! The thread of a free bus: runs it, and runs it again when its line broke.
+//! The thread of a free bus: runs it, and runs it again after its line has failed.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,7 +12,7 @@ use tickbus_fieldbus::{BusError, Cause, Free, LinkState, LinkStatus, Port};
 /// A bus thread; dropping it stops the bus and waits for its end.
 ///
 /// A bus that does not end within its `close_timeout` is in a call that never returns. Its thread is left
-/// behind with all that it uses, since nothing could free that under it.
+/// behind with everything it uses, because nothing can be freed safely.
 #[derive(Debug)]
 pub(super) struct BusThread {
     stop: Stop,
@@ -25,8 +25,8 @@ pub(super) struct BusThread {
 }
 
 impl BusThread {
-    /// Starts a thread that serves `bus`, with the pauses of `reconnect` between attempts (the last
-    /// one again and again).
+    /// Starts a thread that serves `bus`, with the pauses in `reconnect` between attempts (the last one
+    /// repeats).
     pub(super) fn start(
         bus: Box<dyn Free>,
         port: Port,
@@ -43,8 +43,8 @@ impl BusThread {
                 let (stop, status) = (stop.clone(), status.clone());
                 move || {
                     let _end: Sender<()> = end;
-                    // Dropped before that: a bus may take its time to free what it holds, such as a library
-                    // that is unloaded, and whoever closes it waits for `_end` with a limit.
+                    // Dropped before `_end`: freeing what a bus holds, such as unloading a library, may take
+                    // time, and closing waits for `_end` with a limit.
                     let (mut bus, mut port) = (bus, port);
                     let clock = Arc::clone(port.clock());
                     serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
@@ -115,14 +115,14 @@ fn serve(
         status.enter(now, LinkState::Failed, (&ended).into(), &reason);
         let next = now + pause;
         while clock.now() < next && !stop.is_stopped() {
-            // May end early, by a wake that was meant for the attempt before.
+            // This may return early because of a wake meant for the previous attempt.
             clock.wait_until(next, stop);
         }
     }
     status.enter(clock.now(), LinkState::Closed, Cause::Closed, "closed");
 }
 
-/// What a panic said.
+/// The message of a panic.
 pub fn panic_text(panic: &(dyn Any + Send)) -> &str {
     panic
         .downcast_ref::<&'static str>()

@@ -1,4 +1,4 @@
-//! Recording a hosted program: what it saw and made in each scan.
+//! Recording a hosted program: its inputs and outputs in each scan.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use tickbus_record::{Recorder, Tally};
 use super::{Code, DriverError, SlotMap, open};
 use tickbus_driver_cfg::Config;
 
-/// The recording of a hosted program, one tick for each scan.
+/// The recording of a hosted program, one tick per scan.
 pub(super) struct Tape {
     recorder: Recorder,
     reads: Plan,
@@ -18,12 +18,12 @@ pub(super) struct Tape {
     edges: Vec<Option<usize>>,
     slots: Vec<Slot>,
     scans: u64,
-    /// When the first scan was: the times of the recording begin there.
+    /// The time of the first scan: times in the recording count from it.
     begun: Option<Nanos>,
 }
 
 impl Tape {
-    /// Starts what `config` wants recorded.
+    /// Starts the recording that `config` asks for.
     pub(super) fn start(config: &Config, role: Role) -> Result<Option<Self>, DriverError> {
         let map = SlotMap::new(&config.table, role);
         let (writes, reads) = role.areas();
@@ -39,7 +39,7 @@ impl Tape {
         }))
     }
 
-    /// Takes note of the edges of a signal that have come since the scan before.
+    /// Counts edges of a signal since the previous scan.
     pub(super) fn edges(&mut self, signal: usize, count: u32) {
         if let Some(slot) = self.edges[signal] {
             self.slots[slot] = Slot::from_real(f64::from(count));
@@ -57,7 +57,7 @@ impl Tape {
             .record(self.scans, time, code.code(), none, &self.slots);
     }
 
-    /// What was recorded so far.
+    /// The recorder's counters.
     pub(super) fn tally(&self) -> Arc<Tally> {
         Arc::clone(self.recorder.tally())
     }

@@ -1,7 +1,8 @@
 //! The PLC's half of a driver.cfg: sources in the languages of PLC editors.
 //!
-//! [`export`] is a pure function of the configuration: the same file gives the same texts, and no file is touched. What
-//! is made states its directions and that it was never compiled by the editor that it is for, as long as that is so.
+//! [`export`] is a pure function of the configuration: the same file gives the same texts, and no file is
+//! touched. The exported files state their directions and, as long as it is true, that they were never
+//! compiled by the editor for which they are made.
 
 mod names;
 mod plcopen;
@@ -33,7 +34,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// All of them.
+    /// All editors.
     pub const ALL: [Self; 5] = [
         Self::S71500,
         Self::S71200,
@@ -42,7 +43,7 @@ impl Target {
         Self::OpenPlc,
     ];
 
-    /// As the command line names it.
+    /// Its name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::S71500 => "s7-1500",
@@ -54,29 +55,29 @@ impl Target {
     }
 }
 
-/// One file to be written.
+/// One file of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct File {
     /// Its name, without a folder.
     pub name: String,
-    /// Its text, as it is to stand in the file.
+    /// Its contents.
     pub text: String,
 }
 
-/// What an export makes.
+/// The result of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Export {
-    /// The files, in the order in which the editor is to read them.
+    /// The files, in the order in which the editor has to read them.
     pub files: Vec<File>,
-    /// What a person should know before using them, one line each.
+    /// What the user should know before using them, one line each.
     pub notes: Vec<String>,
 }
 
-/// Makes the PLC's half of `config`.
+/// Generates the PLC's half of `config`.
 ///
 /// # Errors
 ///
-/// When the file describes the PLC's end itself, or an image that the PLC cannot hold.
+/// When the file itself describes the PLC's end, or an image that does not fit into the PLC.
 pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
     let file = config.path.display().to_string();
     if config.role == Role::Controller {
@@ -95,7 +96,7 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
             "export from a driver.cfg for each PLC, with the signals of its station",
         ));
     }
-    // TIA Portal imports its tags in a format of its own.
+    // TIA Portal has its own import format for tags.
     let mut export = match target {
         Target::S71500 => return Ok(s7::export(config, s7::Cpu::S71500)),
         Target::S71200 => return Ok(s7::export(config, s7::Cpu::S71200)),
@@ -107,7 +108,7 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
     Ok(export)
 }
 
-/// The name of the file that `config` came from, without its folder: what a head may tell.
+/// The name of the file that `config` came from, without its folder, for the head of files.
 fn source(config: &Config) -> String {
     config.path.file_name().map_or_else(
         || "driver.cfg".to_owned(),
@@ -115,7 +116,7 @@ fn source(config: &Config) -> String {
     )
 }
 
-/// What the head of every file says, line by line.
+/// The head of every file, line by line.
 fn head(config: &Config, what: &str, editor: &str, compiled: &str) -> Vec<String> {
     vec![
         what.to_owned(),

@@ -1,12 +1,12 @@
-//! Names that every PLC editor takes.
+//! Names that every PLC editor accepts.
 
 use std::collections::HashSet;
 
-/// The longest name that is made: short enough for a list of tags, and far below every editor's limit.
+/// The longest generated name: short enough for a tag list, and far below every editor's limit.
 const LONGEST: usize = 60;
 
-/// Words that no variable may be called, in upper case: the words of IEC 61131-3, its types and its blocks, and those
-/// that TIA Portal, CODESYS and `iec2c` keep beyond it.
+/// Words that cannot name a variable, in upper case: the keywords of IEC 61131-3, its types and its blocks,
+/// and further reserved words of TIA Portal, CODESYS and `iec2c`.
 #[rustfmt::skip]
 const RESERVED: &[&str] = &[
     "ABS", "ABSTRACT", "ACOS", "ACTION", "ADD", "ADR", "ADRINST", "AND", "AND_THEN", "ANY", "ANY_BIT", "ANY_DATE",
@@ -35,7 +35,7 @@ const RESERVED: &[&str] = &[
     "WHILE", "WITH", "WORD", "WSTRING", "XOR", "XSIZEOF",
 ];
 
-/// Words of which the standard makes the names of its typed functions, in upper case: `INT_TO_REAL`, `MAX_DINT`,
+/// The parts of the names of the standard's typed functions, in upper case: `INT_TO_REAL`, `MAX_DINT`,
 /// `CTU_UDINT`, `SUB_DATE_DATE`, `WORD_BCD_TO_UINT`.
 #[rustfmt::skip]
 const TYPED: &[&str] = &[
@@ -46,7 +46,8 @@ const TYPED: &[&str] = &[
     "TOD", "TRUNC", "UDINT", "UINT", "ULINT", "USINT", "WORD", "WSTRING", "XOR",
 ];
 
-/// Macros of the C headers that `iec2c`'s output includes, in upper case: there a variable of that name is one, too.
+/// Macros in the C headers that `iec2c`'s output includes, in upper case: a variable of that name would be
+/// expanded.
 #[rustfmt::skip]
 const MACROS: &[&str] = &[
     "BIG_ENDIAN", "BUFSIZ", "BYTE_ORDER", "CHAR_BIT", "CHAR_MAX", "CHAR_MIN", "DBL_MAX", "DBL_MIN", "EN_ENO", "EOF",
@@ -59,14 +60,15 @@ const MACROS: &[&str] = &[
     "USHRT_MAX", "WINT_MAX", "WINT_MIN",
 ];
 
-/// The names that are given already; letter case does not count.
+/// The names given so far, ignoring case.
 #[derive(Debug, Default)]
 pub(super) struct Names {
     given: HashSet<String>,
 }
 
 impl Names {
-    /// A legal name like `text` that was not given before: the same for the same texts in the same order.
+    /// A legal name similar to `text` that was not given before: the same texts in the same order give the
+    /// same names.
     pub(super) fn give(&mut self, text: &str) -> String {
         let name = legal(text);
         let mut wanted = name.clone();
@@ -80,8 +82,8 @@ impl Names {
     }
 }
 
-/// A name like `text` that is legal everywhere: ASCII letters, digits and single underscores, a letter first, and
-/// no word that a language keeps.
+/// A name similar to `text` that is legal everywhere: ASCII letters, digits and single underscores, starting
+/// with a letter, and not a reserved word.
 pub(super) fn legal(text: &str) -> String {
     let mut name = String::new();
     for character in text.chars() {
@@ -110,7 +112,7 @@ pub(super) fn legal(text: &str) -> String {
             _ => "_",
         };
         for character in piece.chars() {
-            // Two underscores in a row are refused by IEC 61131-3, one at either end by some editors.
+            // IEC 61131-3 forbids two underscores in a row, some editors one at either end.
             if character != '_' || !(name.is_empty() || name.ends_with('_')) {
                 name.push(character);
             }
@@ -125,7 +127,8 @@ pub(super) fn legal(text: &str) -> String {
     if name.starts_with(|c: char| c.is_ascii_digit()) {
         name.insert_str(0, "n_");
     }
-    // iec2c looks for the ends of units before it knows of names, and finds one in "Weekend_program", too.
+    // iec2c searches for the ends of units before it tokenises names, and finds one even in
+    // "Weekend_program".
     for end in ["END_CONFIGURATION", "END_FUNCTION", "END_PROGRAM"] {
         while let Some(at) = name.to_ascii_uppercase().find(end) {
             name.remove(at + "END".len());
@@ -137,7 +140,7 @@ pub(super) fn legal(text: &str) -> String {
     name
 }
 
-/// Whether a language keeps a name, which is in upper case, for itself.
+/// Whether a name, in upper case, is reserved by any of the languages.
 fn is_kept(name: &str) -> bool {
     let is_typed = |word: &str| TYPED.binary_search(&word).is_ok();
     let is_in = |words: &[&str]| words.binary_search(&name).is_ok();

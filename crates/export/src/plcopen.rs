@@ -1,8 +1,8 @@
-//! `PLCopen` XML, TC6 version 2: what CODESYS and TwinCAT import as a whole.
+//! `PLCopen` XML, TC6 version 2, which CODESYS and TwinCAT can import.
 //!
-//! The elements are those of the schema `tc6_xml_v201.xsd`. The namespace is that of version 2.00, which is the one that both
-//! editors write and read; a file of ours is valid under it and, with the namespace changed, under 2.01. A list of global
-//! variables that belongs to no configuration has no place in the schema: both editors keep it in `addData`.
+//! The elements are those of the schema `tc6_xml_v201.xsd`. The namespace is that of version 2.00, which both
+//! editors write and read; our files are valid in it and, with the namespace changed, in 2.01. The schema has
+//! no place for a list of global variables outside a configuration: both editors keep it in `addData`.
 
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
@@ -13,14 +13,14 @@ const XHTML: &str = "http://www.w3.org/1999/xhtml";
 const GLOBALS: &str = "http://www.3s-software.com/plcopenxml/globalvars";
 const ATTRIBUTES: &str = "http://www.3s-software.com/plcopenxml/attributes";
 
-/// A file to import.
+/// A file to be imported.
 #[derive(Clone, Debug)]
 pub(super) struct Project {
     pub(super) name: String,
-    /// What it is and where it comes from.
+    /// Its purpose and origin.
     pub(super) comment: String,
     pub(super) units: Vec<Unit>,
-    /// The name of the list of global variables, and what is in it.
+    /// The name of the list of global variables, and the variables.
     pub(super) globals: (String, Vec<Variable>),
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Project {
 #[derive(Clone, Debug)]
 pub(super) struct Unit {
     pub(super) name: String,
-    /// The type of its value, for a function; a program has none.
+    /// The type of a function's value; `None` for a program.
     pub(super) returns: Option<&'static str>,
     pub(super) inputs: Vec<Variable>,
     pub(super) locals: Vec<Variable>,
@@ -48,17 +48,17 @@ pub(super) struct Variable {
 /// The type of a variable.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
-    /// One of the language, such as `BOOL`.
+    /// An elementary type, such as `BOOL`.
     Basic(&'static str),
-    /// A block of a library.
+    /// A function block of a library.
     Block(&'static str),
-    /// So many of one of the language, from 0 on.
+    /// An array of an elementary type, with this number of elements from 0 on.
     Array(usize, &'static str),
-    /// A pointer to one of the language.
+    /// A pointer to an elementary type.
     Pointer(&'static str),
 }
 
-/// A variable that needs no comment.
+/// A variable without a comment.
 pub(super) fn variable(name: &str, kind: Kind) -> Variable {
     Variable {
         name: name.to_owned(),
@@ -70,7 +70,7 @@ pub(super) fn variable(name: &str, kind: Kind) -> Variable {
 type Xml = Writer<Vec<u8>>;
 
 impl Project {
-    /// The file as text. Nothing in it depends on the clock: equal projects give equal texts.
+    /// The file as text. It does not depend on the clock: equal projects give equal texts.
     pub(super) fn text(&self) -> String {
         let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
         self.write(&mut xml).expect("memory takes all");
@@ -89,7 +89,7 @@ impl Project {
                 .with_attribute(("companyName", ""))
                 .with_attribute(("productName", "tickbus"))
                 .with_attribute(("productVersion", env!("CARGO_PKG_VERSION")))
-                // The schema asks for a time; that of an export would make each file differ.
+                // The schema requires a time; the time of the export would make every file different.
                 .with_attribute(("creationDateTime", "2000-01-01T00:00:00"))
                 .write_empty()?;
             let header = xml
@@ -236,7 +236,7 @@ fn within(
     Ok(())
 }
 
-/// Something of the editors' own, which others may leave out.
+/// Data specific to these editors, which others may ignore.
 fn data(
     xml: &mut Xml,
     name: &str,

@@ -1,26 +1,26 @@
-//! The record of one direction: the images of all stations, one after another, as they lie in the PLC.
+//! The record of one direction: the images of all stations, one after another, as arranged in the PLC.
 
 use super::names::{Names, legal};
 use tickbus_base::toml_text::short_number;
 use tickbus_image::signal::{Address, Area, ByteOrder, DataType, Signal, SignalTable};
 
-/// The bytes of one direction, with a place for each signal.
+/// The bytes of one direction, and the place of each signal.
 #[derive(Debug)]
 pub(super) struct Record<'a> {
     pub(super) bytes: usize,
-    /// In the order in which they lie.
+    /// In the order of their bytes.
     pub(super) places: Vec<Place<'a>>,
 }
 
-/// Where a signal lies in the PLC, and what it is called there.
+/// The place of a signal in the PLC, and its name there.
 #[derive(Clone, Debug)]
 pub(super) struct Place<'a> {
     pub(super) signal: &'a Signal,
-    /// Name of its station; empty where there is but one.
+    /// The name of its station; empty if there is only one.
     pub(super) station: &'a str,
     /// Its first byte, counted from the start of the record.
     pub(super) byte: usize,
-    /// A legal name of its own.
+    /// Its unique legal name.
     pub(super) name: String,
 }
 
@@ -37,12 +37,12 @@ impl Place<'_> {
         self.signal.data_type.size_bytes()
     }
 
-    /// The byte behind its last one.
+    /// The offset just beyond its last byte.
     pub(super) fn end(&self) -> usize {
         self.byte + self.size()
     }
 
-    /// Its address in the PLC, counted in bytes.
+    /// Its address in the PLC, in bytes.
     pub(super) fn address(&self) -> Address {
         Address {
             byte: self.byte,
@@ -50,7 +50,7 @@ impl Place<'_> {
         }
     }
 
-    /// What is to be known about it beyond name and type, for a comment: address, name, station, unit, scale.
+    /// What a comment says about it in addition to name and type: address, name, station, unit, scale.
     pub(super) fn remark(&self) -> String {
         let mut text = format!("{} \"{}\"", self.address(), self.signal.name);
         if !self.station.is_empty() {
@@ -64,7 +64,7 @@ impl Place<'_> {
     }
 }
 
-/// Unit, scale and byte order as words.
+/// Unit, scale and byte order as text.
 pub(super) fn facts(signal: &Signal) -> Vec<String> {
     let mut facts = Vec::new();
     if let Some(scale) = signal.scale {
@@ -85,12 +85,12 @@ pub(super) fn facts(signal: &Signal) -> Vec<String> {
 }
 
 impl<'a> Record<'a> {
-    /// The record of one direction; `names` gives the names.
+    /// The record of one direction; names are taken from `names`.
     pub(super) fn of(table: &'a SignalTable, area: Area, names: &mut Names) -> Self {
         Self::aligned(table, area, 1, names)
     }
 
-    /// The same with each station from a multiple of `aligned` bytes on.
+    /// As [`of`](Self::of), with each station at a multiple of `aligned` bytes.
     pub(super) fn aligned(
         table: &'a SignalTable,
         area: Area,
@@ -130,12 +130,12 @@ impl<'a> Record<'a> {
         Self { bytes, places }
     }
 
-    /// Where each station's image begins, for a comment; nothing where there is but one.
+    /// The offset of each station's image, for a comment; nothing for a single station.
     pub(super) fn stations(table: &SignalTable) -> Vec<String> {
         Self::stations_aligned(table, 1)
     }
 
-    /// The same with each station from a multiple of `aligned` bytes on.
+    /// As [`stations`](Self::stations), with each station at a multiple of `aligned` bytes.
     pub(super) fn stations_aligned(table: &SignalTable, aligned: usize) -> Vec<String> {
         if table.stations.len() < 2 {
             return Vec::new();
@@ -155,7 +155,7 @@ impl<'a> Record<'a> {
     }
 }
 
-/// The prefix of all names of a driver's blocks.
+/// The prefix of the names of a driver's blocks.
 pub(super) fn block_prefix(driver: &str) -> String {
     let name: String = legal(driver).chars().take(40).collect();
     legal(&name)

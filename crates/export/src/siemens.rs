@@ -1,9 +1,9 @@
-//! How Siemens spells addresses and types.
+//! Siemens' notation of addresses and types.
 
 use super::record::Place;
 use tickbus_image::signal::{DataType, Width};
 
-/// A type, in the letters of TIA Portal.
+/// A type as TIA Portal writes it.
 pub(super) fn spelling(data_type: DataType) -> &'static str {
     match data_type {
         DataType::Bool => "Bool",
@@ -24,7 +24,7 @@ pub(super) fn spelling(data_type: DataType) -> &'static str {
     }
 }
 
-/// An address as Siemens spells it, `%I0.3` where IEC 61131-3 has `%IX0.3`; it counts bytes.
+/// An address in Siemens' notation, `%I0.3` for `%IX0.3` of IEC 61131-3; it counts bytes.
 pub(super) fn address(place: &Place<'_>) -> String {
     let address = place.address();
     match address.width {

@@ -1,4 +1,4 @@
-//! The symbol table as CSV: what a spreadsheet opens, and `tickbus import` reads again.
+//! The symbol table as CSV, for spreadsheets and for `tickbus import`.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use super::siemens::{address, spelling};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Area;
 
-/// The file. It begins with the mark of UTF-8 that spreadsheets look for.
+/// The file. It starts with the byte order mark that spreadsheets look for.
 pub(super) fn file(config: &Config) -> File {
     let mut text = String::from("\u{feff}name;address;type;comment\r\n");
     let mut names = Names::default();
@@ -45,9 +45,9 @@ pub(super) fn comment(place: &Place<'_>, area: Area) -> String {
     parts.join(", ")
 }
 
-/// A cell, in quotes where it has to be.
+/// A cell, in quotes if necessary.
 fn quoted(cell: &str) -> String {
-    // What begins like a formula would be one in a spreadsheet.
+    // A spreadsheet would take these for formulas.
     if cell.contains([';', '"', ',', '\t']) || cell.starts_with(['=', '+', '-', '@', '#', ' ']) {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {

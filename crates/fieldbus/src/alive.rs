@@ -1,4 +1,4 @@
-//! `alive` and `heartbeat` of `[fieldbus]`: signals by which each end sees that the other one lives.
+//! `alive` and `heartbeat` of `[fieldbus]`: signals by which each end knows that the other one is alive.
 
 use std::ops::Range;
 
@@ -7,36 +7,36 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
-/// The shortest time in which a signal can be asked to change: shorter ones are within the jitter of an operating
-/// system.
+/// The shortest time within which a signal can be required to change: anything shorter is within the jitter
+/// of an operating system.
 const LEAST_WITHIN: Nanos = Nanos::from_millis(10);
 
 /// The shortest interval of a heartbeat.
 const LEAST_EVERY: Nanos = Nanos::from_millis(1);
 
-/// How many beats of a heartbeat may be missed by the end that watches it.
+/// How many beats of a heartbeat may be missed before the watching end regards the data as frozen.
 const MISSED: i64 = 5;
 
-/// A signal that has to change, or the data of its station do not count.
+/// A signal that has to keep changing for the data of its station to be valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Alive {
-    /// Its place in the signal table; the end that the driver.cfg describes reads it.
+    /// Its index in the signal table; the end that the driver.cfg describes reads it.
     pub signal: usize,
-    /// For how long it may stand still; positive.
+    /// The longest time without a change; positive.
     pub within: Nanos,
 }
 
 /// A signal that the driver counts up while the simulation ticks; a BOOL toggles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// Its place in the signal table: an unscaled BOOL or integer, which the end that the driver.cfg describes
-    /// writes.
+    /// Its index in the signal table: an unscaled BOOL or integer, written by the end that the driver.cfg
+    /// describes.
     pub signal: usize,
     /// Time from one beat to the next; positive.
     pub every: Nanos,
 }
 
-/// All that a driver.cfg says of signs of life.
+/// The life signs that a driver.cfg configures.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LifeSigns {
     /// `alive`.
@@ -48,20 +48,20 @@ pub struct LifeSigns {
 /// A signal that is watched for changes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Watch {
-    /// What messages call it.
+    /// Its name in messages.
     pub name: String,
     /// Its station.
     pub station: usize,
-    /// Its bytes in the frame that is received.
+    /// Its bytes in the received frame.
     pub bytes: Range<usize>,
-    /// Its bits in each of these.
+    /// Its bits in each of these bytes.
     pub mask: u8,
-    /// For how long it may stand still.
+    /// The longest time without a change.
     pub within: Nanos,
 }
 
 impl LifeSigns {
-    /// The heartbeats that the end with `role` gives.
+    /// The heartbeats that the end with `role` sends.
     pub fn beats<'a>(
         &'a self,
         table: &'a SignalTable,
@@ -72,8 +72,8 @@ impl LifeSigns {
         beats.filter(move |beat| table.signals[beat.signal].area == writes)
     }
 
-    /// The signals that the end with `role` watches: those that have to change, and at the other end than the one
-    /// that the driver.cfg describes the heartbeats of that one, which may miss five beats and `max_age`.
+    /// The signals that the end with `role` watches: at the end that the driver.cfg describes those in
+    /// `alive`; at the other end the heartbeats of the former, which may miss five beats and `max_age`.
     pub fn watches(&self, table: &SignalTable, role: Role, max_age: Nanos) -> Vec<Watch> {
         let (_, reads) = role.areas();
         let beats = self.heartbeat.iter();
@@ -103,7 +103,7 @@ impl Watch {
     }
 }
 
-/// `alive` and `heartbeat` as they stand in the file, to be read when the signals are.
+/// `alive` and `heartbeat` as written in the file; they can only be read after the signals.
 #[derive(Debug, Default)]
 pub struct Written<'a> {
     alive: Option<Value<'a>>,
@@ -119,8 +119,8 @@ impl<'a> Written<'a> {
         }
     }
 
-    /// Reads them for the end that the file describes, which has `role`; `cycle` is that of its bus, if it has one
-    /// of its own. Reports signals that are not there or that the wrong end writes.
+    /// Reads them for the end that the file describes, which has `role`; `cycle` is that of its bus, if it
+    /// has one of its own. Reports signals that do not exist or that the wrong end writes.
     pub fn read(
         &self,
         signals: &SignalTable,
@@ -186,7 +186,7 @@ impl<'a> Written<'a> {
     }
 }
 
-/// Reads the one table that `value` is, or each table of the list.
+/// Reads `value` if it is a table, or each table if it is a list of them.
 fn each<'a, T>(
     value: &Value<'a>,
     key: &str,
@@ -203,7 +203,7 @@ fn each<'a, T>(
     tables.filter_map(|table| read(table, &mut taken)).collect()
 }
 
-/// The signal that `value` names, in `area` and named once.
+/// The signal that `value` names, in `area` and not named before.
 fn find(
     value: &Value<'_>,
     table: &SignalTable,

@@ -1,4 +1,4 @@
-//! The table `[fieldbus.at]`: where each signal lies in the device's own words.
+//! The table `[fieldbus.at]`: the address of each signal in the device, in the device's own notation.
 
 use tickbus_base::toml_text::{Value, did_you_mean, shown};
 use tickbus_image::signal::SignalTable;
@@ -6,18 +6,18 @@ use tickbus_image::signal::SignalTable;
 /// The longest address, in characters.
 const ADDRESS_LIMIT: usize = 500;
 
-/// One line of `[fieldbus.at]`: a signal, and its address as the device's own tools write it.
+/// One line of `[fieldbus.at]`: a signal, and its address in the notation of the device's own tools.
 #[derive(Clone, Debug)]
 pub struct At<'a> {
-    /// The signal's place in the signal table.
+    /// The signal's index in the signal table.
     pub signal: usize,
-    /// The address; what it means is the bus's own matter.
+    /// The address; the bus interprets it.
     pub text: &'a str,
     value: Value<'a>,
 }
 
 impl<'a> At<'a> {
-    /// Reads the table `[fieldbus.at]` that `value` is, and reports names that no signal has.
+    /// Reads the table `[fieldbus.at]` in `value`, and reports names that no signal has.
     pub fn read(value: &Value<'a>, table: &SignalTable) -> Vec<Self> {
         const SHAPE: &str =
             "write a [fieldbus.at] table with a line \"<name of a signal>\" = \"<address>\" each";
@@ -45,12 +45,12 @@ impl<'a> At<'a> {
         entries
     }
 
-    /// Where the address stands in the text, for [`Collector::report`](tickbus_base::toml_text::Collector::report).
+    /// The offset of the address in the text, for [`Collector::report`](crate::config::Collector::report).
     pub fn at(&self) -> usize {
         self.value.at()
     }
 
-    /// Takes down a mistake in this address.
+    /// Reports a mistake in this address.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.value.wrong(what, right);
     }

@@ -1,78 +1,79 @@
-//! What every bus is.
+//! What all buses have in common.
 
 use tickbus_base::time::{Nanos, Stop};
 
 use super::Port;
 
-/// The bus cycle of a bus with a rhythm of its own, where a driver.cfg states none.
+/// The default bus cycle of a bus that has a cycle of its own.
 pub const CYCLE: Nanos = Nanos::from_millis(10);
 
 /// A bus, of one of the two kinds.
 pub enum Bus {
-    /// Owns the one thread of its line.
+    /// Has its own thread.
     Free(Box<dyn Free>),
-    /// Runs on the tick's own thread.
+    /// Runs on the ticking thread.
     Stepped(Box<dyn Stepped>),
 }
 
-/// A bus that owns the one thread of its line.
+/// A bus with a thread of its own.
 ///
-/// It suits slaves and servers, where a telegram asks and the latest image answers, and cyclic
-/// masters, where a deadline sends.
+/// Suits slaves and servers, which answer a telegram with the latest image, and cyclic masters, which send on
+/// a deadline.
 pub trait Free: Send {
-    /// Serves the line until `stop` says so.
+    /// Serves the line until `stop`.
     ///
-    /// Through `port` it takes the bytes to send when it needs them, hands in whole received frames,
-    /// and says that the peer is alive. It must look at `stop` whenever it would wait, and must wait
-    /// on the port's clock, never on the system's.
+    /// It gets the bytes to send from `port` when it needs them, hands in whole received frames, and reports
+    /// that the peer is alive. It must check `stop` whenever it would wait, and must wait on the port's
+    /// clock, never on the system's.
     ///
     /// # Errors
     ///
-    /// Why the line cannot be served any more. Supervision calls again after its back-off, so
-    /// everything that a fresh start needs must be made anew here.
+    /// Why the line cannot be served any longer. Supervision calls again after a pause, so everything that a
+    /// fresh start needs must be created here.
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError>;
 
-    /// How long closing waits for [`run`](Self::run) to end, in real time. After that its thread is left
+    /// How long closing waits for [`run`](Self::run) to end, in real time. After that the thread is left
     /// behind.
     fn close_timeout(&self) -> Nanos {
         Nanos::from_secs(2)
     }
 }
 
-/// A bus that runs on the tick's own thread and may make the tick wait: for virtual time, and tests.
+/// A bus that runs on the ticking thread and may make the tick wait: for simulation time, and for tests.
 ///
-/// A bus cycle has two halves, each at a simulation time that never falls. A tick that exchanges makes both at once,
-/// sending first; a tick that answers within itself receives, computes, and sends at the same time.
+/// A bus cycle has two halves, each at a simulation time that never decreases. A tick that exchanges does
+/// both at once, sending first; a tick that answers within itself receives, computes, and sends at the same
+/// time.
 pub trait Stepped: Send {
     /// Sends what the simulation has written, at `now`.
     ///
     /// # Errors
     ///
-    /// Why it was not sent.
+    /// Why it could not be sent.
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError>;
 
-    /// Runs the peer up to `now` and brings what it sends; gives the time up to which the simulation may
-    /// go on without the next cycle.
+    /// Runs the peer up to `now` and receives what it sends; returns the time up to which the simulation may
+    /// run before the next cycle.
     ///
     /// # Errors
     ///
-    /// Why nothing came.
+    /// Why nothing was received.
     fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError>;
 }
 
-/// Why a bus cannot go on, apart by whose fault it is.
+/// Why a bus cannot go on; the variant tells who is at fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
-    /// The line is broken, or was never there; trying again may help.
+    /// The line is broken, or was never up; trying again may help.
     #[error("the link failed: {0}")]
     Link(String),
-    /// The peer ended the connection in good order.
+    /// The peer closed the connection properly.
     #[error("the peer left: {0}")]
     Left(String),
-    /// The peer does not keep to the protocol.
+    /// The peer violates the protocol.
     #[error("the protocol was broken: {0}")]
     Protocol(String),
-    /// The peer understood, and declined.
+    /// The peer understood the request, and refused it.
     #[error("refused: {0}")]
     Refused(String),
 }

@@ -1,5 +1,5 @@
-//! Events from frames: every change of a signal between two received frames, and every write where the bus
-//! knows what was written.
+//! Events derived from frames: every change of a signal between two received frames, and every write if the
+//! bus knows what was written.
 
 use std::ops::Range;
 
@@ -11,17 +11,17 @@ use tickbus_image::{Event, Producer};
 #[derive(Debug)]
 pub struct ChangeEvents {
     plan: Plan,
-    /// Positions of the station's signals in the signal table, and the bits that each takes in the frame.
+    /// The indices of the station's signals in the signal table, and the bits of each in the frame.
     signals: Box<[(usize, Range<usize>)]>,
-    /// The bits that the peer has written since the last look, changed or not.
+    /// The bits written by the peer since the last frame, whether or not they changed.
     written: Vec<Range<usize>>,
-    /// All slots of the table, as the frame before and the present one have them.
+    /// All slots of the table for the previous and for the current frame.
     before: Box<[Slot]>,
     now: Box<[Slot]>,
 }
 
 impl ChangeEvents {
-    /// Watches what arrives in `area` of the station with index `station`.
+    /// Watches what is received in `area` of the station with index `station`.
     pub fn new(table: &SignalTable, station: usize, area: Area) -> Self {
         let signals = table.signals.iter().enumerate();
         let signals = signals
@@ -40,12 +40,12 @@ impl ChangeEvents {
         }
     }
 
-    /// Takes note that the next frame writes these bits: their signals are reported whether they change or not.
+    /// Records that the next frame writes these bits: their signals are reported whether they change or not.
     pub fn written(&mut self, bits: Range<usize>) {
         self.written.push(bits);
     }
 
-    /// Forgets what was [written](Self::written): the frame that wrote it was lost.
+    /// Discards what was [written](Self::written): its frame was lost.
     pub fn forget(&mut self) {
         self.written.clear();
     }

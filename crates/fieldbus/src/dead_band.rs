@@ -2,15 +2,15 @@
 
 use tickbus_image::signal::{Area, Plan, Signal, SignalTable, Slot};
 
-/// Compares the frames that one station sends, by the dead bands of its signals.
+/// Compares the frames that one station sends, using the dead bands of its signals.
 ///
-/// A signal with a dead band has changed when its value differs by more than that from the value it
-/// is compared with; one without has changed when any of its bits has.
+/// A signal with a dead band has changed when its value differs by more than that from the value it is
+/// compared with; one without has changed when any of its bits has.
 #[derive(Debug)]
 pub struct DeadBands {
-    /// The bits that are compared one by one: all that no dead band covers.
+    /// A mask of the bits that are compared exactly: all that no dead band covers.
     exact: Box<[u8]>,
-    /// Decodes the signals with a dead band, and no others.
+    /// Decodes only the signals with a dead band.
     plan: Plan,
     bands: Box<[Band]>,
     before: Box<[Slot]>,
@@ -23,7 +23,7 @@ struct Band {
     kind: Kind,
 }
 
-/// What the signal's slot holds.
+/// The type of value in the signal's slot.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Real,
@@ -32,7 +32,7 @@ enum Kind {
 }
 
 impl DeadBands {
-    /// Compares what goes out in `area` of the station with index `station`.
+    /// Compares what is sent in `area` of the station with index `station`.
     pub fn new(table: &SignalTable, station: usize, area: Area) -> Self {
         let of_frame = |signal: &&Signal| {
             signal.station == station && signal.area == area && signal.dead_band > 0.0
@@ -71,7 +71,7 @@ impl DeadBands {
     ///
     /// # Panics
     ///
-    /// When a frame has not the station's size.
+    /// When a frame does not have the station's size.
     pub fn differ(&mut self, before: &[u8], now: &[u8]) -> bool {
         if before == now {
             return false;
@@ -97,7 +97,7 @@ impl Band {
         match self.kind {
             Kind::Real => {
                 let (before, now) = (before.real(), now.real());
-                // One infinity is like itself, though their difference is no number.
+                // Equal infinities count as the same value, though their difference is NaN.
                 #[expect(clippy::float_cmp, reason = "equal to the last bit is no change")]
                 let same = before == now || (before.is_nan() && now.is_nan());
                 let moved = (now - before).abs();
@@ -199,7 +199,7 @@ mod tests {
         assert!(!bands.differ(&at(1.0), &at(1.5)));
         assert!(!bands.differ(&at(1.0), &at(0.5)));
         assert!(bands.differ(&at(1.0), &at(1.5 + f32::EPSILON)));
-        // A dead band of nothing is none: the bits count, and minus zero has others.
+        // A dead band of zero means none: the bits are compared, and minus zero has other bits.
         let bare = |value: f32| frame(4, &value.to_be_bytes());
         assert!(bands.differ(&bare(0.0), &bare(-0.0)));
     }

@@ -1,22 +1,22 @@
-//! The guard before the memory of a PLC: nothing is written into one that was not named.
+//! The guard in front of a PLC's memory: only a PLC that was named is written to.
 
 use super::Port;
 use tickbus_base::os::one_line;
 
-/// Keeps a bus that dials a PLC from writing into another one than was meant.
+/// Keeps a bus that connects to a PLC from writing to the wrong one.
 ///
 /// A driver.cfg names the PLC by the identity that it reports, as `write_to`. Until that identity was
-/// [met](Self::meet), the bus reads only.
+/// [met](Self::meet), the bus only reads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Guard {
     write_to: Option<String>,
     may_write: bool,
-    /// The identity that the log knows of as the wrong one.
+    /// The identity last logged as the wrong one.
     told: Option<String>,
 }
 
 impl Guard {
-    /// A guard that lets writes pass to the PLC that `write_to` names, or to none.
+    /// A guard that permits writes to the PLC that `write_to` names, or to none.
     pub fn new(write_to: Option<&str>) -> Self {
         Self {
             write_to: write_to.map(str::to_owned),
@@ -25,13 +25,13 @@ impl Guard {
         }
     }
 
-    /// Whether the PLC that was met last may be written to.
+    /// Whether the current PLC may be written to.
     pub const fn may_write(&self) -> bool {
         self.may_write
     }
 
-    /// The PLC reports `identity`, or the bus knows it by that. Gives whether it may be written to; statistics
-    /// and log say so, and what would change it.
+    /// The PLC reports `identity`, or the bus identifies it by that. Returns whether it may be written to; if
+    /// not, statistics and log say so, and what would permit it.
     pub fn meet(&mut self, port: &Port, identity: &str) -> bool {
         let identity = &*one_line(identity);
         self.may_write = self.write_to.as_deref() == Some(identity);
@@ -56,13 +56,13 @@ impl Guard {
         self.may_write
     }
 
-    /// The PLC is gone; the next one has to be met first.
+    /// The PLC is gone; the next one must be identified first.
     pub fn part(&mut self) {
         self.may_write = false;
     }
 }
 
-/// As a text of a TOML file.
+/// The text as a TOML string.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

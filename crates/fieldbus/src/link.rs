@@ -1,4 +1,4 @@
-//! How a line is doing: its state, the cause of that, and the reason in words.
+//! The state of a line, its cause, and the reason in words.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -12,23 +12,23 @@ use tickbus_base::time::{Nanos, Spans};
 use super::BusError;
 use super::rarely::Rarely;
 
-/// How a line is doing.
+/// The state of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LinkState {
     /// Not open.
     Closed,
-    /// Trying to reach the peer, or waiting for it.
+    /// Connecting to the peer, or waiting for it.
     Opening,
     /// The peer is there.
     Running,
-    /// The peer was there, and nothing that counts has come from it for longer than `max_age`.
+    /// The peer was there, but no valid data have come from it for longer than `max_age`.
     Stale,
     /// The line broke; it is tried again after a pause.
     Failed,
 }
 
 impl LinkState {
-    /// All of them; each one's code is its place here.
+    /// All states; the code of each is its index here.
     pub const ALL: [Self; 5] = [
         Self::Closed,
         Self::Opening,
@@ -49,41 +49,41 @@ impl LinkState {
     }
 }
 
-/// Why a line is in its state, for programs; the reason in words is for people.
+/// Why a line is in its state, as a code for programs; the reason in words is for people.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
     /// It was not opened yet.
     NotOpened,
-    /// It is on its way, or waits for its peer.
+    /// Connecting, or waiting for the peer.
     Waiting,
-    /// All is well.
+    /// Nothing is wrong.
     Running,
     /// The peer is silent.
     Silent,
-    /// The peer left in good order.
+    /// The peer closed the connection properly.
     Left,
-    /// The line is broken, or was never there.
+    /// The line is broken, or was never up.
     Link,
-    /// The peer broke the protocol.
+    /// The peer violated the protocol.
     Protocol,
-    /// The peer refused.
+    /// The peer refused a request.
     Refused,
-    /// A defect of tickbus itself.
+    /// A defect in tickbus itself.
     Defect,
     /// A call into a library does not return.
     Hung,
     /// It was closed.
     Closed,
-    /// A fault was injected, and holds the line down.
+    /// An injected fault holds the line down.
     Injected,
     /// The PLC does not run its program.
     Stopped,
-    /// A signal that has to change does not.
+    /// A signal that should keep changing does not.
     Frozen,
 }
 
 impl Cause {
-    /// All of them; each one's code is its place here.
+    /// All causes; the code of each is its index here.
     pub const ALL: [Self; 14] = [
         Self::NotOpened,
         Self::Waiting,
@@ -133,20 +133,20 @@ impl From<&BusError> for Cause {
     }
 }
 
-/// State, cause and reason at one moment.
+/// State, cause and reason at a moment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Link {
-    /// How the line is doing.
+    /// The state of the line.
     pub state: LinkState,
-    /// Why, for programs.
+    /// Its cause, for programs.
     pub cause: Cause,
-    /// Why, for people; one line.
+    /// Its reason, for people; one line.
     pub reason: String,
-    /// When it came into this state.
+    /// When it entered this state.
     pub since: Nanos,
 }
 
-/// The state of a line as bus and driver share it.
+/// The state of a line, shared by bus and driver.
 #[derive(Clone, Debug)]
 pub struct LinkStatus(Arc<Shared>);
 
@@ -154,11 +154,11 @@ pub struct LinkStatus(Arc<Shared>);
 struct Shared {
     driver: String,
     max_age: Nanos,
-    /// The names of the stations where there are several.
+    /// The names of the stations, if there are several.
     stations: Vec<String>,
-    /// The record's state once more, to be read without its lock.
+    /// A copy of the record's state that can be read without the lock.
     state: AtomicU8,
-    /// How many stations were stale when the reason was made.
+    /// How many stations were stale when the reason was written.
     stale: AtomicUsize,
     record: Mutex<Record>,
 }
@@ -166,26 +166,26 @@ struct Shared {
 #[derive(Debug)]
 struct Record {
     link: Link,
-    /// Why the line was running, for when it does so again.
+    /// The reason of the last running state, to be restored when it runs again.
     running: String,
     call: Option<Call>,
-    /// The injected faults of the line that are active, in words.
+    /// The active line faults, as text.
     injected: String,
-    /// Why data that arrive do not count; `None` while they do.
+    /// Why received data are invalid; `None` while they are valid.
     doubt: Option<(Cause, String)>,
-    /// What a call that hangs interrupted.
+    /// The state that a hanging call interrupted.
     before_hang: Option<Link>,
-    /// How often each state was entered, and each cause given.
+    /// How often each state was entered, and each cause occurred.
     entered: [u64; LinkState::ALL.len()],
     caused: [u64; Cause::ALL.len()],
     facts: BTreeMap<Cow<'static, str>, String>,
     counts: BTreeMap<&'static str, u64>,
-    /// What the log was told.
+    /// What was logged.
     log: Rarely,
     cycle: Spans,
 }
 
-/// A call into a library that is under way.
+/// A library call in progress.
 #[derive(Clone, Debug)]
 struct Call {
     what: Arc<str>,
@@ -194,7 +194,7 @@ struct Call {
 }
 
 impl Record {
-    /// Whether a call lasts longer than it may.
+    /// Whether the call has exceeded its limit.
     fn is_hung(&self, now: Nanos) -> bool {
         self.call
             .as_ref()
@@ -203,14 +203,14 @@ impl Record {
 }
 
 impl LinkStatus {
-    /// The state of the line of the driver called `driver`, which is closed so far. Data older than
-    /// `max_age` make it stale.
+    /// The state of the line of the driver called `driver`, closed at first. Data older than `max_age` make
+    /// it stale.
     pub fn new(driver: &str, max_age: Nanos) -> Self {
         Self::of_stations(driver, max_age, Vec::new())
     }
 
-    /// The same for a driver with `stations` of these names: the one that is silent is told by its name, if there
-    /// are several.
+    /// As [`new`](Self::new), for a driver with `stations` of these names: if there are several, a silent one
+    /// is reported by its name.
     pub fn of_stations(driver: &str, max_age: Nanos, stations: Vec<String>) -> Self {
         let link = Link {
             state: LinkState::Closed,
@@ -246,8 +246,7 @@ impl LinkStatus {
         &self.0.driver
     }
 
-    /// The injected faults of the line that are active, in words; empty for none. A reason of silence tells
-    /// of them.
+    /// Sets the active line faults, as text; empty for none. The reason of a silence mentions them.
     pub fn injected(&self, faults: &str) {
         let injected = &mut self.lock().injected;
         injected.clear();
@@ -259,32 +258,32 @@ impl LinkStatus {
         self.0.max_age
     }
 
-    /// The state as it was entered last, without a lock.
+    /// The current state, without a lock.
     pub fn state(&self) -> LinkState {
         LinkState::ALL[usize::from(self.0.state.load(Ordering::Relaxed)) % LinkState::ALL.len()]
     }
 
-    /// What a running line says of itself; empty before it ran for the first time.
+    /// The reason of the last running state; empty before the line ran for the first time.
     pub fn running_reason(&self) -> String {
         self.lock().running.clone()
     }
 
-    /// How often the line came up.
+    /// How many times the line has come up.
     pub fn runs(&self) -> u64 {
         self.lock().entered[LinkState::Running as usize]
     }
 
-    /// State, cause and reason as they were entered last.
+    /// The current state, cause and reason.
     pub fn link(&self) -> Link {
         self.lock().link.clone()
     }
 
-    /// Enters a state at `now`; entering the present one with the same reason does nothing.
+    /// Enters a state at `now`; does nothing if the line is in this state with the same reason.
     pub fn enter(&self, now: Nanos, state: LinkState, cause: Cause, reason: &str) {
         self.0.enter(self.lock(), now, state, cause, reason);
     }
 
-    /// The peer is there. A line that is running or stale stays so.
+    /// The peer is there. A line that is running or stale keeps its state.
     pub fn running(&self, now: Nanos, reason: &str) {
         if matches!(self.state(), LinkState::Running | LinkState::Stale) {
             return;
@@ -302,9 +301,9 @@ impl LinkStatus {
         up.into_iter().chain(doubt).for_each(Message::write);
     }
 
-    /// Data that arrive do not count, for a cause and a reason in words, or they do again (`None`). A line that is
-    /// running is stale meanwhile; one that is not will be when it comes up. These are the `ages` of the stations'
-    /// data: silence is told before a signal that stands still, as nothing can change without data.
+    /// Declares received data invalid, with a cause and a reason, or valid again (`None`). A running line is
+    /// stale in the meantime; any other line will be when it comes up. `ages` are those of the stations'
+    /// data: silence takes precedence over a frozen signal, as without data nothing can change.
     pub fn doubt(
         &self,
         now: Nanos,
@@ -334,8 +333,9 @@ impl LinkStatus {
         self.0.enter(record, now, state, cause, &reason);
     }
 
-    /// Looks at the clock: a running line becomes stale when the newest data of a station, whose `ages` these are,
-    /// are too old, and running again when all are young and none is in doubt. Lock-free unless something changes.
+    /// Checks the time: a running line becomes stale when the newest data of a station are too old (`ages`
+    /// has one entry per station), and running again when all are recent and none is invalid. Lock-free
+    /// unless something changes.
     pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
         let limit = self.0.max_age;
         let stale = ages.clone().filter(|age| *age > limit).count();
@@ -347,12 +347,12 @@ impl LinkStatus {
         let mut record = self.lock();
         let shown = now - record.link.since;
         match record.link.state {
-            // A line that has only just come up may still have the old data.
+            // A line that has just come up may still have old data.
             LinkState::Running if shown > limit && stale > 0 => {
                 let reason = self.0.silence(&record, shown, ages);
                 self.0.silent(record, now, stale, &reason);
             }
-            // What stands still and is then too old is silent.
+            // A frozen signal whose data are then too old becomes silence.
             LinkState::Stale
                 if stale > 0 && record.link.cause == Cause::Frozen && shown > limit =>
             {
@@ -377,8 +377,8 @@ impl LinkStatus {
         }
     }
 
-    /// Looks whether a call into a library lasts longer than it may. For those who ask from outside: the
-    /// bus itself cannot, while it is in the call.
+    /// Checks whether a library call has exceeded its limit. For other threads: the bus itself cannot check
+    /// while it is in the call.
     pub fn observe_call(&self, now: Nanos) {
         let mut record = self.lock();
         if let Some(call) = &record.call
@@ -398,7 +398,7 @@ impl LinkStatus {
         }
     }
 
-    /// A call into a library begins, and may last for `limit`.
+    /// A library call begins, which should last at most `limit`.
     pub fn call_begins(&self, now: Nanos, what: &Arc<str>, limit: Nanos) {
         self.lock().call = Some(Call {
             what: Arc::clone(what),
@@ -407,8 +407,8 @@ impl LinkStatus {
         });
     }
 
-    /// The call has returned. A line that was waiting for its peer when the call hung waits on; one that was
-    /// running stays stale until the peer is heard of.
+    /// The call has returned. A line that was waiting for its peer when the call hung resumes waiting; one
+    /// that was running stays stale until the peer is heard from.
     pub fn call_ends(&self, now: Nanos) {
         let mut record = self.lock();
         let call = record.call.take();
@@ -430,18 +430,18 @@ impl LinkStatus {
         }
     }
 
-    /// Notes a fact for the statistics, such as the address that was bound.
+    /// Sets a fact for the statistics, such as the bound address.
     pub fn tell(&self, key: impl Into<Cow<'static, str>>, fact: &str) {
         self.lock().facts.insert(key.into(), one_line(fact));
     }
 
-    /// Counts something for the statistics.
+    /// Increments a counter of the statistics.
     pub fn count(&self, key: &'static str) {
         *self.lock().counts.entry(key).or_default() += 1;
     }
 
-    /// Writes a message of which a peer can cause as many as it likes, with the name of the driver. `kind` names what it
-    /// is about: the log has the first 20 of a kind, and then those whose number is a power of two.
+    /// Logs a message that a peer can cause any number of times, with the name of the driver. `kind` is its
+    /// topic: the first 20 messages of a kind are logged, then those whose number is a power of two.
     pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
         let told = self.lock().log.count(("", kind));
         if let Some(times) = told {
@@ -449,12 +449,12 @@ impl LinkStatus {
         }
     }
 
-    /// A bus cycle was `span` long.
+    /// A bus cycle took `span`.
     pub fn cycle(&self, span: Nanos) {
         self.lock().cycle.record(span);
     }
 
-    /// Appends what is known of the line, one `key=value` a line.
+    /// Appends the state of the line, one `key=value` per line.
     pub fn write(&self, now: Nanos, text: &mut String) {
         let record = self.lock();
         let link = &record.link;
@@ -489,12 +489,12 @@ impl LinkStatus {
     }
 
     fn lock(&self) -> MutexGuard<'_, Record> {
-        // Every change leaves a record that can be read.
+        // The record is consistent after every change, so a poisoned lock is safe to use.
         self.0.record.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A message for the log, made while the record was locked and written when it no longer is.
+/// A log message, made while the record is locked and written after it is released.
 #[must_use]
 struct Message(log::Level, String);
 
@@ -505,7 +505,7 @@ impl Message {
 }
 
 impl Shared {
-    /// Enters a state. The log is told when others have the record again: nobody waits for whoever reads the log.
+    /// Enters a state. Logs after releasing the record: no thread may wait for a slow reader of the log.
     fn enter(
         &self,
         mut record: MutexGuard<'_, Record>,
@@ -521,13 +521,13 @@ impl Shared {
         }
     }
 
-    /// The line is stale as the data of so many stations are too old.
+    /// The line is stale because the data of `stale` stations are too old.
     fn silent(&self, record: MutexGuard<'_, Record>, now: Nanos, stale: usize, reason: &str) {
         self.enter(record, now, LinkState::Stale, Cause::Silent, reason);
         self.stale.store(stale, Ordering::Relaxed);
     }
 
-    /// Changes the state, and gives what the log is to know of that.
+    /// Changes the state, and returns the message to be logged.
     fn change(
         &self,
         record: &mut Record,
@@ -538,14 +538,14 @@ impl Shared {
     ) -> Option<Message> {
         let reason = one_line(reason);
         if (record.link.state, record.link.cause) == (state, cause) {
-            // A state that only tells it in other words, such as how long it has lasted, goes on.
+            // A state whose reason only changed its wording, such as its duration, is not entered anew.
             record.link.reason = reason;
             return None;
         }
         record.entered[state as usize] += 1;
         record.caused[cause as usize] += 1;
         self.state.store(state as u8, Ordering::Relaxed);
-        // What was counted for an earlier silence says nothing of the next one.
+        // The count of an earlier silence does not apply to the next one.
         self.stale.store(0, Ordering::Relaxed);
         let trouble = matches!(state, LinkState::Stale | LinkState::Failed)
             || (state == LinkState::Opening && cause != Cause::Waiting);
@@ -571,7 +571,7 @@ impl Shared {
         message
     }
 
-    /// The reason of a silence: whose data are too old, though the line has been up for `shown`.
+    /// The reason of a silence: which data are too old, although the line has been up for `shown`.
     fn silence(
         &self,
         record: &Record,

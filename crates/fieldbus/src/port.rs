@@ -1,4 +1,4 @@
-//! What a bus sees of its driver.
+//! A bus's view of its driver.
 
 use std::fmt::Arguments;
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub struct Port {
     watchdog: Option<Nanos>,
     changes: Vec<ChangeEvents>,
     status: LinkStatus,
-    /// When the first station's last frame arrived, while the line is running.
+    /// When the first station's last frame arrived while the line was running.
     last_cycle: Option<Nanos>,
     troubles: Troubles,
     vitals: Vitals,
@@ -30,7 +30,7 @@ pub struct Port {
 impl Port {
     /// A port over the bus's end of an image.
     ///
-    /// When the simulation has not ticked for longer than `watchdog`, fail-safe bytes go out.
+    /// If the simulation has not ticked for longer than `watchdog`, fail-safe bytes are sent.
     pub fn new(
         image: BusEnd,
         clock: Arc<dyn Clock>,
@@ -51,22 +51,22 @@ impl Port {
         }
     }
 
-    /// Lets the line suffer from the faults on `board`.
+    /// Applies the faults on `board` to the line.
     pub fn suffer_from(&mut self, board: Arc<Board>) {
         self.troubles = Troubles::of(board);
     }
 
-    /// Gives the stations the names that reasons and statistics call them, in the order of the signal table.
+    /// Sets the stations' names for reasons and statistics, in the order of the signal table.
     pub fn name_stations<'a>(&mut self, names: impl IntoIterator<Item = &'a str>) {
         self.vitals.name_stations(names.into_iter());
     }
 
-    /// Lets the data of a station count only while these signals change.
+    /// Makes the data of a station valid only as long as these signals keep changing.
     pub fn watch_life(&mut self, watches: Vec<Watch>) {
         self.vitals.watch(watches);
     }
 
-    /// Reports every change between received frames as an event; one watcher per station.
+    /// Reports every change between received frames as an event; `changes` has one watcher per station.
     pub fn watch_changes(&mut self, changes: Vec<ChangeEvents>) {
         assert_eq!(changes.len(), self.stations(), "one watcher per station");
         self.changes = changes;
@@ -82,7 +82,7 @@ impl Port {
         &self.clock
     }
 
-    /// How many stations there are.
+    /// The number of stations.
     pub fn stations(&self) -> usize {
         self.image.stations.len()
     }
@@ -93,7 +93,7 @@ impl Port {
         (station.tx_len(), station.rx_len())
     }
 
-    /// Whether an injected fault holds the line down: nothing is to be sent or taken at `now`.
+    /// Whether an injected fault holds the line down, so that nothing is to be sent or taken at `now`.
     ///
     /// A bus that does not ask sends what it sent before, and what it hands in is lost.
     pub fn is_down(&mut self, now: Nanos) -> bool {
@@ -101,13 +101,13 @@ impl Port {
         self.troubles.wires().is_some_and(|wires| wires.is_down())
     }
 
-    /// Whether frames go out in the cycle at `now`. To be asked once a cycle, before
-    /// [`outgoing`](Self::outgoing): an injected fault may swallow them, and what was to be sent is lost.
+    /// Whether frames are sent in the cycle at `now`. Ask once per cycle, before
+    /// [`outgoing`](Self::outgoing): if an injected fault loses the cycle, its frames must not be sent.
     pub fn sends(&mut self, now: Nanos) -> bool {
         self.sends_of(0..self.stations(), now)
     }
 
-    /// The same for a bus whose `stations` have a cycle of their own.
+    /// As [`sends`](Self::sends), for a bus whose `stations` have a cycle of their own.
     pub fn sends_of(&mut self, stations: Range<usize>, now: Nanos) -> bool {
         if self.is_down(now) {
             return false;
@@ -122,8 +122,8 @@ impl Port {
         false
     }
 
-    /// The bytes that a station sends at `now`: latest values, no edge lost, fail-safe when the
-    /// simulation has stopped. Follow with [`sent`](Self::sent) once the peer has them.
+    /// The bytes that a station sends at `now`: the latest values, with every edge, or the fail-safe values
+    /// if the simulation has stopped. Call [`sent`](Self::sent) once the peer has them.
     pub fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
         if station == 0 {
             self.observe(now);
@@ -142,9 +142,9 @@ impl Port {
         wires.outgoing(station)
     }
 
-    /// The peer has what [`outgoing`](Self::outgoing) gave last, or will get it unless the line breaks: for a
-    /// stream that is when the system has taken the whole of it. What is under way when a line breaks is lost,
-    /// pulses too.
+    /// The peer has received what [`outgoing`](Self::outgoing) returned last, or will unless the line breaks:
+    /// for a stream this is when the system has accepted all of it. Data in transit when a line breaks are
+    /// lost, pulses included.
     pub fn sent(&mut self, station: usize) {
         if self
             .troubles
@@ -155,14 +155,14 @@ impl Port {
         }
     }
 
-    /// As [`sent`](Self::sent), for a peer that has only these bytes of the frame: no pulse elsewhere counts as
-    /// seen by it.
+    /// As [`sent`](Self::sent), for a peer that received only these bytes of the frame: pulses elsewhere do
+    /// not count as seen.
     pub fn sent_part(&mut self, station: usize, bytes: Range<usize>) {
         self.sent_bits(station, bytes.start * 8..bytes.end * 8);
     }
 
-    /// As [`sent_part`](Self::sent_part), for a peer that has only these bits (bit n of byte k is 8k + n): the other
-    /// bits of their bytes are news to it.
+    /// As [`sent_part`](Self::sent_part), for a peer that received only these bits (bit n of byte k is 8k +
+    /// n): other bits of the same bytes do not count as seen.
     pub fn sent_bits(&mut self, station: usize, bits: Range<usize>) {
         if self
             .troubles
@@ -177,14 +177,14 @@ impl Port {
     ///
     /// # Panics
     ///
-    /// When the frame has not the station's size.
+    /// When the frame does not have the station's size.
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
         self.attend(now);
         let times = match self.troubles.wires() {
             None => 1,
             Some(wires) => match wires.arrives(station, now, bytes) {
                 Fate::Lost | Fate::Held => {
-                    // When a held frame comes in, its changes are events.
+                    // If the frame is held back, its changes become events when it is released.
                     if let Some(changes) = self.changes.get_mut(station) {
                         changes.forget();
                     }
@@ -198,12 +198,13 @@ impl Port {
         }
     }
 
-    /// Hands in a whole frame that arrived at `now` and of which the peer wrote these bits alone (bit n of byte k
-    /// is 8k + n). Where events are wanted, each signal within them is one, even if its value is the same.
+    /// Hands in a whole frame that arrived at `now` and of which the peer wrote only these bits (bit n of
+    /// byte k is 8k + n). If events are enabled, each signal within them is reported, even if its value is
+    /// unchanged.
     ///
     /// # Panics
     ///
-    /// When the frame has not the station's size.
+    /// When the frame does not have the station's size.
     pub fn received_part(
         &mut self,
         station: usize,
@@ -218,7 +219,7 @@ impl Port {
     ///
     /// # Panics
     ///
-    /// When the frame has not the station's size.
+    /// When the frame does not have the station's size.
     pub fn received_parts(
         &mut self,
         station: usize,
@@ -226,7 +227,7 @@ impl Port {
         bytes: &[u8],
         written: impl IntoIterator<Item = Range<usize>>,
     ) {
-        // What was held back comes in first: these writes are none of its own.
+        // Frames held back earlier are handed in first: these writes do not belong to them.
         self.attend(now);
         if let Some(changes) = self.changes.get_mut(station) {
             written.into_iter().for_each(|bits| changes.written(bits));
@@ -249,11 +250,11 @@ impl Port {
         }
     }
 
-    /// Says that the peer was alive at `now`. After a STOP that is over, the data of the station count again from
-    /// then on; where something of it is read, its first frame has to be handed in before.
+    /// Reports that the peer was alive at `now`. After a STOP has ended, the station's data are valid again
+    /// from then on; if the station is read, hand in its first frame before this call.
     pub fn touch(&mut self, station: usize, now: Nanos) {
         let wires = self.troubles.wires();
-        // Who is late must not seem alive by what has not come yet.
+        // While frames are held back, the peer must not seem more alive than the data that have arrived.
         if wires.is_none_or(|wires| !wires.is_cut(station) && !wires.holds_back(station)) {
             self.image.stations[station].touch(now);
             if self.vitals.heard(station) {
@@ -262,9 +263,9 @@ impl Port {
         }
     }
 
-    /// The PLC of `station` says that it runs its program, or that it does not: then the station is stale at once,
-    /// however young its data are. Fresh again is what comes after it said that it runs. To be called as often as
-    /// the PLC says it; what it said last stays when the line breaks.
+    /// The PLC of `station` reports that it runs its program, or that it does not: then the station is stale
+    /// at once, however recent its data are. It becomes fresh with the first data after the PLC reports that
+    /// it runs. Call it as often as the PLC reports; the last report stays valid when the line breaks.
     pub fn plc_state(&mut self, station: usize, now: Nanos, state: PlcState) {
         if !self.vitals.plc_says(station, state) {
             return;
@@ -277,7 +278,7 @@ impl Port {
         }
     }
 
-    /// Lets image and line follow what is known of the data of `station`.
+    /// Passes the validity of `station`'s data on to image and line.
     fn doubt(&mut self, station: usize, now: Nanos) {
         let is_valid = self.vitals.is_valid(station);
         self.image.stations[station].set_valid(is_valid);
@@ -286,14 +287,14 @@ impl Port {
         self.status.doubt(now, self.vitals.doubt(), ages);
     }
 
-    /// When the port itself has something to do next, for which [`observe`](Self::observe) is to be called;
-    /// [`Nanos::MAX`] if nothing.
+    /// When the port itself has to act next, by a call of [`observe`](Self::observe); [`Nanos::MAX`] for
+    /// never.
     pub fn due(&self) -> Nanos {
         self.troubles.due().min(self.vitals.due())
     }
 
-    /// Looks after the injected faults: takes over new ones, and hands in what was held back long enough.
-    /// Costs one look at a number while there are none.
+    /// Handles injected faults: adopts new ones, and hands in frames that were held back long enough. Without
+    /// faults it costs one comparison.
     #[inline]
     fn attend(&mut self, now: Nanos) {
         if self.troubles.are_there() {
@@ -305,7 +306,7 @@ impl Port {
     fn attend_to_troubles(&mut self, now: Nanos) {
         self.troubles.look(now, &self.image, &self.status);
         for station in 0..self.stations() {
-            // Taken out while frames are handed in, and put back.
+            // Taken out while its frames are handed in, and put back afterwards.
             let mut frame = self.troubles.take_frame(station);
             while self.troubles.release(station, now, &mut frame) {
                 self.hand_in(station, now, &frame);
@@ -314,7 +315,7 @@ impl Port {
         }
     }
 
-    /// Reports a write of the peer, for buses whose every write matters.
+    /// Reports a write by the peer, for buses on which every write matters.
     pub fn event(&mut self, event: Event) {
         if self.troubles.wires().is_some_and(|wires| wires.is_down()) {
             return;
@@ -322,12 +323,12 @@ impl Port {
         self.image.events.push(event);
     }
 
-    /// The limit of age: what is older is stale.
+    /// The limit of age: older data are stale.
     pub fn max_age(&self) -> Nanos {
         self.status.max_age()
     }
 
-    /// How long ago the station that has been silent longest was heard of; [`Nanos::MAX`] for never.
+    /// The time since the most silent station was heard from; [`Nanos::MAX`] if it never was.
     pub fn silence(&self, now: Nanos) -> Nanos {
         let ages = self.image.stations.iter();
         ages.map(|station| station.peer_age(now))
@@ -335,33 +336,33 @@ impl Port {
             .unwrap_or_default()
     }
 
-    /// How long ago the peer of a station was heard of; [`Nanos::MAX`] for never.
+    /// The time since the peer of a station was heard from; [`Nanos::MAX`] if it never was.
     pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
         self.image.stations[station].peer_age(now)
     }
 
-    /// When the next station becomes stale if nothing comes from it; [`Nanos::MAX`] if all are.
+    /// When the next station becomes stale if it stays silent; [`Nanos::MAX`] if all are stale.
     pub fn stale_at(&self, now: Nanos) -> Nanos {
         let limit = self.max_age();
         let ages = self.image.stations.iter();
         let ages = ages.map(|station| station.peer_age(now));
         let oldest = ages.filter(|age| *age <= limit).max();
-        // One more than the limit is stale.
+        // Data are stale when older than the limit, not when equal.
         oldest.map_or(Nanos::MAX, |age| now + (limit - age) + Nanos(1))
     }
 
-    /// How long ago the simulation ticked last; [`Nanos::MAX`] for never.
+    /// The time since the last tick of the simulation; [`Nanos::MAX`] if there was none.
     pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
         self.image.stations[station].tick_age(now)
     }
 
-    /// For how long the simulation may not tick before fail-safe bytes go out; `None` for ever.
+    /// How long the simulation may pause before fail-safe bytes are sent; `None` for any time.
     pub fn watchdog(&self) -> Option<Nanos> {
         self.watchdog
     }
 
-    /// Looks whether the line has become stale, or is so no more. [`outgoing`](Self::outgoing) does it, too;
-    /// this is for buses that have nothing to send for long.
+    /// Checks whether the line has become stale, or is no longer stale. [`outgoing`](Self::outgoing) does
+    /// this as well; this is for buses that rarely send.
     pub fn observe(&mut self, now: Nanos) {
         self.attend(now);
         while let Some(station) = self.vitals.look(now) {
@@ -372,21 +373,21 @@ impl Port {
         self.status.observe(now, ages);
     }
 
-    /// The line is on its way, or waits for its peer.
+    /// The bus connects, or waits for its peer.
     pub fn opening(&mut self, reason: &str) {
         self.last_cycle = None;
         self.enter(LinkState::Opening, Cause::Waiting, reason);
     }
 
-    /// The peer was lost for `error`, and the bus goes on without a pause, as `next` says.
+    /// The peer was lost because of `error`, and the bus continues without a pause, as `next` says.
     pub fn lost(&mut self, error: &BusError, next: &str) {
         self.last_cycle = None;
         let reason = format!("{error}; {next}");
         self.enter(LinkState::Opening, error.into(), &reason);
     }
 
-    /// The peer is there. Whether it also says anything is looked after by the port: a line that is silent
-    /// for too long becomes stale by itself.
+    /// The peer is there. The port itself checks that it sends: a line that is silent for too long becomes
+    /// stale.
     pub fn running(&mut self, reason: &str) {
         self.enter(LinkState::Running, Cause::Running, reason);
     }
@@ -404,22 +405,22 @@ impl Port {
         }
     }
 
-    /// Notes a fact for the statistics, such as the address that was bound.
+    /// Sets a fact for the statistics, such as the bound address.
     pub fn tell(&self, key: &'static str, fact: &str) {
         self.status.tell(key, fact);
     }
 
-    /// Counts something for the statistics; keys are `<kind of bus>.<what>`.
+    /// Increments a counter of the statistics; keys are `<kind of bus>.<what>`.
     pub fn count(&self, key: &'static str) {
         self.status.count(key);
     }
 
-    /// Writes a message of which a peer can cause as many as it likes; see [`LinkStatus::log`].
+    /// Logs a message that a peer can cause any number of times; see [`LinkStatus::log`].
     pub fn log(&self, level: log::Level, kind: &'static str, message: Arguments<'_>) {
         self.status.log(level, kind, message);
     }
 
-    /// What another thread needs to look after the [calls](Self::calling) of this one.
+    /// Lets another thread supervise the [calls](Self::calling) of this one.
     pub fn call_watch(&self) -> CallWatch {
         CallWatch {
             status: self.status.clone(),
@@ -427,10 +428,9 @@ impl Port {
         }
     }
 
-    /// Makes a call into a library that may not return, and lets the statistics tell when it lasts for longer
-    /// than `limit`.
+    /// Makes a library call that may not return; the statistics report it if it lasts longer than `limit`.
     pub fn calling<R>(&self, what: &Arc<str>, limit: Nanos, call: impl FnOnce() -> R) -> R {
-        /// Ends the call, however it ends: one that panics has not hung.
+        /// Ends the call in any case: one that panics has not hung.
         struct Ends<'a>(&'a Port);
 
         impl Drop for Ends<'_> {
@@ -445,7 +445,7 @@ impl Port {
     }
 }
 
-/// Looks after the calls into a library that a bus thread makes, from another thread.
+/// Supervises a bus thread's library calls from another thread.
 #[derive(Clone, Debug)]
 pub struct CallWatch {
     status: LinkStatus,
@@ -453,7 +453,7 @@ pub struct CallWatch {
 }
 
 impl CallWatch {
-    /// Lets the line be stale, and the log say so, when a call lasts longer than it may.
+    /// Makes the line stale, and logs that, when a call exceeds its limit.
     pub fn look(&self) {
         self.status.observe_call(self.clock.now());
     }

@@ -1,26 +1,26 @@
-//! Messages of the log that a peer can cause: counted, and told more and more rarely.
+//! Log messages that a peer can cause: counted, and logged less and less often.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use tickbus_base::os::{is_told, is_told_rarely};
 
-/// What a message is about; a line's state and cause, or a name of its own.
+/// The topic of a message: a line's state and cause, or its own name.
 pub type Topic = (&'static str, &'static str);
 
-/// How often each topic came.
+/// How often each topic occurred.
 #[derive(Debug, Default)]
 pub struct Rarely {
     times: BTreeMap<Topic, u64>,
     untold: u64,
 }
 
-/// The number of a message among those of its topic, as the end of its text.
+/// The number of a message within its topic, appended to its text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Times(u64);
 
 impl Rarely {
-    /// Counts a message; `None` if the log is not to have it.
+    /// Counts a message; `None` if it is not to be logged.
     pub fn count(&mut self, topic: Topic) -> Option<Times> {
         let times = self.times.entry(topic).or_default();
         *times += 1;
@@ -31,7 +31,7 @@ impl Rarely {
         None
     }
 
-    /// How many messages the log did not have.
+    /// How many messages were not logged.
     pub fn untold(&self) -> u64 {
         self.untold
     }

@@ -13,7 +13,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// Both of them.
+    /// Both roles.
     pub const ALL: [Self; 2] = [Self::Device, Self::Controller];
 
     /// The areas that it writes and reads.

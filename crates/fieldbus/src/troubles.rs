@@ -1,4 +1,4 @@
-//! Injected faults of the line, as a port has them.
+//! A port's injected line faults.
 
 use std::sync::Arc;
 
@@ -8,20 +8,20 @@ use tickbus_image::{BusEnd, BusStation};
 
 use super::{Cause, LinkState, LinkStatus};
 
-/// The injected faults of one port: nothing at all until there is one.
+/// The injected faults of a port: without any, nothing is allocated.
 #[derive(Debug, Default)]
 pub(super) struct Troubles {
     board: Arc<Board>,
-    /// The board's news as they were looked at last.
+    /// The board's change counter when it was last read.
     seen: u64,
     wires: Option<Box<Wires>>,
-    /// A frame per station, to hand in what was held back.
+    /// A frame per station, for handing in what was held back.
     frames: Vec<Box<[u8]>>,
-    /// While a fault holds the line down: what the bus says of it.
+    /// While a fault holds the line down: the bus's own state of the line.
     beneath: Option<Beneath>,
 }
 
-/// What a bus says of its line while a fault hides that.
+/// The state that a bus reports while a fault hides it.
 #[derive(Debug)]
 struct Beneath {
     state: LinkState,
@@ -30,7 +30,7 @@ struct Beneath {
 }
 
 impl Troubles {
-    /// Those of `board`.
+    /// The faults on `board`.
     pub(super) fn of(board: Arc<Board>) -> Self {
         Self {
             board,
@@ -38,7 +38,7 @@ impl Troubles {
         }
     }
 
-    /// Whether there is anything to look after.
+    /// Whether there is anything to do.
     #[inline]
     pub(super) fn are_there(&self) -> bool {
         self.wires.is_some() || self.board.news() != self.seen
@@ -50,7 +50,7 @@ impl Troubles {
         self.wires.as_deref_mut()
     }
 
-    /// Looks at the board: takes over new faults, tells the log, and lets the state of the line follow.
+    /// Reads the board: adopts new faults, logs, and updates the state of the line.
     pub(super) fn look(&mut self, now: Nanos, image: &BusEnd, status: &LinkStatus) {
         let news = self.board.news();
         if news == self.seen {
@@ -79,7 +79,7 @@ impl Troubles {
                 self.beneath = Some(beneath.unwrap_or_else(|| {
                     let link = status.link();
                     if link.state == LinkState::Stale {
-                        // Silence is told by the clock, not by the bus.
+                        // Staleness is decided by the clock, not by the bus.
                         Beneath {
                             state: LinkState::Running,
                             cause: Cause::Running,
@@ -112,7 +112,7 @@ impl Troubles {
         }
     }
 
-    /// Keeps what the bus says of its line, while a fault hides it.
+    /// Stores what the bus reports about its line while a fault hides it.
     pub(super) fn hides(
         &mut self,
         now: Nanos,
@@ -128,23 +128,23 @@ impl Troubles {
                 cause,
                 reason: reason.to_owned(),
             };
-            // The supervisor may have said meanwhile that the bus failed.
+            // The supervisor may have reported a failure in the meantime.
             say_down(now, wires.active(), status);
         }
         true
     }
 
-    /// Throws for the frames that are about to go out.
+    /// Decides at random whether the next outgoing frames are lost.
     pub(super) fn decides_to_lose_a_cycle(&mut self) -> bool {
         self.wires().is_some_and(Wires::loses_cycle)
     }
 
-    /// When a frame that is held back is due.
+    /// When the next held frame is due.
     pub(super) fn due(&self) -> Nanos {
         self.wires.as_ref().map_or(Nanos::MAX, |wires| wires.due())
     }
 
-    /// Copies the next frame whose time has come.
+    /// Copies the next frame that is due.
     pub(super) fn release(&mut self, station: usize, now: Nanos, frame: &mut [u8]) -> bool {
         self.wires()
             .is_some_and(|wires| wires.release(station, now, frame))

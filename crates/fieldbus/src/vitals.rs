@@ -1,21 +1,22 @@
-//! Whether the data of a station count, although they arrive: a PLC in STOP goes on answering.
+//! Whether the received data of a station are valid: a PLC in STOP still answers.
 
 use std::fmt::Write as _;
 
 use super::{Cause, alive::Watch};
 use tickbus_base::time::Nanos;
 
-/// What a PLC says of itself.
+/// The operating state reported by a PLC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PlcState {
-    /// It works its program off.
+    /// It executes its program.
     Run,
-    /// It does not, whatever it calls that: STOP, HALT, program mode, start-up. Its outputs are not the program's.
+    /// It does not, whatever it calls that: STOP, HALT, program mode, start-up. Its outputs are not the
+    /// program's.
     Stop,
 }
 
 impl PlcState {
-    /// As the statistics have it.
+    /// Its name in the statistics.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
@@ -24,7 +25,7 @@ impl PlcState {
     }
 }
 
-/// The stations' signs of life beyond frames.
+/// The stations' signs of life, in addition to frames.
 #[derive(Debug)]
 pub(super) struct Vitals {
     stations: Vec<Station>,
@@ -33,33 +34,33 @@ pub(super) struct Vitals {
 
 #[derive(Debug, Default)]
 struct Station {
-    /// As the driver.cfg names it; empty where there is one.
+    /// Its name in the driver.cfg; empty if there is only one.
     name: String,
     plc: Option<PlcState>,
-    /// Its PLC stopped, and nothing has come from it since it runs again.
+    /// Its PLC has stopped, and nothing has arrived since it last reported running.
     is_stopped: bool,
 }
 
-/// A signal that has to change.
+/// A signal that has to keep changing.
 #[derive(Debug)]
 struct Watched {
     watch: Watch,
-    /// Its bytes as they came last.
+    /// Its last bytes.
     last: Vec<u8>,
-    /// When they changed, or came for the first time.
+    /// When they last changed, or arrived for the first time.
     changed: Option<Nanos>,
     /// They have not changed for too long.
     is_frozen: bool,
 }
 
 impl Watched {
-    /// The moment from which on the signal has stood still for too long.
+    /// The time from which on the signal has been unchanged for too long.
     fn due(&self) -> Option<Nanos> {
         let changed = self.changed.filter(|_| !self.is_frozen)?;
         Some(changed + self.watch.within + Nanos(1))
     }
 
-    /// Looks at a frame that arrived at `now`; whether that changes what is thought of the station.
+    /// Checks a frame that arrived at `now`; returns whether the validity of the station changes.
     fn arrived(&mut self, now: Nanos, frame: &[u8]) -> bool {
         let mask = self.watch.mask;
         let bytes = &frame[self.watch.bytes.clone()];
@@ -73,7 +74,7 @@ impl Watched {
         std::mem::take(&mut self.is_frozen)
     }
 
-    /// Looks at the clock; whether the signal has just been found to stand still.
+    /// Checks the time; returns whether the signal has just been found frozen.
     fn look(&mut self, now: Nanos) -> bool {
         let freezes = self.due().is_some_and(|due| due <= now);
         self.is_frozen |= freezes;
@@ -96,7 +97,7 @@ impl Vitals {
         }
     }
 
-    /// Watches these signals from their first frame on.
+    /// Watches these signals, starting from their first frame.
     pub(super) fn watch(&mut self, watches: Vec<Watch>) {
         let watched = watches.into_iter().map(|watch| Watched {
             watch,
@@ -107,7 +108,7 @@ impl Vitals {
         self.watched = watched.collect();
     }
 
-    /// Gives the stations the names that messages call them.
+    /// Sets the stations' names for messages.
     pub(super) fn name_stations<'a>(&mut self, names: impl Iterator<Item = &'a str>) {
         if self.stations.len() > 1 {
             for (station, name) in self.stations.iter_mut().zip(names) {
@@ -116,7 +117,7 @@ impl Vitals {
         }
     }
 
-    /// Takes down what a station's PLC says of itself; whether that is news.
+    /// Records the state that a station's PLC reports; returns whether it is new.
     pub(super) fn plc_says(&mut self, station: usize, state: PlcState) -> bool {
         let station = &mut self.stations[station];
         let is_news = station.plc.replace(state) != Some(state);
@@ -124,7 +125,7 @@ impl Vitals {
         is_news
     }
 
-    /// A whole frame of `station` arrived at `now`. Gives whether that changes what is thought of its data.
+    /// A whole frame of `station` arrived at `now`. Returns whether the validity of its data changes.
     pub(super) fn arrived(&mut self, station: usize, now: Nanos, frame: &[u8]) -> bool {
         let mut changes = false;
         for watched in &mut self.watched {
@@ -135,7 +136,7 @@ impl Vitals {
         changes | self.heard(station)
     }
 
-    /// `station` gave a sign of life. Gives whether that changes what is thought of its data.
+    /// `station` gave a sign of life. Returns whether the validity of its data changes.
     pub(super) fn heard(&mut self, station: usize) -> bool {
         let station = &mut self.stations[station];
         let revives = station.is_stopped && station.plc == Some(PlcState::Run);
@@ -143,7 +144,7 @@ impl Vitals {
         revives
     }
 
-    /// Looks at the clock; gives a station, if there is one, of which a signal has just been found to stand still.
+    /// Checks the time; returns a station, if any, of which a signal has just been found frozen.
     pub(super) fn look(&mut self, now: Nanos) -> Option<usize> {
         self.watched.iter_mut().find_map(|watched| {
             let station = watched.watch.station;
@@ -151,19 +152,19 @@ impl Vitals {
         })
     }
 
-    /// When to look next; [`Nanos::MAX`] for never.
+    /// When to check next; [`Nanos::MAX`] for never.
     pub(super) fn due(&self) -> Nanos {
         let due = self.watched.iter().filter_map(Watched::due);
         due.min().unwrap_or(Nanos::MAX)
     }
 
-    /// Whether the data of `station` count.
+    /// Whether the data of `station` are valid.
     pub(super) fn is_valid(&self, station: usize) -> bool {
         let is_frozen = |watched: &Watched| watched.watch.station == station && watched.is_frozen;
         !self.stations[station].is_stopped && !self.watched.iter().any(is_frozen)
     }
 
-    /// The keys and facts of the statistics: `cpu`, and `cpu.<station>` where there are several.
+    /// The facts for the statistics: `cpu`, or `cpu.<station>` if there are several stations.
     pub(super) fn facts(&self) -> Vec<(String, &'static str)> {
         let known = || {
             self.stations
@@ -183,7 +184,7 @@ impl Vitals {
         facts
     }
 
-    /// Why data that arrive do not count, for programs and for people; `None` while all do.
+    /// Why received data are invalid, for programs and for people; `None` if all are valid.
     pub(super) fn doubt(&self) -> Option<(Cause, String)> {
         let stopped: Vec<&Station> = self.stations.iter().filter(|s| s.is_stopped).collect();
         let Some((first, others)) = stopped.split_first() else {
@@ -205,7 +206,7 @@ impl Vitals {
         Some((Cause::Stopped, reason))
     }
 
-    /// The signals that have not changed as they have to.
+    /// The signals that should have changed and did not.
     fn standstill(&self) -> Option<(Cause, String)> {
         let mut reason = String::new();
         for Watched { watch, .. } in self.watched.iter().filter(|watched| watched.is_frozen) {
@@ -381,7 +382,7 @@ mod tests {
                 port.observe(at(now));
                 status.link().cause
             };
-            // The first round leaves behind what the second one must not be misled by.
+            // The second round must not be misled by what the first one leaves behind.
             for round in [0, 1000] {
                 port.received(0, at(round), &[u8::from(round > 0)]);
                 assert_eq!(cause(&mut port, round + 1), Cause::Running);
@@ -393,7 +394,7 @@ mod tests {
                         "{within} {silent}"
                     );
                 }
-                // It comes again, and is the same.
+                // It arrives again, unchanged.
                 port.received(0, at(round + 310), &[u8::from(round > 0)]);
                 assert_eq!(cause(&mut port, round + 310), Cause::Frozen, "{within}");
             }

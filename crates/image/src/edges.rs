@@ -1,8 +1,8 @@
-//! Edges that must not get lost: counted where frames are written, shown where frames are read.
+//! Edges must not be lost: they are counted where frames are written, and shown where frames are read.
 //!
-//! Frames carry a cumulative, wrapping counter per latched signal. A frame that is overwritten unread
-//! takes none of its edges along, because the next frame's counters hold them too. The reading side
-//! compares counters and shapes the levels that it shows, so that every edge is seen as an edge.
+//! Each frame carries a cumulative, wrapping counter per latched signal. A frame that is overwritten unread
+//! loses no edges, because the counters of the next frame include them. The reading side compares counters
+//! and shapes the levels that it shows, so that every edge appears as an edge.
 
 use std::ops::Range;
 
@@ -43,16 +43,16 @@ pub fn latched_bits(table: &SignalTable, station: usize, area: Area) -> Box<[Lat
     bits
 }
 
-/// The latched bits that lie side by side in one byte.
+/// The latched bits of one byte.
 #[derive(Debug)]
 struct Group {
     byte: usize,
     mask: u8,
-    /// Which of the latched bits they are.
+    /// Their range among the latched bits.
     bits: Range<usize>,
 }
 
-/// Groups bits, which stand byte by byte: so that what a byte costs does not depend on how many others there are.
+/// Groups bits that are sorted by byte, so that the cost of a byte does not depend on the bits elsewhere.
 fn groups(bits: &[LatchedBit]) -> Box<[Group]> {
     let mut begin = 0;
     let of_a_byte = bits.chunk_by(|one, next| one.byte == next.byte);
@@ -74,13 +74,13 @@ fn groups(bits: &[LatchedBit]) -> Box<[Group]> {
 pub struct EdgeCounter {
     bits: Box<[LatchedBit]>,
     groups: Box<[Group]>,
-    /// The bytes of the groups as they were last.
+    /// The last values of the groups' bytes.
     last: Box<[u8]>,
     counts: Box<[u32]>,
 }
 
 impl EdgeCounter {
-    /// A counter that takes `initial` for the levels before the first frame.
+    /// A counter that regards `initial` as the levels before the first frame.
     pub fn new(bits: Box<[LatchedBit]>, initial: &[u8]) -> Self {
         let groups = groups(&bits);
         Self {
@@ -91,18 +91,18 @@ impl EdgeCounter {
         }
     }
 
-    /// Counts the edges from the levels seen last to those in `bytes`, and writes the counters into
-    /// `edges`, which belong to the same frame.
+    /// Counts the edges between the last levels and those in `bytes`, and writes the counters to `edges`,
+    /// which belong to the same frame.
     #[inline]
     pub fn count(&mut self, bytes: &[u8], edges: &mut [u32]) {
-        // Frames without latched signals are common, and have nothing to count or copy.
+        // Frames without latched signals are common; for them there is nothing to count or copy.
         if !self.bits.is_empty() {
             self.observe(bytes);
             edges.copy_from_slice(&self.counts);
         }
     }
 
-    /// Counts the edges from the levels seen last to those in `bytes`.
+    /// Counts the edges between the last levels and those in `bytes`.
     fn observe(&mut self, bytes: &[u8]) {
         for (group, last) in self.groups.iter().zip(&mut self.last) {
             let now = bytes[group.byte];
@@ -146,7 +146,7 @@ fn count_byte(bits: &[LatchedBit], counts: &mut [u32], changed: u8, now: u8) {
 struct Shown {
     /// The counter up to which edges have been shown.
     count: u32,
-    /// Until when the level stays as it is.
+    /// Until when the level is held.
     hold_until: Nanos,
 }
 
@@ -155,29 +155,29 @@ const NOTHING_SHOWN: Shown = Shown {
     hold_until: Nanos(i64::MIN),
 };
 
-/// Shapes the levels on the reading side so that every edge is seen as an edge.
+/// Shapes the levels on the reading side so that every edge appears as an edge.
 ///
-/// Where the counters say that edges happened which the levels no longer show, the level is forced
-/// for one exchange: a pulse that is over is shown late, and a level that fell and rose again in
-/// between is shown low once. Edges that crowd between two exchanges merge into one. What was shaped
-/// counts as seen only once [`confirm`](Self::confirm) says that the exchange was completed.
+/// Where the counters report edges that the levels no longer show, the level is forced for one exchange: a
+/// pulse that is over is shown late, and a level that fell and rose again in between is shown low once.
+/// Several edges between two exchanges merge into one. What was shaped counts as seen only when
+/// [`confirm`](Self::confirm) reports that the exchange was completed.
 #[derive(Debug)]
 pub struct PulseShaper {
     bits: Box<[LatchedBit]>,
     groups: Box<[Group]>,
-    /// The bytes of the groups as the receiver has seen them last, and as it is about to see them.
+    /// The bytes of the groups as the receiver saw them last, and as it is about to see them.
     levels: Box<[u8]>,
     next_levels: Box<[u8]>,
     shown: Box<[Shown]>,
     next_shown: Box<[Shown]>,
-    /// Counters of the frame looked at last.
+    /// Counters of the last frame.
     counts: Box<[u32]>,
     /// Whether any level is forced or held, or any edge still waits.
     busy: bool,
 }
 
 impl PulseShaper {
-    /// A shaper whose receiver is taken to have seen `initial`.
+    /// A shaper that assumes the receiver has seen `initial`.
     pub fn new(bits: Box<[LatchedBit]>, initial: &[u8]) -> Self {
         let groups = groups(&bits);
         let levels: Box<[u8]> = groups.iter().map(|group| initial[group.byte]).collect();
@@ -193,7 +193,7 @@ impl PulseShaper {
         }
     }
 
-    /// The latched bits that it looks after.
+    /// The latched bits that it shapes.
     pub fn bits(&self) -> &[LatchedBit] {
         &self.bits
     }
@@ -211,8 +211,7 @@ impl PulseShaper {
         self.busy || *edges != *self.counts
     }
 
-    /// For each latched bit, how many of the edges counted in `edges` are newer than the frame
-    /// looked at last.
+    /// For each latched bit, how many of the edges counted in `edges` are newer than the last frame.
     pub fn new_edges<'a>(&'a self, edges: &'a [u32]) -> impl Iterator<Item = u32> + 'a {
         edges
             .iter()
@@ -220,7 +219,7 @@ impl PulseShaper {
             .map(|(now, before)| now.wrapping_sub(*before))
     }
 
-    /// Takes note that the receiver is about to see `bytes` unshaped.
+    /// Records that the receiver is about to see `bytes` unshaped.
     #[inline]
     pub fn pass(&mut self, bytes: &[u8]) {
         for (group, level) in self.groups.iter().zip(&mut self.next_levels) {
@@ -228,8 +227,8 @@ impl PulseShaper {
         }
     }
 
-    /// Takes note that the receiver is about to see `bytes` instead of any frame: no edge that waits
-    /// is shown by them.
+    /// Records that the receiver is about to see `bytes` in place of any frame: they show none of the waiting
+    /// edges.
     pub fn pass_instead(&mut self, bytes: &[u8]) {
         self.next_shown.copy_from_slice(&self.shown);
         self.pass(bytes);
@@ -261,7 +260,7 @@ impl PulseShaper {
         self.pass(bytes);
     }
 
-    /// Takes note that the receiver has seen what was shaped or passed last.
+    /// Records that the receiver has seen what was shaped or passed last.
     #[inline]
     pub fn confirm(&mut self) {
         self.levels.copy_from_slice(&self.next_levels);
@@ -270,8 +269,8 @@ impl PulseShaper {
         }
     }
 
-    /// As [`confirm`](Self::confirm), for a receiver that has seen these bits of the frame alone (bit n of byte k is
-    /// 8k + n).
+    /// As [`confirm`](Self::confirm), for a receiver that has seen only these bits of the frame (bit n of
+    /// byte k is 8k + n).
     pub fn confirm_bits(&mut self, bits: &Range<usize>) {
         let levels = self.levels.iter_mut().zip(&self.next_levels);
         for (group, (level, next)) in self.groups.iter().zip(levels) {
@@ -288,13 +287,13 @@ impl PulseShaper {
     }
 }
 
-/// Those bits of a byte that are among `bits`.
+/// The bits of a byte that are within `bits`, as a mask.
 fn mask_of(bits: &Range<usize>, byte: usize) -> u8 {
     let among = (0..8).filter(|bit| bits.contains(&(byte * 8 + bit)));
     among.fold(0, |mask, bit| mask | 1 << bit)
 }
 
-/// The level to show of one bit, and what will have been shown then.
+/// The level to show of one bit, and what the receiver will then have seen.
 fn shape_bit(
     bit: &LatchedBit,
     shown: Shown,
@@ -309,8 +308,8 @@ fn shape_bit(
     if count == shown.count {
         return (level, shown);
     }
-    // An edge waits. The next level is the other one in any case: either it is the edge, or the
-    // receiver must see it before it can see the edge.
+    // An edge waits. The next level is the inverse in either case: it is that edge, or the level that the
+    // receiver must see before it can see the edge.
     let next = !seen;
     let is_edge = match bit.latch {
         Latch::Rising => next,
@@ -342,7 +341,7 @@ mod tests {
         }])
     }
 
-    /// Runs levels through a counter; the reader looks, and confirms, where `looks` has a `^`.
+    /// Feeds levels to a counter; the reader looks, and confirms, where `looks` has a `^`.
     fn seen(latch: Latch, levels: &str, looks: &str) -> String {
         let mut counter = EdgeCounter::new(bit(latch, Nanos::ZERO), &[0]);
         let mut shaper = PulseShaper::new(bit(latch, Nanos::ZERO), &[0]);
@@ -368,7 +367,7 @@ mod tests {
     #[test]
     fn every_edge_of_interest_is_seen_as_an_edge() {
         for (latch, levels, looks, expected) in [
-            // A pulse between two looks is shown late, and for one look.
+            // A pulse between two looks is shown late, for one look.
             (Latch::Rising, "00100000", "^  ^ ^^^", "0  1 000"),
             (Latch::Falling, "01101111", "^^ ^ ^^^", "01 0 111"),
             (Latch::Both, "00100000", "^  ^ ^^^", "0  1 000"),
@@ -376,7 +375,7 @@ mod tests {
             (Latch::Rising, "01101111", "^^  ^^^^", "01  0111"),
             // A level that rises and stays needs no help.
             (Latch::Rising, "00111000", "^^^^^^^^", "00111000"),
-            // After a fall that is not of interest, the next rise shows at once.
+            // After a fall that does not count, the next rise shows at once.
             (Latch::Rising, "01100110", "^^^^^^^^", "01100110"),
             // Crowded edges merge.
             (Latch::Rising, "01010100", "^     ^^", "0     10"),

@@ -29,7 +29,7 @@ pub use station::{Arrival, BusStation, Directions, Receiver, TickStation, statio
 pub use tick_ring::{TickReader, TickWriter, tick_ring};
 pub use triple::{Reader, Writer, triple_buffer};
 
-/// One frame of the process image, with what travels beside its bytes.
+/// One frame of the process image: its bytes and what belongs to them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// The station's `%I` or `%Q`.
@@ -40,7 +40,7 @@ pub struct Frame {
     pub sequence: u64,
 }
 
-/// Events that the ring of one driver holds.
+/// Capacity of a driver's event ring.
 pub const EVENT_CAPACITY: usize = 4096;
 
 /// The tick's end of a driver's image.
@@ -48,7 +48,7 @@ pub const EVENT_CAPACITY: usize = 4096;
 pub struct TickEnd {
     /// In the order of the signal table.
     pub stations: Vec<TickStation>,
-    /// What the peer wrote, where every write matters.
+    /// The peer's writes, for applications to which every write matters.
     pub events: Consumer,
 }
 
@@ -57,11 +57,11 @@ pub struct TickEnd {
 pub struct BusEnd {
     /// In the order of the signal table.
     pub stations: Vec<BusStation>,
-    /// Where a bus reports what the peer wrote.
+    /// Where a bus reports the peer's writes.
     pub events: Producer,
 }
 
-/// Makes the image of a driver, from the directions of each of its stations.
+/// Creates the image of a driver, given the directions of each station.
 pub fn image(stations: Vec<Directions>) -> (TickEnd, BusEnd) {
     let (producer, consumer) = event_ring(EVENT_CAPACITY);
     let (tick, bus) = stations.into_iter().map(station).unzip();

@@ -1,4 +1,4 @@
-//! The event ring: every write of a peer, in order, where the image alone would show the last.
+//! The event ring: every write of a peer, in order; the image itself would only show the last one.
 
 use super::sync::{Arc, AtomicU64, AtomicUsize, Ordering};
 use crate::signal::Slot;
@@ -43,7 +43,7 @@ pub struct Consumer {
     shared: Arc<Shared>,
 }
 
-/// Makes a ring for `capacity` events, which is rounded up to a power of two.
+/// Creates a ring for `capacity` events, rounded up to a power of two.
 pub fn event_ring(capacity: usize) -> (Producer, Consumer) {
     let capacity = capacity.next_power_of_two();
     let shared = Arc::new(Shared {
@@ -69,7 +69,7 @@ impl Shared {
 }
 
 impl Producer {
-    /// Appends an event; when the ring is full the event is lost, and counted.
+    /// Appends an event; if the ring is full, the event is lost and counted.
     pub fn push(&mut self, event: Event) {
         let shared = &*self.shared;
         let pushed = shared.pushed.load(Ordering::Relaxed);
@@ -98,7 +98,7 @@ impl Consumer {
         }
         let slot = shared.slot(popped);
         let event = Event {
-            // Only `push` writes here, and it writes a u32.
+            // Only `push` writes this word, from a u32.
             #[allow(clippy::cast_possible_truncation)]
             signal: slot[0].load(Ordering::Relaxed) as u32,
             value: Slot(slot[1].load(Ordering::Relaxed)),

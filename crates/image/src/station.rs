@@ -1,4 +1,4 @@
-//! One station's two ends.
+//! The two ends of one station.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use super::{EdgeCounter, Frame, LatchedBit, PulseShaper, Reader, Writer, triple_buffer};
 use tickbus_base::time::Nanos;
 
-/// What one station's streams are made of, tx and rx as seen from the tick.
+/// The frames of one station's two streams; tx and rx are as seen from the tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Directions {
-    /// The tx frame before the first tick, and again when the tick has stopped.
+    /// The tx frame before the first tick, and again after the tick has stopped.
     pub tx_fail_safe: Box<[u8]>,
     /// The latched signals of the tx frames.
     pub tx_latched: Box<[LatchedBit]>,
@@ -23,16 +23,16 @@ pub struct Directions {
 /// Never: earlier than any time of a clock.
 const NEVER: i64 = i64::MIN;
 
-/// What both ends tell each other beside the frames.
+/// What the two ends share in addition to the frames.
 #[derive(Debug)]
 struct Beside {
-    /// When the peer was last heard of.
+    /// When the peer was last heard from.
     peer_alive: AtomicI64,
-    /// When the simulation ticked last.
+    /// When the simulation last ticked.
     tick_alive: AtomicI64,
     /// Bus cycles received.
     cycles: AtomicU64,
-    /// The peer says that its data do not count, or they do not change as they have to.
+    /// The peer declares its data invalid, or a signal that should change does not.
     invalid: AtomicBool,
 }
 
@@ -42,34 +42,34 @@ pub struct TickStation {
     tx: Writer<Frame>,
     tx_edges: EdgeCounter,
     tx_sequence: u64,
-    /// The bytes handed over last: most ticks change nothing, and need no hand-over.
+    /// The bytes published last: most ticks change nothing, and need no hand-over.
     published: Box<[u8]>,
     rx: Reader<Frame>,
     rx_shaper: PulseShaper,
     shaped: Box<[u8]>,
-    /// Whether `shaped` holds what was shown last, rather than the frame itself.
+    /// Whether `shaped` holds what was shown last, rather than the frame.
     forced: bool,
     beside: Arc<Beside>,
 }
 
-/// Takes what [`TickStation::read`] has to show.
+/// Receives what [`TickStation::read`] shows.
 pub trait Receiver {
     /// The frame's bytes, with every edge made visible; called when they may have changed.
     fn levels(&mut self, bytes: &[u8]);
 
-    /// How many edges of the latched signal with this index in the signal table have arrived since
-    /// the last read; called for every latched signal when any count may have changed.
+    /// How many edges of the latched signal with this index in the signal table have arrived since the last
+    /// read; called for every latched signal whenever any count may have changed.
     fn edges(&mut self, signal: usize, count: u32);
 }
 
-/// What [`TickStation::read`] found.
+/// The result of [`TickStation::read`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arrival {
-    /// A new whole bus cycle has arrived since the last read.
+    /// A whole new bus cycle has arrived since the last read.
     pub fresh: bool,
     /// The bytes to show differ, or may differ, from those shown last.
     pub changed: bool,
-    /// Time since the peer was last heard of; [`Nanos::MAX`] when it never was.
+    /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
     pub age: Nanos,
     /// Sequence number of the frame shown.
     pub sequence: u64,
@@ -89,7 +89,7 @@ pub struct BusStation {
     beside: Arc<Beside>,
 }
 
-/// Makes the two ends of one station.
+/// Creates the two ends of one station.
 pub fn station(directions: Directions) -> (TickStation, BusStation) {
     let Directions {
         tx_fail_safe,
@@ -145,7 +145,7 @@ fn age(now: Nanos, then: i64) -> Nanos {
 }
 
 impl TickStation {
-    /// Lets `encode` write the whole tx frame; if that changed it, counts its edges and hands it to the
+    /// Lets `encode` write the whole tx frame; if that changed it, counts its edges and publishes it to the
     /// bus.
     #[inline]
     pub fn write<R>(&mut self, now: Nanos, encode: impl FnOnce(&mut [u8]) -> R) -> R {
@@ -169,14 +169,14 @@ impl TickStation {
         result
     }
 
-    /// Takes over the newest rx frame and shows it to `receiver`, if there is anything new to see.
+    /// Takes over the newest rx frame and shows it to `receiver`, if there is anything new to show.
     #[inline]
     pub fn read(&mut self, now: Nanos, receiver: &mut impl Receiver) -> Arrival {
         let fresh = self.rx.update();
         let age = age(now, self.beside.peer_alive.load(Ordering::Relaxed));
         let (shaper, shaped, forced) = (&mut self.rx_shaper, &mut self.shaped, &mut self.forced);
         if !fresh && !*forced && !shaper.is_busy() {
-            // The most common tick: the simulation ticks faster than the bus.
+            // The common case: the simulation ticks faster than the bus.
             let sequence = self.rx.with(|frame| frame.sequence);
             return Arrival {
                 fresh,
@@ -217,22 +217,22 @@ impl TickStation {
         })
     }
 
-    /// Takes note that the simulation sees other levels (fail-safe values) than the frame's, so that
-    /// the next [`read`](Self::read) shows the frame again.
+    /// Records that the simulation sees levels other than the frame's (fail-safe values), so that the next
+    /// [`read`](Self::read) shows the frame again.
     ///
-    /// The shaper goes on from what the peer showed last: a level that is on by its fail-safe value,
-    /// and that the peer switches on when it is back, must not drop in between to show that edge.
+    /// The shaper continues from what the peer showed last: if a level is on by its fail-safe value, and the
+    /// peer switches it on when it returns, it must not drop in between to show that edge.
     pub fn shown_instead(&mut self) {
         self.forced = true;
     }
 
-    /// Time since the peer was heard of last; [`Nanos::MAX`] before the first time.
+    /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
     pub fn peer_age(&self, now: Nanos) -> Nanos {
         age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
 
-    /// Whether the data of the peer count. To be asked before [`read`](Self::read) and after it: if both times this
-    /// says yes, that has not given a frame from the time when they did not.
+    /// Whether the data of the peer are valid. Ask before [`read`](Self::read) and again after it: if both
+    /// answers are yes, the frame that was read is not from an invalid period.
     #[inline]
     pub fn is_valid(&self) -> bool {
         !self.beside.invalid.load(Ordering::Acquire)
@@ -246,9 +246,9 @@ impl TickStation {
 
 impl BusStation {
     /// The bytes to send in an exchange at `now`: the latest tx frame with its pulses shaped, or the
-    /// fail-safe bytes when the simulation has not ticked for longer than `watchdog`, or never.
+    /// fail-safe bytes if the simulation has not ticked for longer than `watchdog`, or never.
     ///
-    /// A pulse counts as sent only once [`sent`](Self::sent) is called.
+    /// A pulse counts as sent only when [`sent`](Self::sent) is called.
     pub fn outgoing(&mut self, now: Nanos, watchdog: Option<Nanos>) -> &[u8] {
         self.tx.update();
         if watchdog.is_some_and(|limit| self.tick_age(now) > limit) {
@@ -272,26 +272,27 @@ impl BusStation {
         self.tx_shaper.confirm();
     }
 
-    /// The exchange carried these bits of [`outgoing`](Self::outgoing) and was completed; bit n of byte k is 8k + n.
+    /// The exchange carried only these bits of [`outgoing`](Self::outgoing) and was completed; bit n of byte
+    /// k is 8k + n.
     pub fn sent_bits(&mut self, bits: &Range<usize>) {
         self.tx_shaper.confirm_bits(bits);
     }
 
-    /// Time since the simulation ticked last; [`Nanos::MAX`] before the first tick.
+    /// Time since the last tick of the simulation; [`Nanos::MAX`] before the first one.
     pub fn tick_age(&self, now: Nanos) -> Nanos {
         age(now, self.beside.tick_alive.load(Ordering::Relaxed))
     }
 
-    /// Time since the peer was heard of last; [`Nanos::MAX`] before the first time.
+    /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
     pub fn peer_age(&self, now: Nanos) -> Nanos {
         age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
 
-    /// A whole bus cycle has arrived: counts its edges and hands it to the tick.
+    /// A whole bus cycle has arrived: counts its edges and publishes it to the tick.
     ///
     /// # Panics
     ///
-    /// When `bytes` is not exactly as long as the station's rx frame: wire code checks lengths.
+    /// When `bytes` is not exactly as long as the station's rx frame: wire code must check lengths.
     pub fn received(&mut self, now: Nanos, bytes: &[u8]) {
         assert_eq!(
             bytes.len(),
@@ -305,7 +306,7 @@ impl BusStation {
             frame.sequence = sequence;
         });
         self.rx_sequence = sequence;
-        // The time first: whoever sees the frame must not think it old.
+        // The time first, so that no reader of the frame thinks it old.
         self.touch(now);
         self.rx.publish();
         self.beside.cycles.fetch_add(1, Ordering::Relaxed);
@@ -316,28 +317,28 @@ impl BusStation {
         self.beside.peer_alive.store(now.0, Ordering::Relaxed);
     }
 
-    /// Says whether the data of the peer count. Data that count again are to be handed in before.
+    /// Sets whether the peer's data are valid. When they become valid again, hand them in before this call.
     pub fn set_valid(&mut self, valid: bool) {
-        // Released after the frame: the tick that sees this sees that, too.
+        // Released after the frame: a tick that sees the flag also sees the frame.
         self.beside.invalid.store(!valid, Ordering::Release);
     }
 
-    /// The bytes that went out, or were about to, last.
+    /// The bytes sent last, or about to be sent.
     pub fn last_outgoing(&self) -> &[u8] {
         &self.outgoing
     }
 
-    /// The latched bits of the frames that go out from here.
+    /// The latched bits of outgoing frames.
     pub fn tx_latched(&self) -> &[LatchedBit] {
         self.tx_shaper.bits()
     }
 
-    /// Size of the frames that arrive here, in bytes.
+    /// Size of incoming frames, in bytes.
     pub fn rx_len(&self) -> usize {
         self.rx_len
     }
 
-    /// Size of the frames that go out from here, in bytes.
+    /// Size of outgoing frames, in bytes.
     pub fn tx_len(&self) -> usize {
         self.outgoing.len()
     }
@@ -482,7 +483,7 @@ mod tests {
         let (mut tick, mut bus) = one_latched_byte();
         bus.received(Nanos(0), &[0]);
         read(&mut tick, 0);
-        // The peer is silent, and the simulation sees the bit on instead.
+        // The peer is silent, and the simulation is shown the bit on in its place.
         tick.shown_instead();
         bus.received(Nanos(90), &[1]);
         let (_, shown, edges) = read(&mut tick, 90);

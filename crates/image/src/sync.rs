@@ -1,4 +1,4 @@
-//! The atomics of the hand-over, switchable to loom's.
+//! The atomics of the hand-over, which loom can replace.
 
 #[cfg(not(loom))]
 pub(crate) use std::sync::{
@@ -15,7 +15,7 @@ pub(crate) use loom::sync::{
 #[cfg(loom)]
 pub(super) use loom::cell::UnsafeCell;
 
-/// The part of loom's cell interface that the hand-over uses, over the standard one.
+/// The part of loom's cell interface that the hand-over uses, implemented on the standard cell.
 #[cfg(not(loom))]
 #[derive(Debug)]
 pub(super) struct UnsafeCell<T>(std::cell::UnsafeCell<T>);

@@ -1,14 +1,14 @@
-//! The ring between the tick and the thread that records: whole ticks, without a lock or a wait.
+//! The ring between the tick and the recording thread: whole ticks, lock-free and wait-free.
 
 use crate::signal::Slot;
 use crate::sync::{Arc, AtomicU64, AtomicUsize, Ordering};
 
 #[derive(Debug)]
 struct Shared {
-    /// Places for ticks, one after another. Atomic words, written relaxed and ordered by the indices, keep
-    /// this free of unsafe code.
+    /// The ticks, one after another. Atomic words, written relaxed and ordered by the indices, keep this free
+    /// of unsafe code.
     words: Box<[AtomicU64]>,
-    /// Ticks that fit, a power of two.
+    /// Capacity in ticks, a power of two.
     ticks: usize,
     /// Words of one tick.
     size: usize,
@@ -30,7 +30,7 @@ impl Shared {
 pub struct TickWriter {
     shared: Arc<Shared>,
     pushed: usize,
-    /// Ticks taken as far as is known: looking again costs a cache line of the other thread's.
+    /// The last known value of `taken`: reading it again costs a transfer of the other thread's cache line.
     taken: usize,
 }
 
@@ -40,7 +40,7 @@ pub struct TickReader {
     shared: Arc<Shared>,
 }
 
-/// Makes a ring for `ticks` ticks (rounded up to a power of two) of `size` words each.
+/// Creates a ring for `ticks` ticks (rounded up to a power of two) of `size` words each.
 pub fn tick_ring(ticks: usize, size: usize) -> (TickWriter, TickReader) {
     let ticks = ticks.max(1).next_power_of_two();
     let shared = Arc::new(Shared {
@@ -59,12 +59,12 @@ pub fn tick_ring(ticks: usize, size: usize) -> (TickWriter, TickReader) {
 }
 
 impl TickWriter {
-    /// Appends a tick, `head` and then `slots`, together one place long. Takes no lock, makes no system
-    /// call, allocates nothing. When the ring is full, nothing is appended, and the answer is false.
+    /// Appends a tick, `head` followed by `slots`, together `size` words. Takes no lock, makes no system
+    /// call, allocates nothing. Returns false, and appends nothing, if the ring is full.
     ///
     /// # Panics
     ///
-    /// When `head` is longer than a place.
+    /// When `head` is longer than a tick.
     #[inline]
     pub fn push(&mut self, head: &[u64], slots: &[Slot]) -> bool {
         if self.is_full() {
@@ -105,8 +105,8 @@ impl TickWriter {
 }
 
 impl TickReader {
-    /// Copies the oldest tick into `words`, which must be one place long, and frees its place; false when
-    /// there is none.
+    /// Copies the oldest tick into `words`, which must be one tick long, and frees its place; false if there
+    /// is none.
     pub fn take(&mut self, words: &mut [u64]) -> bool {
         let shared = &*self.shared;
         let taken = shared.taken.load(Ordering::Relaxed);

@@ -5,9 +5,9 @@
 //!        [ w ]  ──publish──▶   [ h ]   ──update──▶      [ r ]
 //! ```
 //!
-//! The three indices are always a permutation of 0, 1, 2. Publishing swaps w with h, updating swaps
-//! r with h; either is one atomic exchange, so neither side ever waits and no value is ever torn. A
-//! value that was not picked up before the next one is overwritten: readers want the newest.
+//! The three indices are always a permutation of 0, 1, 2. Publishing swaps w with h, updating swaps r with h;
+//! each is one atomic exchange, so that neither side ever waits and no value is ever torn. A value that was
+//! not picked up before the next one is overwritten: readers want the newest.
 //!
 //! A sequence lock would be simpler, but a writer in a tight loop starves its readers.
 #![allow(
@@ -49,9 +49,9 @@ pub struct Reader<T> {
     index: u8,
 }
 
-/// Makes a triple buffer whose three buffers are copies of `initial`.
+/// Creates a triple buffer whose three buffers are copies of `initial`.
 ///
-/// The reader begins with `initial`, which does not count as fresh.
+/// The reader starts with `initial`, which does not count as fresh.
 pub fn triple_buffer<T: Clone + Send>(initial: &T) -> (Writer<T>, Reader<T>) {
     let buffers = [(); 3].map(|()| UnsafeCell::new(initial.clone()));
     let shared = Arc::new(Shared {
@@ -74,7 +74,7 @@ impl<T> Shared<T> {
 }
 
 impl<T> Writer<T> {
-    /// Lets `write` fill the writer's buffer, which still holds some earlier value.
+    /// Lets `write` fill the writer's buffer, which still holds an earlier value.
     #[inline]
     pub fn with_buffer<R>(&mut self, write: impl FnOnce(&mut T) -> R) -> R {
         self.shared.buffer(self.index).with_mut(|buffer| {
@@ -83,7 +83,7 @@ impl<T> Writer<T> {
         })
     }
 
-    /// Hands the writer's buffer over.
+    /// Publishes the writer's buffer.
     #[inline]
     pub fn publish(&mut self) {
         self.index = self.shared.state.swap(self.index | FRESH, Ordering::AcqRel) & INDEX;
@@ -91,10 +91,10 @@ impl<T> Writer<T> {
 }
 
 impl<T> Reader<T> {
-    /// Takes the newest value over, if there is one that was not seen; tells whether there was.
+    /// Takes over the newest value, if it was not seen yet; tells whether there was one.
     #[inline]
     pub fn update(&mut self) -> bool {
-        // Relaxed is enough to look: what counts is ordered by the exchange.
+        // Relaxed suffices for this check: the exchange below orders the accesses.
         if self.shared.state.load(Ordering::Relaxed) & FRESH == 0 {
             return false;
         }
@@ -102,7 +102,7 @@ impl<T> Reader<T> {
         true
     }
 
-    /// Lets `read` see the value taken over last.
+    /// Lets `read` see the value that was last taken over.
     #[inline]
     pub fn with<R>(&self, read: impl FnOnce(&T) -> R) -> R {
         self.shared.buffer(self.index).with(|buffer| {

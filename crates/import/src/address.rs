@@ -2,16 +2,16 @@
 
 use tickbus_image::signal::{Address, AddressError, Addressing};
 
-/// What a text in the address column is.
+/// The contents of an address cell.
 #[derive(Debug)]
 pub(super) enum Place {
     /// An address of an input or output.
     Image(Address),
-    /// Something of the PLC that is no part of its process image: what it is.
+    /// Something in the PLC outside the process image, and what it is.
     Elsewhere(&'static str),
-    /// An input or output, but not as an address is written.
+    /// An input or output in the wrong notation.
     Wrong(AddressError),
-    /// No address at all.
+    /// Not an address.
     Nothing,
 }
 
@@ -25,7 +25,7 @@ pub(super) fn place(text: &str, addressing: Addressing) -> Place {
     if plain.starts_with('%') {
         plain.remove(0);
     }
-    // The peripheral half of an address is the same place.
+    // The peripheral access to an address is at the same place.
     if let Some(rest) = plain.strip_suffix(":P") {
         plain.truncate(rest.len());
     }
@@ -55,7 +55,7 @@ pub(super) fn place(text: &str, addressing: Addressing) -> Place {
     if !elsewhere.is_empty() {
         return Place::Elsewhere(elsewhere);
     }
-    // German mnemonics; an address without a size is one of a bit.
+    // German mnemonics; an address without a size letter is a bit's.
     let international = match letters.chars().next() {
         Some('E') => letters.replacen('E', "I", 1),
         Some('A') => letters.replacen('A', "Q", 1),

@@ -1,25 +1,25 @@
-//! Records and cells of a table, with their places.
+//! Records and cells of a table, and their positions.
 
 use tickbus_base::toml_text::Collector;
 
-/// One cell: its text without quotation marks and blanks around it, and where it begins.
+/// One cell: its text without quotation marks and surrounding blanks, and its offset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
     pub(super) text: String,
     pub(super) at: usize,
 }
 
-/// One line, or several where a cell in quotes goes over their ends.
+/// The cells of one line, or of several if a quoted cell contains line ends.
 pub(super) type Record = Vec<Cell>;
 
-/// What may stand between cells.
+/// The possible separators of cells.
 const SEPARATORS: [char; 3] = [';', '\t', ','];
 
-/// All records that have anything in them; lines that begin with `#` are remarks.
+/// All records that are not empty; lines that start with `#` are comments.
 pub(super) fn records(text: &str, wrong: &Collector<'_>) -> Vec<Record> {
     let mut at = 0;
     let mut separator = None;
-    // How Excel says it.
+    // Excel's way of stating the separator.
     if let Some(stated) = text.strip_prefix("sep=") {
         separator = stated.chars().next().filter(|c| SEPARATORS.contains(c));
         at = text.find('\n').map_or(text.len(), |end| end + 1);
@@ -40,8 +40,8 @@ pub(super) fn records(text: &str, wrong: &Collector<'_>) -> Vec<Record> {
     records
 }
 
-/// The separator that the lines have most of outside of quotes; comments may have commas. In a list of properties
-/// (`Level = holding-register:21:UINT`) an equals sign comes before any of them.
+/// The separator that is most frequent outside quotes; comments may contain commas. In a list of properties
+/// (`Level = holding-register:21:UINT`) an equals sign precedes any of them.
 fn usual(text: &str) -> char {
     let mut lines = text
         .lines()
@@ -69,7 +69,7 @@ fn usual(text: &str) -> char {
         }
     }
     let most = counts.iter().max().copied().unwrap_or(0);
-    // Semicolons and tabs stand in no text by chance: two a line are enough against any commas.
+    // Semicolons and tabs rarely occur in text: two per line outweigh any number of commas.
     let lines = text
         .lines()
         .take(1000)
@@ -84,7 +84,7 @@ fn usual(text: &str) -> char {
         .map_or(';', |(separator, _)| separator)
 }
 
-/// The record that begins at `start`, and where the next one does.
+/// The record that begins at `start`, and where the next one begins.
 fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (Record, usize) {
     let mut record = Vec::new();
     let mut at = start;
@@ -114,7 +114,7 @@ fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
     }
 }
 
-/// The cell in quotes that begins at `start`, and where its separator or line end stands.
+/// The quoted cell that begins at `start`, and the position of the separator or line end after it.
 fn quoted(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (String, usize) {
     let mut cell = String::new();
     let mut at = start + 1;
@@ -125,7 +125,7 @@ fn quoted(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
                 "a cell in quotes has no end",
                 "close it with another \"",
             );
-            // Without its end, the rest of its line is all that can be meant.
+            // If the quote is not closed, only the rest of the line can be meant.
             let line = text[start..]
                 .find('\n')
                 .map_or(text.len(), |end| start + end);
@@ -148,7 +148,7 @@ fn quoted(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
             "write quotation marks within a cell twice: \"\"",
         );
     }
-    // Spreadsheets break lines within cells; names and comments have one.
+    // Spreadsheets permit line breaks within cells; names and comments are one line.
     let cell = cell.split_whitespace().collect::<Vec<_>>().join(" ");
     (cell, end)
 }

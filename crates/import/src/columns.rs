@@ -1,11 +1,11 @@
-//! Which column has what: by its heading, or by what stands in it.
+//! Finds the meaning of columns: by their headings, or by their contents.
 
 use super::address::{Place, place};
 use super::cells::Record;
 use super::device;
 use tickbus_image::signal::Addressing;
 
-/// The columns of a table, and its first record below the headings.
+/// The columns of a table, and the first record after the headings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Columns {
     pub(super) name: usize,
@@ -14,15 +14,15 @@ pub(super) struct Columns {
     pub(super) comment: Option<usize>,
     pub(super) unit: Option<usize>,
     pub(super) order: Option<usize>,
-    /// Who writes it: a direction, or KEPServer's client access.
+    /// The direction column: direction, or KEPServer's client access.
     pub(super) direction: Option<usize>,
-    /// KEPServer's columns of a scale: its kind, two raw values, two scaled ones.
+    /// KEPServer's scaling columns: type, two raw values, two scaled ones.
     pub(super) scale: Option<[usize; 5]>,
     pub(super) first: usize,
 }
 
 impl Columns {
-    /// Name, address, type, comment, and no headings.
+    /// Name, address, type, comment, without headings.
     pub(super) fn fixed() -> Self {
         Self {
             name: 0,
@@ -38,7 +38,7 @@ impl Columns {
     }
 }
 
-/// What headings are called in English and German editors, in small letters.
+/// The headings of English and German editors, in lower case.
 const NAMES: &[&str] = &[
     "name",
     "symbol",
@@ -77,10 +77,10 @@ const SCALES: [&str; 5] = [
 ];
 const ORDERS: &[&str] = &["order", "byte order"];
 
-/// How many records are looked at where there are no headings.
+/// How many records are examined if there are no headings.
 const LOOK: usize = 50;
 
-/// The columns, if one of them has addresses.
+/// The columns, if one of them contains addresses.
 pub(super) fn find(records: &[Record]) -> Option<Columns> {
     let head = records.first()?;
     let called = |words: &[&str]| {
@@ -104,8 +104,8 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
             first: 1,
         });
     }
-    // Without headings: name; address; type; comment, as ours and the SDF files of TIA Portal and STEP 7 begin; the
-    // comment of an SDF file stands behind some flags.
+    // Without headings: name, address, type, comment, as in our files and at the start of the SDF files of
+    // TIA Portal and STEP 7; in an SDF file the comment follows some flags.
     let looked = &records[..records.len().min(LOOK)];
     let width = looked.iter().map(Vec::len).max().unwrap_or(0);
     let is_address = |record: &Record, column: usize| {

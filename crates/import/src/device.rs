@@ -1,11 +1,11 @@
-//! Addresses in a device's own world, as PLC4X, KEPServer and other clients write them in their lists of tags.
+//! Device addresses, as in the tag lists of PLC4X, KEPServer and other clients.
 
 use tickbus_bus_modbus::Spot;
 use tickbus_bus_s7::Variable;
 use tickbus_bus_s7::item::Object;
 use tickbus_image::signal::{Area, DataType, Width};
 
-/// The bus whose addresses a list has.
+/// The bus that the addresses of a list belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Client {
     /// `holding-register:21`, `400021`.
@@ -15,7 +15,7 @@ pub enum Client {
 }
 
 impl Client {
-    /// The bus, as a driver.cfg names it.
+    /// The bus kind's name in a driver.cfg.
     pub const fn kind(self) -> &'static str {
         match self {
             Self::Modbus => "modbus-client",
@@ -24,26 +24,26 @@ impl Client {
     }
 }
 
-/// Where a tag lies in the device.
+/// The place of a tag in the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Spots {
-    /// The type that the address states.
+    /// The type stated in the address.
     pub(super) data_type: Option<DataType>,
-    /// The size of what it names, if it states no type.
+    /// The size according to the address, if it states no type.
     pub(super) width: Width,
-    /// It names the lower or the upper half of a register, or that half's first bit.
+    /// It is the lower or the upper half of a register, or that half's first bit.
     pub(super) is_half: bool,
-    /// The direction that follows from the place; most places can be both read and written.
+    /// The direction that the place implies; most places can be both read and written.
     pub(super) area: Option<Area>,
 }
 
-/// Whether `text` is an address of a device, and surely no other thing that a table may have.
+/// Whether `text` is a device address and cannot be anything else that tables contain.
 pub(super) fn is_address(text: &str) -> bool {
     only(text).is_some()
 }
 
-/// The bus of an address that can be of one bus alone. `%MW20` can be of both, and `%IW4` may as well be one of the
-/// process image.
+/// The bus of an address that only one bus has. `%MW20` may belong to either, and `%IW4` may also be one of
+/// the process image.
 pub(super) fn only(text: &str) -> Option<Client> {
     let upper = text.to_ascii_uppercase();
     let bare = upper.strip_prefix('%').unwrap_or(&upper);
@@ -111,8 +111,8 @@ pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String
     }
 }
 
-/// The direction of a module's point in a Logix controller (`Local:1:I.Data.0`, `Rack:2:O1[3]`); `None` for what is no such
-/// point.
+/// The direction of a module point in a Logix controller (`Local:1:I.Data.0`, `Rack:2:O1[3]`); `None` for
+/// anything else.
 pub(super) fn module_side(target: &str) -> Option<Area> {
     let (_, rest) = target.rsplit_once(':')?;
     let side = rest.split(['.', '[']).next()?;
@@ -125,7 +125,7 @@ pub(super) fn module_side(target: &str) -> Option<Area> {
     is_numbered.then_some(area)
 }
 
-/// The type that KEPServer calls so.
+/// The type that KEPServer calls by this name.
 pub(super) fn kepserver_type(text: &str) -> Option<DataType> {
     Some(match text.to_ascii_lowercase().as_str() {
         "boolean" => DataType::Bool,

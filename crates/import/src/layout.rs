@@ -1,13 +1,13 @@
-//! Addresses in %I and %Q for tags that have none of their own there.
+//! Assigns addresses in %I and %Q to tags that have none.
 
 use super::rows::Tag;
 use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
 
-/// Gives each tag without an address one: the widest ones first, bits last, so that no byte lies idle.
+/// Assigns an address to each tag without one: the widest first, bits last, so that no bytes are wasted.
 ///
 /// # Errors
 ///
-/// They do not fit: what is wrong, and what would be right.
+/// There is not enough room: what is wrong, and what would be right.
 pub(super) fn lay(tags: &mut [Tag]) -> Result<(), (String, &'static str)> {
     // The next free bit of %I and %Q.
     let mut free = [0_usize; 2];

@@ -1,9 +1,9 @@
-//! Lists of PLC tags, made into a driver.cfg.
+//! Converts lists of PLC tags to a driver.cfg.
 //!
-//! [`import`] takes the bytes of a file as editors and spreadsheets save it: a workbook (XLSX), a table as text (CSV, SDF, a
-//! list of properties), PLCopen XML or L5X. Tags of the process image keep their addresses. The lists of clients (PLC4X,
-//! KEPServer) have addresses of the device's own world: those go to `[fieldbus.at]` as they stand, and the signals are
-//! laid out. Each line that cannot be used is told at its place.
+//! [`import`] takes the bytes of a file as saved by editors and spreadsheets: a workbook (XLSX), a table as
+//! text (CSV, SDF, a list of properties), PLCopen XML or L5X. Tags of the process image keep their addresses.
+//! Clients' lists (PLC4X, KEPServer) have device addresses: these go to `[fieldbus.at]` unchanged, and image
+//! addresses are assigned to the signals. Each line that cannot be used is reported with its position.
 
 mod address;
 mod cells;
@@ -28,43 +28,43 @@ use tickbus_base::toml_text::{Collector, Mistake, Mistakes};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Addressing;
 
-/// Files longer than this are no lists of tags.
+/// Longer files are refused: no tag list is this large.
 const LONGEST: usize = 64 << 20;
 
-/// How a table is to be read.
+/// How to read a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reading {
-    /// What the numbers of the addresses count.
+    /// What the numbers of addresses count.
     pub addressing: Addressing,
-    /// Leave lines with mistakes out instead of refusing the table.
+    /// Skip lines with mistakes instead of refusing the table.
     pub lenient: bool,
-    /// The bus whose addresses the list has; `None` to tell it by the list.
+    /// The bus of the device addresses in the list; `None` to detect it.
     pub client: Option<Client>,
 }
 
-/// A table that was read.
+/// The result of reading a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Imported {
-    /// The text of a driver.cfg that `tickbus check` finds nothing wrong with.
+    /// The text of a driver.cfg in which `tickbus check` finds no mistakes.
     pub text: String,
-    /// How many signals it has.
+    /// The number of its signals.
     pub signals: usize,
-    /// The lines that are not in it, in line order: tags outside of the process image, and those with mistakes if they
-    /// were to be left out.
+    /// The lines that were left out, in line order: tags outside the process image, and lines with mistakes
+    /// if those are skipped.
     pub skipped: Vec<Mistake>,
 }
 
-/// A table with the text that places in it are counted in.
+/// A table, and the text that its positions refer to.
 struct Sheet {
-    /// What a workbook calls it.
+    /// Its name in a workbook.
     name: Option<String>,
     text: String,
     records: Vec<Record>,
-    /// Its columns, if they need not be found.
+    /// Its columns, if they are known.
     columns: Option<Columns>,
 }
 
-/// Mistakes and remarks of all sheets.
+/// The mistakes and notes of all sheets.
 #[derive(Default)]
 struct Told {
     wrong: Vec<Mistake>,
@@ -83,11 +83,11 @@ impl Told {
     }
 }
 
-/// Reads the `bytes` of a file; `file` is what its mistakes call it.
+/// Reads the `bytes` of a file; mistakes call it `file`.
 ///
 /// # Errors
 ///
-/// With every mistake in the table, unless lines with mistakes are to be left out; or when nothing is left.
+/// With every mistake in the table, unless lines with mistakes are skipped; or when nothing is left.
 pub fn import(file: &str, bytes: &[u8], reading: Reading) -> Result<Imported, Mistakes> {
     let of_file = |what: String, right: &str| Err(Mistakes::of_file(file, what, right));
     if bytes.len() > LONGEST {
@@ -219,7 +219,7 @@ fn tags_of(
         return Err(Mistakes::of_file(file, what, right));
     }
     let text = write::driver_cfg(Path::new(file), &tags, world);
-    // What the bus itself finds wrong with the addresses is told before anybody writes the file.
+    // Mistakes that only the bus can find in the addresses are reported before the file is written.
     if let Err(mistakes) = Config::parse("driver.cfg", &text) {
         let list = mistakes.iter().map(|mistake| Mistake {
             place: None,

@@ -10,17 +10,17 @@ use super::columns::Columns;
 use super::device;
 use tickbus_base::toml_text::{Collector, Mistakes};
 
-/// More nodes than this are no list of variables.
+/// Files with more nodes than this are refused: no list of variables is this large.
 const NODES: u32 = 3_000_000;
 
-/// What a project has that is to be told beside its variables.
+/// What is needed from a project.
 pub(super) struct Project {
     pub(super) sheet: Sheet,
-    /// The variables have no addresses in the file: they are laid out.
+    /// The variables have no image addresses in the file; they are assigned.
     pub(super) is_logix: bool,
 }
 
-/// The variables of `text` that are inputs or outputs; `skipped` is told of the others.
+/// The variables in `text` that are inputs or outputs; the others are reported to `skipped`.
 pub(super) fn read(file: &str, text: &str, skipped: &Collector<'_>) -> Result<Project, Mistakes> {
     let options = ParsingOptions {
         nodes_limit: NODES,
@@ -60,7 +60,7 @@ pub(super) fn read(file: &str, text: &str, skipped: &Collector<'_>) -> Result<Pr
     Ok(Project { sheet, is_logix })
 }
 
-/// The byte that roxmltree calls a row and a column, which count characters from 1.
+/// The byte offset of roxmltree's row and column, which count characters from 1.
 fn offset(text: &str, at: roxmltree::TextPos) -> usize {
     let (row, column) = (at.row as usize, at.col as usize);
     let mut start = 0;
@@ -71,7 +71,7 @@ fn offset(text: &str, at: roxmltree::TextPos) -> usize {
     rest.map_or(text.len(), |(at, _)| start + at)
 }
 
-/// Elements called `name`, whatever their namespace: versions of PLCopen XML differ in that alone.
+/// Elements called `name` in any namespace: versions of PLCopen XML differ only in that.
 fn named<'a, 'i>(node: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> {
     node.descendants()
         .filter(move |node| node.is_element() && node.tag_name().name() == name)
@@ -82,7 +82,7 @@ fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
         .find(|child| child.is_element() && child.tag_name().name() == name)
 }
 
-/// The text within, in one line; of a long one the beginning.
+/// The text within, as one line; if it is long, only the beginning.
 fn words(node: Option<Node<'_, '_>>) -> String {
     const PIECES: usize = 1000;
     let pieces = node
@@ -96,7 +96,7 @@ fn words(node: Option<Node<'_, '_>>) -> String {
     pieces.join(" ")
 }
 
-/// Where an attribute's value stands, or else its element.
+/// The offset of an attribute's value, or else of its element.
 fn place(node: Node<'_, '_>, attribute: &str) -> usize {
     let attribute = node.attribute_node(attribute);
     attribute.map_or(node.range().start, |attribute| {
@@ -130,7 +130,7 @@ struct Names {
 }
 
 impl Names {
-    /// The name of a variable; where another one has it already, behind that of the program or list that it is local to.
+    /// The name of a variable; if it is taken, prefixed by the program or list that the variable is local to.
     fn give(
         &mut self,
         variable: Node<'_, '_>,
@@ -151,13 +151,13 @@ impl Names {
     }
 }
 
-/// Variables with an `address`: of lists of global variables, and of programs.
+/// Variables with an `address`, in lists of global variables and in programs.
 fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     let (mut records, mut without) = (Vec::new(), Vec::new());
     let mut names = Names::default();
     for variable in named(root, "variable") {
         let Some(address) = variable.attribute("address") else {
-            // Only declarations have types; `variable` is also what blocks in a picture have.
+            // Only declarations have types; graphical elements are also called `variable`.
             if child(variable, "type").is_some() {
                 without.push(variable);
             }
@@ -195,7 +195,8 @@ fn plcopen(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     records
 }
 
-/// Tags that are aliases of a module's inputs and outputs; in place of an address they have that (`Local:1:I.Data.0`).
+/// Tags that are aliases of module inputs and outputs; they have the alias (`Local:1:I.Data.0`) instead of an
+/// address.
 fn logix(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     let types = member_types(root);
     let (mut records, mut others) = (Vec::new(), Vec::new());
@@ -261,8 +262,8 @@ fn logix(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     records
 }
 
-/// The types of the members of all modules' inputs and outputs, by module (`Local:3:I`, `Drive:O`) and member; `None` where
-/// a name stands in several structures with several types.
+/// The types of the members of all modules' inputs and outputs, by module (`Local:3:I`, `Drive:O`) and
+/// member; `None` if a name occurs in several structures with different types.
 fn member_types<'a>(root: Node<'a, '_>) -> HashMap<(String, &'a str), Option<&'a str>> {
     let mut types = HashMap::new();
     let modules = child(root, "Controller").and_then(|controller| child(controller, "Modules"));
@@ -271,7 +272,7 @@ fn member_types<'a>(root: Node<'a, '_>) -> HashMap<(String, &'a str), Option<&'a
         let name = module.attribute("Name").unwrap_or_default();
         let parent = module.attribute("ParentModule").unwrap_or_default();
         let mut slot = None;
-        // The side of the connection, and where its element ends.
+        // The direction of the connection, and the end of its element.
         let mut side = ("", 0);
         for node in module.descendants().filter(Node::is_element) {
             match node.tag_name().name() {

@@ -1,4 +1,4 @@
-//! The tags of a table, each checked by itself and against those before it.
+//! The tags of a table, each checked on its own and against preceding ones.
 
 use std::collections::HashMap;
 
@@ -19,45 +19,45 @@ const LONGEST_UNIT: usize = 40;
 /// The longest address in a device, in characters.
 const LONGEST_ADDRESS: usize = 200;
 
-/// What the addresses of a list are.
+/// The kind of addresses in a list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum World {
-    /// Those of the process image.
+    /// Addresses in the process image.
     Image(Addressing),
-    /// Those of a device, for a client.
+    /// Addresses in a device, for a client.
     Device(Client),
-    /// Inputs and outputs of modules, by their names.
+    /// Names of module inputs and outputs.
     Modules,
 }
 
-/// One tag that becomes a signal.
+/// A tag that becomes a signal.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tag {
     pub(super) name: String,
     pub(super) area: Area,
-    /// Its address in the process image, once it has one.
+    /// Its address in the process image, once assigned.
     pub(super) address: Option<Address>,
-    /// Where it lies in the device; empty where that is its address.
+    /// Its place in the device; empty if that is its address.
     pub(super) at: String,
     pub(super) data_type: DataType,
     pub(super) order: ByteOrder,
     pub(super) unit: Option<String>,
-    /// Two raw values and what they mean.
+    /// Two raw values, and the corresponding scaled values.
     pub(super) scale: Option<[f64; 4]>,
     pub(super) comment: String,
 }
 
-/// What the tags before have taken.
+/// What the preceding tags occupy.
 #[derive(Default)]
 pub(super) struct Taken {
     /// Line of each name.
     names: HashMap<String, usize>,
-    /// For each bit of %I and %Q, the line of the tag that has it; 0 for none.
+    /// For each bit of %I and %Q, the line of the tag that occupies it; 0 if free.
     bits: [Vec<u32>; 2],
 }
 
-/// The client whose addresses these are, if they are no list of a process image. An address that both a process image
-/// and a client can have decides nothing; where some are of the image for sure, all are.
+/// The client that the addresses belong to, or `None` for a process image. An address that may belong to
+/// either decides nothing; if any address is certainly in the image, all are.
 pub(super) fn client<'a>(addresses: impl Iterator<Item = &'a str>) -> Option<Client> {
     let (mut counts, mut of_image, mut typed) = ([0_usize; 2], false, false);
     for address in addresses {
@@ -80,7 +80,7 @@ pub(super) fn client<'a>(addresses: impl Iterator<Item = &'a str>) -> Option<Cli
     })
 }
 
-/// Reads the records below the headings.
+/// Reads the records after the headings.
 pub(super) fn read(
     records: &[Record],
     columns: &Columns,
@@ -117,7 +117,7 @@ struct Row<'r> {
     skipped: &'r Collector<'r>,
 }
 
-/// A tag's place, and what follows from it.
+/// A tag's place, and what it implies.
 struct Found {
     area: Area,
     address: Option<Address>,
@@ -253,7 +253,7 @@ impl Row<'_> {
             Some(stated) => self.agreed(stated, cell, client)?,
             None => self.client_type()?.unwrap_or(spots.width.data_type()),
         };
-        // Several registers make a wider value; nothing else is put together.
+        // Several registers form a wider value; nothing else is combined.
         let is_of_registers = client == Client::Modbus && spots.width == Width::Word;
         let is_half = data_type.width() == Width::Byte;
         let fits = data_type.width() == spots.width
@@ -287,7 +287,8 @@ impl Row<'_> {
             );
             return None;
         }
-        // Who lists a PLC's inputs reads them; the simulation is what writes them.
+        // Clients only read a PLC's inputs, but the simulation writes them. Without a known direction, a tag
+        // is read.
         let area = spots.area.or(stated).unwrap_or(Area::Output);
         Some(Found {
             area,
@@ -297,15 +298,15 @@ impl Row<'_> {
         })
     }
 
-    /// The type that an address states, unless its column says something else.
+    /// The type stated by an address, unless its column says otherwise.
     fn agreed(&self, stated: DataType, address: &Cell, client: Client) -> Option<DataType> {
-        // What is no type there is a comment.
+        // If it is not a type, it is a comment.
         let column = self.cell(self.columns.kind);
         let known = column.and_then(|cell| Some((cell, self.known_type(&cell.text)?)));
         let Some((cell, other)) = known.filter(|(_, other)| *other != stated) else {
             return Some(stated);
         };
-        // In KEPServer's addresses the type is hardly more than a size.
+        // In KEPServer's addresses the type is little more than a size.
         let is_float = |kind| matches!(kind, DataType::Real | DataType::Lreal);
         let is_size = client == Client::S7 && self.columns.scale.is_some();
         if is_size && other.width() == stated.width() && is_float(other) == is_float(stated) {
@@ -322,9 +323,9 @@ impl Row<'_> {
         None
     }
 
-    /// The type that a text is, in the words of IEC 61131-3 or of KEPServer.
+    /// The type of a text in the terms of IEC 61131-3 or of KEPServer.
     fn known_type(&self, text: &str) -> Option<DataType> {
-        // Both have a BYTE and a WORD; with KEPServer's headings they are KEPServer's.
+        // Both have BYTE and WORD; with KEPServer's headings they are KEPServer's.
         let (iec, kepserver) = (text.parse().ok(), kepserver_type(text));
         if self.columns.scale.is_some() {
             kepserver.or(iec)
@@ -345,7 +346,7 @@ impl Row<'_> {
         })
     }
 
-    /// The type that its column states.
+    /// The type stated in its column.
     #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
     fn client_type(&self) -> Option<Option<DataType>> {
         let Some(cell) = self
@@ -361,7 +362,7 @@ impl Row<'_> {
         known.map(Some)
     }
 
-    /// Who writes the tag, if a column says so: the simulation an input of the PLC, the PLC its output.
+    /// The direction stated in a column: the simulation writes inputs of the PLC, the PLC writes its outputs.
     #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
     fn direction(&self) -> Option<Option<Area>> {
         let Some(cell) = self.cell(self.columns.direction) else {
@@ -425,7 +426,7 @@ impl Row<'_> {
 }
 
 impl Taken {
-    /// Takes the bits of `address`, or reports who has them.
+    /// Claims the bits of `address`, or reports which tag has them.
     fn take(
         &mut self,
         name: &str,
@@ -464,7 +465,7 @@ fn quoted(text: &str) -> String {
     format!("\"{}\"", shown(text))
 }
 
-/// The type, and the address in its size.
+/// The type, and the address with that type's size.
 fn kind(
     cell: Option<&Cell>,
     address: Address,
@@ -480,7 +481,7 @@ fn kind(
     if data_type.width() == address.width {
         return Some((data_type, address));
     }
-    // How TIA Portal writes addresses of types with 64 bits, which have no letter of their own there.
+    // TIA Portal has no size letter for 64-bit types and writes them like a bit.
     if data_type.width() == Width::Long && address.width == Width::Bit && address.bit == 0 {
         let long = Address {
             width: Width::Long,

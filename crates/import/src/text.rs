@@ -1,11 +1,11 @@
-//! The text of a file, whatever wrote it.
+//! Decodes the text of a file from any program.
 
 use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-/// What a file is.
+/// The type of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// A table as a text.
+    /// A table as text.
     Table,
     /// A workbook of Excel 2007 and later: a zip archive.
     Workbook,
@@ -14,7 +14,7 @@ pub(super) enum Kind {
     OldWorkbook,
 }
 
-/// What `bytes` are, by how they begin.
+/// The type of `bytes`, by their beginning.
 pub(super) fn kind(bytes: &[u8]) -> Kind {
     if bytes.starts_with(b"PK\x03\x04") {
         return Kind::Workbook;
@@ -30,8 +30,8 @@ pub(super) fn kind(bytes: &[u8]) -> Kind {
     if is_tag { Kind::Xml } else { Kind::Table }
 }
 
-/// The text of `bytes`: UTF-16 and UTF-8 by their marks, UTF-8 if it is that, else Windows-1252, as spreadsheets in
-/// Western Europe save.
+/// The text of `bytes`: UTF-16 or UTF-8 by their byte order marks, otherwise UTF-8 if valid, else
+/// Windows-1252, as saved by spreadsheets in Western Europe.
 pub(super) fn decoded(bytes: &[u8]) -> String {
     if let Some((encoding, mark)) = Encoding::for_bom(bytes) {
         return encoding
@@ -39,7 +39,7 @@ pub(super) fn decoded(bytes: &[u8]) -> String {
             .0
             .into_owned();
     }
-    // The first characters of every table are ASCII: each has a zero byte in UTF-16.
+    // The first characters of every table are ASCII: in UTF-16 each has a zero byte.
     let encoding = match bytes {
         [first, 0, second, 0, ..] if *first > 0 && *second > 0 => UTF_16LE,
         [0, first, 0, second, ..] if *first > 0 && *second > 0 => UTF_16BE,

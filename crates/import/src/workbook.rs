@@ -1,7 +1,7 @@
-//! The sheets of a workbook, as TIA Portal and spreadsheets save it (XLSX).
+//! The sheets of a workbook (XLSX), as saved by TIA Portal and spreadsheets.
 //!
-//! The crate calamine reads them, cell by cell. What a file may say falsely of itself is looked at before: how much it
-//! unpacks to, and how many texts it has, for which calamine reserves memory unseen.
+//! The crate calamine reads the cells. False statements in a file are checked before that: its unpacked size,
+//! and its number of texts, for which calamine allocates memory unchecked.
 
 use std::io::{Cursor, Read};
 
@@ -11,7 +11,7 @@ use zip::ZipArchive;
 use super::Sheet;
 use super::cells::{Cell, Record};
 
-/// The most that all parts of a workbook unpack to.
+/// The largest total unpacked size.
 const UNPACKED: u64 = 64 << 20;
 /// The most parts, rows, columns and texts.
 const PARTS: usize = 10_000;
@@ -25,7 +25,7 @@ type Wrong = (String, &'static str);
 const DAMAGED: &str = "open it in Excel or LibreOffice and save it again, or save the sheet as CSV";
 const TOO_LARGE: &str = "save one tag table alone, or save the sheet as CSV";
 
-/// All sheets with anything in them.
+/// All sheets that are not empty.
 pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Wrong> {
     check_parts(bytes)?;
     let damaged =
@@ -35,7 +35,7 @@ pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Wrong> {
     for name in workbook.sheet_names() {
         let mut cells = match workbook.worksheet_cells_reader(&name) {
             Ok(cells) => cells,
-            // A chart on a sheet of its own has no cells.
+            // A chart sheet has no cells.
             Err(calamine::XlsxError::NotAWorksheet(_)) => continue,
             Err(error) => return Err(damaged(error)),
         };
@@ -43,7 +43,7 @@ pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Wrong> {
         while let Some(cell) = cells.next_cell().map_err(damaged)? {
             let (row, column) = cell.get_position();
             let text = Data::from(cell.get_value().clone()).to_string();
-            // Spreadsheets break lines within cells; names and comments have one.
+            // Spreadsheets permit line breaks within cells; names and comments are one line.
             let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
             if text.is_empty() {
                 continue;
@@ -68,8 +68,8 @@ pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Wrong> {
     Ok(sheets)
 }
 
-/// A sheet as records. Its text has a line for each row and a character for each cell, so that places in it are those
-/// in the sheet.
+/// A sheet as records. Its text has a line per row and a character per cell, so that positions in it are
+/// those in the sheet.
 fn sheet(name: String, mut cells: Vec<(u32, u32, String)>) -> Sheet {
     cells.sort_by_key(|(row, column, _)| (*row, *column));
     let (mut text, mut records) = (String::new(), Vec::new());
@@ -82,7 +82,7 @@ fn sheet(name: String, mut cells: Vec<(u32, u32, String)>) -> Sheet {
         let mut record = Record::new();
         for (_, column, cell) in row {
             let column = *column as usize;
-            // A cell may stand there twice in a damaged file: the last one counts.
+            // A damaged file may have a cell twice: the last one applies.
             record.truncate(column);
             let start = text.len();
             while record.len() <= column {
@@ -92,7 +92,7 @@ fn sheet(name: String, mut cells: Vec<(u32, u32, String)>) -> Sheet {
             }
             record[column].text.clone_from(cell);
         }
-        // The columns were counted from the row's beginning; so are the places.
+        // Pads the line, because positions count columns from the start of the row.
         text.extend(std::iter::repeat_n(' ', record.len()));
         records.push(record);
     }
@@ -105,7 +105,7 @@ fn sheet(name: String, mut cells: Vec<(u32, u32, String)>) -> Sheet {
     }
 }
 
-/// Unpacks all parts once, and looks at what they say of their size.
+/// Unpacks all parts once, and checks their stated sizes.
 fn check_parts(bytes: &[u8]) -> Result<(), Wrong> {
     let damaged = |error: &dyn std::fmt::Display| {
         (
@@ -146,7 +146,7 @@ fn check_parts(bytes: &[u8]) -> Result<(), Wrong> {
     Ok(())
 }
 
-/// The largest number that stands behind a `uniqueCount`.
+/// The largest number after a `uniqueCount`.
 fn stated_texts(part: &[u8]) -> Option<u64> {
     const KEY: &[u8] = b"uniqueCount";
     let places = part

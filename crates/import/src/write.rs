@@ -1,4 +1,4 @@
-//! The driver.cfg that a table becomes.
+//! Writes the driver.cfg for a table.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -7,7 +7,7 @@ use super::device::Client;
 use super::rows::{Tag, World};
 use tickbus_image::signal::ByteOrder;
 
-/// The longest comment that is taken over, in characters.
+/// The longest comment that is copied, in characters.
 const LONGEST_COMMENT: usize = 200;
 
 /// The text of a driver.cfg with these tags.
@@ -52,7 +52,7 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
     out
 }
 
-/// What is to be known of the addresses below.
+/// The remark about the addresses below it.
 const fn remark(world: World) -> &'static str {
     match world {
         World::Image(_) => "",
@@ -131,7 +131,7 @@ fn text(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// A text that may stand in a comment.
+/// A text that is safe in a comment.
 fn comment(text: &str) -> String {
     let mut comment: String = text
         .chars()

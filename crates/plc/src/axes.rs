@@ -1,4 +1,4 @@
-//! The program "axes" in the machine's place: ideal drives for all axes of a driver.cfg, and nothing else.
+//! The program "axes" in place of the machine: ideal drives for all axes of a driver.cfg, and nothing else.
 
 use tickbus_axis::{Axis, Drive, Reflexes};
 use tickbus_base::time::Nanos;
@@ -6,11 +6,11 @@ use tickbus_image::signal::{Addressing, Area, Plan, SignalTable, Slot};
 
 use super::{Program, ProgramError, Scan};
 
-/// The signal that gets the seconds since the beginning, where a driver.cfg has it.
+/// The signal that carries the seconds since the start, if the driver.cfg has it.
 const TIME: &str = "simulation time";
 
-/// A machine of axes without anything around them, for commissioning a PLC: each follows its commands as
-/// [`Drive`] does. What tracks follows its own `TargetPosition`; what closes closes to its lower limit.
+/// A machine that consists of axes only, for commissioning a PLC: each follows its commands like a [`Drive`].
+/// A tracking axis follows its own `TargetPosition`; a closing axis closes to its lower limit.
 ///
 /// Commands by number, acknowledges and end switches work as with a simulator.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ struct Image {
 }
 
 impl Axes {
-    /// What its host calls it.
+    /// The program's name.
     pub const NAME: &'static str = "axes";
 
     /// Drives for `axes`, each at rest in the middle of its limits, or at 0.
@@ -119,7 +119,7 @@ impl Program for Axes {
         let seconds = |span: Nanos| span.to_duration().as_secs_f64();
         let passed = seconds((scan.now - self.last.max(began)).max(Nanos::ZERO));
         self.last = scan.now;
-        // A PLC that is gone enables nothing.
+        // Without a PLC nothing is enabled.
         if scan.alive {
             decode.decode(inputs, slots);
         } else {

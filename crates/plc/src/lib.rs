@@ -1,8 +1,8 @@
-//! IEC 61131-3 function blocks, and PLC programs on a clock that is handed in.
+//! IEC 61131-3 function blocks, and PLC programs on an injected clock.
 //!
-//! A [`Program`] is a pure function of its own state, the time and the inputs: whoever hosts it
-//! calls [`Program::scan`] at the scan interval, on wall time or on simulation time, and carries
-//! the images. [`Hosted`] loads a program of the user's own.
+//! A [`Program`] is a pure function of its own state, the time and the inputs: its host calls
+//! [`Program::scan`] at the scan interval, in wall time or in simulation time, and transfers the images.
+//! [`program`] finds a built-in program by its name, or a user's own by its path.
 
 use std::sync::Arc;
 
@@ -17,35 +17,35 @@ pub mod blocks;
 pub use axes::Axes;
 pub use hosted::Hosted;
 
-/// What a program sees and makes in one scan.
+/// The inputs and outputs of one scan.
 #[derive(Debug)]
 pub struct Scan<'a> {
-    /// The time of this scan; timers measure with nothing else.
+    /// The time of this scan, the only time that timers use.
     pub now: Nanos,
     /// The peer's data are fresh or unchanged, not stale.
     pub alive: bool,
-    /// Whole bus cycles that have arrived so far.
+    /// The number of whole bus cycles received so far.
     pub cycle: u64,
-    /// The inputs, `%I`, from byte 0.
+    /// The inputs, `%I`, starting at byte 0.
     pub inputs: &'a [u8],
-    /// The outputs, `%Q`, from byte 0; they keep their content between scans.
+    /// The outputs, `%Q`, starting at byte 0; they keep their values between scans.
     pub outputs: &'a mut [u8],
 }
 
-/// The scan interval of a program that asks for none.
+/// The default scan interval of a program.
 pub const INTERVAL: Nanos = Nanos::from_millis(10);
 
 /// A PLC program.
 pub trait Program: Send {
-    /// What it is asked for by: its name, or the path of its file.
+    /// Its name for [`program`], or the path of its file.
     fn name(&self) -> &str;
 
-    /// The scan interval that it asks for. Positive.
+    /// Its default scan interval. Positive.
     fn interval(&self) -> Nanos {
         INTERVAL
     }
 
-    /// Hears, before the first scan, how the image is laid out that it will work on.
+    /// Is told, before the first scan, the layout of its image.
     ///
     /// # Errors
     ///
@@ -55,41 +55,41 @@ pub trait Program: Send {
         Ok(())
     }
 
-    /// How many bytes of `%I` the program reads; 0 if it takes what there is.
+    /// How many bytes of `%I` the program reads; 0 if it uses the whole area.
     fn input_bytes(&self) -> usize;
 
-    /// How many bytes of `%Q` the program writes; 0 if it takes what there is.
+    /// How many bytes of `%Q` the program writes; 0 if it uses the whole area.
     fn output_bytes(&self) -> usize;
 
-    /// Another one of the same kind, for a further station of the driver; `None` for a program that serves one.
+    /// A further instance for another station of the driver; `None` if the program serves a single station.
     fn for_another_station(&self) -> Option<Box<dyn Program>> {
         None
     }
 
-    /// Runs the program once: inputs to outputs. It allocates nothing and never waits.
+    /// Runs the program once: inputs to outputs. It allocates nothing and never blocks.
     ///
-    /// Images may be longer than the program asks for, and the rest is left alone. Of shorter
-    /// ones, the missing inputs read as 0 and the missing outputs are dropped.
+    /// Images may be longer than the program needs; the rest is not touched. If they are shorter, missing
+    /// inputs read as 0 and missing outputs are dropped.
     fn scan(&mut self, scan: &mut Scan<'_>);
 
-    /// What the program has to tell beside its outputs, to be asked for at any time while it runs.
+    /// The program's report in addition to its outputs, which can be read at any time while it runs.
     fn report(&self) -> Option<Arc<dyn Report>> {
         None
     }
 }
 
-/// What a program has to tell beside its outputs, shared with whoever hosts it.
+/// A program's report in addition to its outputs, shared with its host.
 pub trait Report: Send + Sync + std::fmt::Debug {
-    /// Appends it, one `key=value` a line.
+    /// Appends the report, one `key=value` per line.
     fn write(&self, text: &mut String);
 
-    /// The same for people, as the program's last word.
+    /// The report for people, shown when the program ends.
     fn summary(&self) -> String;
 
-    /// Whether the program has done all that it was asked to.
+    /// Whether the program has finished its task.
     fn is_done(&self) -> bool;
 
-    /// What went wrong, once it [is done](Self::is_done).
+    /// What went wrong, if anything, once it [is done](Self::is_done).
     fn failure(&self) -> Option<String>;
 }
 
@@ -102,12 +102,12 @@ pub enum ProgramError {
         list(known, "and")
     )]
     UnknownName {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
         /// The programs that are built in.
         known: &'static [&'static str],
     },
-    /// The program has no such option.
+    /// The program does not have this option.
     #[error(
         "the PLC program \"{program}\" has no option \"{option}\"; {}",
         if known.is_empty() { "it takes none".to_owned() } else { format!("it takes {}", list(known, "and")) }
@@ -115,12 +115,12 @@ pub enum ProgramError {
     UnknownOption {
         /// The program.
         program: &'static str,
-        /// The option that was given.
+        /// The given option.
         option: String,
-        /// The options that it takes.
+        /// The program's options.
         known: &'static [&'static str],
     },
-    /// The option cannot have that value.
+    /// The option does not accept the value.
     #[error(
         "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; \
          write {}",
@@ -131,12 +131,12 @@ pub enum ProgramError {
         program: &'static str,
         /// The option.
         option: &'static str,
-        /// The value that was given.
+        /// The given value.
         value: String,
-        /// The values that it can have.
+        /// The values that it accepts.
         known: &'static [&'static str],
     },
-    /// A program of the user's own cannot be used.
+    /// A user's own program cannot be used.
     #[error("the PLC program \"{program}\" {what}; {right}")]
     Hosted {
         /// The path of its file.
@@ -146,17 +146,17 @@ pub enum ProgramError {
         /// What would be right.
         right: String,
     },
-    /// The program cannot work on the image of this driver.
+    /// The program does not fit the image of this driver.
     #[error("the PLC program \"{program}\" {what}; {right}")]
     Unfit {
         /// The program.
         program: String,
-        /// What it misses.
+        /// What is missing.
         what: String,
         /// What would be right.
         right: String,
     },
-    /// The option is no value of its kind.
+    /// The value of the option is malformed.
     #[error(
         "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; {right}"
     )]
@@ -165,7 +165,7 @@ pub enum ProgramError {
         program: &'static str,
         /// The option.
         option: &'static str,
-        /// The value that was given.
+        /// The given value.
         value: String,
         /// What would be right.
         right: String,

@@ -7,16 +7,16 @@ const TENTH: i64 = 100_000_000;
 
 /// A drum with `STEPS` steps, each a pattern of 16 outputs.
 ///
-/// Steps count from 1. The words [`active`](Self::active) and [`preset`](Self::preset) belong to
-/// the program as much as to the block; unless both are within 1 to `STEPS`, the block has no power
-/// flow and changes nothing.
+/// Steps are numbered from 1. The words [`active`](Self::active) and [`preset`](Self::preset) may be written
+/// by the program as well; unless both are from 1 to `STEPS`, the block has no power flow and changes
+/// nothing.
 ///
 /// With power flow: `reset` makes the preset step the active one, and has priority; else a rising
 /// `step` turns the drum one step on, from the last to the first. Then `q` is the active step's
 /// pattern.
 ///
-/// The manuals leave these open; here, a `step` that is already true when the block is enabled is
-/// no edge, `reset` keeps the step's time at 0, and a fault time-out of 0 is none.
+/// Where the manuals are silent: a `step` that is already true when the block is enabled is not an edge,
+/// `reset` keeps the step's time at 0, and a fault time-out of 0 disables it.
 #[derive(Clone, Debug)]
 pub struct Drum<const STEPS: usize> {
     /// The active step, 1 to `STEPS`.
@@ -37,9 +37,9 @@ pub struct Drum<const STEPS: usize> {
     patterns: [u16; STEPS],
     dwell: Option<[u16; STEPS]>,
     fault: Option<[u16; STEPS]>,
-    /// `step` as the last call found it; none if that call was not enabled.
+    /// The value of `step` in the last call; `None` if that call was not enabled.
     step_before: Option<bool>,
-    /// The step that `entered` is about; 0 before the first call.
+    /// The step that `entered` refers to; 0 before the first call.
     timed: u16,
     entered: Nanos,
 }

@@ -1,10 +1,10 @@
-//! The program "mirror": a loop plug in the shape of a PLC.
+//! The program "mirror": a loop-back plug in the form of a PLC.
 
 use tickbus_plc::{Program, ProgramError, Scan};
 
-/// Brings every `%I` byte back on the `%Q` byte of the same offset, as far as both images reach.
+/// Copies every `%I` byte to the `%Q` byte at the same offset, as far as both images reach.
 ///
-/// It mirrors stale inputs too, as they stand: a loop plug has no opinion.
+/// Stale inputs are copied as well, as a plug would do.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mirror;
 
@@ -12,11 +12,11 @@ impl Mirror {
     /// Its name in [`program`](super::program).
     pub const NAME: &'static str = "mirror";
 
-    /// A mirror; it takes no options.
+    /// A mirror; it has no options.
     ///
     /// # Errors
     ///
-    /// Any option was given.
+    /// Any option is given.
     pub fn new(options: &[(String, String)]) -> Result<Self, ProgramError> {
         match options.first() {
             None => Ok(Self),

@@ -1,4 +1,4 @@
-//! The program "reaction": measures how long the machine's end takes to answer.
+//! The program "reaction": measures how long the machine's end takes to respond.
 
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,11 +7,11 @@ use tickbus_base::time::{Nanos, Spans};
 use tickbus_image::signal::{Address, Addressing, Area, Width};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
 
-/// Toggles one `%Q` bit, waits until one `%I` bit follows, and takes the time, again and again: from the
-/// scan that made the edge to the scan that sees the answer.
+/// Repeatedly toggles one `%Q` bit, waits until one `%I` bit follows, and measures the time from the scan
+/// that makes the edge to the scan that sees the response.
 ///
-/// The other end must bring the `%Q` bit back on the `%I` bit, as `tickbus mirror` does. Between two edges
-/// it pauses for a changing time, so that it does not fall into step with the machine's ticks.
+/// The other end must copy the `%Q` bit to the `%I` bit, as `tickbus mirror` does. The pauses between edges
+/// vary, so that the measurement does not synchronise with the machine's ticks.
 #[derive(Debug)]
 pub struct Reaction {
     output: Bit,
@@ -32,20 +32,20 @@ struct Bit {
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// Nobody is there, or an edge was not answered: the answer to a level that has been standing for
-    /// `timeout` counts for nothing.
+    /// There is no peer, or an edge was not answered: responses are ignored until the level has been constant
+    /// for `timeout`.
     Settling { since: Option<Nanos> },
-    /// Until the next edge.
+    /// Waits until the next edge is due.
     Pausing { until: Nanos },
-    /// The edge was made.
+    /// Waits for the response.
     Waiting { since: Nanos, cycle: u64 },
 }
 
-/// What was measured, shared with the host.
+/// The measurements, shared with the host.
 #[derive(Debug)]
 struct Result {
     count: u64,
-    /// The machine's tick, where it is known.
+    /// The machine's tick, if known.
     tick: Option<Nanos>,
     measured: Mutex<Measured>,
 }
@@ -53,31 +53,31 @@ struct Result {
 #[derive(Debug, Default)]
 struct Measured {
     spans: Spans,
-    /// Bus cycles from edge to answer, as so many microseconds.
+    /// Bus cycles from edge to response; each counts as a microsecond.
     cycles: Spans,
-    /// Edges without an answer in time.
+    /// Edges without a response in time.
     lost: u64,
-    /// Lost in a row: once there are too many, nobody will answer any more.
+    /// Edges lost in a row.
     lost_in_row: u64,
 }
 
-/// Edges in a row without an answer after which the measurement gives up.
+/// After this many lost edges in a row the measurement gives up.
 const GIVE_UP: u64 = 5;
 
 impl Reaction {
     /// Its name in [`program`](super::program).
     pub const NAME: &'static str = "reaction";
 
-    /// The options that it takes.
+    /// The program's options.
     const OPTIONS: [&'static str; 6] = ["output", "input", "count", "timeout", "pause", "tick"];
 
-    /// A measurement with its options as text: `output` (default `%QX0.0`) and `input` (`%IX0.0`), `count`
-    /// of edges (1000), `timeout` for an answer (1s), longest `pause` between two edges (10ms), and the
-    /// machine's `tick`, to have the result in ticks, too.
+    /// A measurement with its options as text: `output` (default `%QX0.0`) and `input` (`%IX0.0`), `count` of
+    /// edges (1000), `timeout` of a response (1s), longest `pause` between two edges (10ms), and the
+    /// machine's `tick`, which gives the result in ticks as well.
     ///
     /// # Errors
     ///
-    /// There is no such option, or it cannot have that value.
+    /// The option does not exist, or does not accept the value.
     pub fn from_options(options: &[(String, String)]) -> std::result::Result<Self, ProgramError> {
         let mut output = bit("output", "%QX0.0", Area::Output)?;
         let mut input = bit("input", "%IX0.0", Area::Input)?;
@@ -121,9 +121,9 @@ impl Reaction {
         })
     }
 
-    /// When the next edge is due: after half the pause at least.
+    /// When the next edge is due: after at least half the pause.
     fn next_edge(&mut self, now: Nanos) -> State {
-        // Numerical Recipes' quick generator; nothing here needs better chance than that.
+        // The quick generator of Numerical Recipes is random enough for this.
         self.random = self
             .random
             .wrapping_mul(1_664_525)
@@ -234,7 +234,7 @@ impl Program for Reaction {
 
 impl Result {
     fn lock(&self) -> MutexGuard<'_, Measured> {
-        // A histogram is whole between any two of its changes.
+        // A histogram is consistent after every change, so a poisoned lock is safe to use.
         self.measured.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -330,7 +330,7 @@ mod tests {
         Reaction::from_options(&options).expect("right options")
     }
 
-    /// Scans every 100 us with a machine that answers after `delay`, until done or for a minute.
+    /// Scans every 100 us with a machine that responds after `delay`, until done or for a minute.
     fn measure(program: &mut Reaction, delay: Option<Nanos>) -> Arc<dyn Report> {
         let report = program.report().expect("it reports");
         let (mut inputs, mut outputs) = ([0_u8; 2], [0_u8; 2]);

@@ -1,9 +1,9 @@
-//! What a recording has for every tick.
+//! What a recording contains for every tick.
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Address, DataType, Signal, SignalTable, Slot};
 
-/// How the values of a column are held in a slot, and written.
+/// The type of a column's values, in a slot and in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// A BOOL: a double that is 0 or 1, or NaN.
@@ -14,12 +14,12 @@ pub enum Kind {
     Signed,
     /// An unsigned 64-bit integer.
     Unsigned,
-    /// A double that counts edges, below 2^32.
+    /// A double that counts edges, less than 2^32.
     Count,
 }
 
 impl Kind {
-    /// How the values of a signal of this type are held, which has a scale or not.
+    /// The kind for a signal of this type, with or without a scale.
     pub const fn of(data_type: DataType, scaled: bool) -> Self {
         match data_type {
             DataType::Bool => Self::Bit,
@@ -29,7 +29,7 @@ impl Kind {
         }
     }
 
-    /// What a recording keeps of a value: a BOOL that is neither 0 nor NaN is 1, and NaN is one NaN.
+    /// The value as recorded: a BOOL that is neither 0 nor NaN becomes 1, and every NaN the same NaN.
     pub fn kept(self, slot: Slot) -> Slot {
         let value = slot.real();
         match self {
@@ -41,27 +41,27 @@ impl Kind {
     }
 }
 
-/// One column: a signal, or the edges of one.
+/// One column: a signal, or a signal's edges.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     /// The signal's name.
     pub name: String,
-    /// Whether it counts the signal's edges since the tick before.
+    /// Whether it counts the signal's edges since the previous tick.
     pub is_edges: bool,
-    /// How its values are held.
+    /// The type of its values.
     pub kind: Kind,
-    /// Where the signal lies; unknown in a CSV file.
+    /// The signal's address; unknown in a CSV file.
     pub address: Option<Address>,
     /// The signal's type; unknown in a CSV file.
     pub data_type: Option<DataType>,
     /// The signal's unit, for people.
     pub unit: Option<String>,
-    /// The signal's station; empty where there is one station without a name.
+    /// The signal's station; empty if there is a single station without a name.
     pub station: String,
 }
 
 impl Column {
-    /// Whether it holds a 64-bit integer as a double, because of a scale.
+    /// Whether it represents a 64-bit integer as a double, because of a scale.
     pub(super) fn is_scaled_integer(&self) -> bool {
         let plain = |data_type| Kind::of(data_type, false) != self.kind;
         self.kind == Kind::Real && self.data_type.is_some_and(plain)
@@ -74,14 +74,14 @@ impl Column {
     }
 }
 
-/// All that a recording has for every tick, and who made it.
+/// What a recording contains for every tick, and which driver made it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Columns {
     /// The driver's name; empty in a CSV file.
     pub driver: String,
     /// Which end of the line was recorded: `device` or `controller`; empty in a CSV file.
     pub role: String,
-    /// The stations, if there is more than one: each has a status of its own.
+    /// The stations, if there are several: each has its own status.
     pub stations: Vec<String>,
     /// The signals in the order of their table, then the edges.
     pub columns: Vec<Column>,
@@ -89,7 +89,7 @@ pub struct Columns {
 
 impl Columns {
     /// The columns of a driver called `driver` with these signals. `edges` has, per signal, the slot of its
-    /// count of edges, if it has one.
+    /// edge count, if any.
     pub fn new(driver: &str, role: &str, table: &SignalTable, edges: &[Option<usize>]) -> Self {
         let column = |signal: &Signal, is_edges| Column {
             name: signal.name.clone(),
@@ -122,7 +122,7 @@ impl Columns {
         }
     }
 
-    /// Where the column of a signal, or of its edges, stands.
+    /// The index of the column of a signal, or of its edges.
     pub fn position(&self, name: &str, is_edges: bool) -> Option<usize> {
         self.columns
             .iter()
@@ -133,13 +133,13 @@ impl Columns {
 /// One tick of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tick {
-    /// Its number, from 1; where ticks were dropped, numbers are left out.
+    /// Its number, from 1; the numbers of dropped ticks are missing.
     pub number: u64,
     /// Simulation time.
     pub time: Nanos,
     /// The number of its status: 0 fresh, 1 unchanged, 2 stale, negative for errors.
     pub status: i32,
-    /// Ticks dropped since the recording began, up to this one.
+    /// Ticks dropped between the start of the recording and this one.
     pub dropped: u64,
     /// The status of each of [`Columns::stations`].
     pub stations: Vec<i32>,

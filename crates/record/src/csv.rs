@@ -1,4 +1,4 @@
-//! Writing CSV: a line for each tick, for tables and scripts.
+//! Writing CSV: one line per tick, for spreadsheets and scripts.
 
 use std::io::Write as _;
 
@@ -6,10 +6,10 @@ use super::columns::{Columns, Kind, Tick};
 use super::recorder::Sink;
 use super::vcd::{count, real};
 
-/// The columns that come before the signals; their names are reserved, so that no signal has them.
+/// The columns before the signals; their names are reserved, so that no signal can have them.
 pub(super) const HEAD: [&str; 4] = ["bus.tick", "bus.time_ns", "bus.status", "bus.dropped"];
 
-/// What the status columns of stations begin with.
+/// The prefix of the status columns of stations.
 pub(super) const STATION: &str = "bus.status.";
 
 /// Writes CSV.

@@ -1,11 +1,11 @@
-//! The file of a recording, which ends whole whatever happens to it.
+//! The file of a recording: whatever happens to it, it ends with a whole tick.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 
-/// Where a recording goes.
+/// The destination of a recording.
 pub(super) trait Target: Write + Send {
-    /// Cuts what was written down to `length` bytes, and goes on from there.
+    /// Truncates what was written to `length` bytes, and continues from there.
     fn cut(&mut self, length: u64) -> io::Result<()>;
 }
 
@@ -16,13 +16,13 @@ impl Target for File {
     }
 }
 
-/// A buffer in front of a file, which knows where whole ticks end.
+/// A buffer in front of a file that knows where ticks end.
 pub(super) struct Out {
     target: Box<dyn Target>,
     pending: Vec<u8>,
-    /// Where in `pending` something whole ends, each with the ticks that the file has by then.
+    /// Where ticks end in `pending`, each with the number of ticks in the file up to there.
     ends: Vec<(usize, u64)>,
-    /// Bytes and ticks in the file.
+    /// Bytes in the file, and ticks.
     length: u64,
     ticks: u64,
 }
@@ -38,37 +38,37 @@ impl Out {
         }
     }
 
-    /// Where to write the next tick.
+    /// The buffer for the next tick.
     pub(super) fn buffer(&mut self) -> &mut Vec<u8> {
         &mut self.pending
     }
 
-    /// Bytes that wait to be written.
+    /// Bytes that are not written yet.
     pub(super) fn pending(&self) -> usize {
         self.pending.len()
     }
 
-    /// What is in the buffer by now is whole, and the file has so many `ticks` with it.
+    /// Marks the end of a tick in the buffer; with it the file has `ticks` ticks.
     pub(super) fn whole(&mut self, ticks: u64) {
         self.ends.push((self.pending.len(), ticks));
     }
 
-    /// Whether anything whole is in the file.
+    /// Whether the file has at least one whole part.
     pub(super) fn has_begun(&self) -> bool {
         self.length > 0
     }
 
-    /// Ticks that are in the file.
+    /// Number of ticks in the file.
     pub(super) fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    /// Writes what waits.
+    /// Writes what is pending.
     ///
     /// # Errors
     ///
-    /// The file takes no more. It then ends with the last whole tick for which there was room, and the rest
-    /// is gone.
+    /// The file cannot take more. It then ends with the last whole tick that fitted, and the rest is
+    /// discarded.
     pub(super) fn flush(&mut self) -> io::Result<()> {
         let mut done = 0;
         let mut result = Ok(());
@@ -94,7 +94,7 @@ impl Out {
         self.pending.clear();
         self.ends.clear();
         if result.is_err() {
-            // Of a device that cannot be cut, such as a pipe, nothing better can be made.
+            // Some targets, such as a pipe, cannot be truncated; there is nothing better to do.
             let _ = self.target.cut(self.length);
         }
         result
@@ -107,7 +107,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A disc with so many bytes of room, which takes what fits of a write.
+    /// A disk with little room, which accepts the part of a write that fits.
     #[derive(Clone)]
     pub(crate) struct SmallDisc {
         pub(crate) bytes: Arc<Mutex<Vec<u8>>>,
@@ -156,7 +156,7 @@ pub(super) mod tests {
             for tick in 1..=4 {
                 out.buffer().extend_from_slice(b"abc\n");
                 out.whole(tick);
-                // Two ticks in a flush, so that a flush fails within one.
+                // Two ticks per flush, so that a flush can fail within a tick.
                 failed |= tick % 2 == 0 && out.flush().is_err();
                 if failed {
                     break;

@@ -1,8 +1,8 @@
-//! Recordings: what every tick saw, for people, for reports, and to be replayed.
+//! Recordings: what every tick saw, to be read by people, shown in reports, and replayed.
 //!
-//! A [`Recorder`] takes whole ticks from the thread that ticks, through a ring that never makes it wait,
-//! and a thread of its own writes them to a file: VCD, which every waveform viewer opens, or CSV. A
-//! [`Recording`] reads such a file again, tick by tick.
+//! A [`Recorder`] takes whole ticks from the ticking thread through a ring that never makes it wait, and its
+//! own thread writes them to a file: VCD, which every waveform viewer opens, or CSV. A [`Recording`] reads
+//! such a file back, tick by tick.
 
 mod columns;
 mod csv;
@@ -28,5 +28,5 @@ pub use places::Place;
 pub use reading::{Recording, RecordingError};
 pub use recorder::{Recorder, RecorderError, Tally};
 
-/// The version of the files' own layout, which stands at their beginning.
+/// The version of the layout of these files; they state it at the beginning.
 const VERSION: u32 = 1;

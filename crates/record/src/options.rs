@@ -1,19 +1,19 @@
-//! What a driver.cfg says of recording: the `[record]` table.
+//! The `[record]` table of a driver.cfg.
 
 use std::path::{Component, Path, PathBuf};
 
 use tickbus_base::toml_text::{Table, Value};
 
-/// Ticks that the ring holds where nothing is stated, unless that takes too much memory.
+/// The default capacity of the ring in ticks, unless that takes too much memory.
 const TICKS: usize = 4096;
 
-/// The memory that such a ring takes at most, in bytes.
+/// The memory that the ring may take by default, in bytes.
 const RING_BYTES: usize = 16 << 20;
 
-/// The memory that a stated ring may take, in bytes.
+/// The memory that the ring may take if its capacity is stated, in bytes.
 const MOST_RING_BYTES: usize = 1 << 30;
 
-/// The most ticks that can be stated.
+/// The largest capacity that can be stated, in ticks.
 const MOST_TICKS: usize = 1 << 24;
 
 /// How a recording is written.
@@ -21,16 +21,16 @@ const MOST_TICKS: usize = 1 << 24;
 pub enum Format {
     /// Value change dump, as waveform viewers read it.
     Vcd,
-    /// Comma-separated values, a line for each tick.
+    /// Comma-separated values, one line per tick.
     Csv,
 }
 
 impl Format {
-    /// The format that a file's name asks for by its ending.
+    /// The format that the extension of a file name implies.
     ///
     /// # Errors
     ///
-    /// It is neither; the text says which would be right.
+    /// It is neither; the text says what would be right.
     pub fn of(file: &Path) -> Result<Self, String> {
         let ending = file.extension().map(std::ffi::OsStr::to_ascii_lowercase);
         match ending.as_ref().and_then(|ending| ending.to_str()) {
@@ -45,7 +45,7 @@ impl Format {
     }
 }
 
-/// The longest name of a file, in characters.
+/// The longest file name, in characters.
 const FILE_LIMIT: usize = 1000;
 
 /// When to record.
@@ -58,25 +58,25 @@ pub enum When {
     Never,
 }
 
-/// What a driver.cfg says of recording.
+/// The options for recording in a driver.cfg.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The file, as it is written: relative to the folder of the driver.cfg.
+    /// The file as written there: relative to the folder of the driver.cfg.
     pub file: PathBuf,
-    /// How it is written.
+    /// Its format.
     pub format: Format,
-    /// Ticks that the ring holds; `None` leaves it to the size of a tick. Positive.
+    /// Capacity of the ring in ticks; `None` chooses it by the size of a tick. Positive.
     pub ring: Option<usize>,
     /// When to record.
     pub when: When,
 }
 
 impl Options {
-    /// Recording to `file`, with all else as where nothing is stated.
+    /// Recording to `file`, everything else at its default.
     ///
     /// # Errors
     ///
-    /// Its name asks for no format.
+    /// The file name implies no format.
     pub fn to(file: &Path) -> Result<Self, String> {
         Ok(Self {
             file: file.to_owned(),
@@ -86,8 +86,8 @@ impl Options {
         })
     }
 
-    /// Reads the `[record]` table. `replayed` is the recording that the bus replays, if it does: it must not
-    /// be overwritten.
+    /// Reads the `[record]` table. `replayed` is the recording that the bus replays, if any: it must not be
+    /// overwritten.
     pub fn read(mut table: Table<'_>, replayed: Option<&Path>) -> Option<Self> {
         let file = table.require("file", "name the recording, such as file = \"run.vcd\"");
         let ring = table.take("ring");
@@ -116,7 +116,7 @@ impl Options {
         })
     }
 
-    /// Ticks of the ring, for ticks of `words` words each: a power of two, as the ring wants it, within the limits.
+    /// Capacity of the ring for ticks of `words` words each: a power of two within the limits.
     pub fn ticks(&self, words: usize) -> usize {
         let bytes = words.max(1) * size_of::<u64>();
         match self.ring {
@@ -131,7 +131,7 @@ fn within(power: usize, most: usize) -> usize {
     power.min(1 << most.max(1).ilog2())
 }
 
-/// The name of a recording, and its format.
+/// The file name of a recording, and its format.
 pub fn file_of(value: &Value<'_>) -> Option<(PathBuf, Format)> {
     let right = "write the name of a file in quotes, such as \"run.vcd\"";
     let file = PathBuf::from(value.label(FILE_LIMIT, right)?);
@@ -152,7 +152,7 @@ fn ring_of(value: &Value<'_>) -> Option<usize> {
         .and_then(|ticks| usize::try_from(ticks).ok())
 }
 
-/// A path without its detours by the present folder.
+/// A path without its `.` components.
 fn plain(path: &Path) -> PathBuf {
     path.components()
         .filter(|part| *part != Component::CurDir)

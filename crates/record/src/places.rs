@@ -1,4 +1,5 @@
-//! The files that this process records to and replays: none of them both at once, and none recorded to twice.
+//! The files that this process records to or replays: none is used for both at once, and none is recorded to
+//! twice.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata};
@@ -6,34 +7,34 @@ use std::io;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What is done with each file that is in use.
+/// How each file in use is used.
 static IN_USE: Mutex<BTreeMap<Identity, Use>> = Mutex::new(BTreeMap::new());
 
-/// What a file is, by whatever name and link it is opened: device and inode.
+/// Identifies a file under any name or link: device and inode.
 #[cfg(unix)]
 type Identity = (u64, u64);
 
-/// What a file is: its path without links and detours.
+/// Identifies a file: its path without links and `..`.
 #[cfg(not(unix))]
 type Identity = std::path::PathBuf;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Use {
     Recorded,
-    /// By so many.
+    /// The number of replays.
     Replayed(usize),
 }
 
-/// A file that a recording has to itself, or that recordings must leave alone while it is replayed.
+/// A claim on a file: exclusive for a recording, shared among replays.
 #[derive(Debug)]
 pub struct Place(Identity);
 
 impl Place {
-    /// Claims a file for a recording; gives what is done with it already, if anything is.
+    /// Claims a file for a recording; if it is in use already, gives how.
     ///
     /// # Errors
     ///
-    /// The system does not say which file it is.
+    /// The system cannot identify the file.
     pub(super) fn to_record(path: &Path, file: &File) -> io::Result<Result<Self, &'static str>> {
         let id = identity(path, &file.metadata()?)?;
         let mut in_use = lock();
@@ -49,11 +50,11 @@ impl Place {
         })
     }
 
-    /// Claims the file at `path` for a replay; several may replay one file.
+    /// Claims the file at `path` for a replay; several replays may share a file.
     ///
     /// # Errors
     ///
-    /// The file is not there, or is being recorded to; the text says what to do.
+    /// The file does not exist, or is being recorded to; the text says what to do.
     pub fn to_replay(path: &Path) -> Result<Self, String> {
         let shown = path.display();
         let id = fs::metadata(path).and_then(|metadata| identity(path, &metadata));
@@ -86,7 +87,7 @@ impl Drop for Place {
 }
 
 fn lock() -> MutexGuard<'static, BTreeMap<Identity, Use>> {
-    // The map is whole between any two of its changes.
+    // The map is consistent after every single change, so a poisoned lock is safe to use.
     IN_USE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

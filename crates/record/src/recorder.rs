@@ -1,4 +1,4 @@
-//! The recorder: what the tick hands over, and the thread that writes it down.
+//! The recorder: takes ticks from the tick, and writes them on its own thread.
 
 use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
@@ -19,31 +19,31 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
 use tickbus_image::{TickReader, TickWriter, tick_ring};
 
-/// How often the thread looks into the ring. The tick makes no system call, so that it cannot wake it.
+/// How often the thread polls the ring. The tick makes no system calls, so that it cannot wake the thread.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// Every so many looks the file gets what there is: what a killed process loses at most is a tenth of a
+/// Every this many polls, everything is written to the file: a killed process loses at most a tenth of a
 /// second.
 const LOOKS_PER_FLUSH: u32 = 20;
 
-/// Bytes that go to the file at once.
+/// The size of a write, in bytes.
 const CHUNK: usize = 64 << 10;
 
-/// So long may the file take nothing while the recording is closed.
+/// How long closing waits for a file that accepts no data.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Words of a tick in the ring before the statuses of the stations: number, time, status.
 const HEAD: usize = 3;
 
-/// Turns ticks into the bytes of a file.
+/// Converts ticks to the bytes of a file.
 pub(super) trait Sink: Send {
-    /// What stands at the beginning.
+    /// Writes the beginning of the file.
     fn header(&mut self, out: &mut Vec<u8>);
 
     /// One tick; values are as [`Kind::kept`](super::Kind::kept) gives them.
     fn tick(&mut self, tick: &Tick, out: &mut Vec<u8>);
 
-    /// What stands at the end of a recording that ended in good order.
+    /// Writes the end of a recording that was closed properly.
     fn end(&mut self, note: &str, out: &mut Vec<u8>);
 }
 
@@ -57,29 +57,29 @@ impl Format {
     }
 }
 
-/// What a recorder has done so far; readable from any thread.
+/// Counters of a recorder; readable from any thread.
 #[derive(Debug, Default)]
 pub struct Tally {
     file: PathBuf,
     /// Ticks that were written.
     ticks: AtomicU64,
-    /// Ticks that were dropped because the ring was full.
+    /// Ticks dropped because the ring was full.
     dropped: AtomicU64,
-    /// Ticks whose time was before that of the tick before them.
+    /// Ticks whose time was before that of the previous tick.
     backwards: AtomicU64,
-    /// Nothing is recorded any more.
+    /// Recording has ended.
     ended: AtomicBool,
-    /// Why not, if it was an error.
+    /// The error that ended it, if any.
     error: Mutex<Option<String>>,
 }
 
 impl Tally {
-    /// Why the recording ended before it was told to.
+    /// Why the recording ended before it was closed, if it did.
     pub fn error(&self) -> Option<String> {
         self.lock_error().clone()
     }
 
-    /// Appends it, one `key=value` a line.
+    /// Appends the counters, one `key=value` per line.
     pub fn write(&self, text: &mut String) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
         // Writing to a string cannot fail.
@@ -96,18 +96,18 @@ impl Tally {
     }
 
     fn lock_error(&self) -> MutexGuard<'_, Option<String>> {
-        // A text is whole between any two of its changes.
+        // A string is consistent after every change, so a poisoned lock is safe to use.
         self.error.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Wakes one side of the ring or the other, where either may wait.
+/// Wakes the side of the ring that waits.
 #[derive(Debug, Default)]
 struct Bell {
     state: Mutex<BellState>,
-    /// There is something to do for the thread that records.
+    /// There is something for the recording thread to do.
     work: Condvar,
-    /// There is room in the ring, or nobody who would ever make some.
+    /// There is room in the ring, or there never will be.
     room: Condvar,
 }
 
@@ -119,7 +119,7 @@ struct BellState {
 
 impl Bell {
     fn lock(&self) -> MutexGuard<'_, BellState> {
-        // Two booleans are whole whatever panicked.
+        // Two booleans are valid in any combination, even after a panic.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -136,7 +136,7 @@ impl Bell {
 #[derive(Debug)]
 pub struct Recorder {
     ring: TickWriter,
-    /// Reserved once, filled in each tick.
+    /// Allocated once, refilled at every tick.
     head: Vec<u64>,
     slots: usize,
     lossless: bool,
@@ -148,10 +148,10 @@ pub struct Recorder {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Why nothing can be recorded.
+/// Why a recording cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum RecorderError {
-    /// Another file, or another moment, would do.
+    /// Another file, or another time, would do.
     #[error("{0}")]
     File(String),
     /// The system refused a thread.
@@ -161,7 +161,7 @@ pub enum RecorderError {
     Thread(std::io::Error),
 }
 
-/// Whether there is a pipe at `path`: to open it would wait for somebody who reads it.
+/// Whether `path` is a named pipe: opening it would block until someone reads from it.
 #[cfg(unix)]
 fn is_pipe(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt as _;
@@ -169,14 +169,14 @@ fn is_pipe(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|metadata| metadata.file_type().is_fifo())
 }
 
-/// Nothing here waits for a reader.
+/// No file blocks on opening here.
 #[cfg(not(unix))]
 fn is_pipe(_path: &Path) -> bool {
     false
 }
 
-/// Makes the file at `path` anew, once it is certain that nobody else of this process uses it. A device is taken as
-/// it is.
+/// Creates the file at `path`, once it is certain that nothing else in this process uses it. A device is used
+/// as it is.
 fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
     let shown = path.display();
     let cannot = |error: std::io::Error| {
@@ -189,7 +189,7 @@ fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
             "{shown}: this is a pipe, and a recording is a file; name a file in [record]"
         )));
     }
-    // Nothing is cut before it is known to be nobody's.
+    // Truncated only after it is known to be unused.
     let open = OpenOptions::new()
         .write(true)
         .create(true)
@@ -209,14 +209,14 @@ fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
 }
 
 impl Recorder {
-    /// Creates the file that `options` name, relative to `folder`, and starts the thread that writes it.
+    /// Creates the file that `options` name, relative to `folder`, and starts the thread that writes to it.
     ///
-    /// When the ring is full, a `lossless` recorder lets the tick wait until there is room; any other drops
+    /// If the ring is full, a `lossless` recorder makes the tick wait until there is room; any other drops
     /// the tick and counts it.
     ///
     /// # Errors
     ///
-    /// The file cannot be made or is in use, or the system refused a thread; the text says what to do.
+    /// The file cannot be created or is in use, or the system refused a thread; the text says what to do.
     pub fn start(
         options: &Options,
         folder: &Path,
@@ -240,7 +240,7 @@ impl Recorder {
         .map_err(RecorderError::Thread)
     }
 
-    /// The same over any target.
+    /// As [`start`](Self::start), for any target.
     pub(super) fn over(
         target: Box<dyn Target>,
         format: Format,
@@ -275,7 +275,7 @@ impl Recorder {
             .name("record".to_owned())
             .spawn(move || {
                 let _end = end;
-                // Dropped before that, so that its file is free by then.
+                // Dropped before `_end`, so that the file is closed by the time the end is reported.
                 let mut writing = writing;
                 writing.run();
             })?;
@@ -314,7 +314,7 @@ impl Recorder {
         self.head.clear();
         self.head
             .extend([number, time.0.cast_unsigned(), word(status)]);
-        // Never longer than was reserved.
+        // Never more than was allocated.
         let room = self.head.capacity() - self.head.len();
         self.head.extend(stations.map(word).take(room));
         let slots = &slots[..self.slots];
@@ -338,7 +338,7 @@ impl Recorder {
         }
     }
 
-    /// What it has done so far.
+    /// Its counters.
     pub fn tally(&self) -> &Arc<Tally> {
         &self.tally
     }
@@ -371,7 +371,7 @@ impl Drop for Recorder {
     }
 }
 
-/// The thread's half.
+/// The thread's half of a recorder.
 struct Writing {
     ring: TickReader,
     words: Box<[u64]>,
@@ -379,7 +379,7 @@ struct Writing {
     kinds: Box<[super::Kind]>,
     sink: Box<dyn Sink>,
     out: Out,
-    /// Number and time of the tick before.
+    /// Number and time of the previous tick.
     before: Option<(u64, Nanos)>,
     tally: Arc<Tally>,
     bell: Arc<Bell>,
@@ -388,14 +388,14 @@ struct Writing {
 
 impl Writing {
     fn run(&mut self) {
-        // Whatever happens here, no tick waits for it any more afterwards.
+        // After this thread has ended, for whatever reason, no tick may wait for it.
         let (tally, bell) = (Arc::clone(&self.tally), Arc::clone(&self.bell));
         let _end = Ended { tally, bell };
         if let Err(error) = self.write() {
             let ticks = self.out.ticks();
             let why = format!("the recording ended with tick {ticks} of the file: {error}");
             self.tally.ticks.store(ticks, Ordering::Relaxed);
-            // There may be room for a few words where there was none for a tick.
+            // There may be room for a short comment even if there was none for a tick.
             if self.out.has_begun() {
                 self.sink.end(&why, self.out.buffer());
                 self.out.whole(ticks);
@@ -440,7 +440,7 @@ impl Writing {
         self.out.flush()
     }
 
-    /// Writes all that the ring holds.
+    /// Writes everything that the ring holds.
     fn drain(&mut self) -> std::io::Result<()> {
         while self.ring.take(&mut self.words) {
             self.unpack();
@@ -456,7 +456,7 @@ impl Writing {
         Ok(())
     }
 
-    /// Makes the tick of its words.
+    /// Decodes the words of a tick.
     fn unpack(&mut self) {
         #[expect(clippy::cast_possible_truncation, reason = "made from an i32")]
         let status = |word: u64| word.cast_signed() as i32;
@@ -482,7 +482,7 @@ impl Writing {
             );
         }
         tick.dropped += gap;
-        // VCD knows no time before the one before.
+        // Time in VCD cannot run backwards.
         if tick.time < time {
             if self.tally.backwards.fetch_add(1, Ordering::Relaxed) == 0 {
                 log::warn!(
@@ -499,7 +499,7 @@ impl Writing {
     }
 }
 
-/// Says, when it is dropped, that nothing is recorded any more.
+/// Reports on drop that the recording has ended.
 struct Ended {
     tally: Arc<Tally>,
     bell: Arc<Bell>,

@@ -1,4 +1,4 @@
-//! What is written reads back: whole, cut, and on a disc that is full.
+//! What is written reads back: completely, truncated, and from a full disk.
 
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use super::*;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot, Station};
 
-/// A signal of each type, in both areas, with names that VCD and CSV find hard.
+/// A signal of each type, in both areas, with names that are difficult for VCD and CSV.
 fn table(stations: &[&str]) -> SignalTable {
     let mut signals = Vec::new();
     for (station, _) in stations.iter().enumerate() {
@@ -57,14 +57,14 @@ fn columns(table: &SignalTable) -> Columns {
     Columns::new("Cell \"4\" $end", "device", table, &edges)
 }
 
-/// The file that a sink makes of these ticks, and where in it each tick is whole.
+/// The file that a sink writes for these ticks, and the offset in it at which each tick ends.
 fn written(format: Format, columns: &Columns, ticks: &[Tick]) -> (Vec<u8>, Vec<usize>) {
     let (mut sink, mut out, mut ends) = (format.sink(columns.clone()), Vec::new(), Vec::new());
     sink.header(&mut out);
     let header = out.len();
     for tick in ticks {
         sink.tick(tick, &mut out);
-        // The end of the dump is no part of the tick.
+        // The end of the dump does not belong to the tick.
         let end = out.len();
         let dump = out.ends_with(b"$end\n");
         ends.push(end - if dump { 5 } else { 0 });
@@ -79,7 +79,7 @@ fn open(format: Format, bytes: &[u8], table: &SignalTable) -> Result<Recording, 
     Recording::read("run", format, bytes, Some(table))
 }
 
-/// All ticks, and how the reading ended.
+/// All ticks, and how reading ended.
 fn read(mut recording: Recording) -> (Vec<Tick>, Result<bool, RecordingError>) {
     let mut tick = Tick::new(recording.columns());
     let mut ticks = Vec::new();
@@ -102,7 +102,7 @@ fn value(kind: Kind, word: u64) -> Slot {
     })
 }
 
-/// Ticks from random words; few values change from one to the next.
+/// Ticks made from random words; few values change between two of them.
 fn ticks(columns: &Columns, words: &[(u64, u64)]) -> Vec<Tick> {
     let mut tick = Tick::new(columns);
     let mut ticks = Vec::new();
@@ -171,7 +171,7 @@ proptest! {
     }
 }
 
-/// Every truncation is a clear error, or all ticks that were whole by then.
+/// Every truncation gives a clear error, or all ticks that were complete by then.
 #[test]
 fn every_cut_keeps_what_is_whole() {
     let table = table(&[""]);
@@ -324,7 +324,7 @@ fn damage_is_told_with_its_place() {
     }
 }
 
-/// Records ticks to a disc with so much room; what the recorder says, and the file.
+/// Records ticks to a disk with `room` bytes; returns the recorder's statistics and the file.
 fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String, Vec<u8>, Columns) {
     let table = table(&[""]);
     let columns = columns(&table);
@@ -378,7 +378,7 @@ fn dropped_ticks_are_counted_and_marked() {
         .lines()
         .find_map(|line| line.strip_prefix("record.dropped="));
     let dropped: u64 = dropped.expect("a count").parse().expect("a number");
-    // Those after the last recorded tick are in the count only.
+    // Ticks dropped after the last recorded one appear in the count only.
     assert_eq!(dropped, last.dropped + 50_000 - last.number);
     assert!(dropped > 0, "no machine writes as fast as that");
 }
@@ -405,13 +405,13 @@ fn on_a_full_disc_the_recording_ends_whole_and_says_so() {
                 text.contains(&format!("with tick {last} of")),
                 "{text}: {last}"
             );
-            // No more is lost than the tick for which there was no room.
+            // Nothing is lost except the tick that did not fit.
             assert!(bytes.len() + 500 > room, "{} of {room}", bytes.len());
         }
     }
 }
 
-/// A file whose disc does not answer until the sender is gone.
+/// A file that does not respond until the sender is dropped.
 struct Stuck(std::sync::mpsc::Receiver<()>);
 
 impl std::io::Write for Stuck {

@@ -1,8 +1,8 @@
-//! Writing VCD, the value change dump of IEEE 1364, which waveform viewers open.
+//! Writing VCD, the value change dump of IEEE 1364, for waveform viewers.
 //!
-//! A line for each value that changed; last of all, in every tick, the line of the variable `tick`. So a
-//! tick is whole when its line is, and ticks in which nothing else changed are in the file, too. Comments in
-//! the header say what the variables are, since VCD itself has no types, units or free names.
+//! Each value that changed gets a line; the last line of every tick is that of the variable `tick`. So a tick
+//! is complete when this line is, and ticks without other changes are in the file as well. Comments in the
+//! header describe the variables, because VCD has no types, no units, and no arbitrary names.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use super::columns::{Column, Columns, Kind, Tick};
 use super::recorder::Sink;
 use tickbus_image::signal::Area;
 
-/// What an unsigned number of two's complement has for -1 and so on.
+/// The width of the status in bits: VCD has no signed values, so that negative ones are in two's complement.
 const STATUS_BITS: u32 = 32;
 
 /// A station's name, and one of its areas.
@@ -24,20 +24,20 @@ type Place<'a> = (&'a str, Option<Area>);
 /// Writes VCD.
 pub(super) struct VcdSink {
     columns: Columns,
-    /// What stands behind the values of each column: its identifier.
+    /// The identifier of each column, which follows its value.
     ids: Vec<String>,
     tick: String,
     dropped: String,
-    /// The status of the whole, and of each station.
+    /// The identifiers of the overall status, and of each station's.
     status: Vec<String>,
-    /// The tick before.
+    /// The previous tick.
     last: Option<Tick>,
 }
 
 impl VcdSink {
     pub(super) fn new(columns: Columns) -> Self {
         let mut next = IdCode::FIRST;
-        // Without quotation marks, which are kept for the names in comments.
+        // Without quotation marks, which the comments use around names.
         let mut id = || loop {
             let id = next.to_string();
             next = next.next();
@@ -55,7 +55,7 @@ impl VcdSink {
         }
     }
 
-    /// Comments, which the reader of recordings understands, in front of the scopes.
+    /// The comments before the scopes, for the reader of recordings.
     fn comments(&self) -> Vec<String> {
         let Self { columns, ids, .. } = self;
         let mut lines = vec![
@@ -90,7 +90,7 @@ impl VcdSink {
         lines
     }
 
-    /// The scopes with their variables: the driver, in it the bus, and each station's areas.
+    /// The scopes and their variables: the driver, within it the bus and each station's areas.
     fn scopes(&self, out: &mut Vec<u8>) -> std::io::Result<()> {
         let mut writer = Writer::new(out);
         let var = |writer: &mut Writer<_>, kind, width, id: &str, name: &str| {
@@ -144,7 +144,7 @@ impl VcdSink {
         writer.enddefinitions()
     }
 
-    /// The columns by station and area, in the order in which these first occur.
+    /// The columns by station and area, in order of first occurrence.
     fn places(&self) -> Vec<(Place<'_>, Vec<usize>)> {
         let mut places: Vec<(Place<'_>, Vec<usize>)> = Vec::new();
         let place = |column: &'_ Column| column.address.map(|address| address.area);
@@ -168,7 +168,7 @@ fn letter(area: Area) -> &'static str {
 
 impl Sink for VcdSink {
     fn header(&mut self, out: &mut Vec<u8>) {
-        // Writing to memory cannot fail. No date: two runs that are equal give files that are equal.
+        // Writing to memory cannot fail. No date, so that equal runs give equal files.
         let _ = writeln!(out, "$version tickbus {} $end", env!("CARGO_PKG_VERSION"));
         let _ = Writer::new(&mut *out).timescale(1, TimescaleUnit::NS);
         for line in self.comments() {
@@ -230,7 +230,7 @@ impl Sink for VcdSink {
     }
 }
 
-/// Writes a number so that it reads back the same, in at most 30 characters.
+/// Writes a number, in at most 30 characters, that reads back exactly.
 pub(super) fn real(value: f64, out: &mut Vec<u8>) {
     let size = value.abs();
     let plain = !value.is_finite() || value == 0.0 || (1e-5..1e16).contains(&size);
@@ -241,7 +241,7 @@ pub(super) fn real(value: f64, out: &mut Vec<u8>) {
     };
 }
 
-/// A count of edges as the integer that it is.
+/// An edge count as an integer.
 pub(super) fn count(value: f64) -> u32 {
     #[expect(
         clippy::cast_possible_truncation,
@@ -252,8 +252,8 @@ pub(super) fn count(value: f64) -> u32 {
     count
 }
 
-/// A text in quotes that cannot be taken for the end of a comment, or for more than one line; ASCII, since
-/// not all readers take more.
+/// Quotes a text so that it cannot end the comment or span lines; escapes everything that is not ASCII, since
+/// some readers accept nothing else.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
@@ -267,7 +267,7 @@ fn quoted(text: &str) -> String {
     out
 }
 
-/// Names as VCD allows them, each different from those before.
+/// Names as VCD permits them, each unique.
 #[derive(Default)]
 struct Names(HashMap<String, usize>);
 
@@ -280,7 +280,7 @@ impl Names {
             base.insert(0, '_');
         }
         let mut unique = base.clone();
-        // How often the name was wanted is where the search for the next number begins.
+        // The search for a free number starts at the number of times the name was requested.
         while self.0.contains_key(&unique) {
             let wanted = self.0.entry(base.clone()).or_default();
             *wanted += 1;

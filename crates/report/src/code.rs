@@ -1,29 +1,30 @@
-//! The changes of a signal as text that a script unpacks quickly.
+//! The changes of a signal, encoded as text that a script unpacks quickly.
 //!
 //! A block is, in this order:
 //!
-//! - the times: a varint (7 bits a byte, low bits first, the top bit set on all bytes but the last) for
-//!   each change, in units of the page since the change before it, the first since the run began;
-//! - the values, in the smallest of four codings: [`Coding`].
+//! - the times: a varint (7 bits per byte, low bits first, the top bit set on all bytes but the last) for
+//!   each change: the time since the previous change, the first since the start of the run, in units of the
+//!   page;
+//! - the values, in the most compact of four codings: [`Coding`].
 //!
-//! All of it goes through zlib and base64. Values come out of it bit by bit as they went in.
+//! The block is compressed by zlib and encoded as base64. Values are preserved bit by bit.
 
 use std::collections::HashSet;
 
 use super::Change;
 use tickbus_base::time::Nanos;
 
-/// How the values of a block are written.
+/// How the values of a block are encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coding {
-    /// One byte: the first value, 0 or 1. Each change changes it.
+    /// One byte: the first value, 0 or 1. Each further change toggles it.
     Toggle,
-    /// A varint, how many different values there are; these, ascending, as f64; then for each change which of them
-    /// it is, as the zigzag varint of the difference from the one before, the first from 0.
+    /// A varint with the number of distinct values; these values, ascending, as f64; then for each change the
+    /// index of its value, as the zigzag varint of the difference from the previous index, starting from 0.
     Table,
-    /// The f32 of each change, exclusive-or with the one before; all low bytes first, the high bytes last.
+    /// Each change as f32, XORed with the previous one; all low bytes first, the high bytes last.
     Single,
-    /// The same with f64.
+    /// As `Single`, with f64.
     Double,
 }
 
@@ -43,7 +44,7 @@ impl Coding {
         }
         let is_single = changes.iter().all(|c| narrow(c.value).is_some());
         let plain = if is_single { 4 } else { 8 };
-        // A number in the table takes a byte or two, so that it pays while few values are different.
+        // An index takes a byte or two, so the table pays as long as there are few distinct values.
         let most = changes.len() * (plain - 2) / 8 + 4;
         let mut different = HashSet::new();
         for change in changes {
@@ -74,14 +75,14 @@ fn toggles(changes: &[Change]) -> bool {
         })
 }
 
-/// The value as f32, if that is exactly it.
+/// The value as f32, if that represents it exactly.
 #[expect(clippy::cast_possible_truncation, reason = "compared with what it was")]
 fn narrow(value: f64) -> Option<f32> {
     let narrow = value as f32;
     (f64::from(narrow).to_bits() == value.to_bits()).then_some(narrow)
 }
 
-/// The largest unit of which the run's begin and all times of changes are whole multiples apart.
+/// The largest unit of which the start of the run and the times of all changes are whole multiples apart.
 pub(super) fn common_unit(begin: Nanos, times: impl Iterator<Item = Nanos>) -> i64 {
     let mut unit = 0;
     for time in times {
@@ -249,7 +250,7 @@ mod tests {
         let mut expected = vec![2];
         expected.extend_from_slice(&(-1.5_f64).to_le_bytes());
         expected.extend_from_slice(&2.0_f64.to_le_bytes());
-        // 2.0 is number 1: a step of +1, then -1, +1.
+        // 2.0 has index 1: a step of +1, then -1, +1.
         expected.extend_from_slice(&[2, 1, 2]);
         assert_eq!(bytes(&[2.0, -1.5, 2.0]), expected);
         let mut bytes = Vec::new();

@@ -1,4 +1,4 @@
-//! Small figures that need no script: SVG within the page.
+//! Small figures without a script: SVG within the page.
 
 use std::fmt::Write as _;
 
@@ -6,14 +6,14 @@ use super::html::{count, counted, span};
 use super::statistics::Distribution;
 use tickbus_base::time::{Nanos, Spans};
 
-/// The width of a distribution's figure, in its own units.
+/// The width of a distribution's figure, in SVG units.
 const WIDTH: f64 = 260.0;
 
-/// At most so many bars has a histogram.
+/// The most bars of a histogram.
 const MOST_BARS: f64 = 48.0;
 
-/// From the median to the maximum, on one logarithmic scale for all `alike`: a box from p50 to p90, a line on to p99,
-/// a dot at the maximum.
+/// From the median to the maximum, on a logarithmic scale shared by all `alike`: a box from p50 to p90, a
+/// line to p99, a dot at the maximum.
 pub(super) fn distribution(of: &Distribution, alike: &[&Distribution]) -> String {
     let all = || {
         alike
@@ -42,12 +42,12 @@ pub(super) fn distribution(of: &Distribution, alike: &[&Distribution]) -> String
     )
 }
 
-/// The logarithm; of what is no more than a thousandth, that of a thousandth.
+/// The logarithm, limited below at one thousandth.
 fn log(value: f64) -> f64 {
     value.max(1e-3).log10()
 }
 
-/// A histogram of spans as bars, or a sentence if all are alike.
+/// A histogram of spans as bars, or a sentence if all spans are equal.
 pub(super) fn histogram(
     out: &mut String,
     what: &str,
@@ -80,7 +80,7 @@ pub(super) fn histogram(
     );
     for (place, bar) in bars.iter().enumerate().filter(|(_, bar)| **bar > 0) {
         #[expect(clippy::cast_precision_loss, reason = "places in a figure")]
-        // What is there can be seen, however rare.
+        // A bar that is not empty must be visible, however rare its spans.
         let height = (*bar as f64 / most as f64 * (high - 12.0)).max(2.0);
         let _ = write!(
             out,
@@ -114,7 +114,7 @@ pub(super) fn histogram(
     );
 }
 
-/// The axis of a histogram, cut into bars that are no narrower than the spans are exact.
+/// The axis of a histogram, divided into bars no narrower than the resolution of the spans.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     from: f64,
@@ -146,13 +146,13 @@ impl Axis {
         }
     }
 
-    /// Where, from 0 to 1, the left edge of a bar is.
+    /// The position of a bar's left edge, from 0 to 1.
     #[expect(clippy::cast_precision_loss, reason = "places in a figure")]
     fn place(self, edge: usize) -> f64 {
         edge as f64 / self.bars as f64
     }
 
-    /// How long a span at the left edge of a bar is.
+    /// The span at a bar's left edge.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "between the shortest and the longest"
@@ -166,7 +166,7 @@ impl Axis {
         } as i64)
     }
 
-    /// How many spans each bar has.
+    /// The number of spans in each bar.
     fn bars(self, spans: &Spans) -> Vec<u64> {
         let mut bars = vec![0; self.bars];
         for (length, count) in spans.steps() {

@@ -1,4 +1,4 @@
-//! Pages as files: the only place of the room that opens any.
+//! Pages as files: the only part of this room that opens any.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write as _};
@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use super::{Contents, DEFAULT_BUDGET, Statistics, read, write};
 use tickbus_record::Recording;
 
-/// Writes a page beside its place first: an old page is there until the new one is whole. Gives its size.
+/// Writes a page to a temporary file first: an old page stays until the new one is complete. Returns its
+/// size.
 ///
 /// # Errors
 ///
@@ -30,12 +31,12 @@ pub fn write_file(contents: &Contents<'_>, path: &Path) -> io::Result<u64> {
     written
 }
 
-/// Makes the page of a recording, beside it and ending with .html, and gives its path. The texts stand on it
-/// under their headings.
+/// Writes the page of a recording to a file with the same name and the extension .html, and returns its path.
+/// The texts appear on it under their headings.
 ///
 /// # Errors
 ///
-/// Nothing of the recording can be read, or the page cannot be written; what would be right stands there, too.
+/// Nothing can be read of the recording, or the page cannot be written; the error says what would be right.
 pub fn page_beside(
     recording: &Path,
     title: &str,
@@ -43,7 +44,7 @@ pub fn page_beside(
     texts: &[(String, String)],
 ) -> Result<PathBuf, String> {
     let mut read_from = Recording::open(recording, None).map_err(|error| error.to_string())?;
-    // What came before a fault of the recording is worth a page, too.
+    // What precedes a damaged place in the recording is worth a page.
     let (run, _) = read(&mut read_from, DEFAULT_BUDGET);
     let statistics = statistics.map(Statistics::read);
     let file = recording.file_name().unwrap_or(recording.as_os_str());

@@ -5,20 +5,21 @@ use tickbus_base::time::Nanos;
 use tickbus_record as record;
 use tickbus_record::{Columns, Recording, RecordingError, Tick};
 
-/// Status of an exchange from which on the data are too old.
+/// The status of an exchange from which on data are stale.
 const STALE: i32 = 2;
 
-/// Where the values of a column go.
+/// The destination of a column's values.
 enum Target {
-    /// To the signal of this number; its slots hold this.
+    /// The signal with this number; its slots hold this kind of value.
     Signal(usize, record::Kind),
-    /// They count the edges of the signal of this number.
+    /// The edge count of the signal with this number.
     Edges(usize),
-    /// The signal is not there.
+    /// The signal does not exist.
     Nowhere,
 }
 
-/// Reads a recording to its end; the error is why it could be read no further, and the run what came before.
+/// Reads a recording to its end; the error says why it cannot be read further, and the run is what came
+/// before.
 pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingError>) {
     let columns = recording.columns().clone();
     let mut run = Run::new(budget);
@@ -80,7 +81,7 @@ pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingE
         );
     }
     for (column, target) in columns.columns.iter().zip(&targets) {
-        // A CSV file has no types: what was never but 0 and 1 may as well be a bool.
+        // A CSV file has no types: a signal that was only ever 0 or 1 is taken for a bool.
         if let (None, Target::Signal(signal, _)) = (column.data_type, target) {
             run.call_bool_if_it_looks_like_one(*signal);
         }
@@ -135,7 +136,7 @@ fn number(kind: record::Kind, slot: tickbus_image::signal::Slot) -> f64 {
     }
 }
 
-/// How fresh the data of each station are, over time.
+/// The freshness of each station's data over time.
 struct Lines<'a> {
     stations: Vec<&'a str>,
     last: Vec<Option<i32>>,
@@ -144,7 +145,7 @@ struct Lines<'a> {
 impl<'a> Lines<'a> {
     fn new(columns: &'a Columns) -> Self {
         let stations: Vec<&str> = columns.stations.iter().map(|station| &**station).collect();
-        // One station needs no name.
+        // A single station needs no name.
         let stations = if stations.is_empty() {
             vec![""]
         } else {
@@ -164,7 +165,7 @@ impl<'a> Lines<'a> {
             &tick.stations
         };
         for ((station, last), status) in self.stations.iter().zip(&mut self.last).zip(statuses) {
-            // Fresh and unchanged take turns as ticks and bus cycles fall.
+            // Fresh and unchanged alternate, depending on the phase of ticks and bus cycles.
             let status = if (0..STALE).contains(status) {
                 0
             } else {

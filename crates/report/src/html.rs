@@ -1,10 +1,10 @@
-//! Text that is safe within HTML, and numbers as people read them.
+//! Text escaped for HTML, and numbers formatted for people.
 
 use std::fmt;
 
 use tickbus_base::time::Nanos;
 
-/// Writes a text so that it stands for itself, between tags and between double quotes.
+/// Writes a text escaped for use between tags and within double quotes.
 pub(super) struct Text<'a>(pub(super) &'a str);
 
 impl fmt::Display for Text<'_> {
@@ -21,7 +21,7 @@ impl fmt::Display for Text<'_> {
                 '>' => f.write_str("&gt;")?,
                 '"' => f.write_str("&quot;")?,
                 '\'' => f.write_str("&#39;")?,
-                // Not allowed in HTML, not even escaped.
+                // Not permitted in HTML, not even escaped.
                 _ => f.write_str("\u{fffd}")?,
             }
             rest = &rest[at + special.len_utf8()..];
@@ -34,7 +34,7 @@ fn is_control(c: char) -> bool {
     c.is_control() && !matches!(c, '\n' | '\t')
 }
 
-/// Writes a text as JSON that may stand within a script element.
+/// Writes a text as JSON that is safe within a script element.
 pub(super) struct Json<'a>(pub(super) &'a str);
 
 impl fmt::Display for Json<'_> {
@@ -54,7 +54,7 @@ impl fmt::Display for Json<'_> {
     }
 }
 
-/// A whole number with its thousands apart: 1,234,567.
+/// An integer with thousands separators: 1,234,567.
 pub(super) fn count(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::with_capacity(digits.len() * 4 / 3);
@@ -67,12 +67,12 @@ pub(super) fn count(number: u64) -> String {
     text
 }
 
-/// A count of something, with its word in the right number.
+/// A count and its noun, in singular or plural.
 pub(super) fn counted(number: u64, one: &str, many: &str) -> String {
     format!("{} {}", count(number), if number == 1 { one } else { many })
 }
 
-/// A time in seconds, to the nanosecond, without trailing zeros but with three decimals.
+/// A time in seconds, down to the nanosecond, with at least three decimals and no further trailing zeros.
 pub(super) fn seconds(time: Nanos) -> String {
     let sign = if time.0 < 0 { "−" } else { "" };
     let size = time.0.unsigned_abs();
@@ -81,7 +81,7 @@ pub(super) fn seconds(time: Nanos) -> String {
     format!("{sign}{}.{decimals:0<3} s", count(size / 1_000_000_000))
 }
 
-/// A span in the unit that suits its length, in at most four digits.
+/// A span in a suitable unit, in at most four digits.
 pub(super) fn span(time: Nanos) -> String {
     let size = time.0.unsigned_abs();
     let (unit, name) = match size {
@@ -98,7 +98,7 @@ pub(super) fn span(time: Nanos) -> String {
     )
 }
 
-/// A number in at most four significant digits, but never fewer than its whole part has.
+/// A number in at most four significant digits, or as many as its integer part has.
 pub(super) fn digits(number: f64) -> String {
     let whole = number.abs().max(1.0).log10().floor();
     let decimals = (3.0 - whole).clamp(0.0, 3.0);

@@ -1,11 +1,12 @@
-//! One HTML page about one run: chart, steps, faults, states of the line, distributions.
+//! An HTML page about one run: chart, steps, faults, line states, distributions.
 //!
-//! [`read`] makes a [`Run`] from a recording, [`write()`] a page from that and texts; no file is opened but by
-//! [`write_file`] and [`page_beside`], and no clock is read, so that the same run gives the same bytes. The page stands alone: its style, its script and all data are inside, and its
-//! content security policy forbids it to load anything.
+//! [`read`] makes a [`Run`] from a recording, and [`write()`] a page from the run and texts. Only
+//! [`write_file`] and [`page_beside`] open files, and no clock is read, so that the same run gives the same
+//! bytes. The page is self-contained: style, script and data are inside, and its content security policy
+//! forbids loading anything.
 //!
-//! Tables are HTML that Rust writes. The chart is a canvas that `chart.js` draws from the changes of the
-//! signals, which `code` packs; the script unpacks them one signal at a time.
+//! Tables are written as HTML by Rust. The chart is a canvas on which `chart.js` draws the changes of the
+//! signals; `code` packs them, and the script unpacks them one signal at a time.
 
 mod code;
 mod figures;

@@ -19,10 +19,10 @@ const SCRIPT: [&str; 4] = [
     include_str!("start.js"),
 ];
 
-/// How many bars the strip has that shows where in the run something changes.
+/// The number of bars in the strip that shows where in the run changes occur.
 const ACTIVITY: usize = 400;
 
-/// Of one band, the chart draws no more than this.
+/// The most spans drawn per band of the chart.
 const MOST_SPANS: usize = 20_000;
 
 /// What a page is made from.
@@ -30,21 +30,21 @@ const MOST_SPANS: usize = 20_000;
 pub struct Contents<'a> {
     /// The heading.
     pub title: &'a str,
-    /// Where it comes from: one line, such as the recording's file name.
+    /// The origin, as one line: for example the recording's file name.
     pub source: &'a str,
     /// The run.
     pub run: &'a Run,
-    /// The signal whose values are numbers of steps; 0 is none.
+    /// The signal whose values are step numbers; 0 means no step.
     pub steps: Option<usize>,
-    /// Signals that say, while they are on, that there is a fault.
+    /// Signals that report a fault while they are on.
     pub faults: &'a [usize],
     /// Statistics of a driver or a PLC program.
     pub statistics: Option<&'a Statistics>,
-    /// Texts to be shown as they are, each under its heading.
+    /// Texts to be shown verbatim, each under its heading.
     pub texts: &'a [(String, String)],
 }
 
-/// What lasted, drawn above the signals.
+/// States that last, drawn above the signals.
 struct Band {
     name: String,
     kind: &'static str,
@@ -55,7 +55,7 @@ struct Band {
 ///
 /// # Errors
 ///
-/// What `out` gives.
+/// Errors of `out`.
 pub fn write(contents: &Contents<'_>, out: &mut dyn Write) -> io::Result<()> {
     let run = contents.run;
     let (begin, end) = run.extent();
@@ -144,7 +144,7 @@ fn bands(contents: &Contents<'_>) -> Vec<Band> {
     bands
 }
 
-/// The class of a state of a line, by its word.
+/// The CSS class of a line state, by its word.
 pub(super) fn state_class(word: &str) -> &'static str {
     match word {
         "running" | "live" => "good",
@@ -210,7 +210,7 @@ fn facts(contents: &Contents<'_>, bands: &[Band]) -> String {
     out
 }
 
-/// For which share of the time all lines were live; none if nothing is known of them.
+/// The share of the time for which all lines were live; `None` if nothing is known about them.
 #[expect(clippy::cast_precision_loss, reason = "a share, for people")]
 fn share_good(bands: &[Band]) -> Option<f64> {
     let (mut good, mut all) = (0_i64, 0_i64);
@@ -311,7 +311,7 @@ fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> String {
     out
 }
 
-/// What the statistics say of the line as it is at the end.
+/// The final state of the line according to the statistics.
 fn line(out: &mut String, statistics: &Statistics) {
     let Some(state) = statistics.get("state") else {
         return;
@@ -363,7 +363,7 @@ fn figures_of_signals(out: &mut String, contents: &Contents<'_>) {
     }
 }
 
-/// What the script works with: the run as JSON, and a packed block for each signal.
+/// The script's data: the run as JSON, and a packed block per signal.
 fn data(
     contents: &Contents<'_>,
     bands: &[Band],
@@ -404,7 +404,7 @@ fn data(
             signal.changes().len(),
             coding.name()
         )?;
-        // Infinite numbers are none in JSON, and no chart can show them.
+        // JSON has no infinite numbers, and a chart cannot show them.
         if let Some((low, high)) = signal
             .range()
             .filter(|(low, high)| low.is_finite() && high.is_finite())
@@ -446,13 +446,13 @@ fn data(
     out.write_all(b"]}</script>\n")
 }
 
-/// How many changes each of equal parts of the run has.
+/// The number of changes in each of equal parts of the run.
 fn activity(run: &Run) -> Vec<u64> {
     let (begin, end) = run.extent();
     let length = i128::from((end - begin).0) + 1;
     let mut bars = vec![0; ACTIVITY];
     for signal in run.signals() {
-        // The first change is the first value, no change.
+        // The first entry is the initial value, not a change.
         for change in signal.changes().iter().skip(1) {
             let bar = i128::from((change.at - begin).0) * ACTIVITY as i128 / length;
             if let Some(bar) = usize::try_from(bar).ok().and_then(|bar| bars.get_mut(bar)) {

@@ -1,15 +1,15 @@
-//! What a report knows of a run.
+//! What a report knows about a run.
 
 use tickbus_base::time::{Nanos, Spans};
 
-/// How many changes a report holds, over all signals, unless told otherwise. A page of so many opens
-/// within seconds.
+/// The default number of changes that a report holds, over all signals. A page of that size opens within
+/// seconds.
 pub const DEFAULT_BUDGET: usize = 10_000_000;
 
-/// Marks beyond this many are only counted.
+/// Marks beyond this number are only counted.
 const MOST_MARKS: usize = 10_000;
 
-/// What a signal's values are.
+/// The type of a signal's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// 0 or 1.
@@ -18,7 +18,7 @@ pub enum Kind {
     Real,
 }
 
-/// From `at` on, a signal has `value`; NaN where nobody knows it.
+/// From `at` on, a signal has `value`; NaN if it is unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Simulation time.
@@ -27,12 +27,12 @@ pub struct Change {
     pub value: f64,
 }
 
-/// One signal and what it did.
+/// One signal and its changes.
 #[derive(Clone, Debug)]
 pub struct Signal {
-    /// Its name, whatever characters that has.
+    /// Its name; may contain any characters.
     pub name: String,
-    /// What its values are.
+    /// The type of its values.
     pub kind: Kind,
     /// The unit of its values; empty if it has none.
     pub unit: String,
@@ -44,28 +44,29 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// Its changes, in the order of time. The first is its first known value.
+    /// Its changes, in time order. The first is its first known value.
     pub fn changes(&self) -> &[Change] {
         &self.changes
     }
 
-    /// How often it changed in the recording; more than it has changes here once it was thinned.
+    /// The number of its changes in the recording; greater than the number of changes held here once it was
+    /// thinned.
     pub fn seen(&self) -> u64 {
         self.seen
     }
 
-    /// How many edges were counted, also those that merged within a tick; none if they were not counted.
+    /// The number of edges, including those that merged within a tick; `None` if they were not counted.
     pub fn edges(&self) -> Option<u64> {
         self.edges
     }
 
-    /// Zero for a signal that has every change of the recording. A thinned one has, of each span of
-    /// this length, the least, the greatest and the last value.
+    /// Zero for a signal with all changes of the recording. A thinned one has the least, the greatest and the
+    /// last value of each span of this length.
     pub fn resolution(&self) -> Nanos {
         self.resolution
     }
 
-    /// Its least and its greatest value, if it has any.
+    /// Its least and its greatest value, if known.
     pub fn range(&self) -> Option<(f64, f64)> {
         self.span
     }
@@ -78,14 +79,14 @@ impl Signal {
             .map_or(f64::NAN, |last| self.changes[last].value)
     }
 
-    /// Takes a change; one that changes nothing is left out.
+    /// Adds a change, unless it changes nothing.
     fn push(&mut self, at: Nanos, value: f64) -> bool {
         if let Some(last) = self.changes.last_mut() {
             if same(last.value, value) {
                 return false;
             }
             if last.at >= at {
-                // Two values at one time: the later one holds.
+                // Two values at the same time: the later one applies.
                 last.value = value;
                 self.widen(value);
                 return false;
@@ -105,8 +106,8 @@ impl Signal {
         self.span = Some((low.min(value), high.max(value)));
     }
 
-    /// Makes the changes fewer than half as many: of each of equal spans, only the least, the greatest and the
-    /// last remain.
+    /// Reduces the changes to less than half: for each of equal spans, only the least, the greatest and the
+    /// last value remain.
     fn thin(&mut self) {
         let (Some(first), Some(last)) = (self.changes.first(), self.changes.last()) else {
             return;
@@ -140,7 +141,7 @@ impl Signal {
     }
 }
 
-/// Whether two values are the same to a reader: NaN is NaN.
+/// Whether two values look the same to a reader: NaN equals NaN.
 #[expect(clippy::float_cmp, reason = "a change is any change")]
 fn same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
@@ -149,10 +150,10 @@ fn same(a: f64, b: f64) -> bool {
 /// What a mark is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MarkKind {
-    /// The line came into a state, and is in it until the next mark of this kind. The text is the state,
-    /// and after ": " a reason.
+    /// The line entered a state, which lasts until the next mark of this kind. The text is the state,
+    /// optionally followed by ": " and a reason.
     Link,
-    /// A step began, and lasts until the next mark of this kind; an empty text: none is active.
+    /// A step began, which lasts until the next mark of this kind; with an empty text no step is active.
     Step,
     /// A fault: a jam, or one that was injected.
     Fault,
@@ -162,25 +163,25 @@ pub enum MarkKind {
     Note,
 }
 
-/// Something that happened at a time, or lasted from then on.
+/// Something that happened at a time, or that began then.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mark {
     /// When it began.
     pub at: Nanos,
     /// When it ended, where that is known.
     pub until: Option<Nanos>,
-    /// What it is about.
+    /// Its kind.
     pub kind: MarkKind,
-    /// Whom it concerns, where there are several: the station of a line's state.
+    /// Its subject, where there are several: for a line state, the station.
     pub of: String,
-    /// What is to be said of it.
+    /// Its text.
     pub text: String,
 }
 
-/// A run: its signals with their changes, its ticks and its marks, fed in the order of time.
+/// A run: its signals with their changes, its ticks and its marks, fed in time order.
 ///
-/// It takes no more memory than its budget of changes allows, however long the run: when the budget is used up,
-/// the signal with the most changes is thinned.
+/// Its memory is limited by its budget of changes, however long the run: when the budget is used up, the
+/// signal with the most changes is thinned.
 #[derive(Debug)]
 pub struct Run {
     signals: Vec<Signal>,
@@ -197,7 +198,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// A run without signals, of at most so many changes in all.
+    /// A run without signals, for at most `budget` changes in all.
     pub fn new(budget: usize) -> Self {
         Self {
             signals: Vec::new(),
@@ -214,7 +215,7 @@ impl Run {
         }
     }
 
-    /// Adds a signal and gives its number.
+    /// Adds a signal and returns its number.
     pub fn add_signal(&mut self, name: &str, kind: Kind, unit: &str) -> usize {
         self.signals.push(Signal {
             name: name.to_owned(),
@@ -229,7 +230,7 @@ impl Run {
         self.signals.len() - 1
     }
 
-    /// Takes a tick.
+    /// Adds a tick.
     pub fn tick(&mut self, at: Nanos) {
         self.ticks += 1;
         self.see(at);
@@ -241,23 +242,23 @@ impl Run {
         }
     }
 
-    /// Forgets the last tick: the next one does not follow it, as some in between were not recorded.
+    /// Forgets the last tick: the next one does not follow it, because ticks between them were not recorded.
     pub fn skip(&mut self) {
         self.last_tick = None;
     }
 
-    /// Takes a value of a signal; a time before the signal's last change counts as that.
+    /// Adds a value of a signal; a time before the signal's last change is moved to it.
     ///
     /// # Panics
     ///
-    /// When there is no signal of this number.
+    /// When no signal has this number.
     pub fn change(&mut self, signal: usize, at: Nanos, value: f64) {
         self.see(at);
         if !self.signals[signal].push(at, value) {
             return;
         }
         self.changes += 1;
-        // Too few changes do not get fewer by thinning.
+        // A signal with too few changes cannot be thinned.
         while self.changes > self.budget {
             let largest = self
                 .signals
@@ -272,11 +273,11 @@ impl Run {
         }
     }
 
-    /// Calls a signal a bool whose values were never but 0 and 1.
+    /// Turns a signal into a bool if its values were only ever 0 and 1.
     ///
     /// # Panics
     ///
-    /// When there is no signal of this number.
+    /// When no signal has this number.
     pub fn call_bool_if_it_looks_like_one(&mut self, signal: usize) {
         let signal = &mut self.signals[signal];
         let mut values = signal.changes.iter().map(|change| change.value);
@@ -288,16 +289,16 @@ impl Run {
         }
     }
 
-    /// Takes edges that were counted of a signal.
+    /// Adds edges of a signal to their count.
     ///
     /// # Panics
     ///
-    /// When there is no signal of this number.
+    /// When no signal has this number.
     pub fn count_edges(&mut self, signal: usize, edges: u64) {
         *self.signals[signal].edges.get_or_insert(0) += edges;
     }
 
-    /// Takes a mark.
+    /// Adds a mark.
     pub fn mark(&mut self, mark: Mark) {
         self.see(mark.at);
         if self.marks.len() < MOST_MARKS {
@@ -312,38 +313,38 @@ impl Run {
         self.extent = Some((first.min(at), last.max(at)));
     }
 
-    /// The signals, in the order in which they were added.
+    /// The signals, in the order of their addition.
     pub fn signals(&self) -> &[Signal] {
         &self.signals
     }
 
-    /// The number of the signal with a name.
+    /// The number of the signal with this name.
     pub fn signal(&self, name: &str) -> Option<usize> {
         self.signals.iter().position(|signal| signal.name == name)
     }
 
-    /// The marks, in the order in which they came.
+    /// The marks, in the order of their addition.
     pub fn marks(&self) -> &[Mark] {
         &self.marks
     }
 
-    /// Marks that were too many to keep.
+    /// The number of marks that were not kept.
     pub fn marks_left_out(&self) -> u64 {
         self.marks_left_out
     }
 
-    /// How many ticks it had.
+    /// The number of ticks.
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
 
-    /// Its first and its last moment; zero and zero if nothing happened.
+    /// Its first and last time; zero for both if nothing happened.
     pub fn extent(&self) -> (Nanos, Nanos) {
         self.extent.unwrap_or_default()
     }
 
-    /// Times from one tick to the next: their distribution, the shortest and the longest; none for fewer than two
-    /// ticks.
+    /// The times between successive ticks: their distribution, the shortest and the longest; `None` for fewer
+    /// than two ticks.
     pub fn intervals(&self) -> Option<(&Spans, Nanos, Nanos)> {
         (self.intervals.count() > 0).then_some((&self.intervals, self.shortest, self.longest))
     }

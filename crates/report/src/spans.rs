@@ -1,23 +1,23 @@
-//! What lasted: steps, states of the line, faults, gaps.
+//! Things that last: steps, line states, faults, gaps.
 
 use super::{MarkKind, Run};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 
-/// Something that lasted.
+/// Something with a beginning and an end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) from: Nanos,
-    /// Its end; that of the run, if nothing ended it.
+    /// Its end; the end of the run if nothing ended it.
     pub(super) until: Nanos,
-    /// Whether it went on when the run ended, as far as is known.
+    /// Whether it was still going on when the run ended, as far as is known.
     pub(super) is_open: bool,
-    /// Whom it concerns; mostly empty.
+    /// Its subject; usually empty.
     pub(super) of: String,
     pub(super) text: String,
 }
 
-/// Steps: from the marks of the run, or else the values of the signal with this number; 0 is no step.
+/// Steps: from the marks of the run, or else the values of the signal with this number; 0 means no step.
 pub(super) fn steps(run: &Run, signal: Option<usize>) -> Vec<Span> {
     let marked = states(run, MarkKind::Step, "");
     let Some(signal) = signal.filter(|_| marked.is_empty()) else {
@@ -38,7 +38,7 @@ pub(super) fn steps(run: &Run, signal: Option<usize>) -> Vec<Span> {
     one_after_another(texts, "", run)
 }
 
-/// Whom marks of a kind concern, in the order in which they first occur.
+/// The subjects of marks of a kind, in order of first occurrence.
 pub(super) fn concerned(run: &Run, kind: MarkKind) -> Vec<&str> {
     let mut found: Vec<&str> = Vec::new();
     for mark in run.marks().iter().filter(|mark| mark.kind == kind) {
@@ -49,7 +49,7 @@ pub(super) fn concerned(run: &Run, kind: MarkKind) -> Vec<&str> {
     found
 }
 
-/// States, each of which lasts until the next mark of its kind about the same one; an empty text is none.
+/// States, each of which lasts until the next mark of its kind and subject; an empty text is no state.
 pub(super) fn states(run: &Run, kind: MarkKind, of: &str) -> Vec<Span> {
     let marks = run
         .marks()
@@ -58,7 +58,7 @@ pub(super) fn states(run: &Run, kind: MarkKind, of: &str) -> Vec<Span> {
     one_after_another(marks.map(|mark| (mark.at, mark.text.clone())), of, run)
 }
 
-/// What has its own end: faults and gaps.
+/// Marks with their own end: faults and gaps.
 pub(super) fn events(run: &Run, kind: MarkKind) -> Vec<Span> {
     let (_, end) = run.extent();
     let marks = run.marks().iter().filter(|mark| mark.kind == kind);
@@ -73,7 +73,7 @@ pub(super) fn events(run: &Run, kind: MarkKind) -> Vec<Span> {
         .collect()
 }
 
-/// When a signal was on: not 0, and known.
+/// The times during which a signal was on: known and not 0.
 pub(super) fn while_on(run: &Run, signal: usize) -> Vec<Span> {
     let signal = &run.signals()[signal];
     let is_on = |value: f64| value != 0.0 && !value.is_nan();

@@ -1,29 +1,29 @@
-//! Reading statistics back: `key=value` lines, as `docs/statistics.md` has them.
+//! Reading statistics: `key=value` lines, as documented in `docs/statistics.md`.
 
-/// Statistics of a driver or of a PLC program. Of several blocks, the last value of each key counts.
+/// Statistics of a driver or of a PLC program. If a key occurs more than once, its last value counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics(Vec<(String, String)>);
 
-/// One distribution among them.
+/// One distribution of the statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Distribution {
     pub(super) name: String,
-    /// The unit of all but the count; empty for plain numbers.
+    /// The unit of all values except the count; empty for plain numbers.
     pub(super) unit: &'static str,
     pub(super) count: u64,
     /// The median, the 90th and 99th percentile, the maximum, and the mean.
     pub(super) values: [f64; 5],
 }
 
-/// What `values` of a distribution are called in the text.
+/// The names of `values` in the text.
 const VALUES: [&str; 5] = ["p50", "p90", "p99", "max", "mean"];
 
-/// The units of distributions: by the end of a key, and for people.
+/// The units of distributions: as the suffix of a key, and as shown to people.
 const UNITS: [(&str, &str); 2] = [("_us", "µs"), ("", "")];
 
 impl Statistics {
-    /// Reads the statistics out of a text; lines that are none are passed over, so that the whole output of a command
-    /// may be given.
+    /// Reads the statistics in a text; other lines are skipped, so that the complete output of a command may
+    /// be given.
     pub fn read(text: &str) -> Self {
         let mut found: Vec<(String, String)> = Vec::new();
         let mut places = std::collections::HashMap::new();
@@ -31,7 +31,8 @@ impl Statistics {
             let Some((key, value)) = line.trim().split_once('=') else {
                 continue;
             };
-            // A signal's name may stand in a key, spaces and all; a sentence with a "=" in it has ": " before that.
+            // A key may contain a signal's name, spaces included; a sentence that contains "=" has ": "
+            // before it.
             if key.is_empty() || key.contains(": ") {
                 continue;
             }
@@ -61,7 +62,7 @@ impl Statistics {
             .map(|(_, value)| &**value)
     }
 
-    /// The distributions that have counted anything.
+    /// The distributions that are not empty.
     pub(super) fn distributions(&self) -> Vec<Distribution> {
         let names = self
             .0

@@ -10,10 +10,10 @@ use super::{Kind, Run, Signal, Statistics, figures};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 
-/// Rows of a list beyond this many are left out, and counted.
+/// Further rows of a list are left out, and counted.
 const MOST_ROWS: usize = 1_000;
 
-/// How times in the page reach the script: in units since the run began.
+/// Converts times for the script: to units since the start of the run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub(super) begin: Nanos,
@@ -21,7 +21,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// A time in units, which may be broken.
+    /// A time in units, possibly fractional.
     #[expect(clippy::cast_precision_loss, reason = "a place in a chart")]
     pub(super) fn units(self, at: Nanos) -> f64 {
         (at - self.begin).0 as f64 / self.unit as f64
@@ -35,12 +35,12 @@ impl Scale {
     }
 }
 
-/// Heading cells; those that begin with ">" are over numbers.
+/// Heading cells; those that begin with ">" head columns of numbers.
 fn head(out: &mut String, caption: &str, cells: &[&str]) {
     begin(out, "wide", caption, cells);
 }
 
-/// The same with a class; "list" is for narrow rows, which stand in several columns where there is room.
+/// As [`head`], with a class; "list" is for narrow rows, which are set in several columns if there is room.
 fn begin(out: &mut String, class: &str, caption: &str, cells: &[&str]) {
     let _ = write!(
         out,
@@ -73,13 +73,13 @@ fn left_out(out: &mut String, total: usize) {
     }
 }
 
-/// Steps: how often and how long each, then one after another.
+/// Steps: the number and length of each, then their sequence.
 pub(super) fn steps(out: &mut String, steps: &[Span], scale: Scale) {
     let mut by_text: BTreeMap<(u64, &str), Vec<Nanos>> = BTreeMap::new();
     for step in steps {
-        // By number where they are numbers.
+        // In numerical order if they are numbers.
         let number = step.text.parse().unwrap_or(u64::MAX);
-        // One that the run's end cut off tells nothing about how long it takes.
+        // A step cut off by the end of the run says nothing about its length.
         let lengths = by_text.entry((number, &step.text)).or_default();
         if !step.is_open {
             lengths.push(step.until - step.from);
@@ -143,7 +143,7 @@ fn begin_and_length(out: &mut String, step: &Span, scale: Scale) {
     let _ = write!(out, "<td class=\"n\">{length}{open}</td>");
 }
 
-/// Faults, gaps, notes: each with its kind, begin and duration.
+/// Faults, gaps, notes: each with kind, beginning and duration.
 pub(super) fn events(out: &mut String, events: &[(&str, Span)], scale: Scale) {
     head(
         out,
@@ -192,7 +192,7 @@ pub(super) fn states(out: &mut String, states: &[Span], scale: Scale) {
     left_out(out, states.len());
 }
 
-/// Distributions of a statistics text, each with a figure.
+/// The distributions of the statistics, each with a figure.
 pub(super) fn distributions(out: &mut String, distributions: &[Distribution]) {
     let cells = [
         "Distribution",
@@ -247,7 +247,7 @@ pub(super) fn statistics(out: &mut String, statistics: &Statistics) {
     end(out);
 }
 
-/// What each signal did, in figures.
+/// A summary of each signal.
 pub(super) fn signals(out: &mut String, run: &Run) {
     let cells = [
         "Signal",
@@ -294,7 +294,7 @@ pub(super) fn signals(out: &mut String, run: &Run) {
     end(out);
 }
 
-/// For which share of the run a bool was on.
+/// The share of the run during which a bool was on.
 #[expect(clippy::cast_precision_loss, reason = "a share, for people")]
 fn share_on(signal: &Signal, run: &Run) -> Option<f64> {
     let (begin, end) = run.extent();

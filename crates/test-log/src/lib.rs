@@ -1,18 +1,18 @@
-//! What the log has been told: a warning that no test has asked for fails the process of the tests.
+//! Makes a test process fail on any unexpected warning in the log.
 //!
-//! What happens to a line is what most of these tests are about, and they ask the line itself. So its state is expected
-//! in the log, unless it is a defect, and so is a fault that was injected. Every other warning has to be
-//! [expected](expect).
+//! Most of these tests are about line states, which they check on the line itself. So changes of state are
+//! always expected in the log, unless the cause is a defect, and so are injected faults. Every other warning
+//! must be [expected](expect).
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// The log of this process, as far as it is not expected yet.
+/// The log of this process, as far as it was not expected.
 struct Ledger {
     /// Drivers that are open.
     open: usize,
     /// The part of tickbus whose messages count.
     part: &'static str,
-    /// Words of lines that may come, and how many have.
+    /// Texts of lines that may appear, and how many have.
     expected: Vec<(&'static str, u64)>,
     unexpected: Vec<String>,
 }
@@ -57,7 +57,7 @@ impl Ledger {
     }
 }
 
-/// Whether it tells the state of a driver's line, and no defect; or a fault that a test has injected.
+/// Whether a line reports a line state other than a defect, or a fault that a test has injected.
 fn is_asked_for(line: &str) -> bool {
     if line.contains("\": injected fault \"") {
         return true;
@@ -71,7 +71,7 @@ fn is_asked_for(line: &str) -> bool {
     })
 }
 
-/// A warning with these words is part of a test.
+/// A warning with this text is part of a test.
 pub fn expect(words: &'static str) {
     let mut ledger = ledger();
     ledger.unexpected.retain(|line| !line.contains(words));
@@ -80,7 +80,7 @@ pub fn expect(words: &'static str) {
     }
 }
 
-/// How many warnings have come with the words of an [expectation](expect).
+/// How many warnings have matched the text of an [expectation](expect).
 pub fn times(words: &str) -> u64 {
     let ledger = ledger();
     let mut expected = ledger.expected.iter();
@@ -98,9 +98,9 @@ impl Watch {
         Self::over("tickbus")
     }
 
-    /// Where tests of other parts of tickbus run in the same process, and nobody looks after what they log.
+    /// For processes that also run tests of other parts of tickbus, whose messages are not checked.
     pub fn over(part: &'static str) -> Self {
-        // It fails where another test was first, or the process has a logger of its own.
+        // Fails if another test was first, or if the process has its own logger.
         if log::set_logger(&Logger).is_ok() {
             log::set_max_level(log::LevelFilter::Warn);
         }

@@ -1,4 +1,4 @@
-//! Conditions on signals, as a test file writes them.
+//! Conditions on signals in test files.
 
 use std::fmt;
 
@@ -8,38 +8,38 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
 use super::watch::{Watch, real};
 
-/// A condition on one signal: those of faults, and what only a test asks for.
+/// A condition on one signal: those that faults have, and further ones only for tests.
 ///
 /// | text | holds when |
 /// |---|---|
-/// | `NAME`, `not NAME` | it is on, it is off |
-/// | `NAME == 3`, `!=`, `<`, `<=`, `>`, `>=` | it compares so |
-/// | `NAME == 120 ± 0.5` (or `+- 0.5`) | it is that near |
-/// | `NAME rises`, `NAME falls` | it has gone on, off, since the wait began |
+/// | `NAME`, `not NAME` | the signal is on, is off |
+/// | `NAME == 3`, `!=`, `<`, `<=`, `>`, `>=` | the comparison is true |
+/// | `NAME == 120 ± 0.5` (or `+- 0.5`) | the value is within the tolerance |
+/// | `NAME rises`, `NAME falls` | it has switched on, off, since the wait began |
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     /// Index of the signal in the table.
     pub signal: usize,
-    /// What must be true of it.
+    /// The condition itself.
     pub demand: Demand,
 }
 
-/// What must be true of a signal.
+/// A condition, without its signal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Demand {
     /// It is not 0.
     On,
     /// It is 0.
     Off,
-    /// It compares as the text says.
+    /// The comparison in the text is true.
     Compares(faults::Condition, String),
-    /// It differs from a number by no more than another.
+    /// It differs from the first number by at most the second.
     Near(f64, f64),
-    /// It is a 64-bit integer with these bits, which is nearly this number.
+    /// It is a 64-bit integer with these bits; the number is its nearest double.
     Is(Slot, f64),
-    /// It has gone from 0 to something else since the wait began.
+    /// It has changed from 0 to another value since the wait began.
     Rises,
-    /// It has gone to 0 since the wait began.
+    /// It has changed to 0 since the wait began.
     Falls,
 }
 
@@ -51,7 +51,7 @@ impl Condition {
     ///
     /// # Errors
     ///
-    /// What is wrong, and what would be right: there is no such signal, or nothing that it is compared with.
+    /// What is wrong, and what would be right: the signal or the number to compare with is invalid.
     pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Wrong> {
         let text = text.trim();
         if let Some(signal) = table.position(text) {
@@ -98,7 +98,7 @@ impl Condition {
         Ok(Self { signal, demand })
     }
 
-    /// Whether it holds for a signal that is as `watch` and `slots` have it; edges count from the bookmark on.
+    /// Whether it holds for a signal with this history and these slots; edges count from the bookmark on.
     pub(super) fn holds(&self, watch: &Watch, slots: &[Slot], since: Bookmark) -> bool {
         match &self.demand {
             Demand::On => watch.value() != 0.0,
@@ -111,14 +111,14 @@ impl Condition {
         }
     }
 
-    /// Whether it is about an edge and not a level.
+    /// Whether it is about an edge rather than a level.
     pub(super) const fn is_edge(&self) -> bool {
         matches!(self.demand, Demand::Rises | Demand::Falls)
     }
 }
 
 impl Demand {
-    /// The signal has the value of this slot, as near as its type can have it.
+    /// The signal has the value of this slot, within the resolution of its type.
     pub(super) fn equal(slot: Slot, signal: &Signal) -> Self {
         let number = real(slot, signal);
         match signal.data_type {
@@ -133,7 +133,7 @@ impl Demand {
     }
 }
 
-/// Where the counts of edges stood when a wait began.
+/// The edge counts at the beginning of a wait.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bookmark {
     rises: u64,
@@ -149,7 +149,7 @@ impl Bookmark {
     }
 }
 
-/// What is expected, after the name of the signal: `on`, `> 3`.
+/// Writes the expectation without the signal's name: `on`, `> 3`.
 impl fmt::Display for Demand {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -174,9 +174,9 @@ impl fmt::Display for Demand {
     }
 }
 
-/// A condition that only a BOOL can meet.
+/// A condition that only applies to a BOOL.
 fn bit(signal: usize, demand: Demand, table: &SignalTable) -> Result<Condition, Wrong> {
-    // Faults know what to say of other types.
+    // The faults' conditions have the error for other types.
     faults::Condition::parse(&table.signals[signal].name, table)?;
     Ok(Condition { signal, demand })
 }

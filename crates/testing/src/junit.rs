@@ -1,4 +1,4 @@
-//! Results in the XML format of `JUnit`, which every CI server reads.
+//! Results in the XML format of `JUnit`, which all CI servers read.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -19,22 +19,22 @@ pub struct Case {
     pub name: String,
     /// The line of the file where it begins.
     pub line: usize,
-    /// How long it took, on the clock on the wall.
+    /// How long it took, in wall time.
     pub took: Duration,
-    /// What came of it.
+    /// Its result.
     pub verdict: Verdict,
-    /// What more there is to tell, for the report's output.
+    /// Further information for the report's output.
     pub output: String,
 }
 
-/// What came of one test.
+/// The result of one test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// It passed.
     Passed,
-    /// An expectation failed: in one line, and in full.
+    /// An expectation failed: as one line, and in full.
     Failed(String, String),
-    /// It could not be run: in one line, and in full.
+    /// It could not be run: as one line, and in full.
     Wrong(String, String),
 }
 
@@ -102,7 +102,8 @@ fn write_case(text: &mut String, file: &str, case: &Case) {
     text.push_str("    </testcase>\n");
 }
 
-/// Text for an element or an attribute. What XML cannot have at all becomes the sign for that.
+/// Text escaped for an element or an attribute. Characters that XML does not allow become the replacement
+/// character.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -111,7 +112,7 @@ fn escaped(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // An attribute would show them as blanks.
+            // In an attribute they would be read as blanks.
             '\n' | '\t' | '\r' => {
                 let _ = write!(out, "&#{};", u32::from(c));
             }

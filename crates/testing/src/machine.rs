@@ -7,7 +7,7 @@ use super::condition::{Bookmark, Condition};
 use super::suite::Rule;
 use super::watch::Watch;
 
-/// Rules with what they remember from tick to tick.
+/// Rules, and their state from tick to tick.
 #[derive(Debug)]
 pub(super) struct Stub<'a> {
     rules: Vec<Armed<'a>>,
@@ -16,13 +16,13 @@ pub(super) struct Stub<'a> {
 #[derive(Debug)]
 struct Armed<'a> {
     rule: &'a Rule,
-    /// Per condition of the rule, the edges that are over.
+    /// Per condition of the rule, the edges that have been used up.
     since: Vec<Bookmark>,
-    /// Whether the condition held in the tick before.
+    /// Whether the condition held in the previous tick.
     held: bool,
-    /// When the rule does what it does; `None` once it has, or while its condition does not hold.
+    /// When the rule takes effect; `None` once it has, or while its condition does not hold.
     due: Option<Nanos>,
-    /// Whether it has done so and its condition still holds.
+    /// Whether it has taken effect and its condition still holds.
     done: bool,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Stub<'a> {
         }
     }
 
-    /// One tick of `step` that ends at `now`: looks at what the PLC commanded, and sets what the sensors show.
+    /// One tick of `step` that ends at `now`: checks what the PLC commanded, and sets the sensors.
     pub(super) fn step(&mut self, now: Nanos, step: Nanos, watches: &[Watch], slots: &mut [Slot]) {
         for armed in &mut self.rules {
             armed.step(now, step, watches, slots);
@@ -55,7 +55,7 @@ impl Armed<'_> {
         let holds = all.all(|(one, since)| one.holds(&watches[one.signal], slots, *since));
         let edge = rule.when.iter().any(Condition::is_edge);
         if edge {
-            // An edge is over at once, but what it has begun comes to its end.
+            // An edge is over at once, but its effect still takes place.
             self.since.clear();
             self.since.extend(bookmarks(rule, watches));
             if holds {

@@ -1,4 +1,4 @@
-//! A recording in the place of the machine: what its sensors showed then, they show again.
+//! A recording in place of the machine: its sensors show what they showed when it was recorded.
 
 use std::path::{Path, PathBuf};
 
@@ -13,11 +13,11 @@ use super::suite::Place;
 #[derive(Clone, Debug)]
 pub(super) struct Tape {
     file: PathBuf,
-    /// Column and signal of what the machine sent.
+    /// Column and signal of each value that the machine sent.
     sent: Vec<(usize, usize)>,
-    /// Column and signal of what the PLC must send as it did then.
+    /// Column and signal of each value that the PLC must send as recorded.
     compared: Vec<(usize, usize)>,
-    /// Where the test file says so.
+    /// Its position in the test file.
     pub(super) place: Place,
 }
 
@@ -25,8 +25,8 @@ pub(super) struct Tape {
 type Wrong = (String, String);
 
 impl Tape {
-    /// Opens the recording at `file`, which must have signals of `table`; `own` is the area that the machine
-    /// writes.
+    /// Opens the recording at `file`, which must contain signals of `table`; `own` is the area that the
+    /// machine writes.
     pub(super) fn open(
         file: &Path,
         table: &SignalTable,
@@ -57,7 +57,7 @@ impl Tape {
         })
     }
 
-    /// Adds a signal that the PLC must send as it did then.
+    /// Adds a signal that the PLC must send as recorded.
     pub(super) fn compare(&mut self, index: usize, table: &SignalTable) -> Result<(), Wrong> {
         let signal = &table.signals[index];
         let recording =
@@ -78,13 +78,13 @@ impl Tape {
         Ok(())
     }
 
-    /// Its file, as messages name it.
+    /// The name of its file, for messages.
     pub(super) fn name(&self) -> String {
         self.file.display().to_string()
     }
 }
 
-/// The column of a signal, if the recording has one, and if it is of the same kind.
+/// The column of a signal, if the recording has one of the same kind.
 fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Wrong> {
     let columns = recording.columns();
     let Some(index) = columns.position(&signal.name, false) else {
@@ -110,7 +110,7 @@ fn kind(signal: &Signal) -> Kind {
     Kind::of(signal.data_type, signal.scale.is_some())
 }
 
-/// A signal that is not as it was recorded.
+/// A signal that differs from the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Difference {
     pub(super) signal: usize,
@@ -127,7 +127,7 @@ pub(super) struct Playback<'a> {
     next: Tick,
     more: bool,
     present: Tick,
-    /// Whether a recorded tick fell on this tick.
+    /// Whether a recorded tick was applied in this tick.
     taken: bool,
     offset: Option<Nanos>,
 }
@@ -148,7 +148,7 @@ impl<'a> Playback<'a> {
         })
     }
 
-    /// One tick that ends at `now`: sets what the sensors showed. The first recorded tick falls on the first one.
+    /// One tick that ends at `now`: sets the sensors. The first recorded tick is applied in the first one.
     pub(super) fn step(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), RecordingError> {
         let offset = *self.offset.get_or_insert(now - self.next.time);
         self.taken = false;
@@ -165,7 +165,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// The first signal that the PLC sends otherwise than it did then.
+    /// The first signal that the PLC sends differently.
     pub(super) fn difference(&self, slots: &[Slot], signals: &[Signal]) -> Option<Difference> {
         if !self.taken {
             return None;

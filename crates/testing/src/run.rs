@@ -13,7 +13,7 @@ use super::playback::{Difference, Playback, Tape};
 use super::suite::{Passage, Place, Step, Suite, Test};
 use super::watch::{Watch, moment, real, span, text_of};
 
-/// What came of one test.
+/// The result of one test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ran {
     /// Ticks that have passed.
@@ -37,14 +37,14 @@ impl Ran {
 pub struct Failure {
     /// Where in the test file.
     pub place: Place,
-    /// When, what was expected and what was seen, in one line.
+    /// The time, what was expected and what was seen, as one line.
     pub what: String,
-    /// What more there is to tell, such as the last changes of the signal, a line each.
+    /// Further information, such as the last changes of the signal, one per line.
     pub more: Vec<String>,
 }
 
 impl Suite {
-    /// Runs one of its tests from a fresh start; with a name, it is recorded to that file.
+    /// Runs one of its tests from the start; with a path, it is recorded to that file.
     ///
     /// # Errors
     ///
@@ -52,7 +52,7 @@ impl Suite {
     pub fn run(&self, test: &Test, record: Option<&Path>) -> Result<Ran, DriverError> {
         let bench = &self.bench;
         let mut config = bench.config.clone();
-        // What the driver.cfg records is the plant's.
+        // Recordings configured in the driver.cfg are the plant's.
         config.record = record
             .map(record::Options::to)
             .transpose()
@@ -62,7 +62,7 @@ impl Suite {
         let playback = playback
             .transpose()
             .map_err(|error| DriverError::Config(error.to_string()))?;
-        // A stepped bus keeps simulation time, and looks at no other clock.
+        // A stepped bus uses simulation time, and no other clock.
         let driver = Driver::open(config, Manual::new())?;
         let mut slots = driver.initial_slots();
         for (signal, value) in bench.initial.iter().chain(&test.initial) {
@@ -96,7 +96,7 @@ impl Suite {
     }
 }
 
-/// A condition with the edges that it counts from.
+/// A condition, and the edge counts at which it started.
 #[derive(Clone, Debug)]
 struct Watched {
     condition: Condition,
@@ -104,7 +104,7 @@ struct Watched {
     since: Bookmark,
 }
 
-/// A condition that has to hold, or must not, at every tick.
+/// A condition that has to hold, or must not hold, at every tick.
 #[derive(Clone, Debug)]
 struct Standing {
     watched: Watched,
@@ -112,7 +112,7 @@ struct Standing {
     from: u64,
 }
 
-/// Everything that a test is run on.
+/// The state of a running test.
 struct Stand<'a> {
     driver: Driver,
     signals: &'a [Signal],
@@ -124,7 +124,7 @@ struct Stand<'a> {
     step: Nanos,
     ticks: u64,
     forced: Vec<(usize, Slot)>,
-    /// Faults that were injected, with their numbers.
+    /// Injected faults and their numbers.
     faults: Vec<(String, u32)>,
     standing: Vec<Standing>,
 }
@@ -204,7 +204,7 @@ impl Stand<'_> {
         (0..count).try_for_each(|_| self.tick(place))
     }
 
-    /// One tick: the machine moves, then the PLC scans if its scan is due.
+    /// One tick: the machine moves, then the PLC is scanned if due.
     fn tick(&mut self, place: Place) -> Result<(), Failure> {
         let now = self.time() + self.step;
         if let Some(playback) = &mut self.playback
@@ -233,7 +233,7 @@ impl Stand<'_> {
             .try_for_each(|standing| self.check_standing(standing))
     }
 
-    /// Fails where the PLC sends something else than was recorded.
+    /// Fails if the PLC sends something other than recorded.
     fn check_recorded(&self) -> Result<(), Failure> {
         let (Some(playback), Some(tape)) = (&self.playback, self.tape) else {
             return Ok(());
@@ -305,7 +305,7 @@ impl Stand<'_> {
         one.condition.holds(watch, &self.slots, one.since)
     }
 
-    /// Fails with the first of these that does not hold.
+    /// Fails with the first condition that does not hold.
     fn expect(&self, expected: &[Watched], when: &str) -> Result<(), Failure> {
         match expected.iter().find(|one| !self.holds(one)) {
             None => Ok(()),
@@ -319,7 +319,7 @@ impl Stand<'_> {
             never,
             from,
         } = standing;
-        // An edge that must come is awaited, not there at every tick.
+        // A required edge is awaited; it cannot be there at every tick.
         if self.holds(watched) != *never {
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! What the sections of a test file say: the machine, the tests, their steps.
+//! The sections of a test file: the machine, the tests, their steps.
 
 use std::path::Path;
 
@@ -13,16 +13,16 @@ use super::condition::{Condition, Demand};
 use super::playback::Tape;
 use super::suite::{Passage, Place, Ramp, Rule, Step, Test};
 
-/// The longest that time may pass in one go: ten minutes on a fast machine.
+/// The longest time that may pass in one step: ten minutes on a fast machine.
 const MOST_TICKS: i128 = 1_000_000_000;
 
-/// How long a button is pressed: as long as a finger does, and longer than any scan.
+/// How long a button is pressed: about as long as a finger does it, and longer than any scan.
 const PRESS: Nanos = Nanos::from_millis(200);
 
 /// The longest name of a test, in characters.
 const NAME_LIMIT: usize = 200;
 
-/// What is known while the rest is read.
+/// What reading the other sections depends on.
 pub(super) struct Reader<'a> {
     pub(super) table: &'a SignalTable,
     pub(super) role: Role,
@@ -30,7 +30,7 @@ pub(super) struct Reader<'a> {
     pub(super) folder: &'a Path,
 }
 
-/// What a test file says of the machine.
+/// The machine in a test file.
 #[derive(Default)]
 pub(super) struct Machine {
     pub(super) initial: Vec<(usize, Slot)>,
@@ -296,7 +296,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A span of simulation time in ticks: a number of them, or a duration, rounded up or down.
+    /// A span of simulation time in ticks: a number of ticks, or a duration, rounded up or down.
     fn ticks(&self, value: &Value<'_>, up: bool) -> Option<u64> {
         if value.as_text().is_none() {
             return u64::try_from(value.whole(1..=MOST_TICKS)?).ok();
@@ -383,7 +383,7 @@ impl Reader<'_> {
         };
         let fault = |value: Value<'_>| {
             let section = value.table("fault", RIGHT)?;
-            // One that cannot be read has its mistakes reported.
+            // If it cannot be read, its mistakes were reported.
             let fault = faults::read_sections(vec![section], Some(self.table)).pop()?;
             Some((fault, value.place()))
         };

@@ -18,7 +18,7 @@ use super::condition::Condition;
 use super::playback::Tape;
 use super::sections::{Machine, Reader};
 
-/// The step of a test file that states none.
+/// The default step of a test file.
 const STEP: Nanos = Nanos::from_millis(1);
 
 /// Line and column, both from 1.
@@ -34,7 +34,7 @@ pub struct Suite {
     pub(super) bench: Bench,
 }
 
-/// What the tests of one file have in common.
+/// What the tests of a file have in common.
 #[derive(Clone, Debug)]
 pub(super) struct Bench {
     pub(super) config: Config,
@@ -55,7 +55,7 @@ pub struct Test {
     pub(super) steps: Vec<Step>,
 }
 
-/// One step: some signals are set, time passes, something is expected; in this order.
+/// One step: sets some signals, lets time pass, expects something; in this order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
     pub(super) place: Place,
@@ -63,11 +63,11 @@ pub(super) struct Step {
     pub(super) force: Vec<(usize, Slot)>,
     pub(super) release: Vec<usize>,
     pub(super) inject: Vec<(Fault, Place)>,
-    /// Faults to be ended, by their names.
+    /// Faults to end, by name.
     pub(super) end: Vec<(String, Place)>,
     pub(super) passage: Option<Passage>,
     pub(super) expect: Vec<(Condition, Place)>,
-    /// For how many ticks the expectations have to hold.
+    /// For how many ticks the expectations must hold.
     pub(super) during: u64,
     pub(super) always: Vec<(Condition, Place)>,
     pub(super) never: Vec<(Condition, Place)>,
@@ -76,18 +76,18 @@ pub(super) struct Step {
 /// How time passes in a step.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Passage {
-    /// So many ticks.
+    /// This many ticks.
     Ticks(u64),
-    /// So many ticks, with a button pressed.
+    /// This many ticks, with a button pressed.
     Press(usize, u64),
-    /// Until all of these hold, at most so many ticks.
+    /// Until all of these hold, for at most this many ticks.
     Await(Vec<(Condition, Place)>, u64),
 }
 
 /// One rule of the machine's stub.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rule {
-    /// All of these. Never empty.
+    /// All of these must hold. Never empty.
     pub(super) when: Vec<Condition>,
     pub(super) after: Nanos,
     pub(super) set: Vec<(usize, Slot)>,
@@ -100,7 +100,7 @@ pub(super) struct Rule {
 pub(super) struct Ramp {
     pub(super) signal: usize,
     pub(super) to: f64,
-    /// Units a second. Positive.
+    /// Units per second. Positive.
     pub(super) per_second: f64,
 }
 
@@ -109,14 +109,14 @@ impl Suite {
     ///
     /// # Errors
     ///
-    /// With every mistake of the test file; if it has none but its driver.cfg does, with those.
+    /// With every mistake in the test file; if it has none but its driver.cfg does, with those.
     pub fn load(path: &Path) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
         Self::parse(&path.display().to_string(), &text, folder)
     }
 
-    /// Reads the text of a test file; `folder` is where its paths begin.
+    /// Reads the text of a test file; its paths are relative to `folder`.
     ///
     /// # Errors
     ///
@@ -141,7 +141,7 @@ impl Suite {
     }
 }
 
-/// Reads the file; the mistakes of its driver.cfg go to `of_config`.
+/// Reads the file; mistakes in its driver.cfg go to `of_config`.
 fn read(
     mut root: Table<'_>,
     folder: &Path,
@@ -168,7 +168,7 @@ fn read(
     let step = step.map_or(Some(STEP), |value| value.duration());
     let peer = match &program {
         None => Some(None),
-        // The driver.cfg may lie in another folder than this file.
+        // The driver.cfg may be in a different folder from this file.
         Some(program) => {
             Peer::hosted(program, options, scan.as_ref()).map(|peer| Some(peer.seen_from(folder)))
         }
@@ -224,7 +224,7 @@ fn load_config(
     }
 }
 
-/// Puts the PLC program at the other end of the line, and the line on simulation time.
+/// Puts the PLC program at the other end of the line, and the line into simulation time.
 fn on_simulation_time(
     mut config: Config,
     value: &Value<'_>,
@@ -232,7 +232,7 @@ fn on_simulation_time(
     peer: Option<Peer>,
 ) -> Option<Config> {
     if let Some(mut peer) = peer {
-        // A program's file counts from this file, and not from the driver.cfg's folder.
+        // A program's path is relative to this file, and not to the driver.cfg.
         if let Peer::Program { name, .. } = &mut peer
             && plc::Hosted::is_path(name)
             && let Ok(file) = std::path::absolute(folder.join(&*name))
@@ -260,7 +260,7 @@ fn on_simulation_time(
     None
 }
 
-/// No name twice, so that a report tells the tests apart.
+/// Reports duplicate names, so that reports can tell tests apart.
 fn check_twins(tables: &[Table<'_>]) {
     let mut first: HashMap<&str, Value<'_>> = HashMap::new();
     for table in tables {

@@ -1,4 +1,4 @@
-//! What a signal was at the ends of the ticks, as far back as a failure tells.
+//! The recent history of a signal, for failure messages.
 
 use std::fmt::Write as _;
 
@@ -9,19 +9,19 @@ use tickbus_image::signal::{DataType, Signal, Slot};
 /// How many changes are kept.
 const KEPT: usize = 8;
 
-/// One signal's recent past. It allocates nothing while it looks.
+/// A signal's recent history. Updating it allocates nothing.
 #[derive(Clone, Debug)]
 pub(super) struct Watch {
     slot: Slot,
     value: f64,
-    /// Value before and tick of each of the last changes, in a ring.
+    /// Ring buffer of the last changes: previous value, and tick.
     past: [(f64, u64); KEPT],
     changes: u64,
     rises: u64,
     falls: u64,
 }
 
-/// The value in a slot of `signal`; the nearest double where it is a 64-bit integer.
+/// The value in a slot of `signal`; the nearest double if it is a 64-bit integer.
 #[expect(clippy::cast_precision_loss, reason = "for people and comparisons")]
 pub(super) fn real(slot: Slot, signal: &Signal) -> f64 {
     if !signal.is_integer_slot() {
@@ -33,7 +33,7 @@ pub(super) fn real(slot: Slot, signal: &Signal) -> f64 {
     }
 }
 
-/// A value of `signal` for people: `on`, `12.5 mm`.
+/// A value of `signal` formatted for people: `on`, `12.5 mm`.
 pub(super) fn text_of(value: f64, signal: &Signal) -> String {
     if signal.data_type == DataType::Bool {
         return (if value == 0.0 { "off" } else { "on" }).to_owned();
@@ -44,12 +44,12 @@ pub(super) fn text_of(value: f64, signal: &Signal) -> String {
     }
 }
 
-/// A point of simulation time for people.
+/// A point in simulation time formatted for people.
 pub(super) fn moment(tick: u64, step: Nanos) -> String {
     format!("tick {tick} ({})", seconds(tick, step))
 }
 
-/// So many ticks for people.
+/// A number of ticks formatted for people.
 pub(super) fn span(ticks: u64, step: Nanos) -> String {
     let plural = if ticks == 1 { "tick" } else { "ticks" };
     format!("{ticks} {plural} ({})", seconds(ticks, step))
@@ -79,7 +79,7 @@ impl Watch {
         }
     }
 
-    /// Looks at the signal at the end of `tick`.
+    /// Updates the history at the end of `tick`.
     pub(super) fn look(&mut self, slot: Slot, signal: &Signal, tick: u64) {
         if slot == self.slot {
             return;
@@ -108,7 +108,7 @@ impl Watch {
         self.falls
     }
 
-    /// The last changes, in one line.
+    /// The last changes as one line.
     pub(super) fn history(&self, signal: &Signal, step: Nanos) -> String {
         let head = format!(
             "last changes of \"{}\" ({}): ",

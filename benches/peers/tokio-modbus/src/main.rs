@@ -1,5 +1,5 @@
-//! A Modbus server by tokio-modbus, for comparison: 2,048 holding registers. It prints its address and serves
-//! until its stdin ends.
+//! A tokio-modbus server, for comparison: 2,048 holding registers. It prints its address and serves until its
+//! stdin ends.
 
 use std::future::{Ready, ready};
 use std::io::Read as _;

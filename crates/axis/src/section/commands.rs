@@ -6,7 +6,7 @@ use super::{LIST_LIMIT, check_within};
 use crate::{Command, Kind, Mode, Motion};
 use tickbus_base::toml_text::{Table, Value};
 
-/// Reads the commands that an axis of this `kind` has by number.
+/// Reads the numbered commands of an axis of this `kind`.
 pub(super) fn read_commands(
     value: &Value<'_>,
     kind: Option<Kind>,

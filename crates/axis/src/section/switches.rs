@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Table, Value};
 use tickbus_image::signal::section::{Section, Structure, address_of, name_of};
 use tickbus_image::signal::{Addressing, Area, ByteOrder, DataType, Signal, Slot, Width};
 
-/// What is right where a trip point stands.
+/// The remedy where a trip point is expected.
 const POSITION: &str = "write a position in the unit of the axis, such as 395.0";
 
 /// Reads the end switches of the axis with this `number`.

@@ -6,32 +6,32 @@ use std::path::Path;
 
 use libloading::Library as Loaded;
 
-/// A shared library, loaded into this process; dropping it takes it out again.
+/// A shared library, loaded into this process; dropping it unloads it.
 #[derive(Debug)]
 pub struct Library(Loaded);
 
 impl Library {
-    /// Loads the library at `path`. Its initialisers run: whoever names the path vouches for them, as for
-    /// any program that they start. Every symbol that it needs is looked up at once, so that one that is
-    /// missing is an error here, not a crash later; its own are offered to no other library.
+    /// Loads the library at `path`. Its initialisers run: the caller vouches for the file, as for any program
+    /// that they start. All symbols that it imports are resolved at once, so that a missing one is an error
+    /// here and not a crash later; its exports are not visible to other libraries.
     ///
     /// # Errors
     ///
-    /// What the system's loader says, in one line.
+    /// The message of the system's loader, as one line.
     pub fn load(path: &Path) -> Result<Self, String> {
         open(path).map(Self).map_err(|error| words(&error))
     }
 
-    /// What stands under an exported symbol: a function, or the address of a variable. It is good as long
-    /// as the library is loaded.
+    /// The value of an exported symbol: a function, or the address of a variable. It is valid as long as the
+    /// library is loaded.
     ///
     /// # Errors
     ///
-    /// There is no such symbol, in the loader's words.
+    /// There is no such symbol; the message is the loader's.
     ///
     /// # Safety
     ///
-    /// `T` is a pointer or a function pointer, of the type that the library has under this name.
+    /// `T` must be a pointer or function pointer of the type that the library declares under this name.
     pub unsafe fn symbol<T: Copy>(&self, name: &str) -> Result<T, String> {
         // SAFETY: the caller answers for the type.
         let found = unsafe { self.0.get::<T>(name) };
@@ -48,27 +48,27 @@ impl Library {
 #[cfg(unix)]
 fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
-    // SAFETY: the initialisers of the library run, and its finalisers when it is dropped. They are foreign
-    // code, which nobody can check here; `load` says who vouches for them.
+    // SAFETY: the initialisers of the library run now, its finalisers when it is dropped. They are foreign
+    // code, which cannot be checked here; the caller of `load` vouches for them.
     unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }.map(Into::into)
 }
 
 #[cfg(windows)]
 fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // SAFETY: as on other systems. The libraries that it needs itself may lie beside it.
+    // SAFETY: as on other systems. Libraries that it imports are also looked for in its own folder.
     unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Into::into)
 }
 
 fn words(error: &libloading::Error) -> String {
-    // On some systems the words stand in the source alone.
+    // On some systems only the source error has the loader's message.
     let text =
         std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string);
     one_line(&text)
 }
 
-/// A text with its line breaks and other control characters as spaces: that of a panic or of a library often
-/// has some.
+/// `text` with line breaks and other control characters replaced by spaces: messages of panics and of
+/// libraries often contain some.
 pub fn one_line(text: &str) -> String {
     let words = text.split(|c: char| c.is_whitespace() || c.is_control());
     let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();

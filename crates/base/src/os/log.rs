@@ -1,4 +1,4 @@
-//! Messages of the log on stderr.
+//! Log messages on stderr.
 
 mod queue;
 
@@ -11,19 +11,19 @@ use log::LevelFilter;
 use crate::time::Nanos;
 use queue::Queue;
 
-/// The queue before stderr, once there is one; the process has one stderr.
+/// The queue before stderr; one per process, because there is one stderr.
 static QUEUE: OnceLock<Queue> = OnceLock::new();
 
-/// Messages of one kind that are logged in any case.
+/// The number of messages of one kind that are always logged.
 const TOLD: u64 = 20;
 
-/// Lets what is logged reach stderr, from the level that the variable `TICKBUS_LOG` names (`off`, `error`,
-/// `warn`, `info`, `debug`), or else from `level` on. That is the level of tickbus' own messages; of the crates that it
-/// uses warnings and errors alone are shown, unless the variable names them (`info,opcua_client=debug`). A host that has a
-/// logger of its own in this process keeps it.
+/// Sends log messages to stderr, from the level in the variable `TICKBUS_LOG` (`off`, `error`, `warn`,
+/// `info`, `debug`), or else from `level` on. That is the level of tickbus' own messages; of the crates that
+/// it uses only warnings and errors are shown, unless the variable names them (`info,opcua_client=debug`). If
+/// the host already has a logger in this process, that one stays.
 ///
-/// Whoever logs waits for nobody: a thread of the log writes to stderr, and what does not fit into its queue is
-/// dropped and counted, see [`dropped_log_lines`].
+/// Logging never blocks: a thread writes to stderr, and messages that do not fit into its queue are dropped
+/// and counted, see [`dropped_log_lines`].
 pub fn log_to_stderr(level: LevelFilter) {
     let mut builder = Builder::new();
     set_levels(
@@ -31,36 +31,37 @@ pub fn log_to_stderr(level: LevelFilter) {
         std::env::var("TICKBUS_LOG").ok().as_deref(),
         level,
     );
-    // Without a thread for it the log is written as it comes.
+    // Without that thread, messages are written directly.
     if QUEUE.get().is_none()
         && let Ok(queue) = Queue::start(io::stderr())
     {
         let queue = QUEUE.get_or_init(|| queue);
         builder.target(Target::Pipe(Box::new(queue.clone())));
     }
-    // It fails where there is a logger already, which is then the right one.
+    // Fails if there is a logger already; then that one is to be used.
     let _ = builder.try_init();
 }
 
-/// Waits until what was logged has reached stderr, but for no longer than `limit`: to be called before a process ends.
+/// Waits until all messages so far have reached stderr, but at most `limit`; to be called before the process
+/// ends.
 pub fn flush_log(limit: Nanos) {
     if let Some(queue) = QUEUE.get() {
         queue.flush_within(limit);
     }
 }
 
-/// How many lines of the log were dropped in this process, since stderr was not read as fast as they came.
+/// The number of log lines dropped in this process because stderr was not read fast enough.
 pub fn dropped_log_lines() -> u64 {
     QUEUE.get().map_or(0, Queue::dropped)
 }
 
-/// Whether the log is to have a message that comes for the `times`-th time: the first 20 of its kind, then those whose
-/// number is a power of two. So nothing that happens again and again can fill the log.
+/// Whether the `times`-th message of a kind is logged: the first 20 are, then those whose number is a power
+/// of two. So a recurring event cannot fill the log.
 pub const fn is_told(times: u64) -> bool {
     times <= TOLD || times.is_power_of_two()
 }
 
-/// Whether from the `times`-th message on some of its kind are left out.
+/// Whether from the `times`-th message on some of the same kind are left out.
 pub const fn is_told_rarely(times: u64) -> bool {
     times >= TOLD
 }
@@ -77,14 +78,14 @@ fn set_levels(builder: &mut Builder, variable: Option<&str>, level: LevelFilter)
     }
     builder.filter_level(own.min(LevelFilter::Warn));
     builder.filter_module("tickbus", own);
-    // What the OPC UA crates say is about their own inside; the bus says what it means.
+    // The OPC UA crates log their internals; the bus itself logs what matters to the user.
     builder.filter_module("opcua", LevelFilter::Off);
     if !rest.is_empty() {
         builder.parse_filters(&rest.join(","));
     }
 }
 
-/// A message is written with one call.
+/// One call is one message.
 impl Write for Queue {
     fn write(&mut self, message: &[u8]) -> io::Result<usize> {
         self.push(message);

@@ -1,4 +1,5 @@
-//! What only the operating system can do, behind safe functions; one file per thing.
+//! The project's only room that calls the operating system directly, behind safe functions; one file per
+//! topic.
 
 mod library;
 mod log;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 ///
 /// # Errors
 ///
-/// The system does not tell, or the file is there no more.
+/// The system does not tell, or the file no longer exists.
 pub fn own_file() -> io::Result<PathBuf> {
     #[cfg(target_os = "linux")]
     {
@@ -16,7 +16,8 @@ pub fn own_file() -> io::Result<PathBuf> {
         let address = own_file as fn() -> io::Result<PathBuf> as usize;
         let maps = std::fs::read("/proc/self/maps")?;
         match mapped_file(&maps, address) {
-            // Its folder is often one where everybody may put files: nothing beside it is its own.
+            // Its folder is often world-writable, such as /tmp: files beside it cannot be trusted to belong
+            // to it.
             Some(file) if file.ends_with(DELETED) => {
                 let text = "its file came out of a jar, and is deleted since";
                 return Err(io::Error::other(text));
@@ -28,7 +29,7 @@ pub fn own_file() -> io::Result<PathBuf> {
     Err(io::Error::other("this system does not tell where that is"))
 }
 
-/// What the list of mappings has behind a file that has been deleted.
+/// The suffix in the list of mappings for a deleted file.
 #[cfg(target_os = "linux")]
 const DELETED: &[u8] = b" (deleted)";
 

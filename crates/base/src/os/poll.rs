@@ -1,4 +1,4 @@
-//! Waiting for sockets, for the time and for a stop, all at once.
+//! Waiting for sockets, a deadline and a stop, all at once.
 
 use std::io::{self, ErrorKind};
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use rustix::fd::{AsFd, BorrowedFd};
 
 use crate::time::{Clock, Nanos, Stop};
 
-/// What a source is waited for.
+/// What to wait for on a socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interest {
     /// There is something to read, the peer has closed, or an error is pending.
@@ -20,7 +20,7 @@ pub enum Interest {
     ReadWrite,
 }
 
-/// A socket that is waited for.
+/// A socket to wait for.
 #[derive(Clone, Debug)]
 pub struct Source<'a> {
     fd: PollFd<'a>,
@@ -28,7 +28,7 @@ pub struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Waits for `socket`.
+    /// A source that waits for `interest` on `socket`.
     pub fn new(socket: &'a impl AsFd, interest: Interest) -> Self {
         Self {
             fd: PollFd::new(socket, flags(interest)),
@@ -36,20 +36,20 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// What the system told of a socket.
+    /// What the system reported about a socket.
     #[cfg(not(any(target_os = "linux", target_os = "android")))]
     pub(super) fn looked_at(fd: PollFd<'a>) -> Self {
         let ready = fd.revents();
         Self { fd, ready }
     }
 
-    /// Whether a read would not wait, after [`Poller::wait`].
+    /// Whether a read would not block, after [`Poller::wait`].
     pub fn is_readable(&self) -> bool {
         let ready = PollFlags::IN | PollFlags::HUP | PollFlags::ERR;
         self.ready.intersects(ready)
     }
 
-    /// Whether a write would not wait, after [`Poller::wait`].
+    /// Whether a write would not block, after [`Poller::wait`].
     pub fn is_writable(&self) -> bool {
         let ready = PollFlags::OUT | PollFlags::HUP | PollFlags::ERR;
         self.ready.intersects(ready)
@@ -58,7 +58,7 @@ impl<'a> Source<'a> {
 
 /// Lets one thread wait for sockets, for a deadline, and for its [`Stop`], whichever is first.
 ///
-/// While it lives it is the waker of its token.
+/// While it exists it is the waker of its token.
 #[derive(Debug)]
 pub struct Poller {
     stop: Stop,
@@ -70,10 +70,10 @@ impl Poller {
     ///
     /// # Errors
     ///
-    /// The system refused the pair of sockets by which other threads wake this one.
+    /// The system refused the socket pair by which other threads wake this one.
     pub fn new(stop: &Stop) -> io::Result<Self> {
         let (sender, receiver) = wake::pair()?;
-        // A full buffer already wakes; nothing else can fail between the ends of one pair.
+        // If the buffer is full, a wake-up is already pending; nothing else can fail within one pair.
         stop.set_waker(Some(Arc::new(move || drop(sender.send()))));
         Ok(Self {
             stop: stop.clone(),
@@ -81,8 +81,8 @@ impl Poller {
         })
     }
 
-    /// Waits until one of `sources` is ready, `deadline` has come on `clock`, or the token was stopped or
-    /// woken. It may end early.
+    /// Waits until one of `sources` is ready, `deadline` has come on `clock`, or the token is stopped or
+    /// woken. It may return early.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ impl Poller {
         let all = &mut all[..=sources.len()];
         let mut waited = Ok(());
         clock.wait_with(deadline, &self.stop, &mut |patience| {
-            // A token that was roused before the waker came would never be again.
+            // The token may have been woken before the waker was set; no wake-up would follow.
             let patience = if self.stop.is_roused() {
                 Some(Duration::ZERO)
             } else {
@@ -137,9 +137,9 @@ pub(super) const fn flags(interest: Interest) -> PollFlags {
     }
 }
 
-/// A time-out that the system takes.
+/// A time-out within the range that the system accepts.
 pub(super) fn timespec(patience: Duration) -> Timespec {
-    // Longer than any time-out that the system takes, and soon enough to look again.
+    // Within every system's range, and rare enough to cost nothing.
     const LONGEST: Duration = Duration::from_secs(3600);
     Timespec::try_from(patience.min(LONGEST)).expect("an hour fits into every system's time")
 }
@@ -148,7 +148,7 @@ pub(super) fn poll_once(fds: &mut [PollFd<'_>], patience: Option<Duration>) -> i
     let patience = patience.map(timespec);
     match poll(fds, patience.as_ref()) {
         Ok(_) => Ok(()),
-        // A signal for another part of the process: nothing is ready, and the caller looks again.
+        // A signal interrupted the wait: nothing is ready, and the caller looks again.
         Err(error) if io::Error::from(error).kind() == ErrorKind::Interrupted => {
             fds.iter_mut().for_each(PollFd::clear_revents);
             Ok(())
@@ -157,7 +157,7 @@ pub(super) fn poll_once(fds: &mut [PollFd<'_>], patience: Option<Duration>) -> i
     }
 }
 
-/// Handles of one's own on sockets of others.
+/// Owned handles of borrowed sockets.
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 pub(super) mod own {
     use super::{BorrowedFd, io};
@@ -172,7 +172,7 @@ pub(super) mod own {
     }
 }
 
-/// The pair of sockets by which other threads wake one that polls.
+/// The socket pair by which other threads wake a thread that polls.
 pub(super) mod wake {
     use super::{AsFd, BorrowedFd, io};
 

@@ -13,7 +13,8 @@ use crate::time::{Clock, Nanos, Stop};
 
 /// Lets one thread wait for many sockets, for a deadline, and for its [`Stop`], whichever is first.
 ///
-/// A socket is known by the key that it was added with. While the set lives it is the waker of its token.
+/// A socket is identified by the key that it was added with. While the set exists it is the waker of its
+/// token.
 pub struct PollSet {
     stop: Stop,
     wake: wake::Receiver,
@@ -27,14 +28,14 @@ impl fmt::Debug for PollSet {
     }
 }
 
-/// A socket that need not be waited for.
+/// A socket that is ready.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ready {
     /// The key that the socket was added with.
     pub key: usize,
-    /// A read would not wait.
+    /// A read would not block.
     pub is_readable: bool,
-    /// A write would not wait.
+    /// A write would not block.
     pub is_writable: bool,
 }
 
@@ -46,12 +47,12 @@ impl PollSet {
     ///
     /// # Errors
     ///
-    /// The system gives no more sockets.
+    /// The system has no more sockets.
     pub fn new(stop: &Stop) -> io::Result<Self> {
         let (sender, wake) = wake::pair()?;
         let mut watch = watch::Watch::new()?;
         watch.add(WAKE, &wake, Interest::Read)?;
-        // A full buffer already wakes; nothing else can fail between the ends of one pair.
+        // If the buffer is full, a wake-up is already pending; nothing else can fail within one pair.
         stop.set_waker(Some(Arc::new(move || drop(sender.send()))));
         Ok(Self {
             stop: stop.clone(),
@@ -61,7 +62,7 @@ impl PollSet {
         })
     }
 
-    /// Adds a socket. The caller keeps it, and [removes](Self::remove) it before it is closed.
+    /// Adds a socket. The caller keeps it, and must [remove](Self::remove) it before closing it.
     ///
     /// # Errors
     ///
@@ -69,13 +70,13 @@ impl PollSet {
     ///
     /// # Panics
     ///
-    /// When `key` is the greatest number, which the set needs for itself.
+    /// When `key` is `usize::MAX`, which the set uses itself.
     pub fn add(&mut self, key: usize, socket: &impl AsFd, interest: Interest) -> io::Result<()> {
         assert_ne!(key, WAKE, "a key that is taken");
         self.watch.add(key, socket, interest)
     }
 
-    /// Waits for something else of a socket that was added.
+    /// Changes what the set waits for on a socket.
     ///
     /// # Errors
     ///
@@ -84,14 +85,14 @@ impl PollSet {
         self.watch.change(key, socket, interest)
     }
 
-    /// Removes a socket that was added.
+    /// Removes a socket.
     pub fn remove(&mut self, key: usize, socket: &impl AsFd) {
         self.watch.remove(key, socket);
         self.ready.retain(|ready| ready.key != key);
     }
 
-    /// Waits until a socket is ready, `deadline` has come on `clock`, or the token was stopped or woken; it may
-    /// end early. What is ready stands in [`ready`](Self::ready).
+    /// Waits until a socket is ready, `deadline` has come on `clock`, or the token is stopped or woken. It
+    /// may return early. [`ready`](Self::ready) then lists the sockets.
     ///
     /// # Errors
     ///
@@ -101,7 +102,7 @@ impl PollSet {
         let (watch, ready, stop) = (&mut self.watch, &mut self.ready, &self.stop);
         let mut waited = Ok(());
         clock.wait_with(deadline, stop, &mut |patience| {
-            // A token that was roused before the waker came would never be again.
+            // The token may have been woken before the waker was set; no wake-up would follow.
             let patience = if stop.is_roused() {
                 Some(Duration::ZERO)
             } else {
@@ -117,7 +118,7 @@ impl PollSet {
         Ok(())
     }
 
-    /// The sockets that were ready after the last wait, in no order.
+    /// The sockets that were ready after the last wait, in no particular order.
     pub fn ready(&self) -> &[Ready] {
         &self.ready
     }
@@ -129,7 +130,7 @@ impl Drop for PollSet {
     }
 }
 
-/// Linux tells which of many sockets are ready without a look at each of them.
+/// Linux reports which of many sockets are ready without looking at each of them.
 #[cfg(any(target_os = "linux", target_os = "android"))]
 mod watch {
     use rustix::buffer::spare_capacity;
@@ -142,7 +143,7 @@ mod watch {
     use super::{AsFd, Duration, Interest, Ready, io};
     use crate::os::poll::{poll_once, timespec};
 
-    /// So many sockets are told at most by one wait; the others by the next.
+    /// Sockets reported by one wait; further ones are reported by the next.
     const MOST: usize = 256;
 
     const MILLISECOND: Duration = Duration::from_millis(1);
@@ -196,7 +197,7 @@ mod watch {
         }
 
         pub(super) fn remove(&mut self, _key: usize, socket: &impl AsFd) {
-            // What fails here was never added, and is in nobody's way.
+            // This fails only for a socket that was never added.
             let _ = epoll::delete(&self.epoll, socket);
         }
 
@@ -206,8 +207,8 @@ mod watch {
             ready: &mut Vec<Ready>,
         ) -> io::Result<()> {
             let patience = match patience {
-                // The system counts whole milliseconds here. So a wait ends early rather than late, and what is
-                // left of it is waited for by the call that counts finer.
+                // epoll counts whole milliseconds. The wait is rounded down, and what remains is waited for
+                // by `ppoll`, which has a finer resolution.
                 Some(span) if span < MILLISECOND && !span.is_zero() => {
                     let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
                     poll_once(&mut epoll, Some(span))?;
@@ -227,13 +228,13 @@ mod watch {
                 patience.as_ref(),
             ) {
                 Ok(_) => {}
-                // A signal for another part of the process.
+                // A signal interrupted the wait.
                 Err(Errno::INTR) => return Ok(()),
                 Err(error) => return Err(error.into()),
             }
             let broken = EventFlags::HUP | EventFlags::ERR;
             ready.extend(self.events.iter().map(|event| {
-                // A packed field has to be copied out.
+                // Fields of a packed struct have to be copied out before they are borrowed.
                 let (flags, data) = (event.flags, event.data);
                 Ready {
                     key: usize::try_from(data.u64()).unwrap_or(super::WAKE),
@@ -246,7 +247,7 @@ mod watch {
     }
 }
 
-/// Elsewhere each of them is looked at, through a handle of the set's own.
+/// Other systems look at every socket, through the set's own handles.
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 mod watch {
     use rustix::event::PollFd;
@@ -387,7 +388,7 @@ mod tests {
             let clock = Arc::clone(&clock);
             let stop = stop.clone();
             move || {
-                // A set stays on its thread.
+                // A set cannot move to another thread.
                 let mut set = PollSet::new(&stop).expect("sockets");
                 set.wait(&*clock, Nanos::MAX)
             }

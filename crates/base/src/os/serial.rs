@@ -2,27 +2,27 @@
 
 use std::fmt;
 
-/// What guards each character.
+/// The parity bit of each character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Parity {
-    /// An even number of ones.
+    /// Even parity.
     Even,
-    /// An odd number of ones.
+    /// Odd parity.
     Odd,
-    /// Nothing.
+    /// No parity bit.
     None,
 }
 
-/// How a serial port is set: eight bits a character, no flow control, and this.
+/// Settings of a serial port; always eight data bits and no flow control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SerialSettings {
     /// Bits per second.
     pub baud: u32,
-    /// What guards each character.
+    /// The parity bit of each character.
     pub parity: Parity,
-    /// Two stop bits; else one.
+    /// Two stop bits instead of one.
     pub two_stop_bits: bool,
-    /// The port switches the transceiver of an RS-485 line to sending while it sends, with RTS.
+    /// RTS switches the transceiver of an RS-485 line to sending while the port sends.
     pub rs485: bool,
 }
 
@@ -57,17 +57,17 @@ mod unix {
 
     use super::{Parity, SerialSettings};
 
-    /// An open serial port. Reading and writing never wait; it can be waited for with a
-    /// [`Poller`](crate::os::Poller).
+    /// An open serial port. Reading and writing never block; a [`Poller`](crate::os::Poller) can wait for it.
     #[derive(Debug)]
     pub struct SerialPort(File);
 
     impl SerialPort {
-        /// Opens the port that the system calls `device`, for this process alone.
+        /// Opens the port that the system calls `device`, for exclusive use.
         ///
         /// # Errors
         ///
-        /// It is not there, is none, is another program's, or cannot be set so.
+        /// It does not exist, is not a serial port, is in use by another program, or does not support the
+        /// settings.
         pub fn open(device: &Path, settings: SerialSettings) -> io::Result<Self> {
             let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
             let port = open(device, flags, Mode::empty())?;
@@ -90,7 +90,7 @@ mod unix {
                 Parity::None => ControlModes::empty(),
             };
             if settings.parity != Parity::None {
-                // A character with the wrong parity comes as a zero, and the checksum finds it.
+                // A character with wrong parity is read as zero; the checksum then finds the error.
                 attributes.input_modes |= InputModes::INPCK;
             }
             if settings.two_stop_bits {
@@ -109,7 +109,7 @@ mod unix {
         }
     }
 
-    /// Lets the driver of the port switch between sending and receiving with RTS: on while it sends.
+    /// Lets the port's driver switch the direction with RTS, which is on while it sends.
     #[cfg(target_os = "linux")]
     #[allow(unsafe_code, reason = "no crate of ours wraps this request")]
     fn switch_direction(port: &impl AsFd) -> io::Result<()> {
@@ -146,15 +146,15 @@ mod unix {
     }
 
     impl Read for SerialPort {
-        /// Reads what has come; [`WouldBlock`](io::ErrorKind::WouldBlock) when nothing has, 0 when the port is
-        /// gone.
+        /// Reads the bytes received so far; [`WouldBlock`](io::ErrorKind::WouldBlock) when there are none, 0
+        /// when the port is gone.
         fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
             self.0.read(bytes)
         }
     }
 
     impl Write for SerialPort {
-        /// Writes as much as there is room for.
+        /// Writes as much as fits into the port's buffer.
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
             self.0.write(bytes)
         }
@@ -166,7 +166,7 @@ mod unix {
 
     impl Drop for SerialPort {
         fn drop(&mut self) {
-            // Where another program has it open, too, it would stay so.
+            // If another program has the port open as well, exclusive use would outlive this handle.
             let _ = ioctl_tiocnxcl(&self.0);
         }
     }

@@ -14,8 +14,8 @@ const WORD: usize = size_of::<AtomicU64>();
 
 /// A piece of memory that another process may read and write at any time.
 ///
-/// Whole images are copied in and out. The processes take turns by other means, such as a socket; a
-/// process that does not keep to its turn makes wrong bytes, and nothing worse.
+/// Whole images are copied in and out. The processes take turns by other means, such as a socket; a process
+/// that violates its turn causes wrong bytes, but nothing worse.
 #[derive(Debug)]
 pub struct SharedMemory {
     words: NonNull<AtomicU64>,
@@ -26,23 +26,23 @@ pub struct SharedMemory {
 unsafe impl Send for SharedMemory {}
 
 impl SharedMemory {
-    /// Makes zeroed memory of at least `bytes` bytes, and the file by which another process
+    /// Creates zeroed memory of at least `bytes` bytes, and the file by which another process
     /// [opens](Self::open) it.
     ///
     /// # Errors
     ///
-    /// The system has no such memory left.
+    /// The system has no memory left.
     pub fn create(bytes: usize) -> io::Result<(Self, OwnedFd)> {
         let file = file(words(bytes) * WORD)?;
         let memory = Self::open(&file, bytes)?;
         Ok((memory, file))
     }
 
-    /// Opens the memory of `bytes` bytes that another process has made.
+    /// Opens memory of `bytes` bytes that another process has created.
     ///
     /// # Errors
     ///
-    /// The file is no such memory, or is smaller.
+    /// The file is not such memory, or is too small.
     pub fn open(file: &impl AsFd, bytes: usize) -> io::Result<Self> {
         let count = words(bytes);
         let has = u64::try_from(rustix::fs::fstat(file)?.st_size).unwrap_or(0);
@@ -69,20 +69,20 @@ impl SharedMemory {
 
     /// The memory as words.
     ///
-    /// What makes it sound that the other process writes at any time, whatever runs there: the words are
-    /// atomics, to which concurrent writes are no data race, and of which every bit pattern is a value.
-    /// No reference to plain bytes of the mapping is ever made.
+    /// This is sound although the other process may write at any time, whatever code it runs: the words are
+    /// atomics, so concurrent writes are no data race, and every bit pattern is a valid value. No reference
+    /// to plain bytes of the mapping is ever made.
     fn words(&self) -> &[AtomicU64] {
         // SAFETY: the mapping has `count` words, page-aligned, zeroed by the system, and lives until
         // `drop`; see above for the other process.
         unsafe { std::slice::from_raw_parts(self.words.as_ptr(), self.count) }
     }
 
-    /// Copies `bytes` to the beginning of word `at`.
+    /// Copies `bytes` to the memory, from word `at` on.
     ///
     /// # Panics
     ///
-    /// When they reach beyond the memory.
+    /// When they would reach beyond the memory.
     pub fn write(&self, at: usize, bytes: &[u8]) {
         let words = &self.words()[at..at + Self::words_for(bytes.len())];
         for (word, chunk) in words.iter().zip(bytes.chunks(WORD)) {
@@ -90,17 +90,17 @@ impl SharedMemory {
             value[..chunk.len()].copy_from_slice(chunk);
             word.store(u64::from_ne_bytes(value), Ordering::Relaxed);
         }
-        // Whatever tells the other process that it is its turn comes after the words.
+        // The message that gives the turn to the other process must come after the words.
         fence(Ordering::Release);
     }
 
-    /// Copies from the beginning of word `at` until `bytes` is full.
+    /// Fills `bytes` from the memory, from word `at` on.
     ///
     /// # Panics
     ///
-    /// When that reaches beyond the memory.
+    /// When that would reach beyond the memory.
     pub fn read(&self, at: usize, bytes: &mut [u8]) {
-        // Whatever told that it is our turn came before the words.
+        // The message that gave us the turn came before the words.
         fence(Ordering::Acquire);
         let words = &self.words()[at..at + Self::words_for(bytes.len())];
         for (word, chunk) in words.iter().zip(bytes.chunks_mut(WORD)) {
@@ -123,12 +123,12 @@ impl Drop for SharedMemory {
     }
 }
 
-/// How many words hold `bytes` bytes: at least one, since nothing cannot be mapped.
+/// How many words hold `bytes` bytes: at least one, since an empty mapping is not allowed.
 fn words(bytes: usize) -> usize {
     SharedMemory::words_for(bytes).max(1)
 }
 
-/// A file in memory of a size that cannot change.
+/// A file in memory, sealed against changes of its size.
 #[cfg(target_os = "linux")]
 fn file(bytes: usize) -> io::Result<OwnedFd> {
     use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, ftruncate, memfd_create};
@@ -141,7 +141,7 @@ fn file(bytes: usize) -> io::Result<OwnedFd> {
     Ok(file)
 }
 
-/// A file that has no name any more.
+/// A file that has already been unlinked.
 #[cfg(not(target_os = "linux"))]
 fn file(bytes: usize) -> io::Result<OwnedFd> {
     use std::os::unix::fs::OpenOptionsExt as _;

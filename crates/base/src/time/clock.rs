@@ -1,4 +1,4 @@
-//! Clocks, as they are handed in.
+//! Injected clocks.
 
 use std::fmt;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -16,14 +16,15 @@ pub trait Clock: Send + Sync + fmt::Debug {
     /// Waits until `deadline`, or until `stop` is stopped or woken, whichever is first.
     fn wait_until(&self, deadline: Nanos, stop: &Stop);
 
-    /// Lets `sleep` wait in the operating system, for a thread that waits for more than the time.
+    /// Lets `sleep` wait in the operating system, for a thread that also waits for something other than the
+    /// time, such as a socket.
     ///
-    /// `sleep` gets the longest that it may wait; `None` means until the [waker](Stop::set_waker) of
-    /// `stop` wakes it. It may end early; who waits looks at the clock again.
+    /// `sleep` is given the longest time that it may wait; `None` means until the [waker](Stop::set_waker) of
+    /// `stop` wakes it. It may return early; the caller then looks at the clock again.
     fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>));
 
-    /// The date at which this clock showed zero, as the time since 1 January 1970 UTC; `None` for a clock that has no
-    /// dates.
+    /// The date at which this clock read zero, as the time since 1 January 1970 UTC; `None` for a clock
+    /// without dates.
     fn epoch(&self) -> Option<Nanos> {
         None
     }
@@ -31,9 +32,9 @@ pub trait Clock: Send + Sync + fmt::Debug {
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick reads it, too: on the systems that tickbus runs on that is no system call (on Linux some 25 ns in the
-/// vDSO). A time that a thread keeps in memory would cost less and lag by as much as that thread is kept waiting, tens
-/// of milliseconds on a busy machine.
+/// The tick reads it as well: on the systems that tickbus runs on that is not a system call (on Linux some 25
+/// ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy machine it would
+/// lag by the tens of milliseconds for which that thread is not scheduled.
 ///
 /// It stands still while the computer sleeps.
 #[derive(Debug)]
@@ -46,7 +47,7 @@ fn monotonic_now() -> Nanos {
 }
 
 impl Monotonic {
-    /// The process's clock, shared by all who hold it.
+    /// The clock of the process, shared by everyone.
     pub fn shared() -> Arc<Self> {
         static SHARED: LazyLock<Arc<Monotonic>> = LazyLock::new(|| Arc::new(Monotonic(())));
         Arc::clone(&SHARED)
@@ -105,11 +106,11 @@ impl Manual {
         self.set(self.now() + span);
     }
 
-    /// Sets the clock to `now`; a clock never goes back, so an earlier time changes nothing.
+    /// Sets the clock to `now`; a clock never runs backwards, so an earlier time changes nothing.
     pub fn set(&self, now: Nanos) {
         self.now.fetch_max(now.0, Ordering::SeqCst);
         let now = self.now();
-        // Collected first: a waker may take its time, and threads come and go meanwhile.
+        // Collected first: a waker may take its time, and threads may be added or removed meanwhile.
         let due: Vec<_> = self
             .lock()
             .iter()
@@ -121,8 +122,8 @@ impl Manual {
         }
     }
 
-    /// Whether at least `threads` threads wait on this clock, and none of them has reached its deadline:
-    /// then all that was due by now has been done.
+    /// Whether at least `threads` threads wait on this clock and none of them has reached its deadline:
+    /// everything that was due by now is then done.
     pub fn is_settled(&self, threads: usize) -> bool {
         let waiters = self.lock();
         let now = self.now();
@@ -130,7 +131,7 @@ impl Manual {
     }
 
     fn lock(&self) -> MutexGuard<'_, Vec<Waiter>> {
-        // A list of numbers and tokens is whole between any two of its changes.
+        // The list is consistent after every single change, so a poisoned lock is safe to use.
         self.waiters.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -154,8 +155,8 @@ impl Clock for Manual {
 }
 
 impl Manual {
-    /// Waits as a thread that the clock knows of. It is on the list before it looks at the time, so no
-    /// advance is missed.
+    /// Waits as a thread known to the clock. It enters the list before it looks at the time, so it misses no
+    /// advance.
     fn wait_listed(&self, deadline: Nanos, stop: &Stop, wait: impl FnOnce()) {
         let me = stop.downgrade();
         self.lock().push(Waiter {

@@ -1,4 +1,4 @@
-//! Time, handed in: integer nanoseconds, the injected [`Clock`], and the [`Stop`] token.
+//! Time: integer nanoseconds, the injected [`Clock`], and the [`Stop`] token.
 //!
 //! Nothing outside this room reads a clock of the operating system. Protocol cores take `now` as an
 //! argument; adapters and supervision take a [`Clock`], which is [`Monotonic`] in production and

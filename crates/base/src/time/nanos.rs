@@ -12,7 +12,7 @@ use std::str::FromStr;
 pub struct Nanos(pub i64);
 
 impl Nanos {
-    /// No time at all, and the epoch of every clock.
+    /// An empty span, and the epoch of every clock.
     pub const ZERO: Self = Self(0);
     /// Later than anything.
     pub const MAX: Self = Self(i64::MAX);
@@ -32,7 +32,7 @@ impl Nanos {
         Self(secs.saturating_mul(1_000_000_000))
     }
 
-    /// The span, `count` times over.
+    /// The span multiplied by `count`.
     #[must_use]
     pub const fn times(self, count: i64) -> Self {
         Self(self.0.saturating_mul(count))
@@ -47,7 +47,7 @@ impl Nanos {
         self.0 as f64 / 1e3
     }
 
-    /// The span to three digits or so, for messages: whole milliseconds from 10 ms on, whole
+    /// The span rounded to about three digits for messages: whole milliseconds from 10 ms on, whole
     /// microseconds from 10 us on.
     #[must_use]
     pub const fn rounded(self) -> Self {

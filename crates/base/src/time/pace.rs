@@ -1,10 +1,11 @@
-//! A rhythm of deadlines.
+//! Periodic deadlines.
 
 use super::Nanos;
 
-/// Deadlines at even intervals, which do not drift however late each one is met.
+/// Deadlines at even intervals; a deadline met late does not delay the next one.
 ///
-/// After a stall the missed ones are left out: a burst would carry old news. The rhythm stays.
+/// After a stall the missed ones are skipped, because a burst would only carry outdated data. The phase
+/// stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pace {
     due: Nanos,
@@ -12,7 +13,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// A rhythm whose first deadline is `first`.
+    /// A pace whose first deadline is `first`.
     ///
     /// # Panics
     ///
@@ -30,7 +31,7 @@ impl Pace {
         self.due
     }
 
-    /// If the deadline has come by `now`, moves on to the first one that has not; tells whether it had.
+    /// If the deadline has come by `now`, moves on to the first one after `now`; tells whether it had come.
     pub fn take(&mut self, now: Nanos) -> bool {
         if now < self.due {
             return false;

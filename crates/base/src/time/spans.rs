@@ -6,15 +6,15 @@ use hdrhistogram::Histogram;
 
 use super::Nanos;
 
-/// The shortest span that is told from others, in nanoseconds.
+/// The resolution at the lower end, in nanoseconds: shorter spans are not told apart.
 const SHORTEST: u64 = 100;
-/// The longest: an hour. Longer ones count as this.
+/// The longest span that is told apart: an hour. Longer ones count as this.
 const LONGEST: i64 = 3_600_000_000_000;
-/// Significant decimal digits of what is read out.
+/// Significant decimal digits of the figures.
 const DIGITS: u8 = 2;
 
-/// A histogram of time spans, from 100 ns to an hour, good to 1 %; their mean, their scatter and the shortest one are
-/// exact.
+/// A histogram of time spans from 100 ns to an hour, accurate to 1 %; mean, standard deviation and the
+/// shortest span are exact.
 ///
 /// Its size is fixed, some 15 kB; recording allocates nothing.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ pub struct Spans {
     histogram: Histogram<u32>,
     shortest: Nanos,
     mean: f64,
-    /// Sum of the squared distances from the mean, kept up as Welford does.
+    /// Sum of the squared deviations from the mean, updated by Welford's method.
     squares: f64,
 }
 
@@ -48,22 +48,23 @@ impl Spans {
         self.squares += off * (as_float(nanos.unsigned_abs()) - self.mean);
     }
 
-    /// How many spans were counted.
+    /// The number of spans.
     pub fn count(&self) -> u64 {
         self.histogram.len()
     }
 
-    /// The span that a share of all spans does not exceed: 0.5 gives the median. Zero if there are none.
+    /// The span that the fraction `share` of all spans does not exceed: 0.5 gives the median. Zero without
+    /// spans.
     pub fn quantile(&self, share: f64) -> Nanos {
         Nanos(i64::try_from(self.histogram.value_at_quantile(share)).unwrap_or(i64::MAX))
     }
 
-    /// The mean in nanoseconds; zero if there are none.
+    /// The mean in nanoseconds; zero without spans.
     pub fn mean(&self) -> f64 {
         self.mean
     }
 
-    /// The standard deviation in nanoseconds; zero if there are none.
+    /// The standard deviation in nanoseconds; zero without spans.
     pub fn deviation(&self) -> f64 {
         if self.count() == 0 {
             return 0.0;
@@ -71,7 +72,7 @@ impl Spans {
         (self.squares / as_float(self.count())).sqrt()
     }
 
-    /// The shortest span; zero if there are none.
+    /// The shortest span; zero without spans.
     pub fn shortest(&self) -> Nanos {
         if self.count() == 0 {
             return Nanos::ZERO;
@@ -84,7 +85,7 @@ impl Spans {
         Nanos(i64::try_from(self.histogram.max()).unwrap_or(i64::MAX))
     }
 
-    /// Each step of the histogram that has any spans: the longest that it takes, and how many there are.
+    /// The bins of the histogram that are not empty: the longest span of each, and its count.
     pub fn steps(&self) -> impl Iterator<Item = (Nanos, u64)> + '_ {
         self.histogram.iter_recorded().map(|step| {
             let longest = i64::try_from(step.value_iterated_to()).unwrap_or(i64::MAX);
@@ -92,13 +93,13 @@ impl Spans {
         })
     }
 
-    /// Appends `key.count`, and if there are any, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and `stdev`, one
-    /// `key=value` a line, in microseconds.
+    /// Appends `key.count` and, unless it is zero, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and
+    /// `stdev`, in microseconds, one `key=value` per line.
     pub fn write(&self, key: &str, text: &mut String) {
         self.write_in(key, Nanos::from_micros(1), "_us", text);
     }
 
-    /// The same in multiples of `unit`, which `suffix` names.
+    /// As [`write`](Self::write), in multiples of `unit`, which `suffix` names.
     pub fn write_in(&self, key: &str, unit: Nanos, suffix: &str, text: &mut String) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{key}.count={}", self.count());
@@ -118,8 +119,8 @@ impl Spans {
         let _ = writeln!(text, "{key}.stdev{suffix}={deviation:.1}");
     }
 
-    /// The distribution for people: twelve rows at most, each longer than the one before by the same factor,
-    /// with a bar for its share.
+    /// The distribution as text: at most twelve rows, whose limits grow by a constant factor, each with a bar
+    /// for its share.
     pub fn chart(&self) -> String {
         const ROWS: usize = 12;
         const WIDTH: u64 = 40;
@@ -130,7 +131,7 @@ impl Spans {
         let (Some((first, _)), Some((last, _))) = (steps.first(), steps.last()) else {
             return String::new();
         };
-        // Rows closer than the histogram's own steps would be empty every now and then.
+        // Rows narrower than the bins of the histogram would at times be empty.
         let factor = (last / first).powf(1.0 / 11.0).max(1.03);
         let mut rows = vec![(*first, 0_u64)];
         for (longest, count) in &steps {
@@ -152,7 +153,7 @@ impl Spans {
     }
 }
 
-/// Counts and spans here are far below 2^53.
+/// Counts and spans here are far below 2^53, so the conversion is exact.
 #[expect(clippy::cast_precision_loss, reason = "an hour has 3.6e12 nanoseconds")]
 fn as_float(number: u64) -> f64 {
     number as f64

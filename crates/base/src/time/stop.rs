@@ -1,16 +1,16 @@
-//! The token that ends a thread's work, and wakes it for that.
+//! The token that tells a thread to stop, and wakes it for that.
 
 use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
-/// What wakes a thread that waits in the operating system.
+/// Wakes a thread that waits in the operating system.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
 
-/// Says "stop" to a thread, and wakes it when it waits.
+/// Tells a thread to stop, and wakes it if it waits.
 ///
-/// Clones share one state. A thread that waits on a [`Clock`](super::Clock) gives its token along,
-/// so that stopping never has to wait for a deadline.
+/// Clones share one state. A thread that waits on a [`Clock`](super::Clock) passes its token, so that
+/// stopping never has to wait for a deadline.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<Shared>);
 
@@ -23,7 +23,7 @@ pub(super) struct Shared {
 #[derive(Default)]
 struct State {
     stopped: bool,
-    /// Set by [`Stop::wake`], taken by the next wait: a wake that comes before the wait counts.
+    /// Set by [`Stop::wake`], taken by the next wait: a wake before the wait is not lost.
     wake: bool,
     waker: Option<Waker>,
 }
@@ -43,7 +43,7 @@ impl Stop {
         Self::default()
     }
 
-    /// Stops, for good, and wakes whoever waits.
+    /// Stops, for good, and wakes every thread that waits.
     pub fn stop(&self) {
         self.0.lock().stopped = true;
         self.0.rouse();
@@ -54,21 +54,21 @@ impl Stop {
         self.0.lock().stopped
     }
 
-    /// Ends the present or the next wait of the thread, without stopping it.
+    /// Ends the current or the next wait of the thread, without stopping it.
     pub fn wake(&self) {
         self.0.lock().wake = true;
         self.0.rouse();
     }
 
-    /// Has `waker` called by whatever would end a wait, for a thread that waits in the operating system
-    /// and not here; `None` ends that.
+    /// Sets the `waker` to be called by everything that would end a wait, for a thread that waits in the
+    /// operating system and not here; `None` removes it.
     ///
     /// The waker is called from any thread and must not block.
     pub fn set_waker(&self, waker: Option<Waker>) {
         self.0.lock().waker = waker;
     }
 
-    /// Whether the present wait is over: stopped, or woken. A wake counts once.
+    /// Whether the current wait is over: stopped, or woken. A wake counts once.
     pub fn is_roused(&self) -> bool {
         let mut state = self.0.lock();
         state.stopped || std::mem::take(&mut state.wake)
@@ -78,7 +78,8 @@ impl Stop {
         Arc::downgrade(&self.0)
     }
 
-    /// Waits until stopped, woken, or `remaining()` gives `None`; `Some(None)` waits for a nudge.
+    /// Waits until stopped, woken, or `remaining()` returns `None`; `Some(None)` waits without a limit until
+    /// nudged.
     pub(super) fn wait_while(&self, mut remaining: impl FnMut() -> Option<Option<Duration>>) {
         let mut state = self.0.lock();
         while !state.stopped && !std::mem::take(&mut state.wake) {
@@ -103,14 +104,14 @@ impl Stop {
 
 impl Shared {
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
-        // A panic elsewhere leaves two booleans, which are valid in any combination.
+        // The state is two independent booleans: any combination is valid, even after a panic elsewhere.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Makes a waiting thread look at its deadline again.
     pub(super) fn nudge(&self) {
-        // Taken and left, so that the nudge does not fall between a thread's look at its deadline and
-        // its wait.
+        // Locked and released at once, so that the nudge cannot fall between a thread's look at its deadline
+        // and its wait.
         drop(self.lock());
         self.rouse();
     }

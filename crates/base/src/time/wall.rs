@@ -1,4 +1,4 @@
-//! The time of day, for what carries dates: certificates and the timestamps of protocols.
+//! The time of day, for everything that carries dates: certificates and protocol timestamps.
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -6,9 +6,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// production hands in [`system_time`].
 pub type WallClock = fn() -> Duration;
 
-/// The time of day as the operating system has it. It may jump, so it measures no spans.
+/// The time of day of the operating system. It may jump, so it must not be used to measure spans.
 pub fn system_time() -> Duration {
-    // A system that counts from before 1970 has not been set.
+    // A clock that reads earlier than 1970 has not been set.
     SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default()

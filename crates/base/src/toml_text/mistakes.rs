@@ -7,8 +7,8 @@ use std::fmt;
 /// One mistake: where it is, what is wrong, and what would be right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// Line and column, both from 1; columns count characters. `None` when the file as a whole is
-    /// wrong, as one that is not there.
+    /// Line and column, both from 1; columns count characters. `None` when the file as a whole is wrong, such
+    /// as one that does not exist.
     pub place: Option<(usize, usize)>,
     /// What is wrong.
     pub what: String,
@@ -26,7 +26,7 @@ pub struct Mistakes {
 }
 
 impl Mistakes {
-    /// The one mistake that the file as a whole is.
+    /// The single mistake of a file that is wrong as a whole.
     pub fn of_file(file: &str, what: impl Into<String>, right: impl Into<String>) -> Self {
         let only = Mistake {
             place: None,
@@ -39,7 +39,7 @@ impl Mistakes {
         }
     }
 
-    /// These mistakes of `file`, in the order in which they are; there has to be one.
+    /// These mistakes of `file`, in the order given. The list must not be empty.
     pub fn of_list(file: &str, list: Vec<Mistake>) -> Self {
         debug_assert!(!list.is_empty(), "no mistakes are none");
         Self {
@@ -48,12 +48,12 @@ impl Mistakes {
         }
     }
 
-    /// Each of them, in line order.
+    /// All mistakes, in line order.
     pub fn iter(&self) -> std::slice::Iter<'_, Mistake> {
         self.list.iter()
     }
 
-    /// How many there are.
+    /// The number of mistakes.
     #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.list.len()
@@ -121,7 +121,7 @@ impl<'t> Collector<'t> {
         }
     }
 
-    /// Takes down a mistake at byte offset `at` of the text.
+    /// Records a mistake at byte offset `at` of the text.
     pub fn report(&self, at: usize, what: impl Into<String>, right: impl Into<String>) {
         let (what, right) = (what.into(), right.into());
         self.found.borrow_mut().push(Found { at, what, right });
@@ -139,12 +139,12 @@ impl<'t> Collector<'t> {
         (line, before.chars().count() + 1)
     }
 
-    /// Notes that the line of byte offset `at` has a syntax error and is left out.
+    /// Marks the line at byte offset `at` as left out because of a syntax error.
     pub(super) fn break_line(&mut self, at: usize) {
         self.broken_lines.insert(self.line(at));
     }
 
-    /// Whether any line is left out. What is not in the text may then stand there.
+    /// Whether any line was left out. A key that seems to be missing may have been in it.
     pub fn is_broken(&self) -> bool {
         !self.broken_lines.is_empty()
     }
@@ -161,12 +161,13 @@ impl<'t> Collector<'t> {
         broken.is_none_or(|broken| (first..*broken).any(header))
     }
 
-    /// All mistakes in line order, each once; `None` when there are none.
+    /// All mistakes in line order, without duplicates; `None` when there are no mistakes.
     pub fn finish(self) -> Option<Mistakes> {
         let mut found = self.found.take();
         found.sort_by_key(|found| found.at);
         let mut list = Vec::with_capacity(found.len());
-        // Counted on from one mistake to the next: a line may be long and have many of them.
+        // Counted on from the previous mistake: a long line with many mistakes must not be counted from its
+        // start each time.
         let (mut line, mut column, mut counted) = (0, 0, 0);
         for Found { at, what, right } in found {
             let at = at.min(self.text.len());
@@ -191,7 +192,7 @@ impl<'t> Collector<'t> {
     }
 }
 
-/// A text from a file as a message may show it: short, and without control characters.
+/// Text from a file as messages quote it: shortened, and without control characters.
 pub fn shown(text: &str) -> String {
     const LONGEST: usize = 40;
     let mut shown: String = text.chars().take(LONGEST).flat_map(printable).collect();

@@ -1,10 +1,9 @@
 //! The right name nearest to a wrong one.
 
-/// Words longer than this are not compared: no name that we know is as long, and the comparison
-/// takes time by the square of the length.
+/// Longer words are not compared: no known name is this long, and the comparison takes quadratic time.
 const LONGEST: usize = 64;
 
-/// The candidate most like `word`, if one is like it at all; letter case does not count.
+/// The candidate most similar to `word`, ignoring case; `None` if no candidate is similar enough.
 pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     let word = word.trim().to_lowercase();
     let length = word.chars().take(LONGEST + 1).count();
@@ -17,7 +16,7 @@ pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
         .filter_map(|candidate| {
             let other = candidate.chars().count();
             let limit = length.max(other).div_ceil(3).min(length.max(other) - 1);
-            // A difference in length alone may be too much, and is known at once.
+            // The difference in length is a lower bound of the distance, and cheap.
             let near = length.abs_diff(other) <= limit;
             let distance = || strsim::damerau_levenshtein(&word, &candidate.to_lowercase());
             near.then(distance)
@@ -28,8 +27,8 @@ pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// What would be right instead of `word`: the nearest candidate, or those that begin like it, else
-/// all of them; `kinds` is what they are called together.
+/// What to write instead of `word`: the nearest candidate, or those that start like it, else all of them;
+/// `kinds` is their collective name.
 pub fn did_you_mean(word: &str, kinds: &str, candidates: &[&str]) -> String {
     if let Some(near) = nearest(word, candidates.iter().copied()) {
         return format!("did you mean \"{near}\"?");

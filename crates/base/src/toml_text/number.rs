@@ -1,4 +1,4 @@
-//! Numbers as people read them.
+//! Formatting of numbers for people.
 
 /// A number in at most seven significant digits.
 pub fn short_number(number: f64) -> String {

@@ -9,17 +9,17 @@ use toml::de::DeTable;
 use super::syntax::{Kind, faults, line_around};
 use super::{Collector, Mistakes, Table};
 
-/// Texts longer than this are no configuration.
+/// Longer texts are refused unread: no configuration is this large.
 const LONGEST: usize = 16 << 20;
 
-/// How often a text is repaired before the rest of it is left unread.
+/// How many times a text is repaired and parsed again before the rest is given up.
 const ROUNDS: usize = 40;
 
 /// The text of the file at `path`.
 ///
 /// # Errors
 ///
-/// When the file cannot be read or is no text.
+/// When the file cannot be read or is not UTF-8.
 pub fn load_text(path: &Path) -> Result<String, Mistakes> {
     let file = path.display().to_string();
     let refused = |what: String, right: &str| Mistakes::of_file(&file, what, right);
@@ -44,7 +44,7 @@ pub fn load_text(path: &Path) -> Result<String, Mistakes> {
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let bytes = error.into_bytes();
-        // What precedes the odd byte is enough to say where it stands.
+        // The text before the bad byte is enough to locate it.
         let before = String::from_utf8_lossy(&bytes[..at]);
         let collector = Collector::new(&file, &before);
         collector.report(
@@ -58,9 +58,9 @@ pub fn load_text(path: &Path) -> Result<String, Mistakes> {
 
 /// Reads `text` and hands its root table to `read`.
 ///
-/// Syntax errors are reported to `collector`, one for each line, and the lines that have them are
-/// left out: `read` sees what remains. It is not called, and the answer is `None`, when a broken
-/// table header leaves unsure to which table the lines below it belong.
+/// Syntax errors are reported to `collector`, one per line, and their lines are left out: `read` sees the
+/// rest. If a table header is broken, the keys below it cannot be assigned to a table; then `read` is not
+/// called and the answer is `None`.
 pub fn read_text<'t, T>(
     collector: &mut Collector<'t>,
     text: &'t str,
@@ -79,12 +79,12 @@ pub fn read_text<'t, T>(
     read(Table::root(collector, root.get_ref()))
 }
 
-/// The text without its broken lines, each of them reported; every byte keeps its offset.
+/// The text with its broken lines blanked, each of them reported; every byte keeps its offset.
 fn repaired<'t>(collector: &mut Collector<'t>, text: &'t str) -> Option<Cow<'t, str>> {
     let mut text = Cow::Borrowed(text);
-    // Without the line that opens an endless value, the lines below it come to light, and with them
-    // errors that are real. Without any other broken line, what comes to light is what only the tree
-    // of the whole knows; a new error of grammar is then a consequence of the repair.
+    // Removing the line that opens an unterminated value exposes the lines below it, and their syntax errors
+    // are real. After any other line is removed, only errors that the parser finds in the whole tree, such as
+    // a duplicate key, are real; a new grammar error would be a consequence of the repair.
     let mut trusted = true;
     for _ in 0..ROUNDS {
         let faults = faults(&text);
@@ -116,7 +116,7 @@ fn repaired<'t>(collector: &mut Collector<'t>, text: &'t str) -> Option<Cow<'t, 
 mod tests {
     use super::*;
 
-    /// Reads a text; its mistakes, and the top keys that are left.
+    /// Reads a text; gives its mistakes and the top-level keys that survived.
     fn read(text: &str) -> (Vec<String>, Option<Vec<String>>) {
         let mut collector = Collector::new("f", text);
         let keys = read_text(&mut collector, text, |root| {

@@ -10,18 +10,18 @@ use super::shown;
 pub(super) enum Kind {
     /// The grammar of its line is broken, and perhaps that of the lines below it.
     Grammar,
-    /// A list, table or text never ends and swallows what follows.
+    /// A list, table or string is not closed and swallows what follows.
     Endless,
-    /// The lines can be told apart, but a key or a value is none.
+    /// The lines can be told apart, but a key or a value is invalid.
     Content,
-    /// A key or a table stands there twice.
+    /// A key or a table appears twice.
     Double,
 }
 
 /// One syntax error.
 #[derive(Debug)]
 pub(super) struct Fault {
-    /// Byte offset of its place.
+    /// Byte offset of the error.
     pub(super) at: usize,
     pub(super) kind: Kind,
     /// Whether it makes a table header unreadable, so that the keys below it belong nowhere.
@@ -54,7 +54,7 @@ pub(super) fn faults(text: &str) -> Vec<Fault> {
         faults.push(translate(error, text));
     }
     if let Some(endless) = endless {
-        // What precedes it in its own line leads to it.
+        // Whatever precedes it in its own line is only its key.
         let line = line_around(text, endless.at);
         faults.retain(|fault| fault.at < line.start);
         faults.push(endless);
@@ -62,7 +62,7 @@ pub(super) fn faults(text: &str) -> Vec<Fault> {
     without_consequences(faults, text)
 }
 
-/// The place that an error blames, at a character's beginning within the text.
+/// The start of the span that an error blames, moved to a character boundary within the text.
 fn begin(error: &Error, text: &str) -> usize {
     let at = error.span().map_or(0, |span| span.start).min(text.len());
     (0..=at)
@@ -71,9 +71,9 @@ fn begin(error: &Error, text: &str) -> usize {
         .unwrap_or(0)
 }
 
-/// Drops the doubled keys that come of a broken table header above them.
+/// Drops duplicate keys that only result from a broken table header above them.
 fn without_consequences(mut faults: Vec<Fault>, text: &str) -> Vec<Fault> {
-    // From where on no header has been seen since a broken one.
+    // Where the last broken header is, unless another header has followed it.
     let mut lost: Option<usize> = None;
     faults.retain(|fault| {
         if let Some(from) = lost {
@@ -110,7 +110,7 @@ pub(super) fn line_around(text: &str, at: usize) -> std::ops::Range<usize> {
     start..end
 }
 
-/// How the messages begin that tell of something without an end.
+/// The beginnings of the parser's messages about unterminated values.
 const ENDLESS: [&str; 4] = [
     "cannot recurse further",
     "unclosed array,",
@@ -118,7 +118,7 @@ const ENDLESS: [&str; 4] = [
     "invalid multi-line",
 ];
 
-/// The value that never ends, or goes too deep, of which one of [`ENDLESS`] tells.
+/// The value that is not closed, or nested too deeply, that one of the [`ENDLESS`] messages is about.
 fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<Fault> {
     let message = error.message();
     let end = begin(error, text);
@@ -150,7 +150,7 @@ fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<Fault> {
     })
 }
 
-/// Where the outermost value begins that is still open at `end`.
+/// The start of the outermost value that is still open at `end`.
 fn open_value(table: &DeTable<'_>, text: &str, end: usize) -> Option<usize> {
     table
         .iter()
@@ -167,7 +167,7 @@ fn open_at(value: &Spanned<DeValue<'_>>, text: &str, end: usize) -> Option<usize
     match value.get_ref() {
         DeValue::Table(_) | DeValue::Array(_) if reaches || unclosed => Some(span.start),
         DeValue::String(_) if reaches => Some(span.start),
-        // The span of a table with a header, and of a list of those, is that of the header alone.
+        // The span of a table with a header, or of a list of such tables, covers the header only.
         DeValue::Table(table) => open_value(table, text, end),
         DeValue::Array(list) => list
             .iter()
@@ -177,7 +177,7 @@ fn open_at(value: &Spanned<DeValue<'_>>, text: &str, end: usize) -> Option<usize
     }
 }
 
-/// What kind of error the parser's message tells.
+/// The kind of error that the parser's message reports.
 fn kind_of(message: &str) -> Kind {
     const BEGINNINGS: [&str; 9] = [
         "extra ",
@@ -233,8 +233,8 @@ fn translate(error: &Error, text: &str) -> Fault {
     }
 }
 
-/// What is wrong and what would be right, by the parser's message and what it expected, the piece of
-/// text that it blames, and the line around that.
+/// What is wrong and what would be right, derived from the parser's message and what it expected, the piece
+/// of text that it blames, and the line around that.
 fn words(message: &str, expected: &str, piece: &str, line: &str) -> (String, String) {
     let both = |what: &str, right: &str| (what.to_owned(), right.to_owned());
     let foreign_comment = ["//", ";", "--", "/*"]

@@ -11,8 +11,7 @@ use crate::time::Nanos;
 /// What messages call the root table.
 const ROOT: &str = "the file";
 
-/// One table, read key by key; [`finish`](Self::finish) then reports what is missing and what is
-/// unknown.
+/// One table, read key by key; [`finish`](Self::finish) then reports missing and unknown keys.
 #[derive(Debug)]
 pub struct Table<'a> {
     collector: &'a Collector<'a>,
@@ -49,7 +48,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Lets `read` look into a table that stands nowhere in the text, so that what it has to have is told at `at`.
+    /// Lets `read` read a table that the text does not have, so that its required keys are reported as
+    /// missing at `at`.
     pub fn absent<R>(
         collector: &Collector<'_>,
         title: &str,
@@ -60,7 +60,7 @@ impl<'a> Table<'a> {
         read(Table::new(collector, title.to_owned(), at, &nothing, true))
     }
 
-    /// The value of `key`, if it is there.
+    /// The value of `key`, if present.
     pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
         self.known.push(key);
         let node = self.entries.get(key)?;
@@ -71,7 +71,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// The value of `key`; when it is not there, `right` says what to write.
+    /// The value of `key`; when it is missing, `right` says what to write.
     pub fn require(&mut self, key: &'static str, right: impl Into<String>) -> Option<Value<'a>> {
         let value = self.take(key);
         if value.is_none() {
@@ -80,14 +80,14 @@ impl<'a> Table<'a> {
         value
     }
 
-    /// Says that one of `keys` has to be there after all; `right` says what to write.
+    /// Reports that one of `keys` is required after all; `right` says what to write.
     pub fn require_one_of(&mut self, keys: &[&'static str], right: impl Into<String>) {
         if !keys.iter().any(|key| self.entries.contains_key(*key)) {
             self.missing.push((keys.to_vec(), right.into()));
         }
     }
 
-    /// All keys with their values, whatever they are called.
+    /// All keys with their values, known or not.
     pub fn all(&self) -> impl Iterator<Item = (&'a str, Value<'a>)> + use<'a> {
         let collector = self.collector;
         self.entries.iter().map(move |(key, node)| {
@@ -103,28 +103,28 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Whether no line of it was left out for a syntax error. If one was, a key that is not there may
-    /// stand in that line, and rules about several keys cannot be checked.
+    /// Whether none of its lines was left out for a syntax error. If one was, a missing key may be in that
+    /// line, and rules that involve several keys cannot be checked.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
 
-    /// Byte offset of its beginning.
+    /// Byte offset of its start.
     pub fn at(&self) -> usize {
         self.at
     }
 
-    /// Where the mistakes of its text go.
+    /// The collector for mistakes in its text.
     pub fn collector(&self) -> &'a Collector<'a> {
         self.collector
     }
 
-    /// Takes down a mistake of the table as a whole.
+    /// Reports a mistake in the table as a whole.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.collector.report(self.at, what, right);
     }
 
-    /// Reports the keys that are unknown, and those that were required and are not there.
+    /// Reports unknown keys, and required keys that are missing.
     pub fn finish(mut self) {
         for (key, _) in self.entries {
             let name = key.get_ref().as_ref();
@@ -145,7 +145,7 @@ impl<'a> Table<'a> {
         self.finish_open();
     }
 
-    /// Reports the keys that were required and are not there; others may be there as they like.
+    /// Reports required keys that are missing; unknown keys are allowed.
     pub fn finish_open(self) {
         if self.whole {
             for (keys, right) in &self.missing {
@@ -156,7 +156,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// A key as a message shows it: the keys of the root table are tables, by their headers.
+    /// A key as messages show it: keys of the root table are tables, shown as their headers.
     fn shown_key(&self, key: &str) -> String {
         if self.title == ROOT {
             format!("[{key}]")
@@ -165,7 +165,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The known keys that are not there: what a misspelt key most likely means.
+    /// Known keys that are absent: the likely meaning of a misspelt key.
     fn unused(&self) -> Vec<&'static str> {
         self.known
             .iter()
@@ -175,7 +175,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// One value of a table or list. Its getters report a value of the wrong kind and answer `None`.
+/// One value of a table or list. Its getters report a value of the wrong type and return `None`.
 #[derive(Clone, Debug)]
 pub struct Value<'a> {
     collector: &'a Collector<'a>,
@@ -184,22 +184,22 @@ pub struct Value<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// Byte offset of its beginning.
+    /// Byte offset of its start.
     pub fn at(&self) -> usize {
         self.node.span().start
     }
 
-    /// The line, from 1, where it begins.
+    /// The line, from 1, on which it starts.
     pub fn line(&self) -> usize {
         self.collector.line(self.at())
     }
 
-    /// Line and column, both from 1, where it begins.
+    /// Line and column, both from 1, at which it starts.
     pub fn place(&self) -> (usize, usize) {
         self.collector.place(self.at())
     }
 
-    /// Takes down a mistake at this value.
+    /// Reports a mistake in this value.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.collector.report(self.at(), what, right);
     }
@@ -219,7 +219,7 @@ impl<'a> Value<'a> {
         matches!(self.node.get_ref(), DeValue::Integer(_))
     }
 
-    /// A number as it is written; empty for everything else.
+    /// A number as the text has it; empty for everything else.
     pub fn written(&self) -> String {
         match self.node.get_ref() {
             DeValue::Integer(digits) => shown(&digits.to_string()),
@@ -228,7 +228,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The text, if it is one; anything else is no mistake here.
+    /// The text if this is one; anything else is not a mistake here.
     pub fn as_text(&self) -> Option<&'a str> {
         self.node.get_ref().as_str()
     }
@@ -241,8 +241,8 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A text for people: not empty, of at most `longest` characters, none of them a control
-    /// character, and without blanks around it.
+    /// A text for people: not empty, at most `longest` characters, no control characters, no leading or
+    /// trailing blanks.
     pub fn label(&self, longest: usize, right: &str) -> Option<&'a str> {
         let text = self.text(right)?;
         let key = &self.key;
@@ -321,7 +321,7 @@ impl<'a> Value<'a> {
         finite
     }
 
-    /// A duration longer than nothing.
+    /// A duration greater than zero.
     pub fn duration(&self) -> Option<Nanos> {
         let text = self.text("write a duration in quotes, such as \"10ms\"")?;
         match text.parse::<Nanos>() {
@@ -342,7 +342,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A duration of at least `least`; `why` no shorter one makes sense.
+    /// A duration of at least `least`; `why` explains why a shorter one makes no sense.
     pub fn duration_from(&self, least: Nanos, why: &str) -> Option<Nanos> {
         let span = self.duration()?;
         if span < least {
@@ -355,7 +355,7 @@ impl<'a> Value<'a> {
         Some(span)
     }
 
-    /// One of the names in `choices`; `kinds` is what they are called together, such as "roles".
+    /// One of the names in `choices`; `kinds` is their collective name, such as "roles".
     pub fn choice<T: Copy>(&self, kinds: &str, choices: &[(&str, T)]) -> Option<T> {
         let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
         let text = self.text(&format!("{kinds} are {}", quoted(&names)))?;
@@ -380,7 +380,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A table, which messages call `title`.
+    /// A table; messages call it `title`.
     pub fn table(&self, title: &str, right: &str) -> Option<Table<'a>> {
         match self.node.get_ref() {
             DeValue::Table(entries) => Some(self.as_table(title, entries)),
@@ -388,7 +388,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// All tables of a list of tables, which stand in the text under `title`, such as `[[signal]]`.
+    /// All tables of a list of tables that the text writes as `title`, such as `[[signal]]`.
     pub fn tables(&self, title: &str) -> Vec<Table<'a>> {
         let right = format!("write {title} tables");
         match self.node.get_ref() {

@@ -61,7 +61,7 @@ fn input_registers_are_the_bytes_of_i() {
     let mut unit = Unit::device();
     let done = unit.answers(&[4, 0, 0, 0, 1], &[4, 2, 0x12, 0x34]);
     assert_eq!(done.read, Some(0..16));
-    // The last byte alone is half a register.
+    // The last byte is half a register.
     let done = unit.answers(&[4, 0, 0, 0, 2], &[4, 4, 0x12, 0x34, 0x81, 0]);
     assert_eq!(done.read, Some(0..24));
     unit.refuses(&[4, 0, 0, 0, 3], 2);
@@ -126,7 +126,7 @@ fn holding_registers_and_coils_give_back_what_was_written() {
 fn a_mask_sets_and_clears_as_the_standard_reckons() {
     let mut unit = Unit::device();
     unit.holds[4..].copy_from_slice(&[0x00, 0x12]);
-    // The standard's own example: 12h, F2h and 25h give 17h.
+    // The standard's example: 12h, F2h and 25h give 17h.
     let echo = [22, 0, 2, 0x00, 0xF2, 0x00, 0x25];
     assert_eq!(unit.answers(&echo, &echo).wrote, Some(32..48));
     unit.answers(&[3, 0, 2, 0, 1], &[3, 2, 0x00, 0x17]);
@@ -140,7 +140,7 @@ fn read_and_write_writes_first() {
     let pdu = [23, 0, 0, 0, 2, 0, 1, 0, 1, 2, 0xAB, 0xCD];
     let done = unit.answers(&pdu, &[23, 4, 0, 0, 0xAB, 0xCD]);
     assert_eq!((done.wrote, done.read), (Some(16..32), None));
-    // Where there is nothing to read, nothing is written.
+    // If the read is impossible, nothing is written.
     unit.refuses(&[23, 0, 3, 0, 1, 0, 0, 0, 1, 2, 1, 2], 2);
     unit.refuses(&[23, 0, 0, 0, 1, 0, 3, 0, 1, 2, 1, 2], 2);
     unit.refuses(&[23, 0, 0, 0, 1, 0, 0, 0, 1, 3, 1, 2, 3], 3);
@@ -163,7 +163,7 @@ fn a_window_shows_the_inputs_among_the_holding_registers() {
     assert_eq!((done.wrote, done.read), (Some(0..16), Some(0..16)));
 }
 
-/// A PLC that is a server: its outputs are read, its inputs written.
+/// A PLC that is a server: its outputs are read, its inputs are written.
 #[test]
 fn a_controller_s_outputs_are_read_and_its_inputs_written() {
     let mut unit = Unit::device();
@@ -267,7 +267,7 @@ fn a_long_name_is_told_in_two_answers() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4096))]
 
-    /// Whatever is asked, the answer is one, and nothing changes but what it says.
+    /// Every request gets an answer, and changes nothing except what the answer reports.
     #[test]
     fn every_request_is_answered_or_refused_and_nothing_else_happens(
         function in prop::sample::select(Function::ALL.map(Function::code).to_vec()),

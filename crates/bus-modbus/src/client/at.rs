@@ -1,4 +1,4 @@
-//! The lines of `[fieldbus.at]`: signals that lie where the device has them.
+//! The lines of `[fieldbus.at]`: signals with their own place in the device.
 
 use crate::Spot;
 use tickbus_fieldbus::At;
@@ -8,8 +8,8 @@ use super::lie::nobody_writes;
 use super::{ClientOptions, Piece};
 
 impl ClientOptions {
-    /// Takes the lines, and reports those that are none, that do not fit their signals, and that would let two signals
-    /// be written into one place.
+    /// Takes the lines, and reports those that are invalid, that do not fit their signals, or that would make
+    /// two signals write to the same place.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let (writes, _) = self.role.areas();
         let mut placed = Vec::new();
@@ -41,12 +41,12 @@ impl ClientOptions {
         }
     }
 
-    /// Reports lines of signals that would be written into bits that are another one's.
+    /// Reports lines whose signals would be written to bits of another signal.
     fn check_claims(&self, lines: &[&At<'_>], table: &SignalTable, station: usize) {
         let (writes, _) = self.role.areas();
         let blocks = self.blocks(writes, table.stations[station].bytes(writes));
         let blocks = blocks.unwrap_or_default();
-        // All that is written: the bits, and which signal's they are.
+        // Everything that is written: the bits, and the signal that they belong to.
         let mut claims: Vec<(Piece, usize)> = Vec::new();
         for (index, signal) in table.signals.iter().enumerate() {
             if signal.station != station || signal.area != writes {
@@ -62,14 +62,14 @@ impl ClientOptions {
             }
         }
         claims.sort_by_key(|(piece, _)| (piece.table.digit(), piece.claim().start));
-        // The one that reaches furthest so far.
+        // The claim that reaches furthest so far.
         let mut furthest: Option<(Piece, usize)> = None;
         for (piece, index) in claims {
             if let Some((other, of)) = furthest
                 && other.table == piece.table
                 && piece.claim().start < other.claim().end
             {
-                // Those that lie as a whole may share a register: it is written once.
+                // Signals placed by their image address may share a register: it is written once.
                 let line = |index| lines.iter().find(move |line| line.signal == index);
                 let (line, name) = match (line(index), line(of)) {
                     (Some(line), _) => (Some(line), &table.signals[of].name),

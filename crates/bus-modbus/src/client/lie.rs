@@ -1,4 +1,4 @@
-//! Where an area of the image lies as a whole: `inputs` and `outputs` of a driver.cfg.
+//! The place of a whole area of the image: `inputs` and `outputs` of a driver.cfg.
 
 use crate::Place;
 use crate::place::SHAPE;
@@ -9,37 +9,37 @@ use tickbus_image::signal::Area;
 /// The most parts that an area may have.
 const PARTS: usize = 100;
 
-/// Where an area of the image lies in the tables of a unit.
+/// The place of an area of the image in the tables of a unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lie {
-    /// From the first byte on, one behind the other.
+    /// Consecutive parts of the area, from its first byte on.
     parts: Vec<Part>,
-    /// Where the driver.cfg says so.
+    /// The offset of the key in the driver.cfg.
     pub(super) at: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Part {
     place: Place,
-    /// How many bytes; `None` for all that are left.
+    /// The number of bytes; `None` for all remaining ones.
     bytes: Option<usize>,
 }
 
-/// Bytes of an image that lie in a table, all in a row.
+/// Consecutive bytes of an image in one table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
     /// The table.
     pub table: Table,
-    /// The offset of the first element.
+    /// The wire offset of the first element.
     pub first: usize,
     /// The first byte of the image.
     pub byte: usize,
-    /// How many bytes. Of a last register half of which is none of these only the first half counts.
+    /// How many bytes. If the number is odd, the last register carries one byte only, in its high half.
     pub bytes: usize,
 }
 
 impl Block {
-    /// The elements of the table.
+    /// The elements that hold the bytes.
     pub fn span(self) -> Span {
         Span {
             first: self.first,
@@ -49,8 +49,8 @@ impl Block {
 }
 
 impl Lie {
-    /// Reads what `value` says; all of it at `default` without one. `writes` says that this end writes there, and `at`
-    /// where the table of the bus begins.
+    /// Reads `value`; without one the whole area is at `default`. `writes` says that this end writes the
+    /// area, and `at` is the offset of the bus's table.
     pub(super) fn read(
         value: Option<&Value<'_>>,
         at: usize,
@@ -112,12 +112,12 @@ impl Lie {
         Some(Self { parts, at })
     }
 
-    /// Where the parts begin.
+    /// The first elements of the parts.
     pub(super) fn places(&self) -> impl Iterator<Item = Place> {
         self.parts.iter().map(|part| part.place)
     }
 
-    /// Where `area`, which has so many bytes, lies.
+    /// The blocks of `area`, which has `bytes` bytes.
     ///
     /// # Errors
     ///
@@ -164,11 +164,11 @@ impl Lie {
         Ok(blocks)
     }
 
-    /// Whether the blocks of `area`, which is written, lie beside one another.
+    /// Checks that the blocks of `area`, which this end writes, do not overlap.
     ///
     /// # Errors
     ///
-    /// Two lie over one another: what is wrong, and what would be right.
+    /// Two blocks overlap: what is wrong, and what would be right.
     pub(super) fn check_apart(area: Area, blocks: &[Block]) -> Result<(), (String, String)> {
         for (index, block) in blocks.iter().enumerate() {
             let other = blocks[..index].iter().find(|other| {
@@ -212,7 +212,7 @@ fn read_place(value: &Value<'_>, table: Table, writes: bool) -> Option<Place> {
     Some(place)
 }
 
-/// What is wrong with writing into a table that can only be read, and what would be right.
+/// The error for writing to a read-only table: what is wrong, and what would be right.
 pub(super) fn nobody_writes(table: Table) -> (String, &'static str) {
     (
         format!("nobody can write {table}"),

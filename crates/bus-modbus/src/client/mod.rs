@@ -28,7 +28,7 @@ pub use plan::{Abilities, queries};
 use poll::{Framing, Poll, Station};
 pub use query::{Fault, Query, Region};
 
-/// So many times `max_age` a server may leave what it was sent unacknowledged.
+/// For how many times `max_age` a server may leave sent data unacknowledged.
 const PATIENCE: i64 = 4;
 
 /// The bus of kind `modbus-client`.
@@ -41,7 +41,7 @@ pub struct ModbusClient {
 }
 
 impl ModbusClient {
-    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if one is stated.
+    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if stated.
     pub fn new(
         options: &ClientOptions,
         table: &SignalTable,
@@ -146,7 +146,7 @@ impl Free for ModbusClient {
     }
 }
 
-/// A connection that is left in good order.
+/// A connection that is closed properly when dropped.
 struct Leaving(TcpStream);
 
 impl Drop for Leaving {
@@ -177,7 +177,7 @@ impl AsFd for Leaving {
     }
 }
 
-/// Carries bytes between the line and the polling until `stop`.
+/// Transfers bytes between the line and the polling until `stop`.
 fn serve(
     line: &mut (impl Read + Write + AsFd),
     mut poll: Poll<'_>,

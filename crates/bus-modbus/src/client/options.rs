@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus `modbus-client`.
+//! The options of the bus `modbus-client` in a driver.cfg.
 
 use std::collections::BTreeMap;
 
@@ -16,44 +16,43 @@ use super::lie::Lie;
 use super::plan::{Abilities, queries};
 use super::{Block, Piece, Query};
 
-/// Where a client connects to unless a driver.cfg says otherwise: where a server of ours listens.
+/// The default address: the one at which our own server listens.
 const ADDRESS: Address = Address::local(1502);
 
-/// How long a server has for an answer unless a driver.cfg says otherwise.
+/// The default time-out for an answer.
 const TIMEOUT: Nanos = Nanos::from_secs(1);
 
-/// The unit of a single station unless a driver.cfg says otherwise.
+/// The default unit of a single station.
 const UNIT: u8 = 1;
 
-/// On a serial line a gap of so many bits is read rather than that two requests are made: eight registers last about as
-/// long as what a request has beside its values.
+/// On a serial line, a gap of up to this many bits is read over to save a request: eight registers take about
+/// as long as the overhead of a request.
 const SERIAL_GAP: usize = 128;
 
-/// What a driver.cfg says to the bus `modbus-client`.
+/// The options of the bus `modbus-client`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClientOptions {
     /// The line to the server.
     pub line: Line,
-    /// Which unit each station is, and which device it may write to.
+    /// The unit of each station, and the device that it may write to.
     pub stations: Stations,
-    /// Where `%I` lies.
+    /// The place of `%I`.
     pub inputs: Lie,
-    /// Where `%Q` lies.
+    /// The place of `%Q`.
     pub outputs: Lie,
-    /// The signals that lie elsewhere, by their names: `[fieldbus.at]`.
+    /// Signals with their own place, by name: `[fieldbus.at]`.
     pub at: BTreeMap<String, Spot>,
-    /// How long the server has for an answer, if the driver.cfg says so.
+    /// The time-out for an answer, if stated.
     pub timeout: Option<Nanos>,
-    /// Whether one request may write and read.
+    /// Whether a single request may write and read.
     pub combine: bool,
-    /// Whether every change that the server makes is reported as an event, beside the image.
+    /// Whether every change by the server is reported as an event, in addition to the image.
     pub events: bool,
     pub(super) role: Role,
 }
 
 impl ClientOptions {
-    /// Reads the keys of the bus. `moved` says that another address will take the place of the one that is
-    /// read.
+    /// Reads the keys of the bus. `moved` says that the address will be replaced.
     pub fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
         let line = Line::read(&mut table, ADDRESS, |address| {
             if moved {
@@ -101,7 +100,7 @@ impl ClientOptions {
         })
     }
 
-    /// Reports what does not go together with the sizes of the stations.
+    /// Reports conflicts with the sizes of the stations.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         let (writes, _) = self.role.areas();
         for area in [Area::Input, Area::Output] {
@@ -138,13 +137,13 @@ impl ClientOptions {
         }
     }
 
-    /// Whether `inputs` or `outputs` matters: whether not every signal of the area has a place of its own.
+    /// Whether `inputs` or `outputs` has an effect: whether any signal of the area has no place of its own.
     pub(crate) fn lies_as_a_whole(&self, area: Area, table: &SignalTable) -> bool {
         let mut signals = table.signals.iter().filter(|signal| signal.area == area);
         self.at.is_empty() || signals.any(|signal| !self.at.contains_key(&signal.name))
     }
 
-    /// Where the parts of an area begin.
+    /// The first elements of the parts of an area.
     pub(crate) fn places(&self, area: Area) -> impl Iterator<Item = Place> {
         self.lie(area).places()
     }
@@ -154,10 +153,10 @@ impl ClientOptions {
         self.stations.unit(station).unwrap_or(UNIT)
     }
 
-    /// How long a server has for an answer where there are so many stations.
+    /// The time-out for an answer, given the number of stations.
     ///
-    /// Where the driver.cfg does not say, one of several that is silent must not make the data of the others older than
-    /// `max_age`.
+    /// If the driver.cfg does not state it, a silent station among several must not make the data of the
+    /// others older than `max_age`.
     pub fn patience(&self, stations: usize, max_age: Nanos) -> Nanos {
         self.timeout.unwrap_or(if stations > 1 {
             TIMEOUT.min(Nanos(max_age.0 / 2))
@@ -166,7 +165,7 @@ impl ClientOptions {
         })
     }
 
-    /// Where an area of so many bytes lies as a whole.
+    /// The blocks of an area of `bytes` bytes.
     ///
     /// # Errors
     ///
@@ -175,9 +174,9 @@ impl ClientOptions {
         self.lie(area).blocks(area, bytes)
     }
 
-    /// Where the signals of a station's area lie.
+    /// The pieces of the signals in a station's area.
     pub fn pieces(&self, table: &SignalTable, station: usize, area: Area) -> Vec<Piece> {
-        // What does not fit was reported when the driver.cfg was read.
+        // Errors were reported when the driver.cfg was read.
         let blocks = self.blocks(area, table.stations[station].bytes(area));
         let blocks = blocks.unwrap_or_default();
         let mut pieces = Vec::new();
@@ -195,7 +194,7 @@ impl ClientOptions {
         pieces
     }
 
-    /// What is taken for granted of a device that is met anew.
+    /// The abilities assumed of a device at the start of a connection.
     pub(super) fn abilities(&self) -> Abilities {
         let gap = match self.line {
             Line::Tcp(_) => usize::MAX,
@@ -204,7 +203,7 @@ impl ClientOptions {
         Abilities::new(self.combine, gap)
     }
 
-    /// The requests that a station is sent in each cycle, unless its device refuses some of them.
+    /// The requests sent to a station in each cycle, unless its device refuses some of them.
     pub fn requests(&self, table: &SignalTable, station: usize) -> Vec<Query> {
         let (writes, reads) = self.role.areas();
         let pieces = |area| self.pieces(table, station, area);
@@ -212,7 +211,7 @@ impl ClientOptions {
     }
 }
 
-/// Where an area lies unless a driver.cfg says so.
+/// The default place of an area.
 fn default(role: Role, area: Area) -> Place {
     let (table, offset) = match (role, area) {
         (_, Area::Output) => (OfTable::HoldingRegisters, 0),

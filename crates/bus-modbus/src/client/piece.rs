@@ -1,4 +1,4 @@
-//! Where each signal lies in the tables, bit for bit.
+//! The place of each signal in the tables, bit by bit.
 
 use crate::table::{ADDRESSES, Span, Table};
 use crate::{Place, Spot};
@@ -6,24 +6,25 @@ use tickbus_image::signal::{DataType, Signal};
 
 use super::Block;
 
-/// Bits of a frame, and the bits of a table that carry them, in the same order.
+/// Bits of a frame, and the bits of a table that carry them in the same order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
     /// The table.
     pub table: Table,
-    /// The first bit in the table. That of a coil or discrete input is its offset; of registers the bytes follow one
-    /// another as on the wire, the high one first, and bit n of byte k is 8k + n.
+    /// The first bit in the table. For a coil or discrete input it is the offset; registers are taken as
+    /// consecutive bytes in wire order, high byte first, and bit n of byte k is 8k + n.
     pub wire: usize,
     /// The first bit in the frame; bit n of byte k is 8k + n.
     pub bit: usize,
     /// How many bits; at most [`LONGEST`](Self::LONGEST).
     pub bits: usize,
-    /// Whether the rest of a register that it does not fill belongs to the image, too, and is written as zero.
+    /// Whether the rest of a register that it does not fill belongs to the image as well, and is written as
+    /// zero.
     pub fills: bool,
 }
 
 impl Piece {
-    /// Bits of the longest signal.
+    /// Number of bits of the longest signal.
     pub const LONGEST: usize = 64;
 
     /// The elements that it touches.
@@ -37,7 +38,7 @@ impl Piece {
         }
     }
 
-    /// The bits of the table from `begin` to `end`, without the second, as far as they are of this piece.
+    /// The part of this piece within the bits `begin..end` of the table.
     pub(super) fn within(self, begin: usize, end: usize) -> Option<Self> {
         let from = self.wire.max(begin);
         let to = (self.wire + self.bits).min(end);
@@ -49,7 +50,7 @@ impl Piece {
         })
     }
 
-    /// The bits that a write claims: to the register where it fills that.
+    /// The bits that writing it affects: whole registers if it fills them.
     pub(super) fn claim(self) -> std::ops::Range<usize> {
         if self.fills {
             let (span, width) = (self.span(), self.table.width());
@@ -59,7 +60,7 @@ impl Piece {
         }
     }
 
-    /// What `signal` has of `block`, where the image lies as a whole.
+    /// The part of `signal` in `block`, for an area placed as a whole.
     pub(super) fn of_block(signal: &Signal, block: &Block) -> Option<Self> {
         let bits = signal.address().bits();
         let begin = bits.start.max(block.byte * 8);
@@ -73,11 +74,11 @@ impl Piece {
         })
     }
 
-    /// Where `signal` lies whose own place is `spot`.
+    /// The piece of a `signal` with its own place `spot`.
     ///
     /// # Errors
     ///
-    /// It cannot lie there: what is wrong, and what would be right.
+    /// It does not fit there: what is wrong, and what would be right.
     pub(super) fn of_spot(signal: &Signal, spot: Spot) -> Result<Self, (String, String)> {
         let Place { table, offset } = spot.place;
         let data_type = signal.data_type;
@@ -104,7 +105,7 @@ impl Piece {
             0
         } else {
             match (bits, spot.bit) {
-                // Bit n of a register lies in its second byte, which is the low one, or in its first.
+                // Bits 0 to 7 of a register are in its second byte, the low one; bits 8 to 15 in its first.
                 (1, Some(bit)) => 8 * (1 - usize::from(bit / 8)) + usize::from(bit % 8),
                 (1, None) => {
                     return Err((

@@ -1,4 +1,4 @@
-//! The planning of requests: which of them bring the signals of a station across, and as few as there can be.
+//! Plans the requests of a cycle: as few as possible that transfer all signals of a station.
 
 use std::collections::BTreeMap;
 
@@ -10,21 +10,21 @@ use crate::table::{Span, Table};
 use super::Piece;
 use super::query::{Query, Region};
 
-/// What is known of a device, and how its requests are to be made.
+/// The abilities of a device, which decide how requests are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Abilities {
-    /// One request may write and read holding registers: function 23.
+    /// One request can write and read holding registers: function 23.
     pub combine: bool,
-    /// A request may read over a gap of so many bits of a table rather than that two requests are made.
+    /// The widest gap in a table, in bits, that is read over to save a request.
     pub gap: usize,
-    /// It has function 15; else its coils are written one by one.
+    /// It has function 15; otherwise coils are written one at a time.
     pub many_coils: bool,
-    /// It has function 16; else its registers are written one by one.
+    /// It has function 16; otherwise registers are written one at a time.
     pub many_registers: bool,
 }
 
 impl Abilities {
-    /// Those of a device of which nothing is known yet.
+    /// The abilities assumed of an unknown device.
     pub const fn new(combine: bool, gap: usize) -> Self {
         Self {
             combine,
@@ -35,10 +35,11 @@ impl Abilities {
     }
 }
 
-/// The requests of one cycle, what is written first.
+/// The requests of one cycle, writes first.
 ///
-/// Every piece is read or written once. Reading may join pieces over gaps; nothing is written but what pieces have.
-/// Only a piece that shares its registers with others beyond the limit of a request is divided.
+/// Every piece is read or written once. A read may include gaps between pieces; a write never includes
+/// anything else. A piece is split only if it shares registers with others and they exceed the limit of a
+/// request.
 pub fn queries(reads: &[Piece], writes: &[Piece], able: &Abilities) -> Vec<Query> {
     let is_holding = |piece: &Piece| piece.table == Table::HoldingRegisters;
     let combine = able.combine
@@ -71,7 +72,7 @@ pub fn queries(reads: &[Piece], writes: &[Piece], able: &Abilities) -> Vec<Query
     queries
 }
 
-/// The pieces of each table by their place, tables in the order in which they are met first.
+/// The pieces of each table in order of place; tables in order of first occurrence.
 fn by_table(pieces: &[Piece]) -> impl Iterator<Item = (Table, Vec<Piece>)> {
     let mut tables: Vec<Table> = Vec::new();
     for piece in pieces {
@@ -87,7 +88,7 @@ fn by_table(pieces: &[Piece]) -> impl Iterator<Item = (Table, Vec<Piece>)> {
     })
 }
 
-/// What is read of one table, whose pieces are in order.
+/// The reads from one table, whose pieces are in order.
 fn readings(table: Table, pieces: &[Piece], gap: usize) -> Vec<Region> {
     let limit = if table.is_bits() {
         READ_BITS
@@ -114,7 +115,7 @@ fn readings(table: Table, pieces: &[Piece], gap: usize) -> Vec<Region> {
     regions
 }
 
-/// What is written into one table, whose pieces are in order.
+/// The writes to one table, whose pieces are in order.
 fn writings(table: Table, pieces: &[Piece], able: &Abilities) -> Vec<Query> {
     let (most, many) = match (table.is_bits(), able.combine) {
         (true, _) => (WRITE_BITS, able.many_coils),
@@ -153,7 +154,7 @@ fn writings(table: Table, pieces: &[Piece], able: &Abilities) -> Vec<Query> {
     queries
 }
 
-/// The offsets of the elements that pieces have as a whole, and of those that they have in part; both in order.
+/// The offsets of elements covered completely by pieces, and of those covered in part; both in order.
 fn elements(table: Table, pieces: &[Piece]) -> (Vec<usize>, Vec<usize>) {
     const ALL: u16 = 0xFFFF;
     let mut covered: BTreeMap<usize, u16> = BTreeMap::new();
@@ -175,12 +176,12 @@ fn elements(table: Table, pieces: &[Piece]) -> (Vec<usize>, Vec<usize>) {
     (offsets(whole), offsets(partial))
 }
 
-/// So many bits from one on, of 16.
+/// A mask of `bits` bits, starting at bit `from`.
 fn mask(from: usize, bits: usize) -> u16 {
     (from..from + bits).fold(0, |mask, bit| mask | 1 << bit)
 }
 
-/// How many elements of `run`, at most `most`, one request writes, such that no piece is divided if that can be.
+/// How many elements of `run` one request writes, at most `most`, avoiding a split of a piece if possible.
 fn cut(run: Span, most: usize, pieces: &[Piece]) -> usize {
     if run.count <= most {
         return run.count;
@@ -198,7 +199,7 @@ fn cut(run: Span, most: usize, pieces: &[Piece]) -> usize {
     end - run.first
 }
 
-/// The pieces in order of which some could touch the elements around the one with this offset.
+/// The pieces, which are in order, that may touch the elements next to the one at this offset.
 fn near(pieces: &[Piece], offset: usize) -> impl Iterator<Item = &Piece> {
     let width = pieces.first().map_or(1, |piece| piece.table.width());
     let bit = offset * width;
@@ -207,7 +208,7 @@ fn near(pieces: &[Piece], offset: usize) -> impl Iterator<Item = &Piece> {
     pieces[begin..end.max(begin)].iter()
 }
 
-/// Elements of a table with what pieces have of them.
+/// The elements `span` of a table with the parts of pieces in them.
 fn region(table: Table, span: Span, pieces: &[Piece]) -> Region {
     let (begin, end) = (span.first * table.width(), span.end() * table.width());
     let from = pieces.partition_point(|piece| piece.wire + Piece::LONGEST < begin);

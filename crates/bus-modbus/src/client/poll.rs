@@ -1,5 +1,5 @@
-//! The polling of a server's units, without I/O: time and bytes are handed in, bytes and the next deadline come
-//! out.
+//! Polling a server's units, without I/O: time and received bytes go in, bytes to send and the next deadline
+//! come out.
 
 mod identify;
 mod station;
@@ -20,43 +20,43 @@ use super::query::{Fault, length};
 use identify::Identity;
 pub(super) use station::Station;
 
-/// How telegrams are told apart.
+/// How telegrams are delimited.
 #[derive(Debug)]
 pub(super) enum Framing {
     /// By their header.
     Tcp {
-        /// The last one's number.
+        /// The last transaction number.
         transaction: u16,
-        /// What has come of the next one.
+        /// The received part of the next telegram.
         inbox: Vec<u8>,
     },
-    /// By their length, and silence between them.
+    /// By their length, and by silence between them.
     #[cfg_attr(
         not(unix),
         expect(dead_code, reason = "no serial ports are used there")
     )]
     Rtu {
-        /// What has come of an answer.
+        /// The received part of an answer.
         inbox: Vec<u8>,
-        /// How long one character takes.
+        /// Duration of one character.
         character: Nanos,
         silence: Nanos,
-        /// Until when nothing may be sent.
+        /// Nothing may be sent before this.
         quiet_until: Nanos,
-        /// The line's echo of what is sent, where it has one.
+        /// The line's echo of what is sent, if it has one.
         echo: Option<rtu::Echo>,
     },
 }
 
-/// What the server is asked.
+/// What the server was asked.
 #[derive(Clone, Debug)]
 enum Asked {
-    /// Who it is.
+    /// Its identity.
     Identity {
         so_far: Identification,
         requests: usize,
     },
-    /// The query with this index of the station's.
+    /// The station's query with this index.
     Query(usize),
 }
 
@@ -66,29 +66,29 @@ struct Asking {
     what: Asked,
     /// The function code.
     code: u8,
-    /// Until when it has to answer.
+    /// When the time-out of the answer ends.
     limit: Nanos,
 }
 
-/// The polling of all stations, over one connection.
+/// Polls all stations over one connection.
 #[derive(Debug)]
 pub(super) struct Poll<'a> {
     stations: &'a mut [Station],
     guards: &'a mut [Guard],
     framing: Framing,
     timeout: Nanos,
-    /// What messages call the server.
+    /// The server's name in messages.
     peer: String,
     cycle: Nanos,
     pace: Pace,
-    /// When it was last looked at what is due.
+    /// When it last checked what is due.
     looked: Nanos,
     asking: Option<Asking>,
-    /// The request as it goes over the line, where its PDU lies, and how much of it the system has taken.
+    /// The request as sent over the line, the range of its PDU, and how much of it the system has accepted.
     request: Vec<u8>,
     pdu: Range<usize>,
     written: usize,
-    /// Whether the line is said to be lost, as no station is in order.
+    /// Whether the line is reported as lost because no station works.
     lost: bool,
 }
 
@@ -123,12 +123,12 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// Until when the owner of the line may wait, if nothing comes and nothing can be written.
+    /// Until when the owner of the line may wait if nothing arrives and nothing can be written.
     pub(super) fn deadline(&self) -> Nanos {
         let Some(asking) = &self.asking else {
             return self.pace.due();
         };
-        // An answer that takes its time is waited for cycle by cycle, so that its age is looked at.
+        // While an answer is slow, wake up every cycle to check the age of the data.
         let deadline = asking.limit.min(self.looked + self.cycle);
         match self.framing {
             Framing::Rtu { quiet_until, .. } if self.written < self.request.len() => {
@@ -138,7 +138,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// What is to be written at `now`.
+    /// The bytes to be written at `now`.
     pub(super) fn to_write(&self, now: Nanos) -> &[u8] {
         match self.framing {
             Framing::Rtu { quiet_until, .. } if now < quiet_until => &[],
@@ -146,7 +146,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// The system took so many bytes of it at `now`.
+    /// The system accepted `count` of them at `now`.
     pub(super) fn wrote(&mut self, now: Nanos, count: usize) {
         if let Framing::Rtu {
             echo: Some(echo), ..
@@ -157,7 +157,7 @@ impl<'a> Poll<'a> {
         self.written += count;
     }
 
-    /// Does what is due at `now`: begins a cycle, gives up what is not answered.
+    /// Does what is due at `now`: begins a cycle, gives up on an answer.
     pub(super) fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         self.looked = now;
         match &self.asking {
@@ -167,7 +167,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// These bytes came at `now`.
+    /// `bytes` arrived at `now`.
     pub(super) fn arrived(
         &mut self,
         now: Nanos,
@@ -207,9 +207,9 @@ impl<'a> Poll<'a> {
                     self.clear();
                     return Ok(());
                 }
-                // The beginning of an answer tells how long it is. So pauses within one, which some adapters make, do
-                // no harm, and none has to be waited for. Nor does noise behind it, as when the line's driver is
-                // switched off.
+                // The beginning of an answer tells its length. So pauses within an answer, as some adapters
+                // make, do no harm, and there is no silence to wait for; nor does noise after it, when the
+                // transmitter is switched off.
                 let expected = inbox.get(1..).and_then(length);
                 match expected.map(|pdu| 1 + pdu + rtu::CHECKSUM) {
                     Some(expected) if inbox.len() >= expected => {
@@ -222,7 +222,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// A telegram of RTU came.
+    /// An RTU telegram arrived.
     fn hear(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(asking) = &self.asking else {
             return Ok(());
@@ -235,7 +235,7 @@ impl<'a> Poll<'a> {
             Some((from, pdu)) if from == unit && pdu[0] & !EXCEPTION_BIT == code => {
                 self.answered(pdu, now, port)
             }
-            // A late answer to what was asked before; the one that is waited for may yet come.
+            // A late answer to an earlier request; the expected one may still arrive.
             Some((from, pdu)) => {
                 port.count("modbus-client.unasked");
                 if from == unit && pdu[0] == Function::DeviceIdentification.code() {
@@ -260,7 +260,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// Takes all whole telegrams of TCP; gives how many bytes they had.
+    /// Takes all complete TCP telegrams; returns their number of bytes.
     fn read_telegrams(
         &mut self,
         bytes: &[u8],
@@ -273,7 +273,8 @@ impl<'a> Poll<'a> {
                 Ok(Some(parsed)) => parsed,
                 Ok(None) => return Ok(taken),
                 Err(error) => {
-                    // This end hangs up now; if it had asked who the device is, that counts as if the device had.
+                    // This end closes the connection now; if it was asking for the identity, that counts as
+                    // if the device had closed it.
                     self.hung_up();
                     return Err(BusError::Protocol(format!("of {}: {error}", self.peer)));
                 }
@@ -283,7 +284,7 @@ impl<'a> Poll<'a> {
                 return Ok(taken);
             };
             if self.asking.is_none() || telegram.transaction != *transaction {
-                // Too late, or never asked for.
+                // Too late, or never requested.
                 port.count("modbus-client.unasked");
                 continue;
             }
@@ -291,7 +292,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// The answer to what is asked came.
+    /// The answer to the current request arrived.
     fn answered(&mut self, pdu: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(Asking { station, what, .. }) = self.asking.take() else {
             return Ok(());
@@ -322,12 +323,12 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// The unit as messages call it.
+    /// The unit's name in messages.
     fn named(&self, station: usize) -> String {
         format!("unit {} of {}", self.stations[station].unit, self.peer)
     }
 
-    /// Begins with the first station from this one on that does not rest in this cycle, or ends the cycle.
+    /// Begins with the first station, from this one on, that is not resting in this cycle, or ends the cycle.
     fn begin(&mut self, station: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let mut rest = station..self.stations.len();
         let Some(next) = rest.find(|station| !self.stations[*station].rests(now)) else {
@@ -340,7 +341,7 @@ impl<'a> Poll<'a> {
         self.go_on(next, 0, now, port)
     }
 
-    /// Makes the request with this index, or ends the station's part of the cycle behind the last one.
+    /// Sends the request with this index, or ends the station's part of the cycle after the last one.
     fn go_on(
         &mut self,
         station: usize,
@@ -351,7 +352,7 @@ impl<'a> Poll<'a> {
         let polled = &self.stations[station];
         if let Some(query) = polled.queries.get(index) {
             if polled.is_to_be_prepared() {
-                // Who the device is has become doubtful since: the rest is not written.
+                // The identity of the device has become doubtful in the meantime: nothing more is written.
                 return self.begin(station + 1, now, port);
             }
             let (code, answer) = (query.function().code(), query.answer_length());
@@ -382,7 +383,7 @@ impl<'a> Poll<'a> {
         self.begin(station + 1, now, port)
     }
 
-    /// Makes a request with this function code, whose PDU `write` appends, and to which an answer of so many bytes is
+    /// Sends a request with this function code, whose PDU `write` appends; an answer of `answer` bytes is
     /// expected.
     fn ask(
         &mut self,
@@ -413,7 +414,7 @@ impl<'a> Poll<'a> {
                 inbox.clear();
                 rtu::append(polled.unit, request, |pdu| write(polled, pdu));
                 self.pdu = 1..request.len() - rtu::CHECKSUM;
-                // The line needs its time for both, and for what is around the answer.
+                // Request and answer need their time on the line, with unit and checksum.
                 let characters = i64::try_from(request.len() + answer + 3).unwrap_or(i64::MAX);
                 limit = limit.max(*quiet_until + self.timeout) + character.times(characters);
             }

@@ -1,4 +1,4 @@
-//! The client's half of the codec: what is asked for, and what an answer to it may be.
+//! The client's half of the codec: requests, and their possible answers.
 
 use std::fmt;
 
@@ -8,21 +8,21 @@ use crate::{Exception, Function, Place, identification};
 
 use super::Piece;
 
-/// Elements of a table in a row, and the bits of a frame that they carry.
+/// Consecutive elements of a table, and the bits of a frame that they carry.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Region {
     /// The table.
     pub table: Table,
     /// The elements.
     pub span: Span,
-    /// What they carry, by place; neighbours in both are one.
+    /// The pieces that they carry, in order of place; adjacent ones are merged.
     pub pieces: Vec<Piece>,
-    /// Whether there are elements between the pieces that none of them has.
+    /// Whether there are elements between the pieces that belong to none.
     pub joined: bool,
 }
 
 impl Region {
-    /// These elements, which carry nothing yet.
+    /// These elements, without pieces.
     pub const fn new(table: Table, span: Span) -> Self {
         Self {
             table,
@@ -32,7 +32,7 @@ impl Region {
         }
     }
 
-    /// One more piece, behind the others.
+    /// Adds a piece, in order of place.
     pub(super) fn take(&mut self, piece: Piece) {
         if let Some(last) = self.pieces.last_mut()
             && last.wire + last.bits == piece.wire
@@ -49,19 +49,19 @@ impl Region {
         (self.span.count * self.table.width()).div_ceil(8)
     }
 
-    /// The first bit of a piece among those of the elements.
+    /// The first bit of a piece, counted from the first element.
     const fn bit(&self, piece: &Piece) -> usize {
         piece.wire - self.span.first * self.table.width()
     }
 
-    /// How many bits of the elements are no piece's, and are written as zero.
+    /// The number of bits that belong to no piece, and are written as zero.
     pub fn zeros(&self) -> usize {
         let own: usize = self.pieces.iter().map(|piece| piece.bits).sum();
-        // Those that lie over one another count twice; no driver.cfg may have them where it writes.
+        // Overlapping pieces count twice; a driver.cfg must not have them where it writes.
         (self.span.count * self.table.width()).saturating_sub(own)
     }
 
-    /// Appends the elements' values, with zeros where no piece is.
+    /// Appends the elements' values, with zeros between the pieces.
     fn append(&self, sends: &[u8], pdu: &mut Vec<u8>) {
         let begin = pdu.len();
         pdu.resize(begin + self.bytes(), 0);
@@ -71,14 +71,14 @@ impl Region {
         }
     }
 
-    /// Takes the pieces out of the elements' values.
+    /// Copies the pieces from the elements' values.
     fn scatter(&self, values: &[u8], receives: &mut [u8]) {
         for piece in &self.pieces {
             copy_bits(values, self.bit(piece), piece.bits, receives, piece.bit);
         }
     }
 
-    /// The bits of its only register that pieces have.
+    /// The bits that pieces cover in its only register.
     fn mask(&self) -> u16 {
         let mut mask = [0; 2];
         for piece in &self.pieces {
@@ -88,7 +88,7 @@ impl Region {
     }
 }
 
-/// Both ways to write its elements, as a message has them.
+/// The elements in both notations, for messages.
 impl fmt::Display for Region {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Span { first, count } = self.span;
@@ -110,11 +110,11 @@ impl fmt::Display for Region {
 pub enum Query {
     /// Reads elements.
     Read(Region),
-    /// Writes elements in a row.
+    /// Writes consecutive elements.
     Write(Region),
-    /// Writes one element, where a device cannot write several.
+    /// Writes one element, for a device that cannot write several.
     WriteOne(Region),
-    /// Writes bits of one register and leaves its others alone.
+    /// Writes bits of one register without changing the others.
     Mask(Region),
     /// Writes, then reads; both holding registers.
     Both {
@@ -125,17 +125,17 @@ pub enum Query {
     },
 }
 
-/// Why an answer is none.
+/// Why an answer is not valid data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The server refused.
     Refused(Exception),
-    /// The answer is not as the standard wants it.
+    /// The answer violates the standard.
     Malformed(String),
 }
 
 impl Query {
-    /// What it asks the server for.
+    /// Its function code.
     pub const fn function(&self) -> Function {
         match self {
             Self::Both { .. } => Function::ReadWriteRegisters,
@@ -172,12 +172,12 @@ impl Query {
         }
     }
 
-    /// Whether it only looks whether the device is there: whatever it reads, nothing takes that.
+    /// Whether it only checks that the device is there: what it reads is ignored.
     pub(super) fn is_look(&self) -> bool {
         matches!(self, Self::Read(read) if read.pieces.is_empty())
     }
 
-    /// How many bytes the PDU of the answer has.
+    /// The length of the answer's PDU.
     pub fn answer_length(&self) -> usize {
         match self.read() {
             Some(read) => 2 + read.bytes(),
@@ -185,11 +185,11 @@ impl Query {
         }
     }
 
-    /// Appends its PDU; what it writes is taken from `sends`.
+    /// Appends its PDU, with values from `sends`.
     ///
     /// # Panics
     ///
-    /// When that is too short, or the query is larger than the limits allow.
+    /// When `sends` is too short, or the query exceeds the limits.
     pub fn append(&self, sends: &[u8], pdu: &mut Vec<u8>) {
         pdu.push(self.function().code());
         if let Some(read) = self.read() {
@@ -220,15 +220,16 @@ impl Query {
         }
     }
 
-    /// Takes over what the answer `pdu` to the request `asked` brings, into `receives`.
+    /// Copies the values in the answer `pdu` to the request `asked` into `receives`.
     ///
     /// # Errors
     ///
-    /// The answer is a refusal, or malformed; then nothing was taken over.
+    /// The answer is a refusal, or malformed; then nothing was copied.
     pub fn take(&self, asked: &[u8], pdu: &[u8], receives: &mut [u8]) -> Result<(), Fault> {
         let data = expect(self.function(), pdu)?;
         let Some(read) = self.read() else {
-            // Of several elements the answer tells where and how many; of one, all that was asked.
+            // An answer to writing several elements has their address and count; to writing one, the whole
+            // request.
             let echo = match self {
                 Self::Write(_) => asked.get(1..5),
                 _ => asked.get(1..),
@@ -258,7 +259,7 @@ impl Query {
     }
 }
 
-/// What the query does, as a message has it.
+/// The query in words, for messages.
 impl fmt::Display for Query {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let code = self.function().code();
@@ -285,7 +286,7 @@ impl fmt::Display for Query {
     }
 }
 
-/// What follows the function code of an answer, if that is the one asked for.
+/// What follows the function code of an answer, if that is the expected one.
 pub(super) fn expect(function: Function, pdu: &[u8]) -> Result<&[u8], Fault> {
     let code = function.code();
     match *pdu {
@@ -301,8 +302,8 @@ pub(super) fn expect(function: Function, pdu: &[u8]) -> Result<&[u8], Fault> {
     }
 }
 
-/// How long an answer is, as far as that can be told from its beginning, which begins with the function code. RTU has
-/// no other way to know before the silence.
+/// The length of an answer that starts like this, function code first, as soon as it can be told. With RTU
+/// there is no other way to know it before the silence.
 pub(super) fn length(beginning: &[u8]) -> Option<usize> {
     let (&code, data) = beginning.split_first()?;
     if code & EXCEPTION_BIT != 0 {

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus `modbus-server`.
+//! The options of the bus `modbus-server` in a driver.cfg.
 
 use crate::line::Line;
 use crate::stations::{Stations, Units};
@@ -11,29 +11,28 @@ use tickbus_image::signal::SignalTable;
 
 use super::super::place::SHAPE;
 
-/// Where a server listens unless a driver.cfg says otherwise: on this machine alone, at a port that needs no
-/// privilege.
+/// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1502);
 
-/// The most clients of a server, unless a driver.cfg says otherwise.
+/// The default number of clients.
 const CLIENTS: usize = 1024;
 
-/// What a driver.cfg says to the bus `modbus-server`.
+/// The options of the bus `modbus-server`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServerOptions {
-    /// Where it serves.
+    /// The line on which it serves.
     pub line: Line,
     /// The frame of `%I`.
     pub input: Side,
-    /// The holding register at which `%I` begins once more, if the driver.cfg says so, and where it does.
+    /// The holding register at which `%I` is repeated, if stated, and the offset of that key.
     pub window: Option<(usize, usize)>,
-    /// Which unit each station is.
+    /// The unit of each station.
     pub stations: Stations,
-    /// The most clients at once.
+    /// The most clients at the same time.
     pub clients: usize,
-    /// Whether every change that a client makes is reported as an event, beside the image.
+    /// Whether every change by a client is reported as an event, in addition to the image.
     pub events: bool,
-    /// Whether every write is, changed or not.
+    /// Whether every write is reported, changed or not.
     pub every_write: bool,
 }
 
@@ -79,10 +78,10 @@ impl ServerOptions {
 }
 
 impl ServerOptions {
-    /// Where the frames of a station lie in the tables, whose `%Q` has so many bytes.
+    /// The tables of a station whose `%Q` has this many bytes.
     pub fn map(&self, output_bytes: usize) -> Map {
         let outputs = table::Table::HoldingRegisters.elements(output_bytes);
-        // Where %Q reaches so far there is no room for it, and nobody asked for it.
+        // If %Q reaches that far, the default window has no room and is omitted.
         let usual = (outputs <= INPUTS).then_some(INPUTS);
         Map {
             input: self.input,
@@ -90,7 +89,7 @@ impl ServerOptions {
         }
     }
 
-    /// Reports `inputs` that would lie among the registers of `%Q`.
+    /// Reports an `inputs` that lies among the registers of `%Q`.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         let Some((first, at)) = self.window else {
             return;
@@ -110,7 +109,7 @@ impl ServerOptions {
     }
 }
 
-/// The holding register at which `%I` begins once more.
+/// Reads the holding register at which `%I` is repeated.
 fn read_window(value: &Value<'_>) -> Option<usize> {
     let text = value.text(SHAPE)?;
     let place = Place::parse(text, table::Table::HoldingRegisters)

@@ -14,18 +14,18 @@ use tickbus_fieldbus::{BusError, Port};
 
 use super::units::{Carried, UnitSet};
 
-/// The unit that is everyone.
+/// The unit number that addresses all units.
 const BROADCAST: u8 = 0;
 
-/// After so many requests in a row that equal the answer before, the log tells how a line that echoes is served. (A
-/// client that writes one value again and again looks the same: it is answered all the same.)
+/// After this many consecutive requests that equal the previous answer, the log explains the setting for a
+/// line with echo. (A client that writes one value repeatedly looks the same, and is answered as usual.)
 const ECHOES: u32 = 20;
 
 /// Serves the units until `stop`.
 ///
 /// # Errors
 ///
-/// The serial port is not there, or is gone.
+/// The serial port does not exist, or is gone.
 pub(super) fn serve(
     line: &Serial,
     units: &mut UnitSet,
@@ -39,7 +39,7 @@ pub(super) fn serve(
     let mut server = Server {
         line,
         serial,
-        // A line has one client.
+        // A line has a single client.
         writes: vec![true; units.len()].into(),
         units,
         framer: Framer::new(line.silence),
@@ -62,10 +62,10 @@ struct Server<'a> {
     /// The stations that the client has written to.
     writes: Box<[bool]>,
     framer: Framer,
-    /// What the line gives back of what is sent, where it is known to do so.
+    /// The echo of what is sent, if the line is known to have one.
     echo: Option<Echo>,
     suspicion: Suspicion,
-    /// The answer that is under way, and how much of it the system has taken.
+    /// The answer being sent, and how much of it the system has accepted.
     reply: Vec<u8>,
     written: usize,
     carried: Option<Carried>,
@@ -81,7 +81,7 @@ impl Server<'_> {
         let mut sources = [Source::new(&self.serial, interest)];
         let clock = port.clock();
         let now = clock.now();
-        // One more than the limit of age is stale.
+        // Data are stale when older than the limit, not when equal.
         let age = port.silence(now);
         let stale = if age <= port.max_age() {
             now + (port.max_age() - age) + Nanos(1)
@@ -113,7 +113,7 @@ impl Server<'_> {
             Err(error) if is_for_later(&error) => return Ok(()),
             Err(error) => return Err(gone(self.line, &error)),
         };
-        // Silence may have ended a telegram before these came.
+        // Silence may have ended a telegram before these bytes arrived.
         self.attend(now, port);
         let own = self.echo.as_mut();
         let own = own.map_or(0, |echo| echo.strip(now, &bytes[..count]));
@@ -121,7 +121,7 @@ impl Server<'_> {
         Ok(())
     }
 
-    /// Answers the telegram that silence has ended, if it has and is for a unit here.
+    /// Answers the telegram that silence has ended, if it is complete and addressed to a unit here.
     fn attend(&mut self, now: Nanos, port: &mut Port) {
         let Self {
             line,
@@ -142,7 +142,7 @@ impl Server<'_> {
             if port.is_down(now) {
                 return;
             }
-            // No request has that bit: it is somebody's answer, or the echo of one.
+            // Requests never have this bit: it is another unit's answer, or an echo of one.
             if pdu[0] & EXCEPTION_BIT != 0 {
                 port.count("modbus-server.answers_heard");
                 return;
@@ -158,7 +158,7 @@ impl Server<'_> {
                     ),
                 );
             }
-            // Whoever asks anew no longer waits for the last answer.
+            // A client that sends a new request no longer waits for the previous answer.
             reply.clear();
             *written = 0;
             *carried = None;
@@ -172,7 +172,7 @@ impl Server<'_> {
                 }
                 return;
             }
-            // On a line with others the silence of those who are not meant is the rule.
+            // With other units on the line, silence is the rule for units that are not addressed.
             let Some(station) = units.station(number) else {
                 port.count("modbus-server.unknown_unit");
                 return;
@@ -208,12 +208,13 @@ impl Server<'_> {
     }
 }
 
-/// Looks whether answers come back as requests: those to functions 5, 6 and 22 are such.
+/// Detects answers that come back as requests: those of functions 5, 6 and 22 look like requests.
 #[derive(Debug, Default)]
 struct Suspicion(u32);
 
 impl Suspicion {
-    /// One more request came, which equals the last answer or not; whether that has happened often enough now.
+    /// Another request arrived, equal to the last answer or not; returns whether that has now happened often
+    /// enough.
     fn is_confirmed(&mut self, is_last_answer: bool) -> bool {
         self.0 = if is_last_answer { self.0 + 1 } else { 0 };
         self.0 >= ECHOES && self.0.is_multiple_of(ECHOES)

@@ -8,10 +8,10 @@ use tickbus_fieldbus::{BusError, Port};
 
 use super::units::{Carried, UnitSet};
 
-/// So many answers of a client are remembered at most until it has them.
+/// The most unconfirmed answers remembered per client.
 const REMEMBERED: usize = 64;
 
-/// The protocol as the server for many clients speaks it.
+/// Modbus TCP as a service for many clients.
 #[derive(Debug)]
 pub(super) struct TcpService<'a> {
     pub(super) units: &'a mut UnitSet,
@@ -22,7 +22,7 @@ pub(super) struct TcpService<'a> {
 /// One client.
 #[derive(Debug)]
 pub(super) struct Client {
-    /// What is under way to it.
+    /// What its unconfirmed answers carry.
     carried: Vec<Carried>,
     /// The stations that it has written to.
     writes: Box<[bool]>,

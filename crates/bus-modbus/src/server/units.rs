@@ -9,11 +9,11 @@ use tickbus_image::signal::{SignalTable, fail_safe_frame};
 use super::ServerOptions;
 use crate::{Done, Exception, Function, Identification, Map, Tables, answer};
 
-/// The units of a server, and what clients have written to them.
+/// The units of a server, and the values that clients have written to them.
 #[derive(Debug)]
 pub(super) struct UnitSet {
     identification: Identification,
-    /// Whether a write is an event even where it changes nothing.
+    /// Whether a write is an event even if it changes nothing.
     every_write: bool,
     units: Box<[Unit]>,
 }
@@ -23,18 +23,18 @@ struct Unit {
     /// Its number; `None` for any.
     number: Option<u8>,
     map: Map,
-    /// What clients have written, from the fail-safe values on; one byte more where that makes the last register
-    /// whole.
+    /// The values written by clients, initially the fail-safe values; with an additional byte if the size is
+    /// odd, to complete the last register.
     holds: Box<[u8]>,
     holds_len: usize,
-    /// The frame that an answer was made of last, and how many different ones there were before it.
+    /// The frame used for the last answer, and how many different frames there were before it.
     shown: Vec<u8>,
     generation: u64,
-    /// Whether anybody has ever written.
+    /// Whether any client has ever written.
     has_writer: bool,
 }
 
-/// What an answer carries of the frame of a station; it counts once the client has it.
+/// The part of a station's frame that an answer carries; it counts as sent once the client has the answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Carried {
     station: usize,
@@ -71,20 +71,20 @@ impl UnitSet {
         }
     }
 
-    /// How many units there are.
+    /// The number of units.
     pub(super) fn len(&self) -> usize {
         self.units.len()
     }
 
-    /// The station that the unit with this number is.
+    /// The station of the unit with this number.
     pub(super) fn station(&self, number: u8) -> Option<usize> {
         self.units
             .iter()
             .position(|unit| unit.number.is_none_or(|own| own == number))
     }
 
-    /// Answers a request to a station that came at `now`, and appends the answer's PDU to `reply`. `writes` says of
-    /// each station whether this client has written to it.
+    /// Answers a request to a station that arrived at `now`, and appends the answer's PDU to `reply`.
+    /// `writes` says for each station whether this client has written to it.
     pub(super) fn answer(
         &mut self,
         station: usize,
@@ -97,7 +97,7 @@ impl UnitSet {
         let unit = &mut self.units[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
-        // An injected fault may swallow what goes out: then the answer is lost on its way.
+        // If an injected fault loses outgoing frames, the request takes effect but its answer is lost.
         let is_lost = !writes_only && !port.sends_of(station..station + 1, now);
         let before = reply.len();
         let sends = if writes_only {
@@ -140,7 +140,7 @@ impl UnitSet {
                     port.received(station, now, frame);
                 }
             }
-            // Whoever only looks does not make the values of another one younger.
+            // A client that only reads must not make the values of one that writes look recent.
             (None, None) if writes[station] || !unit.has_writer => port.touch(station, now),
             (None, None) => {}
         }
@@ -151,21 +151,22 @@ impl UnitSet {
         })
     }
 
-    /// A client has an answer that carries this.
+    /// A client has received an answer that carries this.
     pub(super) fn carried(&self, carried: Carried, port: &mut Port) {
         let Carried {
             station,
             generation,
             bits,
         } = carried;
-        // After an answer with another frame nobody knows what of this one was news; it is told again.
+        // If another frame has been answered since, it is unknown which bits of this one were new; they are
+        // sent again.
         if self.units[station].generation == generation {
             port.sent_bits(station, bits);
         }
     }
 }
 
-/// What a refusal counts as.
+/// The counter of refusals with this exception.
 fn counted(exception: Exception) -> &'static str {
     match exception {
         Exception::ILLEGAL_FUNCTION => "modbus-server.illegal_function",

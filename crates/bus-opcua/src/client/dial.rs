@@ -1,4 +1,4 @@
-//! A TCP connection that stands already, as the crate wants to make it.
+//! An existing TCP connection in the form in which the crate makes connections.
 
 use std::net::TcpStream;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,7 +16,7 @@ use tokio_util::codec::FramedRead;
 type Reader = ReadHalf<tokio::net::TcpStream>;
 type Writer = WriteHalf<tokio::net::TcpStream>;
 
-/// Hands out one connection, once: it was made as all buses make theirs, and is made anew by them.
+/// Gives the crate one connection, once. The connection is made and remade by the bus, as for all buses.
 #[derive(Clone)]
 pub(super) struct Dial {
     stream: Arc<Mutex<Option<TcpStream>>>,
@@ -24,7 +24,7 @@ pub(super) struct Dial {
 }
 
 impl Dial {
-    /// For the server at `url`, to which `stream` is connected.
+    /// A dial for the server at `url`, to which `stream` is connected.
     pub(super) fn new(stream: TcpStream, url: &str) -> Self {
         Self {
             stream: Arc::new(Mutex::new(Some(stream))),

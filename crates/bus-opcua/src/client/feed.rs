@@ -1,4 +1,4 @@
-//! What the server reports by itself: a subscription.
+//! What the server reports on its own: a subscription.
 
 use std::sync::Arc;
 
@@ -16,31 +16,31 @@ use tickbus_fieldbus::{BusError, PlcState};
 
 use super::Field;
 
-/// So many items are asked for in one call: every server takes as many.
+/// The most items in one call; every server accepts this many.
 const CHUNK: usize = 100;
 
-/// So many changes of a latched signal are kept between two publishes.
+/// How many changes of a latched signal are queued between two publishes.
 const QUEUE: u32 = 10;
 
-/// For how many publishing intervals the server keeps a subscription that is not asked for.
+/// How long the server keeps a subscription without requests.
 const LIFE: Nanos = Nanos::from_secs(30);
 
-/// What has come from the server.
+/// What has arrived from the server.
 #[derive(Debug)]
 pub(super) enum News {
-    /// Values of one publish, in order, with the positions of their signals.
+    /// The values of one publish, in order, with the indices of their signals.
     Values(Vec<(usize, DataValue)>),
-    /// A publish without values: all are as they were.
+    /// A publish without values: none has changed.
     Alive,
-    /// What the PLC says of itself.
+    /// The operating state of the PLC.
     Plc(PlcState),
-    /// The answer to a Write, one status per value; or why there is none.
+    /// The answer to a Write: one status per value, or why there is no answer.
     Written(Result<Vec<StatusCode>, BusError>),
     /// The session is over.
     Ended(BusError),
 }
 
-/// How often the server looks, and reports.
+/// How often the server samples and publishes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rhythm {
     pub(super) publishing: Nanos,
@@ -49,7 +49,7 @@ pub(super) struct Rhythm {
     pub(super) max_age: Nanos,
 }
 
-/// Takes notifications, each as a whole.
+/// Receives notifications, each as a whole.
 struct Feed(Inbox<News>);
 
 impl OnSubscriptionNotificationCore for Feed {
@@ -82,12 +82,13 @@ impl OnSubscriptionNotificationCore for Feed {
     }
 }
 
-/// The name of the item that is no signal: the state of the server.
+/// The client handle of the item that is not a signal: the state of the server.
 const STATE: u32 = u32::MAX;
 
-/// What `Server_ServerStatus_State` says of the PLC; `None` for nothing yet. A server that does not report it, or
-/// does not know it, is believed to run, also if an earlier one at this place said that it stood. Outputs of a server in test mode lead
-/// nowhere, as those of one that was suspended (OPC 10000-5, 12.6).
+/// The PLC's operating state according to `Server_ServerStatus_State`; `None` for nothing yet. A server that
+/// does not report the state, or does not know it, is assumed to run, even if an earlier server at this
+/// address reported a stop. The outputs of a server in test mode have no effect, like those of a suspended
+/// one (OPC 10000-5, 12.6).
 fn state(value: &DataValue) -> Option<PlcState> {
     const RUNNING: i32 = ServerState::Running as i32;
     const UNKNOWN: i32 = ServerState::Unknown as i32;
@@ -100,7 +101,7 @@ fn state(value: &DataValue) -> Option<PlcState> {
     }
 }
 
-/// The server's name for an item is the signal's position, from 1.
+/// The client handle of an item is the signal's index, from 1.
 fn handle(signal: usize) -> u32 {
     u32::try_from(signal + 1).expect("tables hold fewer than 2^32 signals")
 }
@@ -109,8 +110,8 @@ fn signal(handle: u32) -> usize {
     (handle as usize).wrapping_sub(1)
 }
 
-/// Subscribes to the signals that are read; `nodes` has the node of each signal of the table. Gives the
-/// publishing interval that the server has made of it.
+/// Subscribes to the signals that are read; `nodes` has the node of each signal of the table. Returns the
+/// publishing interval as revised by the server.
 pub(super) async fn subscribe(
     session: &Arc<Session>,
     fields: &[Field],
@@ -119,7 +120,7 @@ pub(super) async fn subscribe(
     inbox: Inbox<News>,
 ) -> Result<Nanos, BusError> {
     let interval = rhythm.publishing;
-    // Three signs of life within the age at which data are stale.
+    // Three signs of life within `max_age`.
     let quiet = count(Nanos(rhythm.max_age.0 / 3), interval).max(1);
     let life = count(LIFE, interval).max(quiet.saturating_mul(3));
     let id = session
@@ -142,7 +143,7 @@ pub(super) async fn subscribe(
             rhythm.max_age
         );
     }
-    // Before the values, which count for nothing while it is not running.
+    // Before the values, which are invalid while the server is not running.
     watch_state(session, id, interval, &inbox).await?;
     let read: Vec<usize> = (0..fields.len())
         .filter(|index| fields[*index].is_read)
@@ -185,7 +186,7 @@ pub(super) async fn subscribe(
     Ok(revised)
 }
 
-/// Subscribes to the state of the server. One that does not report it is believed to run.
+/// Subscribes to the state of the server. If the server does not report it, it is assumed to run.
 async fn watch_state(
     session: &Session,
     id: u32,
@@ -218,7 +219,7 @@ async fn watch_state(
     Ok(())
 }
 
-/// Publishing interval and the longest silence, counted in it, as the server has made them of what was asked.
+/// The publishing interval, and the keep-alive count, as revised by the server.
 fn revised(session: &Session, id: u32, asked: (Nanos, u32)) -> (Nanos, u32) {
     let state = session.subscription_state.lock();
     let Some(one) = state.get(id) else {

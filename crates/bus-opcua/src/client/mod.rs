@@ -1,4 +1,4 @@
-//! The client: a PLC that is an OPC UA server is read by a subscription and written by Write.
+//! The client: reads a PLC that is an OPC UA server through a subscription, and writes to it by Write.
 
 mod dial;
 mod feed;
@@ -29,11 +29,11 @@ use session::Login;
 use talk::Talk;
 use writings::Writings;
 
-/// How long a server may take to name its endpoints, and again to open a session and have it looked at. Within
-/// that the crate gives up single requests after some seconds of real time.
+/// How long a server may take to name its endpoints, and again to open a session and have it checked. Within
+/// that, the crate gives up on single requests after some seconds of real time.
 const PATIENCE: Nanos = Nanos::from_secs(60);
 
-/// A server that takes no bytes for so many times `max_age` is given up.
+/// A server that accepts no bytes for this many times `max_age` is given up.
 const SILENCE: i64 = 4;
 
 /// The bus of kind `opcua-client`.
@@ -48,14 +48,14 @@ pub struct Client {
     guard: Guard,
 }
 
-/// A signal, as this bus knows it.
+/// What this bus needs to know about a signal.
 #[derive(Clone, Debug)]
 struct Field {
     name: String,
     data_type: DataType,
-    /// Whether its edges must not get lost.
+    /// Whether its edges must not be lost.
     latched: bool,
-    /// Whether it is read, and not written.
+    /// Whether it is read rather than written.
     is_read: bool,
     node: NodeName,
 }
@@ -65,7 +65,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// The node ids and the signals do not fit.
+    /// Node ids and signals do not match.
     pub fn new(options: &ClientOptions, line: Line<'_>) -> Result<Self, String> {
         Ok(Self {
             options: options.clone(),
@@ -78,7 +78,7 @@ impl Client {
         })
     }
 
-    /// Connects; `None` when `stop` came first.
+    /// Connects; `None` if `stop` came first.
     fn dial(&self, port: &mut Port, stop: &Stop) -> Result<Option<Dial>, BusError> {
         let stream = self.stream(port, stop)?;
         Ok(stream.map(|stream| Dial::new(stream, &self.options.url.to_string())))
@@ -96,7 +96,7 @@ impl Client {
         Ok(Some(stream))
     }
 
-    /// The endpoint of the server that the options ask for.
+    /// The server's endpoint that matches the options.
     fn endpoint(
         &self,
         client: &opcua::client::Client,

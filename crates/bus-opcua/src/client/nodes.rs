@@ -1,4 +1,4 @@
-//! The nodes of signals in the server, and whether they are what the signals are.
+//! The nodes of signals in the server, and whether they match the signals.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -16,28 +16,28 @@ use tickbus_fieldbus::BusError;
 
 use super::Field;
 
-/// So many nodes are looked at in one call.
+/// The most nodes checked in one call.
 const CHUNK: usize = 50;
 
-/// So many mistakes are told in one message.
+/// The most mistakes in one message.
 const TOLD: usize = 5;
 
-/// What is read of each node.
+/// The attributes that are read of each node.
 const ATTRIBUTES: [AttributeId; 3] = [
     AttributeId::Value,
     AttributeId::DataType,
     AttributeId::UserAccessLevel,
 ];
 
-/// Bits of an access level.
+/// The bits of an access level.
 const READS: u8 = 1;
 const WRITES: u8 = 2;
 
-/// What the server says of itself.
+/// What the server reports about itself.
 pub(super) struct Server {
     /// The name of the product.
     pub(super) product: String,
-    /// The most values that one Write may have; 0 for no limit.
+    /// The most values in one Write; 0 for no limit.
     pub(super) most_writes: usize,
     namespaces: Vec<String>,
 }
@@ -113,8 +113,8 @@ impl Server {
     }
 }
 
-/// The node of each signal, after a look at each: it is there, has the signal's type, and may be read, or
-/// written if `writes`.
+/// The node of each signal, each checked: it exists, has the signal's type, and can be read, or written if
+/// `writes`.
 pub(super) async fn check(
     session: &Arc<Session>,
     server: &Server,
@@ -192,7 +192,7 @@ fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String
             Some(theirs) => return differs(&format!("{theirs:?}")),
             None => {}
         },
-        // No value yet: the type by which it is declared has to do, if it is one of the plain ones.
+        // Without a value yet, the declared type decides, if it is one of the plain ones.
         _ => {
             if let Some(Variant::NodeId(id)) = &kind.value
                 && let Ok(declared) = id.as_data_type_id()
@@ -218,7 +218,7 @@ fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String
     Ok(())
 }
 
-/// Whether values of the type are of that type alone, and none of a type below it.
+/// Whether all values of the type are of exactly that type, and not of a subtype.
 fn is_plain(declared: DataTypeId) -> bool {
     // Boolean to String are 1 to 12.
     (1..=12).contains(&(declared as u32))

@@ -1,4 +1,4 @@
-//! What was read: values with their quality, on their way into the image.
+//! What was read: values and their quality, on their way into the image.
 
 use opcua::types::{DataValue, DateTime, StatusCode};
 
@@ -10,33 +10,33 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use super::Field;
 
-/// How often the newest source time is told at most.
+/// The shortest interval between two updates of the newest source time in the statistics.
 const TOLD_EVERY: Nanos = Nanos::from_secs(1);
 
-/// How far a value can be relied on.
+/// The quality of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quality {
-    /// None has come yet.
+    /// No value yet.
     Missing,
     Good,
     Uncertain,
     Bad(StatusCode),
 }
 
-/// The signals that are read, with their quality.
+/// The signals that are read, and their quality.
 ///
-/// A frame goes into the image when every value of its station is there and none of them is bad. While
-/// one is, nothing of the station does, so that its data grow old: that is what they are.
+/// A frame is handed to the image if every value of its station is present and none is bad. While one is bad,
+/// nothing of the station is handed in, so that its data grow old, as they should.
 #[derive(Debug)]
 pub(super) struct Readings {
     values: Values,
     quality: Vec<Quality>,
-    /// When the value of each signal was made, by its source.
+    /// The source time of each signal's value.
     made: Vec<Option<DateTime>>,
     frames: Vec<Box<[u8]>>,
     newest: Option<DateTime>,
     told: Nanos,
-    /// What was told of the quality last.
+    /// The quality as last reported.
     said: Option<String>,
 }
 
@@ -55,12 +55,12 @@ impl Readings {
         }
     }
 
-    /// Takes the values of one publish, and commits them: once, with the newest of each signal. The earlier
-    /// ones of a signal that has several are shown before that, for their edges.
+    /// Takes the values of one publish and commits them: once, with the newest value of each signal. If a
+    /// signal has several, the earlier ones are committed before that, for their edges.
     ///
     /// # Errors
     ///
-    /// A value has another type than its signal.
+    /// A value's type is not its signal's.
     pub(super) fn take(
         &mut self,
         port: &mut Port,
@@ -75,7 +75,7 @@ impl Readings {
             }
         }
         let steps = counts.iter().copied().max().unwrap_or(0);
-        // The last value of each signal belongs to the last step.
+        // Aligned at the end: the last value of each signal belongs to the last step.
         let mut at: Vec<usize> = counts.iter().map(|count| steps - count).collect();
         let steps_of: Vec<usize> = values
             .iter()
@@ -152,13 +152,13 @@ impl Readings {
         Ok(())
     }
 
-    /// Whether all values of a station are there and can be used.
+    /// Whether all values of a station are present and usable.
     fn is_sound(&self, station: usize) -> bool {
         let mut signals = self.values.signals(station).iter();
         signals.all(|&signal| matches!(self.quality[signal], Quality::Good | Quality::Uncertain))
     }
 
-    /// Hands in what is known, as far as it is whole.
+    /// Hands in the stations whose values are complete.
     pub(super) fn commit(&mut self, port: &mut Port, now: Nanos, fields: &[Field]) {
         debug_assert_eq!(fields.len(), self.quality.len(), "one per signal");
         for station in 0..self.frames.len() {
@@ -167,7 +167,7 @@ impl Readings {
             }
             let frame = &mut self.frames[station];
             if frame.is_empty() {
-                // Nothing of it is read, but the server that has it is there.
+                // None of its signals is read, but its server is there.
                 port.touch(station, now);
             } else {
                 self.values.give(station, frame);
@@ -176,7 +176,7 @@ impl Readings {
         }
     }
 
-    /// The server said that it is there.
+    /// The server sent a sign of life.
     pub(super) fn touch(&mut self, port: &mut Port, now: Nanos) {
         for station in 0..self.frames.len() {
             if self.is_sound(station) {
@@ -185,12 +185,12 @@ impl Readings {
         }
     }
 
-    /// Whether all that is read is there and can be used.
+    /// Whether everything that is read is present and usable.
     pub(super) fn is_complete(&self) -> bool {
         (0..self.frames.len()).all(|station| self.is_sound(station))
     }
 
-    /// What is wrong with the first signal that has a bad value; `None` when none has.
+    /// What is wrong with the first signal that has a bad value; `None` if all are good.
     pub(super) fn trouble(&self, fields: &[Field]) -> Option<String> {
         let mut bad = self.quality.iter().enumerate();
         bad.find_map(|(signal, quality)| match quality {
@@ -203,7 +203,7 @@ impl Readings {
         })
     }
 
-    /// Tells the statistics of quality and source time.
+    /// Updates quality and source time in the statistics.
     fn tell(&mut self, port: &Port, now: Nanos, fields: &[Field]) {
         let named = |wanted: fn(&Quality) -> bool| {
             let signals = self.quality.iter().enumerate();

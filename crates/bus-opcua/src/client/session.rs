@@ -1,4 +1,4 @@
-//! From a TCP connection to a session of a user.
+//! Opens a user session on a TCP connection.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use tickbus_fieldbus::BusError;
 use super::dial::Dial;
 use super::feed::News;
 
-/// The user, if there is one, and the password.
+/// The user and the password, if there is a user.
 pub(super) type Login = Option<(String, String)>;
 
 /// The crate's client, for a peer whose data are stale after `max_age`.
@@ -33,7 +33,7 @@ pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Clie
     let folder = if secure {
         pki.folder.clone()
     } else {
-        // The crate makes folders wherever it can. Within a file it cannot.
+        // The crate would create folders at any path; below a file it cannot.
         std::env::current_exe().unwrap_or_default().join("none")
     };
     let builder = ClientBuilder::new()
@@ -44,10 +44,10 @@ pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Clie
         .pki_dir(folder)
         .certificate_path(&pki.certificate)
         .private_key_path(&pki.key)
-        // Judged before a session is made, with words that help.
+        // Checked before a session is opened, with helpful messages.
         .verify_server_certs(false)
         .trust_server_certs(pki.trust == Trust::Any)
-        // The supervisor of the bus tries again, not the crate.
+        // Reconnecting is done by the bus's supervisor, not by the crate.
         .session_retry_limit(0)
         .request_timeout(patience.to_duration())
         .keep_alive_interval(heartbeat.to_duration())
@@ -57,7 +57,7 @@ pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Clie
     Client::new(builder.into_config())
 }
 
-/// Asks the server for its endpoints, and chooses the one that `options` ask for.
+/// Asks the server for its endpoints, and chooses the one that matches `options`.
 pub(super) async fn endpoint(
     client: &Client,
     dial: Dial,
@@ -92,7 +92,7 @@ pub(super) async fn endpoint(
     };
     let mut endpoint = endpoint.clone();
     check_user(&endpoint, login)?;
-    // The name that the server has for itself may mean nothing here.
+    // The host name that the server uses for itself may be unknown here.
     let own = url_with_replaced_hostname(
         endpoint.endpoint_url.as_ref(),
         &url.address.host.to_string(),
@@ -101,7 +101,7 @@ pub(super) async fn endpoint(
     Ok(endpoint)
 }
 
-/// Security as the driver.cfg asks for it.
+/// The security that the driver.cfg asks for.
 fn asked(options: &ClientOptions) -> String {
     match options.security {
         Policy::None => "security = \"None\"".to_owned(),
@@ -113,7 +113,7 @@ fn asked(options: &ClientOptions) -> String {
     }
 }
 
-/// An endpoint as a driver.cfg would name it.
+/// An endpoint in the terms of a driver.cfg.
 fn shown(endpoint: &EndpointDescription) -> String {
     let uri = endpoint.security_policy_uri.as_ref();
     let name = uri.rsplit_once('#').map_or(uri, |(_, name)| name);
@@ -123,7 +123,7 @@ fn shown(endpoint: &EndpointDescription) -> String {
     }
 }
 
-/// Checks that the endpoint lets such a user in at all.
+/// Checks that the endpoint accepts this kind of user.
 fn check_user(endpoint: &EndpointDescription, login: &Login) -> Result<(), BusError> {
     let Some(policies) = &endpoint.user_identity_tokens else {
         return Ok(());
@@ -141,7 +141,7 @@ fn check_user(endpoint: &EndpointDescription, login: &Login) -> Result<(), BusEr
     }
 }
 
-/// Makes a session, and a task that keeps it up and reports its end.
+/// Opens a session, and starts a task that maintains it and reports its end.
 pub(super) async fn open(
     client: &Client,
     endpoint: EndpointDescription,
@@ -209,7 +209,7 @@ pub(super) async fn open(
     Ok(session)
 }
 
-/// Whether a subscription that publishes with this status publishes no more.
+/// Whether this status of publishing means that the subscription has ended.
 fn is_fatal(status: StatusCode) -> bool {
     [
         StatusCode::BadNoSubscription,
@@ -254,16 +254,16 @@ fn refusal(status: StatusCode, secure: bool, user: Option<&str>, pki: &Pki) -> B
     }
 }
 
-/// How long taking leave may take, in real time.
+/// How long closing the session may take, in real time.
 pub(super) const FAREWELL: std::time::Duration = std::time::Duration::from_millis(300);
 
-/// Takes leave of the server.
+/// Closes the session.
 pub(super) async fn close(session: Arc<Session>) {
-    // What fails here has failed already.
+    // If this fails, the session is gone already.
     let _ = session.disconnect().await;
 }
 
-/// What the server calls itself: its application, then its product.
+/// The name by which the server identifies itself: its application, then its product.
 pub(super) fn identity(endpoint: &EndpointDescription, product: &str) -> String {
     let uri = endpoint.server.application_uri.as_ref();
     format!("{uri} {product}").trim().to_owned()

@@ -1,4 +1,4 @@
-//! The session while it stands: what comes goes into the image, what has changed goes out.
+//! An open session: received values go into the image, changed ones are written.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use super::feed::News;
 use super::readings::Readings;
 use super::writings::Writings;
 
-/// A session with all that belongs to it.
+/// An open session and its state.
 pub(super) struct Talk<'a> {
     pub(super) session: Arc<Session>,
     pub(super) reactor: &'a Reactor,
@@ -30,7 +30,7 @@ pub(super) struct Talk<'a> {
     /// The most values of one Write; 0 for no limit.
     pub(super) most_writes: usize,
     pub(super) cycle: Nanos,
-    /// What a running line says.
+    /// The reason shown while the line is running.
     pub(super) running: String,
 }
 
@@ -39,12 +39,12 @@ impl Talk<'_> {
     ///
     /// # Errors
     ///
-    /// Why the session cannot go on.
+    /// Why the session has ended.
     pub(super) fn serve(mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), self.cycle);
         let mut news = Vec::new();
-        // What was said of the values last; `None` for nothing.
+        // The trouble with values as last reported; `None` for none.
         let mut said = None;
         while !stop.is_stopped() {
             let now = clock.now();
@@ -81,7 +81,8 @@ impl Talk<'_> {
                 for station in 0..port.stations() {
                     port.plc_state(station, now, state);
                 }
-                // Values that have not changed while it stood are not reported again: they count from now on.
+                // Values that did not change during the stop are not reported again; they are valid from now
+                // on.
                 if state == PlcState::Run {
                     self.readings.commit(port, now, self.fields);
                 }
@@ -96,7 +97,7 @@ impl Talk<'_> {
         Ok(())
     }
 
-    /// Sends what has changed, unless an answer is awaited: one Write at a time.
+    /// Writes changed values, unless an answer is pending: one Write at a time.
     fn write(&mut self, port: &mut Port, now: Nanos) {
         let Some(writings) = &mut self.writings else {
             return;

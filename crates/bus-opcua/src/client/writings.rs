@@ -1,4 +1,4 @@
-//! What is written: the signals that have changed, in one Write.
+//! What is written: changed signals, in one Write.
 
 use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, WriteValue};
 
@@ -10,15 +10,15 @@ use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::Field;
 
-/// The signals that are written, and what the server has of them.
+/// The signals that are written, and the values that the server has.
 #[derive(Debug)]
 pub(super) struct Writings {
     values: Values,
-    /// The bits that the server has taken; `None` for none yet.
+    /// The bits that the server has accepted; `None` for none yet.
     known: Vec<Option<Slot>>,
-    /// What is under way: the position of a signal, and its bits.
+    /// The pending Write: indices of signals, and their bits.
     flight: Option<Vec<(usize, Slot)>>,
-    /// The signals that the server does not take, as the log knows them.
+    /// The signals that the server refuses, as last logged.
     refused: Vec<Option<StatusCode>>,
 }
 
@@ -34,12 +34,12 @@ impl Writings {
         }
     }
 
-    /// Whether an answer is awaited.
+    /// Whether an answer is pending.
     pub(super) fn is_under_way(&self) -> bool {
         self.flight.is_some()
     }
 
-    /// What is to be written now; empty for nothing. Then what goes out counts as sent.
+    /// The values to write now; empty for none. The outgoing frame then counts as sent.
     pub(super) fn due(
         &mut self,
         port: &mut Port,
@@ -65,7 +65,7 @@ impl Writings {
             node_id: nodes[signal].clone(),
             attribute_id: AttributeId::Value as u32,
             index_range: NumericRange::None,
-            // Without a status and times: many servers take a value alone.
+            // Without status and timestamps: many servers accept only the bare value.
             value: DataValue::value_only(values::variant(fields[signal].data_type, bits)),
         };
         let list = flight.iter().map(write).collect();

@@ -1,4 +1,4 @@
-//! Between the image and the nodes.
+//! Connects the image and the nodes.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use super::manager::Nodes;
 use super::space;
 use super::watched::{Variable, Watched};
 
-/// All signals, as the image has them and as their nodes show them.
+/// All signals, with their values in the image and in their nodes.
 pub(super) struct Image {
     table: Arc<SignalTable>,
     role: Role,
@@ -26,11 +26,11 @@ pub(super) struct Image {
     places: Vec<Place>,
     frames: Vec<Box<[u8]>>,
     show: Show,
-    /// Whether a write is an event though it changes nothing.
+    /// Whether a write is an event even if it changes nothing.
     every_write: bool,
 }
 
-/// Where values are shown: the nodes of the crate's server, and who is told of them.
+/// Where values are published: the nodes of the crate's server, and their subscribers.
 #[derive(Clone)]
 pub(super) struct Show {
     pub(super) nodes: Arc<Nodes>,
@@ -40,12 +40,12 @@ pub(super) struct Show {
 }
 
 impl Show {
-    /// A value of this status, made now.
+    /// A value with this status, timestamped now.
     fn value(&self, status: StatusCode, value: Variant) -> DataValue {
         let time = date((self.wall)());
         DataValue {
-            // None but the empty one where it is bad, so that the first good one is a change also for
-            // subscribers that are not told of a status alone.
+            // Empty if bad, so that the first good value is a change even for subscribers that do not monitor
+            // the status.
             value: Some(if status.is_bad() {
                 Variant::Empty
             } else {
@@ -58,7 +58,7 @@ impl Show {
         }
     }
 
-    /// Tells subscribers what their sampling intervals have kept back.
+    /// Reports what the sampling intervals of subscribers have held back.
     fn tell_due(&self, places: &[Place]) {
         let node = |variable: Variable| {
             let place = &places[variable.signal];
@@ -72,7 +72,7 @@ impl Show {
         self.watched.tell_due(&self.subscriptions, now, node);
     }
 
-    /// Gives a node a value, and tells those who subscribe to it.
+    /// Sets a node's value and reports it to subscribers.
     fn put(&self, node: &NodeId, variable: Variable, value: &DataValue) {
         if let Some(NodeType::Variable(shown)) = self.nodes.address_space().write().find_mut(node) {
             shown.set_data_value(value.clone());
@@ -84,20 +84,20 @@ impl Show {
     }
 }
 
-/// A signal's nodes, and what they show.
+/// A signal's nodes, and their current value.
 struct Place {
     node: NodeId,
     scaled: Option<(NodeId, Scale)>,
-    /// What the node shows; `None` before the first time.
+    /// The node's value; `None` at first.
     shown: Option<(Slot, StatusCode)>,
-    /// Since when.
+    /// When it was set.
     since: Nanos,
-    /// Whether a client has written it.
+    /// Whether a client has written the signal.
     written: bool,
 }
 
 impl Image {
-    /// Nothing shown yet.
+    /// An image whose nodes have no values yet.
     pub(super) fn new(
         table: &Arc<SignalTable>,
         role: Role,
@@ -114,7 +114,7 @@ impl Image {
             written: false,
         };
         let mut receives = Values::new(table, rx);
-        // What no client has written yet is as if there were none.
+        // Values not written by any client yet are treated as missing.
         let mut slots = vec![Slot::default(); table.signals.len()];
         let frames = (0..port.stations()).map(|station| {
             let plan = Plan::new(table, station, rx);
@@ -137,7 +137,7 @@ impl Image {
         }
     }
 
-    /// Goes on with another server, which shows nothing yet.
+    /// Continues with another server, whose nodes have no values yet.
     pub(super) fn move_to(&mut self, show: Show) {
         self.show = show;
         for place in &mut self.places {
@@ -145,16 +145,16 @@ impl Image {
         }
     }
 
-    /// How many subscriptions to a node the server remembers, though nobody is there.
+    /// How many monitored items the server retains although no client is connected.
     pub(super) fn left_behind(&self) -> usize {
         self.show.watched.left_behind()
     }
 
-    /// Takes the values of one list into the image, as one commit for each station that it touches.
+    /// Writes the values of one list to the image, as one commit per station.
     pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, Slot)]) {
         let mut touched = vec![false; self.frames.len()];
         for &(signal, bits) in list {
-            // A change is reported by the port.
+            // The port itself reports a change.
             if self.every_write && self.receives.bits(signal) == bits {
                 let value = slot(&self.table.signals[signal], bits);
                 let signal = u32::try_from(signal).expect("tables hold fewer than 2^32 signals");
@@ -167,7 +167,7 @@ impl Image {
             self.receives.set(signal, bits);
             let place = &mut self.places[signal];
             place.written = true;
-            // The write itself has shown it, but not in engineering units.
+            // The write itself has set this node, but not the one in engineering units.
             place.shown = Some((bits, StatusCode::Good));
             self.put_scaled(signal);
             touched[self.table.signals[signal].station] = true;
@@ -179,7 +179,7 @@ impl Image {
         }
     }
 
-    /// Brings all nodes up to date. Pulses that every subscriber has had the time to see count as sent.
+    /// Updates all nodes. Pulses that every subscriber has had time to see count as sent.
     pub(super) fn show(&mut self, port: &mut Port, now: Nanos) {
         if port.sends(now) {
             self.show_what_is_sent(port, now);
@@ -208,7 +208,7 @@ impl Image {
         self.show.tell_due(&self.places);
     }
 
-    /// Brings the nodes up to date for a client that reads these signals now: pulses in them count as sent.
+    /// Updates the nodes of these signals for a client that is reading them: their pulses count as sent.
     pub(super) fn show_to_reader(&mut self, port: &mut Port, now: Nanos, signals: &[usize]) {
         if port.is_down(now) {
             return;
@@ -233,7 +233,7 @@ impl Image {
         }
     }
 
-    /// Writes a value into the nodes of a signal if it is another than they show, and tells subscribers.
+    /// Sets the nodes of a signal if the value is new, and reports it to subscribers.
     fn put(&mut self, now: Nanos, index: usize, bits: Slot, status: StatusCode) {
         let place = &mut self.places[index];
         if place.shown == Some((bits, status)) {
@@ -253,7 +253,7 @@ impl Image {
         self.show.put(&self.places[index].node, variable, &value);
     }
 
-    /// Brings the node that has a signal in engineering units up to what the signal's own node shows.
+    /// Updates the node in engineering units from the signal's own node.
     fn put_scaled(&self, index: usize) {
         let place = &self.places[index];
         let (Some((node, scale)), Some((bits, status))) = (&place.scaled, place.shown) else {
@@ -270,7 +270,7 @@ impl Image {
     }
 }
 
-/// How far the values of the simulation can be relied on.
+/// The quality of the simulation's values.
 fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
     let age = port.tick_age(station, now);
     match port.watchdog() {
@@ -281,7 +281,7 @@ fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
     }
 }
 
-/// The slot of a signal with these bits, in engineering units.
+/// The slot of a signal with these bits, converted to engineering units.
 fn slot(signal: &Signal, bits: Slot) -> Slot {
     if signal.is_integer_slot() {
         return bits;

@@ -1,4 +1,4 @@
-//! What clients do to the nodes: they read, subscribe and write.
+//! What clients do with the nodes: read, subscribe, write.
 
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
@@ -29,16 +29,16 @@ use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
 use super::watched::{Rhythm, Variable, Watched};
 
-/// A sampling interval that keeps no change back, in milliseconds; the crate takes no zero here.
+/// A sampling interval that holds no change back, in milliseconds; the crate does not accept zero.
 const UNFILTERED: f64 = 0.001;
 
-/// A session of a client, as far as one can be looked at: the crate does not give its type a name.
+/// A client's session. It is reached through closures because the crate does not export its type.
 pub(super) struct Visitor {
-    /// The number of the session.
+    /// The session's number.
     pub(super) id: u32,
-    /// The name of the client, or else of the session.
+    /// The client's name, or else the session's.
     pub(super) name: String,
-    /// When the session would expire, which every request puts off; `None` when it is over.
+    /// When the session will expire, which every request postpones; `None` if it is over.
     pub(super) deadline: Box<dyn Fn() -> Option<Instant> + Send>,
 }
 
@@ -70,40 +70,40 @@ impl Visitor {
 
 /// What clients have done.
 pub(super) enum News {
-    /// Values were written, all in one request. A signal that was written twice in it begins a new list.
+    /// Values written in one request. A signal written twice in it starts a new list.
     Written(Visitor, Vec<Vec<(usize, Slot)>>),
-    /// These signals are about to be read: their nodes have to be brought up to date first.
+    /// These signals are about to be read: their nodes must be updated first.
     Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
-    /// A client was refused, as the text says: its certificate is that of another application.
+    /// A client was refused because its certificate is another application's; the text says so.
     Impostor(String),
-    /// Certificates were turned away: the new files, and how many there were in all.
+    /// Certificates were rejected: the new files, and their total number.
     Rejected(Vec<String>, usize),
     /// The server has ended.
     Ended(String),
 }
 
-/// All the nodes and their values.
+/// The nodes and their values.
 pub(super) type Nodes = InMemoryNodeManager<Signals>;
 
-/// The signals, as the crate's server asks for them.
+/// The signals, as a node manager of the crate's server.
 pub(super) struct Signals {
     table: Arc<SignalTable>,
     by_node: HashMap<NodeId, Variable>,
     own: Own,
-    /// What was found of the applications of sessions, the latest last.
+    /// The results of checking sessions' applications, the latest last.
     judged: Mutex<VecDeque<(u32, bool)>>,
 }
 
-/// What the nodes belong to.
+/// The bus that the nodes belong to.
 pub(super) struct Own {
     /// The area that clients write.
     pub(super) reads: Area,
     pub(super) watched: Watched,
     pub(super) inbox: Inbox<News>,
     pub(super) wall: WallClock,
-    /// Whether a client's certificate has to be that of its application.
+    /// Whether a client's certificate must belong to its application.
     pub(super) checks_applications: bool,
-    /// How many tasks the server has while nobody is connected; known from when it begins to listen.
+    /// The number of the server's tasks without any connection; set when it starts to listen.
     pub(super) tasks_alone: Arc<AtomicUsize>,
 }
 
@@ -135,8 +135,8 @@ impl Signals {
         }
     }
 
-    /// Whether the certificate of a client is that of the application that it says it is. The crate looks after the
-    /// rest of it before there is a session.
+    /// Checks that the certificate of a client belongs to the application that it claims to be. The crate
+    /// checks everything else about it before there is a session.
     fn admits(&self, context: &RequestContext) -> Result<(), StatusCode> {
         if !self.own.checks_applications {
             return Ok(());
@@ -146,7 +146,7 @@ impl Signals {
                 .then_some(())
                 .ok_or(StatusCode::BadCertificateUriInvalid)
         };
-        // A list is whole between any two of its changes.
+        // The list is consistent after every change, so a poisoned lock is safe to use.
         let mut judged = self.judged.lock().unwrap_or_else(PoisonError::into_inner);
         let known = judged.iter().find(|(id, _)| *id == context.session_id);
         if let Some((_, is_good)) = known {
@@ -170,7 +170,7 @@ impl Signals {
         verdict(is_good)
     }
 
-    /// The signal and its bits that a client wants to write.
+    /// Checks one value that a client writes; returns its signal and its bits.
     fn judge(
         &self,
         space: &AddressSpace,
@@ -193,7 +193,7 @@ impl Signals {
         if write.index_range != NumericRange::None {
             return Err(StatusCode::BadWriteNotSupported);
         }
-        // Who writes a bad value says that it has none.
+        // A value with a bad status is no value.
         if write.value.status.is_some_and(|status| !status.is_good()) {
             return Err(StatusCode::BadWriteNotSupported);
         }
@@ -207,7 +207,7 @@ impl Signals {
 #[expect(clippy::mut_mut, reason = "the crate's own signature")]
 impl InMemoryNodeManagerImpl for Signals {
     async fn init(&self, _: &mut AddressSpace, _: ServerContext) {
-        // The last manager to be asked, just before the server listens.
+        // This is the last node manager to be initialised, just before the server listens.
         let tasks = tokio::runtime::Handle::current()
             .metrics()
             .num_alive_tasks();
@@ -245,7 +245,7 @@ impl InMemoryNodeManagerImpl for Signals {
         self.own
             .inbox
             .push(News::Reads(Visitor::of(context), signals, done));
-        // It fails when the bus has stopped; then the nodes are as they were.
+        // Fails if the bus has stopped; the nodes then keep their values.
         let _ = ready.await;
         let space = address_space.read();
         let read = nodes
@@ -280,8 +280,8 @@ impl InMemoryNodeManagerImpl for Signals {
             if let Some(&variable) = self.by_node.get(&item.item_to_monitor().node_id) {
                 let publishing = publishing(context, item.handle());
                 let mut rhythm = rhythm(item.sampling_interval(), item.queue_size(), publishing);
-                // Without a queue, what is there when it publishes is seen: the newest of all items, and so values
-                // that belong together.
+                // Without a queue, a client sees the values at the time of publishing: the newest of all
+                // items, and thus consistent.
                 if item.queue_size() <= 1 && rhythm.sampling <= publishing {
                     item.revise_sampling_interval(UNFILTERED);
                     rhythm.sampling = millis(item.sampling_interval());
@@ -324,7 +324,7 @@ impl InMemoryNodeManagerImpl for Signals {
         address_space: &RwLock<AddressSpace>,
         nodes_to_write: &mut [&mut WriteNode],
     ) -> Result<(), StatusCode> {
-        // Every node of a service that fails has its status.
+        // If a service fails, every node gets its status.
         self.admits(context)?;
         let mut lists: Vec<Vec<(usize, Slot)>> = vec![Vec::new()];
         let mut space = address_space.write();
@@ -368,7 +368,7 @@ impl InMemoryNodeManagerImpl for Signals {
     }
 }
 
-/// What is told of the namespace of the signals.
+/// The metadata of the signals' namespace.
 pub(super) fn namespace() -> NamespaceMetadata {
     NamespaceMetadata {
         namespace_uri: NAMESPACE_URI.to_owned(),
@@ -377,8 +377,8 @@ pub(super) fn namespace() -> NamespaceMetadata {
     }
 }
 
-/// The rhythm of an item with a sampling interval in milliseconds and a queue. A queue keeps what is sampled; without
-/// one, what is there when it publishes is seen.
+/// The rhythm of an item with a sampling interval in milliseconds and a queue. With a queue the client sees
+/// every sample, without one the value at the time of publishing.
 fn rhythm(sampling: f64, queue: usize, publishing: Nanos) -> Rhythm {
     let sampling = millis(sampling);
     let span = if queue > 1 {
@@ -405,7 +405,7 @@ fn publishing(context: &RequestContext, item: MonitoredItemHandle) -> Nanos {
     })
 }
 
-/// A span that is given in milliseconds; negative ones stand for the publishing interval.
+/// A span in milliseconds; a negative one means the publishing interval.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a sampling interval, in nanoseconds"

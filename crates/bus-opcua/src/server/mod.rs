@@ -32,17 +32,18 @@ use manager::{News, Own, Visitor};
 use peers::{Peers, Seen};
 use watched::Watched;
 
-/// How long clients are given to hear of the end, in real time.
+/// How long clients have to learn of the end, in real time.
 const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
 
-/// How often the folder of rejected certificates is looked at, in real time.
+/// How often the folder of rejected certificates is checked, in real time.
 const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// The most sessions at once.
+/// The most sessions at the same time.
 const SESSIONS: usize = 100;
 
-/// async-opcua 0.19 does not forget the monitored items of a subscription that ends as a whole, up to 200 bytes each.
-/// When at least this many have ended and nobody at all is connected, its server is made anew; the listener stays.
+/// async-opcua 0.19 retains the monitored items of a subscription that ends as a whole, up to 200 bytes each.
+/// When at least this many have ended and no client is connected, its server is recreated; the listener
+/// stays.
 const WORN: usize = 10;
 
 /// The bus of kind `opcua-server`.
@@ -138,13 +139,13 @@ impl Server {
     }
 }
 
-/// Looks after the folder of rejected certificates, beside the bus thread: files take the time that they take.
+/// Checks the folder of rejected certificates outside the bus thread, because file operations may be slow.
 async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
     loop {
         tokio::time::sleep(LOOK).await;
         let rejects = Arc::clone(&rejects);
         let look = move || {
-            // A list is whole between any two of its changes.
+            // The list is consistent after every change, so a poisoned lock is safe to use.
             let mut rejects = rejects.lock().unwrap_or_else(PoisonError::into_inner);
             rejects.look()
         };
@@ -153,7 +154,7 @@ async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
                 inbox.push(News::Rejected(found.files, found.count));
             }
             Ok(_) => {}
-            // The bus is ending.
+            // The bus is closing.
             Err(_) => return,
         }
     }
@@ -163,16 +164,16 @@ async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
 struct Started {
     inbox: Inbox<News>,
     handle: ServerHandle,
-    /// Told when it has ended.
+    /// Notified when it has ended.
     ended: Arc<Notify>,
     show: Show,
-    /// How many tasks it has while nobody is connected.
+    /// The number of its tasks without any connection.
     tasks_alone: Arc<AtomicUsize>,
 }
 
 impl Started {
-    /// Whether nobody is connected, not even on the way to a session, and no session waits for its client to come
-    /// back.
+    /// Whether there is no connection, not even one without a session yet, and no session waits for its
+    /// client to return.
     fn is_alone(&self, reactor: &Reactor) -> bool {
         let sessions =
             VariableId::Server_ServerDiagnostics_ServerDiagnosticsSummary_CurrentSessionCount;
@@ -191,7 +192,7 @@ impl Free for Server {
         let Some((listener, bound)) = tcp::listen(&self.options.address, port, stop)? else {
             return Ok(());
         };
-        // Every connection inherits it: an answer waits for no other.
+        // All connections inherit this: an answer is sent at once, without waiting for more.
         let refused = |error: std::io::Error| tcp::no_wait(&error);
         SockRef::from(&listener)
             .set_tcp_nodelay(true)
@@ -221,7 +222,7 @@ impl Free for Server {
                 }),
             };
             match service.serve(&reactor, &mut started, self.cycle, port, stop) {
-                // Nobody is there to take leave of; who comes now waits at the listener.
+                // No client is connected; new ones wait at the listener.
                 Ok(Served::Worn) => port.count("opcua.begun_anew"),
                 ended => {
                     started.handle.cancel();
@@ -236,18 +237,18 @@ impl Free for Server {
 /// How serving ended.
 enum Served {
     Stopped,
-    /// The crate's server remembers too much of clients that are gone.
+    /// The crate's server retains too much of clients that are gone.
     Worn,
 }
 
-/// The server while it runs, as its bus sees it.
+/// The running server as its bus sees it.
 struct Service<'a> {
     image: Image,
     peers: Peers,
     table: &'a SignalTable,
     waiting: String,
     pki: &'a Pki,
-    /// Clients that were turned away, for certificates that are unknown or not their own.
+    /// Clients rejected because their certificate is unknown or not their own.
     turned_away: Rarely,
 }
 
@@ -295,7 +296,7 @@ impl Service<'_> {
             }
             News::Reads(visitor, signals, done) => {
                 self.image.show_to_reader(port, now, &signals);
-                // Where nothing is written, readers are the peers.
+                // If nothing can be written, clients that read are the peers.
                 let stations = signals.iter().map(|at| self.table.signals[*at].station);
                 let fed: Vec<usize> = stations
                     .filter(|station| port.sizes(*station).1 == 0)
@@ -338,7 +339,7 @@ impl Service<'_> {
         Ok(())
     }
 
-    /// A client is a peer of these stations from now on.
+    /// From now on a client is a peer of these stations.
     fn meet(
         &mut self,
         port: &mut Port,

@@ -1,38 +1,38 @@
-//! The clients that feed the image, and whether they are still there.
+//! The clients that supply the image, and whether they are still there.
 
 use std::time::Instant;
 
 use super::manager::Visitor;
 
-/// Sessions of clients that have written, or, at stations that have nothing to write, read. Each counts for the
-/// stations that it has dealt with, and for no other.
+/// The sessions of clients that have written or, for stations without writable signals, have read. Each
+/// counts only for the stations that it has accessed.
 ///
-/// Every request of a session is a sign of life, a Publish too: a client that writes on change only has a
-/// subscription or a heartbeat besides.
+/// Every request of a session is a sign of life, Publish included: a client that writes only on change also
+/// needs a subscription or a heartbeat.
 #[derive(Default)]
 pub(super) struct Peers(Vec<Peer>);
 
 struct Peer {
     visitor: Visitor,
-    /// When its session was to expire, as seen at the last look.
+    /// When its session was due to expire, as of the last look.
     deadline: Option<Instant>,
-    /// The stations that it feeds.
+    /// The stations that it supplies.
     stations: Vec<usize>,
 }
 
-/// What was seen of the peers since the last look.
+/// What has happened to the peers since the last look.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Seen {
-    /// Nobody has left.
+    /// No peer has left.
     Same,
-    /// Some have closed their sessions, or let them expire; others are there.
+    /// Some have closed their sessions, or let them expire; others remain.
     Fewer,
     /// The last one has left.
     Gone,
 }
 
 impl Peers {
-    /// A client has fed these stations; gives its name if it is new.
+    /// A client has supplied these stations; returns its name if it is new.
     pub(super) fn add(
         &mut self,
         visitor: Visitor,
@@ -57,7 +57,8 @@ impl Peers {
         known.is_none().then_some(&*peer.visitor.name)
     }
 
-    /// Looks at all of them; `alive` is told each station of a peer that has sent a request since the last look.
+    /// Checks all peers; `alive` is called with each station of a peer that has sent a request since the last
+    /// look.
     pub(super) fn look(&mut self, mut alive: impl FnMut(usize)) -> Seen {
         let before = self.0.len();
         self.0.retain_mut(|peer| {
@@ -74,7 +75,7 @@ impl Peers {
         }
     }
 
-    /// How many there are.
+    /// The number of peers.
     pub(super) fn count(&self) -> usize {
         self.0.len()
     }

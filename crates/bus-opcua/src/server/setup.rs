@@ -1,4 +1,4 @@
-//! The crate's server, set up as a driver.cfg asks for it.
+//! Sets up the crate's server as a driver.cfg describes.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -20,25 +20,25 @@ use super::manager::{self, Signals};
 use super::status::Status;
 use super::{SESSIONS, space};
 
-/// The name of the one user among the crate's.
+/// The crate's name for the only user.
 const USER: &str = "user";
 
-/// How often subscriptions are looked at: the shortest publishing interval. At most every millisecond, at least
-/// every ten.
+/// How often subscriptions are processed, in milliseconds, which is also the shortest publishing interval:
+/// the bus cycle, limited to 1 to 10 ms.
 fn rhythm(cycle: Nanos) -> u64 {
     let millis = cycle.0 / Nanos::from_millis(1).0;
     u64::try_from(millis.clamp(1, 10)).expect("it is positive")
 }
 
-/// For how many publishing intervals a subscription may have nothing to say: three times within `max_age` for one
-/// that publishes every 100 ms, as most do.
+/// After how many publishing intervals without changes a keep-alive is due: three times within `max_age` for
+/// a subscription that publishes every 100 ms, as most do.
 fn keep_alives(max_age: Nanos) -> u32 {
     u32::try_from(max_age.0 / Nanos::from_millis(300).0)
         .unwrap_or(u32::MAX)
         .max(1)
 }
 
-/// Makes the server of the bus `of`, bound to `bound`, with the nodes of `signals`.
+/// Builds the server of the bus `of`, bound to `bound`, with the nodes of `signals`.
 pub(super) fn build(
     of: &super::Server,
     max_age: Nanos,
@@ -50,7 +50,7 @@ pub(super) fn build(
     let folder = if of.is_secure() {
         pki.folder.clone()
     } else {
-        // The crate makes folders wherever it can. Within a file it cannot.
+        // The crate would create folders at any path; below a file it cannot.
         std::env::current_exe().unwrap_or_default().join("none")
     };
     let rhythm = rhythm(of.cycle);
@@ -69,7 +69,7 @@ pub(super) fn build(
         .discovery_urls(vec![format!("opc.tcp://{host}:{}/", bound.port())])
         .host(host)
         .port(bound.port())
-        // They count the sessions.
+        // The diagnostics count the sessions.
         .diagnostics_enabled(true)
         .subscription_poll_interval_ms(rhythm)
         .max_sessions(SESSIONS)
@@ -85,10 +85,10 @@ pub(super) fn build(
     #[expect(clippy::cast_precision_loss, reason = "a few milliseconds")]
     let shortest = rhythm as f64;
     limits.min_publishing_interval_ms = shortest;
-    // A client that asks for the next publish shows that it is there: it is answered often enough.
+    // A client's request for the next publish shows that it is alive, so it must be answered often enough.
     limits.max_keep_alive_count = keep_alives(max_age);
     limits.default_keep_alive_count = limits.max_keep_alive_count;
-    // Changes are reported when they happen.
+    // Changes are reported as they happen.
     limits.min_sampling_interval_ms = 0.0;
     limits.max_monitored_items_per_sub = limits
         .max_monitored_items_per_sub
@@ -130,7 +130,7 @@ pub(super) fn build(
     };
     let wall = pki.wall;
     let built = builder
-        // The first that owns a node has it, and the signals' own has to be the last.
+        // The first node manager that owns a node wins, and the signals' own must be the last.
         .without_node_managers()
         .with_node_manager(move |context| Status::new(context, wall))
         .with_node_manager(InMemoryNodeManagerBuilder::new(CoreNodeManagerBuilder))
@@ -140,7 +140,7 @@ pub(super) fn build(
     built.map_err(|error| BusError::Refused(format!("there can be no server ({error})")))
 }
 
-/// The host that clients are told: where it listens, or the name of the machine if that is everywhere.
+/// The host announced to clients: the address to listen on, or the machine's name if that is a wildcard.
 fn announced(ip: IpAddr) -> String {
     let name = || X509Data::computer_hostnames().into_iter().next();
     match ip {

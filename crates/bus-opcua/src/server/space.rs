@@ -1,4 +1,4 @@
-//! The nodes of a driver: a folder, one below it for each station, and the signals in those.
+//! The nodes of a driver: a folder, in it a folder per station, and in these the signals.
 
 use opcua::nodes::{ObjectBuilder, VariableBuilder};
 use opcua::server::address_space::AddressSpace;
@@ -12,16 +12,16 @@ use tickbus_image::signal::{Area, Scale, Signal, SignalTable, Slot};
 
 use super::units::unit;
 
-/// The namespace of the signals; the crate's own are 0 and 1.
+/// The namespace of the signals; 0 and 1 are the crate's.
 pub(super) const NAMESPACE: u16 = 2;
 
 /// The URI of that namespace.
 pub(super) const NAMESPACE_URI: &str = "urn:tickbus:signals";
 
-/// What the name of a scaled signal's value in engineering units ends with.
+/// The suffix of a node with a scaled signal's value in engineering units.
 const SCALED: &str = ".scaled";
 
-/// The numbers of folders and properties, beside the texts of signals.
+/// The first numeric ids of folders and properties; signals have strings.
 const FOLDERS: usize = 1;
 const PROPERTIES: usize = 1_000_000;
 
@@ -30,15 +30,15 @@ pub(super) fn node(name: &str) -> NodeId {
     NodeId::new(NAMESPACE, name)
 }
 
-/// The node that has a signal's value in engineering units, if there is one.
+/// The node with a signal's value in engineering units, if it has one.
 pub(super) fn scaled(table: &SignalTable, signal: &Signal) -> Option<(NodeId, Scale)> {
     let name = format!("{}{SCALED}", signal.name);
-    // A signal of that name goes first.
+    // A signal of that name takes precedence.
     let scale = signal.scale.filter(|_| table.position(&name).is_none())?;
     Some((node(&name), scale))
 }
 
-/// Makes the nodes; `reads` is the area that clients write.
+/// Creates the nodes; `reads` is the area that clients write.
 pub(super) fn build(space: &mut AddressSpace, driver: &str, table: &SignalTable, reads: Area) {
     let top = number(FOLDERS);
     folder(space, &top, driver, ObjectId::ObjectsFolder.into());
@@ -89,7 +89,7 @@ fn variable(
     let signal = &table.signals[index];
     let id = node(&signal.name);
     let scaled = scaled(table, signal);
-    // The unit is that of the value in engineering units.
+    // The unit belongs to the value in engineering units.
     let own_unit = signal.unit.as_deref().filter(|_| signal.scale.is_none());
     let kind = match own_unit {
         Some(_) => VariableTypeId::AnalogUnitType,
@@ -135,7 +135,7 @@ fn variable(
         &value,
     );
     if let Some([low, high]) = signal.range {
-        // The range of normal operation, not that of the type (OPC 10000-8, 5.3.2).
+        // The range of normal operation, not of the type (OPC 10000-8, 5.3.2).
         let range = ExtensionObject::from_message(Range { low, high });
         property(
             space,
@@ -171,7 +171,7 @@ fn property(
         .insert(space);
 }
 
-/// What a person reads of a signal: its address and type in the PLC.
+/// The description of a signal: its address and type in the PLC.
 fn description(signal: &Signal) -> String {
     format!("{} {}", signal.address(), signal.data_type)
 }

@@ -1,4 +1,4 @@
-//! The structure `Server_ServerStatus`, whose time goes on.
+//! The structure `Server_ServerStatus` with its current time.
 
 use std::sync::Arc;
 
@@ -19,8 +19,8 @@ use opcua::types::{
 use crate::pki::date;
 use tickbus_base::time::WallClock;
 
-/// Stands before the crate's own manager of that node, to which it leaves all but the value: there, `CurrentTime`
-/// stands still unless somebody subscribes to it.
+/// Handles the value of that node in front of the crate's own manager, which handles everything else: with
+/// the latter, `CurrentTime` stands still unless a client subscribes to it.
 pub(super) struct Status {
     node: NodeId,
     context: ServerContext,
@@ -41,7 +41,7 @@ impl Status {
         core.ok_or(StatusCode::BadServerHalted)
     }
 
-    /// The structure as it is now.
+    /// The current value of the structure.
     fn value(&self) -> DataValue {
         let whole = self.context.status.full_status_obj();
         let time = date((self.wall)());
@@ -98,7 +98,7 @@ impl NodeManager for Status {
     }
 
     async fn browse(&self, _: &RequestContext, _: &mut [BrowseNode]) -> Result<(), StatusCode> {
-        // Every manager is asked for every node.
+        // Every manager is asked about every node.
         Ok(())
     }
 

@@ -2,10 +2,10 @@
 
 use opcua::types::EUInformation;
 
-/// Where the numbers of units come from: UN/CEFACT, recommendation 20.
+/// The origin of the unit numbers: UN/CEFACT, recommendation 20.
 const CEFACT: &str = "http://www.opcfoundation.org/UA/units/un/cefact";
 
-/// Units as people write them, and the three characters of their common code.
+/// Units as people write them, and their common codes of three characters.
 const CODES: [(&str, &str); 36] = [
     ("%", "P1"),
     ("1/min", "RPM"),
@@ -45,7 +45,7 @@ const CODES: [(&str, &str); 36] = [
     ("°C", "CEL"),
 ];
 
-/// The unit that people call `name`; one without a code goes by its name alone.
+/// The unit called `name`; without a code it has only its name.
 pub(super) fn unit(name: &str) -> EUInformation {
     let code = CODES.iter().find(|(known, _)| *known == name);
     EUInformation {
@@ -56,7 +56,7 @@ pub(super) fn unit(name: &str) -> EUInformation {
     }
 }
 
-/// A common code as a number: its characters are the digits.
+/// A common code as a number, whose digits are the characters.
 fn number(code: &str) -> i32 {
     code.bytes()
         .fold(0, |number, byte| number << 8 | i32::from(byte))

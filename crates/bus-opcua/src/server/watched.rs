@@ -1,4 +1,5 @@
-//! The monitored items of clients: who is told of a change, and for how long a value has to be shown.
+//! The monitored items of clients: which ones are told of a change, and how long a value must be shown to be
+//! seen.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,34 +9,35 @@ use opcua::types::{AttributeId, DataValue, DateTime, NodeId};
 
 use tickbus_base::time::Nanos;
 
-/// A node that has a value: that of a signal, raw or in engineering units.
+/// A node with a value: a signal's, raw or in engineering units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Variable {
-    /// The position of the signal.
+    /// The index of the signal.
     pub(super) signal: usize,
     /// Whether its value is in engineering units.
     pub(super) is_scaled: bool,
 }
 
-/// How often a monitored item looks, and for how long a value has to be shown to be seen by it.
+/// How often a monitored item samples, and how long a value must be shown to be seen by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Rhythm {
-    /// How long after one change the crate keeps the next one back.
+    /// How long after a change the crate holds the next one back.
     pub(super) sampling: Nanos,
     pub(super) span: Nanos,
 }
 
 /// A monitored item.
 ///
-/// async-opcua 0.19 keeps back a value whose source time is less than the sampling interval after that of the last
-/// one that passed. At the next publish it looks whether that interval is over; if it is not, it never looks again,
-/// and the value is not seen before there is another. So what may be kept back is told a second time when it is due.
+/// async-opcua 0.19 holds back a value whose source time is less than the sampling interval after that of the
+/// last value that passed. At the next publish it checks whether that interval is over; if not, it never
+/// checks again, and the value is not seen until there is another one. So a value that may have been held
+/// back is reported a second time when it is due.
 #[derive(Debug)]
 struct Item {
     rhythm: Rhythm,
-    /// The latest source time that it was told.
+    /// The latest source time reported to it.
     latest: Ticks,
-    /// What may be kept back, and until when.
+    /// The value that may be held back, and until when.
     held: Option<(Ticks, DataValue)>,
 }
 
@@ -44,13 +46,13 @@ impl Item {
         self.rhythm.sampling.0 / NANOS_PER_TICK
     }
 
-    /// It is told of a value for the first time.
+    /// A value is reported to it for the first time.
     fn told(&mut self, value: &DataValue) {
         let source = ticks(value.source_timestamp);
         let now = ticks(value.server_timestamp);
         let free = self.latest.saturating_add(self.sampling());
         if self.held.is_some() || source < free {
-            // Clocks of clients, which stamp what they write, may be ahead of this one.
+            // Values are timestamped by clients' clocks, which may be ahead of this one.
             let due = self.latest.min(now).saturating_add(self.sampling());
             let due = self.held.as_ref().map_or(due, |(due, _)| *due);
             self.held = Some((due, value.clone()));
@@ -58,7 +60,7 @@ impl Item {
         self.latest = self.latest.max(source);
     }
 
-    /// What is to be told a second time. Its source time lets it pass, whatever passed before it.
+    /// The value to report a second time, with a source time that makes it pass in any case.
     fn due(&mut self, now: Ticks) -> Option<DataValue> {
         let (_, value) = self.held.take_if(|(due, _)| *due <= now)?;
         self.latest = self.latest.saturating_add(self.sampling()).max(now);
@@ -69,7 +71,7 @@ impl Item {
     }
 }
 
-/// Time as OPC UA counts it, in units of 100 ns.
+/// Time in OPC UA's unit of 100 ns.
 type Ticks = i64;
 
 const NANOS_PER_TICK: i64 = 100;
@@ -78,27 +80,27 @@ fn ticks(time: Option<DateTime>) -> Ticks {
     time.map_or(0, |time| time.ticks())
 }
 
-/// The items that clients have made and not deleted, for each variable.
+/// The existing monitored items of each variable.
 ///
-/// The crate keeps a list of its own, from which an item vanishes only when it is deleted by itself; of those whose
-/// subscription ended as a whole it remembers, and tells, every one. So changes are told by this list.
+/// The crate has its own list, from which an item is only removed when it is deleted itself; items whose
+/// subscription ended as a whole stay in it and are reported to. So changes are reported by this list.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watched(Arc<Mutex<Items>>);
 
 #[derive(Debug, Default)]
 struct Items {
     of: HashMap<Variable, HashMap<MonitoredItemHandle, Item>>,
-    /// How many ended, by whichever way.
+    /// The number of items that have ended in any way.
     ended: usize,
 }
 
 impl Watched {
     fn lock(&self) -> MutexGuard<'_, Items> {
-        // A table is whole between any two of its changes.
+        // The table is consistent after every change, so a poisoned lock is safe to use.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// An item was made; its first value has this source time.
+    /// An item was created; its first value has this source time.
     pub(super) fn add(
         &self,
         variable: Variable,
@@ -115,7 +117,7 @@ impl Watched {
         of.entry(variable).or_default().insert(item, made);
     }
 
-    /// An item has another rhythm from now on.
+    /// The rhythm of an item was changed.
     pub(super) fn modify(&self, variable: Variable, item: MonitoredItemHandle, rhythm: Rhythm) {
         let mut items = self.lock();
         let of = items.of.get_mut(&variable);
@@ -136,7 +138,7 @@ impl Watched {
         }
     }
 
-    /// For how long the value of a signal has to be shown; `None` when nobody subscribes to it.
+    /// How long the value of a signal must be shown; `None` without subscribers.
     pub(super) fn span(&self, signal: usize) -> Option<Nanos> {
         let items = self.lock();
         let both = [false, true].map(|is_scaled| Variable { signal, is_scaled });
@@ -147,7 +149,7 @@ impl Watched {
             .max()
     }
 
-    /// Tells all who subscribe to the variable, which is `node`.
+    /// Reports a value to all subscribers of the variable, which is `node`.
     pub(super) fn tell(
         &self,
         subscriptions: &SubscriptionCache,
@@ -170,7 +172,7 @@ impl Watched {
         }
     }
 
-    /// Tells again what the crate has kept back and would forget.
+    /// Reports again what the crate has held back and would drop.
     pub(super) fn tell_due<'n>(
         &self,
         subscriptions: &SubscriptionCache,
@@ -197,7 +199,7 @@ impl Watched {
         }
     }
 
-    /// How many items the crate may still remember, if none is alive; 0 otherwise.
+    /// How many ended items the crate may retain if none exists any more; 0 otherwise.
     pub(super) fn left_behind(&self) -> usize {
         let items = self.lock();
         if items.of.is_empty() { items.ended } else { 0 }
@@ -215,7 +217,7 @@ mod tests {
         }
     }
 
-    /// A value with these times, in ticks.
+    /// A value with these timestamps, in ticks.
     fn value(value: i16, source: Ticks, server: Ticks) -> DataValue {
         DataValue {
             source_timestamp: Some(DateTime::from(source)),
@@ -224,7 +226,7 @@ mod tests {
         }
     }
 
-    /// An item that samples every 10 ticks, and had its first value at tick 100.
+    /// An item that samples every 10 ticks, with its first value at tick 100.
     fn item() -> Item {
         Item {
             rhythm: rhythm(10 * NANOS_PER_TICK, 0),
@@ -254,7 +256,7 @@ mod tests {
     #[test]
     fn a_value_that_is_older_than_the_last_one_passes_when_it_is_told_again() {
         let mut item = item();
-        // One client's clock is ahead of that of the next.
+        // One client's clock is ahead of the next one's.
         item.told(&value(1, 5000, 111));
         item.told(&value(2, 112, 112));
         let again = item.due(122).expect("it is over");
@@ -291,7 +293,7 @@ mod tests {
             (Some(Nanos(10)), 0)
         );
         watched.remove(raw, item(1));
-        // An item that was never made does not count as one that ended.
+        // An item that was never created does not count as ended.
         watched.remove(raw, item(3));
         assert_eq!((watched.span(7), watched.left_behind()), (None, 2));
     }

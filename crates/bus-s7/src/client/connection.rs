@@ -1,4 +1,4 @@
-//! One connection with its socket: carries bytes between the socket, the dialog and the port.
+//! One connection and its socket: transfers bytes between the socket, the dialog and the port.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -10,17 +10,18 @@ use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::tcp::{bow_out, is_for_later};
 use tickbus_fieldbus::{BusError, PlcState, Port};
 
-/// So many bytes are read at once.
+/// At most this many bytes are read at once.
 const BUFFER: usize = 4096;
 
-/// How often a CPU is asked whether it runs.
+/// How often a CPU is asked for its operating state.
 const STATE: Nanos = Nanos::from_millis(200);
 
-/// A CPU that has said whether it runs may refuse to say it so many times in a row, less one, before it is believed
-/// to be another one, which does not say it: a busy CPU refuses now and then.
+/// A CPU that has reported its operating state may then refuse to report it one time fewer than this in a
+/// row: a busy CPU refuses now and then. After that it is assumed to be another CPU, which does not report
+/// it.
 const UNTOLD: u8 = 5;
 
-/// When a station is tried again of which the CPU refused something.
+/// When a station is tried again after the CPU refused something of it.
 const RETRY: Nanos = Nanos::from_secs(1);
 
 /// One connection.
@@ -31,20 +32,20 @@ pub(super) struct Connection<'a> {
     dialog: Dialog,
     pace: Pace,
     has_identity: bool,
-    /// When the CPU is asked next whether it runs; never where it does not say.
+    /// When to ask the CPU for its operating state next; `None` if it does not report it.
     state: Option<Nanos>,
-    /// A cycle became due while it was asked.
+    /// A cycle became due while the question was pending.
     is_due: bool,
     stations: Vec<Station>,
     buffer: [u8; BUFFER],
 }
 
-/// A station as the last cycles left it.
+/// The state of a station after the last cycles.
 #[derive(Clone, Debug, Default)]
 struct Station {
-    /// Whether anything of it is written, and whether anything is read.
+    /// Whether any of its data are written, and whether any are read.
     has: [bool; 2],
-    /// The CPU refused something of it, which is tried again at this time.
+    /// The CPU refused some of its data; they are tried again at this time.
     resume: Option<Nanos>,
     refusal: Option<Refusal>,
 }
@@ -76,7 +77,7 @@ impl<'a> Connection<'a> {
         }
     }
 
-    /// The connection has ended by an error.
+    /// The connection has ended with an error.
     pub(super) fn end(&mut self) {
         if self.dialog.asks_who() {
             self.bus.identity.unanswered += 1;
@@ -114,7 +115,7 @@ impl<'a> Connection<'a> {
         if is_readable {
             self.read(now, port)?;
         }
-        // First, or a line with more cycles than it can do would never come to it.
+        // Before the cycle, or an overloaded line would never get to it.
         if self.has_identity {
             self.ask_state(now);
         }
@@ -152,7 +153,7 @@ impl<'a> Connection<'a> {
     }
 
     fn meet(&mut self, now: Nanos, length: u16, identity: Option<Identity>, port: &mut Port) {
-        // A CPU that hangs up when it is asked who it is would do so at the next question of that kind.
+        // A CPU that closed the connection when asked for its identity would do the same for this question.
         if identity.is_some() {
             self.bus.identity.unanswered = 0;
             self.state = self.bus.state.is_asked().then_some(now);
@@ -172,11 +173,11 @@ impl<'a> Connection<'a> {
         self.has_identity = true;
         port.tell("pdu", &length.to_string());
         port.running(&format!("connected with {}, {line}", self.peer));
-        // Before the first cycle: what lies in the memory of a CPU in STOP is not to be taken for its outputs.
+        // Before the first cycle: the memory of a CPU in STOP must not be taken for its outputs.
         self.ask_state(now);
     }
 
-    /// Asks whether the CPU runs, between two cycles, when it is time to.
+    /// Asks for the operating state if that is due, between two cycles.
     fn ask_state(&mut self, now: Nanos) {
         if self.dialog.is_idle() && self.state.is_some_and(|due| due <= now) {
             self.state = Some(now + STATE);
@@ -184,7 +185,7 @@ impl<'a> Connection<'a> {
         }
     }
 
-    /// The CPU said whether it runs, or that it does not say.
+    /// The CPU reported its operating state, or that it does not report it.
     fn learn(
         &mut self,
         now: Nanos,
@@ -211,8 +212,8 @@ impl<'a> Connection<'a> {
         Ok(())
     }
 
-    /// The CPU does not say whether it runs, and its data count. One that said STOP and does not say anything any
-    /// more is another one.
+    /// The CPU does not report its operating state, so its data are taken as valid. If an earlier CPU
+    /// reported STOP and this one reports nothing, it is assumed to be another one.
     fn presume_run(&mut self, now: Nanos, port: &mut Port) {
         if self.bus.said.take() == Some(PlcState::Stop) {
             for station in 0..self.stations.len() {
@@ -262,7 +263,7 @@ impl<'a> Connection<'a> {
     /// A cycle is complete.
     fn done(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let may_write = self.bus.guard.may_write();
-        // In a cycle in which nothing was read and nothing written, the CPU has not been heard of.
+        // In a cycle without reads and writes, nothing was heard from the CPU.
         let is_heard = self.stations.iter().any(|station| {
             let [is_written, is_read] = station.has;
             station.resume.is_none() && (is_read || is_written && may_write)
@@ -287,7 +288,7 @@ impl<'a> Connection<'a> {
                 port.sent(index);
             }
             station.refusal = None;
-            // It may have been told by an earlier connection.
+            // It may have been reported during an earlier connection.
             let told = &mut self.bus.told_refusals[index];
             if !told.is_empty() {
                 told.clear();
@@ -297,7 +298,7 @@ impl<'a> Connection<'a> {
         self.put_off(port)
     }
 
-    /// Leaves the stations out for a while of which the CPU refused something.
+    /// Skips the stations for a while of which the CPU refused something.
     ///
     /// # Errors
     ///
@@ -358,7 +359,7 @@ impl<'a> Connection<'a> {
     }
 }
 
-/// What the statistics say of what the CPU refuses.
+/// The refusals as the statistics show them.
 fn refusals(told: &[String]) -> String {
     let told = told.iter().map(String::as_str);
     let told: Vec<&str> = told.filter(|text| !text.is_empty()).collect();

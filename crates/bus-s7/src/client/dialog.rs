@@ -1,5 +1,5 @@
-//! A client's side of one connection, without I/O: time and bytes are handed in, bytes and the next deadline come
-//! out.
+//! The client's side of one connection, without I/O: time and received bytes go in, bytes to send and the
+//! next deadline come out.
 
 use super::plan::{Job, Way};
 use super::traffic::{Traffic, function_of, write_data};
@@ -11,65 +11,65 @@ use crate::szl::{self, Identity};
 use crate::transport::{self, Connect, Tpdu};
 use tickbus_base::time::Nanos;
 
-/// This client's reference of every connection: there is one connection per socket.
+/// The client's reference, the same on every connection: a socket carries only one.
 const REFERENCE: u16 = 1;
 
-/// The transport size that is asked for: 1024 bytes, which hold the longest unit.
+/// The requested transport size: 1024 bytes, enough for the longest PDU.
 const TPDU: u8 = 10;
 
-/// The longest list that is fetched; an identity is shorter by far.
+/// The longest list that is read; identities are far shorter.
 const LIST_LIMIT: usize = 16_384;
 
-/// The lists that tell who a CPU is, and the one that tells whether it runs.
+/// The lists with a CPU's identity, and the one with its operating state.
 const LISTS: [u16; 3] = [0x0011, 0x001C, szl::STATE];
 
-/// Where the last of them stands.
+/// The index of the last of them.
 const STATE: usize = 2;
 
-/// One connection with a CPU.
+/// One connection to a CPU.
 ///
-/// The owner of the socket hands what it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write) and says
-/// how much the system took by [`wrote`](Self::wrote), and asks [`check`](Self::check) whether the connection may go
-/// on. Once [`News::Met`] was heard, it begins a cycle by [`begin`](Self::begin), or asks whether the CPU runs by
-/// [`ask_state`](Self::ask_state), whenever the dialog [is idle](Self::is_idle); [`News::Done`] ends the cycle,
-/// [`News::State`] the question.
+/// The owner of the socket passes what it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write),
+/// reports how much the system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to see
+/// whether the connection may go on. After [`News::Met`] it starts a cycle by [`begin`](Self::begin), or asks
+/// for the operating state by [`ask_state`](Self::ask_state), whenever the dialog [is idle](Self::is_idle);
+/// [`News::Done`] ends the cycle, [`News::State`] the question.
 #[derive(Debug)]
 pub struct Dialog {
     terms: Terms,
     phase: Phase,
-    /// Bytes that have come and are no whole packet yet.
+    /// Received bytes of an incomplete packet.
     inbox: Vec<u8>,
-    /// The pieces of a message whose last one has not come.
+    /// Received pieces of an incomplete message.
     pieces: Vec<u8>,
     outbox: Vec<u8>,
     pdu: u16,
     /// Power of two of the longest TPDU.
     size: u8,
     reference: u16,
-    /// Since when an answer is awaited.
+    /// Since when an answer has been pending.
     asked: Option<Nanos>,
     identity: Identity,
-    /// What has come of the list that is being fetched.
+    /// The received part of the list being read.
     list: Vec<u8>,
     traffic: Traffic,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// A transport connection is asked for.
+    /// A transport connection was requested.
     Connecting,
-    /// The length of units is to be agreed.
+    /// The PDU length is being negotiated.
     Agreeing,
-    /// The CPU is asked for the list with this index.
+    /// The list with this index was requested.
     Asking(usize),
-    /// There is nothing to do.
+    /// Nothing is pending.
     Idle,
-    /// The job with this index is under way.
+    /// The job with this index is pending.
     Working(usize),
 }
 
 impl Dialog {
-    /// A dialog that begins at `now` and carries these frames.
+    /// A dialog that starts at `now` and transfers these frames.
     pub(super) fn new(terms: Terms, now: Nanos, frames: Frames) -> Self {
         let mut dialog = Self {
             phase: Phase::Connecting,
@@ -96,50 +96,50 @@ impl Dialog {
         dialog
     }
 
-    /// Lets frames be written from now on, or not. The dialog has to be idle.
+    /// Allows or forbids writing frames from now on. The dialog must be idle.
     pub fn allow(&mut self, may_write: bool) {
         self.traffic.may_write = may_write;
         self.traffic.plan(usize::from(self.pdu));
     }
 
-    /// Leaves a station out of the cycles, or takes it in again. The dialog has to be idle.
+    /// Excludes a station from the cycles, or includes it again. The dialog must be idle.
     pub fn suspend(&mut self, station: usize, is_out: bool) {
         if std::mem::replace(&mut self.traffic.suspended[station], is_out) != is_out {
             self.traffic.plan(usize::from(self.pdu));
         }
     }
 
-    /// Whether the CPU is being asked who it is.
+    /// Whether the CPU is being asked for its identity.
     pub fn asks_who(&self) -> bool {
         matches!(self.phase, Phase::Asking(list) if list < STATE)
     }
 
-    /// Whether the CPU is being asked if it runs.
+    /// Whether the CPU is being asked for its operating state.
     pub fn asks_state(&self) -> bool {
         self.phase == Phase::Asking(STATE)
     }
 
-    /// Whether a cycle may begin.
+    /// Whether a cycle can start.
     pub fn is_idle(&self) -> bool {
         self.phase == Phase::Idle
     }
 
-    /// Where the frame of a station goes that the next cycle writes.
+    /// The buffer for the frame that the next cycle writes to a station.
     pub fn frame_to_write(&mut self, station: usize) -> &mut [u8] {
         &mut self.traffic.out[station]
     }
 
-    /// The frame of a station that the last cycle read: the bits of its signals.
+    /// The frame that the last cycle read from a station: only the bits of its signals.
     pub fn frame_read(&self, station: usize) -> &[u8] {
         &self.traffic.into[station]
     }
 
-    /// What the CPU refused to a station in the last cycle: all else of it was done.
+    /// What the CPU refused of a station in the last cycle; everything else was transferred.
     pub fn refusal(&self, station: usize) -> Option<&Refusal> {
         self.traffic.refused[station].as_ref()
     }
 
-    /// Begins a cycle at `now`; news when there is nothing to be done in one.
+    /// Starts a cycle at `now`; returns news if the cycle has no jobs.
     ///
     /// # Panics
     ///
@@ -150,7 +150,7 @@ impl Dialog {
         self.work(now, 0)
     }
 
-    /// Asks at `now` whether the CPU runs.
+    /// Asks for the operating state at `now`.
     ///
     /// # Panics
     ///
@@ -160,27 +160,27 @@ impl Dialog {
         self.ask_list(now, STATE);
     }
 
-    /// What is to be written; empty when there is nothing to send.
+    /// The bytes to be written; empty if there are none.
     pub fn to_write(&self) -> &[u8] {
         &self.outbox
     }
 
-    /// The system took so many bytes of [`to_write`](Self::to_write).
+    /// The system accepted `count` bytes of [`to_write`](Self::to_write).
     pub fn wrote(&mut self, count: usize) {
         self.outbox.drain(..count);
     }
 
-    /// When an answer has taken too long.
+    /// When the time-out of the pending answer ends.
     pub fn deadline(&self) -> Nanos {
         self.asked
             .map_or(Nanos::MAX, |asked| asked + self.terms.patience + Nanos(1))
     }
 
-    /// Whether the connection may go on at `now`.
+    /// Checks whether the connection may go on at `now`.
     ///
     /// # Errors
     ///
-    /// An answer has taken too long.
+    /// An answer has timed out.
     pub fn check(&self, now: Nanos) -> Result<(), End> {
         match self.asked {
             Some(asked) if now - asked > self.terms.patience => {
@@ -190,8 +190,8 @@ impl Dialog {
         }
     }
 
-    /// Takes in what has come, up to the next news; more of it may be waiting, so this is to be called with no bytes
-    /// until it gives none.
+    /// Takes in received bytes, up to the next news; more may be buffered, so call it again without bytes
+    /// until it returns none.
     ///
     /// # Errors
     ///
@@ -241,7 +241,7 @@ impl Dialog {
             return Err(Fault::Pieces(self.pdu).into());
         }
         if last && self.pieces.is_empty() {
-            // An empty message is a sign of life.
+            // An empty message is a keep-alive.
             return if bytes.is_empty() {
                 Ok(None)
             } else {
@@ -276,7 +276,7 @@ impl Dialog {
         }
     }
 
-    /// Appends a unit of `kind` that `fill` makes, and awaits its answer.
+    /// Appends a PDU of `kind`, made by `fill`, and waits for its answer.
     fn ask(&mut self, now: Nanos, kind: Kind, fill: impl FnOnce(&mut Draft, &mut Vec<u8>)) {
         self.reference = self.reference.wrapping_add(1);
         self.asked = Some(now);
@@ -319,7 +319,7 @@ impl Dialog {
         News::Met(self.pdu, identity)
     }
 
-    /// Asks for the list with this index.
+    /// Requests the list with this index.
     fn ask_list(&mut self, now: Nanos, index: usize) {
         self.phase = Phase::Asking(index);
         self.list.clear();
@@ -331,10 +331,10 @@ impl Dialog {
         });
     }
 
-    /// A piece of a list has come, or none.
+    /// A piece of a list has arrived, or a refusal.
     fn told(&mut self, now: Nanos, index: usize, answer: &Pdu<'_>) -> Result<Option<News>, End> {
         const WRONG: Fault = Fault::Answer("no system status list");
-        // A peer that knows no such questions answers as if they were jobs.
+        // A peer without such requests answers them like jobs.
         let mut more = None;
         if answer.kind == Kind::UserData {
             let [_, _, 0x12, 8, _, 0x84, 1, sequence, _, last, e0, e1] = *answer.parameters else {
@@ -349,7 +349,7 @@ impl Dialog {
                     self.list.extend_from_slice(datum.bytes);
                     more = (last != 0).then_some(sequence);
                 }
-                // It has no such list.
+                // The CPU does not have this list.
                 _ => self.list.clear(),
             }
         }
@@ -377,7 +377,7 @@ impl Dialog {
         Ok(Some(self.meet(Some(identity))))
     }
 
-    /// Asks for the job with this index to be done; news when there is none.
+    /// Starts the job with this index; returns news if there is none.
     fn work(&mut self, now: Nanos, index: usize) -> Option<News> {
         if index == self.traffic.jobs.len() {
             self.phase = Phase::Idle;
@@ -403,7 +403,7 @@ impl Dialog {
         None
     }
 
-    /// A job was done.
+    /// A job has been answered.
     fn done(&mut self, now: Nanos, index: usize, answer: &Pdu<'_>) -> Result<Option<News>, End> {
         whole(answer)?;
         let Job { way, pieces } = &self.traffic.jobs[index];
@@ -440,7 +440,7 @@ impl Dialog {
     }
 }
 
-/// An answer to a job that was done as a whole.
+/// Checks the header of an answer to a job for an error.
 fn whole(answer: &Pdu<'_>) -> Result<(), End> {
     match (answer.kind, answer.error) {
         (Kind::Ack | Kind::AckData, error::NONE) => Ok(()),

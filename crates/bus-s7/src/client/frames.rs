@@ -1,4 +1,4 @@
-//! What is written into a CPU and read from it, signal by signal.
+//! What is written to a CPU and read from it, signal by signal.
 
 use std::fmt::Write as _;
 
@@ -10,17 +10,17 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::SignalTable;
 
-/// What is written into a CPU and read from it, and where it lies there.
+/// What is written to a CPU and read from it, and where.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Frames {
     pub(super) written: Vec<Field>,
     pub(super) read: Vec<Field>,
-    /// Bytes of the frames of each station: the one that is written, and the one that is read.
+    /// Sizes of each station's frames in bytes: the written one and the read one.
     pub(super) lengths: Vec<[usize; 2]>,
 }
 
 impl Frames {
-    /// Those of the end with `role`.
+    /// The frames of the end with `role`.
     pub fn new(options: &ClientOptions, table: &SignalTable, role: Role) -> Self {
         let (sends, receives) = role.areas();
         let fields = |area| {
@@ -48,19 +48,19 @@ impl Frames {
         }
     }
 
-    /// A dialog about them.
+    /// A dialog that transfers them.
     pub fn dialog(&self, terms: Terms, now: Nanos) -> Dialog {
         Dialog::new(terms, now, self.clone())
     }
 
-    /// Whether anything of a station is written, and whether anything is read.
+    /// Whether any data of a station are written, and whether any are read.
     pub(super) fn has(&self, station: usize) -> [bool; 2] {
         let any = |fields: &[Field]| fields.iter().any(|field| field.station == station);
         [any(&self.written), any(&self.read)]
     }
 
-    /// What is written and what is read in one cycle, for people: the items, and how many jobs they take with units
-    /// of at most `longest` bytes and with the shortest that there are.
+    /// What is written and read in one cycle, for people: the items, and the number of jobs with PDUs of at
+    /// most `longest` bytes and with the shortest possible ones.
     pub fn summary(&self, longest: u16) -> [String; 2] {
         let one = |way, fields: &[Field]| {
             let jobs = |limit: u16| plan::jobs(way, fields, usize::from(limit));
@@ -85,7 +85,7 @@ impl Frames {
     }
 }
 
-/// Items for people, neighbours together: `DB11 bytes 0 to 3 and 8, bits 4.0 and 4.3; %M bit 0.1`.
+/// Items as text, adjacent ones merged: `DB11 bytes 0 to 3 and 8, bits 4.0 and 4.3; %M bit 0.1`.
 fn items(jobs: &[Job]) -> String {
     let pieces = jobs.iter().flat_map(|job| &job.pieces);
     let mut all: Vec<Item> = pieces.map(|piece| piece.item).collect();

@@ -1,4 +1,4 @@
-//! The bus of kind `s7-client`: the peer is a CPU, whose memory this end reads and writes.
+//! The bus of kind `s7-client`: reads and writes the memory of a CPU.
 
 mod connection;
 mod dialog;
@@ -23,7 +23,7 @@ pub use options::ClientOptions;
 pub use refusal::Refusal;
 pub use terms::{End, News, Terms};
 
-/// How long an answer may take at least; in other cases four times `max_age`.
+/// The shortest time-out of an answer; otherwise it is four times `max_age`.
 const PATIENCE: Nanos = Nanos::from_secs(2);
 
 /// The bus of kind `s7-client`.
@@ -35,31 +35,31 @@ pub struct S7Client {
     /// The stations' names, for messages.
     names: Vec<String>,
     guard: Guard,
-    /// Asking who the CPU is, and whether it runs.
+    /// The requests for the CPU's identity and operating state.
     identity: Question,
     state: Question,
-    /// What the CPU said last of whether it runs, and how often in a row it has not answered that since.
+    /// The last operating state that the CPU reported, and how often in a row it has not answered since.
     said: Option<PlcState>,
     untold: u8,
-    /// Whether the log knows that it does not say.
+    /// Whether it was logged that the CPU does not report it.
     told_unknown: bool,
-    /// What the log knows of that the CPU refuses, by station.
+    /// The refusals that were logged, by station.
     told_refusals: Vec<String>,
     rarely: Rarely,
 }
 
-/// A question about the system that some CPUs answer by hanging up, or not at all.
+/// A request to which some CPUs respond by closing the connection, or not at all.
 #[derive(Clone, Copy, Debug, Default)]
 struct Question {
-    /// How many times in a row.
+    /// How many times in a row it was not answered.
     unanswered: u8,
 }
 
 impl Question {
-    /// After so many of them it is not asked, for one connection.
+    /// After this many times it is omitted for one connection.
     const LIMIT: u8 = 2;
 
-    /// Whether it is asked in the connection that begins. The one after that asks once more.
+    /// Whether to send it on the connection that starts. If omitted, the next connection tries it once more.
     fn is_asked(&mut self) -> bool {
         let is_asked = self.unanswered < Self::LIMIT;
         self.unanswered = self.unanswered.min(Self::LIMIT - 1);
@@ -68,7 +68,7 @@ impl Question {
 }
 
 impl S7Client {
-    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if one is stated.
+    /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if stated.
     pub fn new(
         options: &ClientOptions,
         table: &SignalTable,

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus `s7-client`.
+//! The options of the bus `s7-client` in a driver.cfg.
 
 use std::collections::BTreeMap;
 
@@ -12,13 +12,13 @@ use tickbus_fieldbus::tcp::{Address, AddressError};
 use tickbus_fieldbus::{At, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
-/// This end, as libraries and programming devices name themselves.
+/// The local TSAP, as of libraries and programming devices.
 const CALLING: [u8; 2] = [1, 0];
 
-/// The longest identity that is written down, in characters.
+/// The longest identity, in characters.
 const IDENTITY_LIMIT: usize = 200;
 
-/// What a driver.cfg says to the bus `s7-client`.
+/// The options of the bus `s7-client`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClientOptions {
     /// The CPU.
@@ -27,34 +27,34 @@ pub struct ClientOptions {
     pub calling: Tsap,
     /// The CPU's end of it.
     pub called: Tsap,
-    /// Where `%I` and `%Q` of each station lie in the CPU; one pair where there are no `[[station]]` tables.
+    /// The places of each station's `%I` and `%Q` in the CPU; one pair if there are no `[[station]]` tables.
     pub places: Vec<[Option<Start>; 2]>,
-    /// Where single signals lie, by their names: the lines of `[fieldbus.at]`.
+    /// The places of single signals, by name: the lines of `[fieldbus.at]`.
     pub variables: BTreeMap<String, Variable>,
-    /// The longest unit that is asked for.
+    /// The longest PDU that is requested.
     pub pdu: u16,
     /// The identity of the CPU that may be written to.
     pub write_to: Option<String>,
-    /// Whether every change that the CPU makes is reported as an event, beside the image.
+    /// Whether every change by the CPU is reported as an event, in addition to the image.
     pub events: bool,
-    /// Where the `[fieldbus]` table stands, for complaints, and whether `[[station]]` tables have been read.
+    /// The offset of the `[fieldbus]` table, for mistakes, and whether `[[station]]` tables have been read.
     at: usize,
     has_stations: bool,
     role: Role,
 }
 
 impl ClientOptions {
-    /// Takes another address than the driver.cfg names.
+    /// Replaces the address of the driver.cfg.
     ///
     /// # Errors
     ///
-    /// The text is no address, or none that can be dialled.
+    /// The text is not an address, or one that cannot be connected to.
     pub fn set_address(&mut self, address: &str) -> Result<(), String> {
         self.address = parse_address(address).map_err(|why| why.to_string())?;
         Ok(())
     }
 
-    /// Where an area of a station lies.
+    /// The place of an area of a station.
     pub fn place(&self, station: usize, area: Area) -> Option<Start> {
         let [input, output] = *self.places.get(station)?;
         match area {
@@ -63,7 +63,7 @@ impl ClientOptions {
         }
     }
 
-    /// Where a signal lies: as its line in `[fieldbus.at]` says, or else within its area of its station.
+    /// The place of a signal: from its line in `[fieldbus.at]`, or else within its station's area.
     pub fn variable(&self, signal: &Signal) -> Option<Variable> {
         if let Some(variable) = self.variables.get(&signal.name) {
             return Some(*variable);
@@ -78,7 +78,7 @@ impl ClientOptions {
         })
     }
 
-    /// What is written and what is read in one cycle, for people.
+    /// What is written and read in one cycle, for people.
     pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
         let frames = Frames::new(self, table, self.role);
         let writes = match self.write_to {
@@ -113,7 +113,7 @@ impl ClientOptions {
         self.report_overlaps(lines, table);
     }
 
-    /// Reports signals that would be written over one another. What is read may be read twice.
+    /// Reports signals that would be written to overlapping places. Overlapping reads are allowed.
     fn report_overlaps(&self, lines: &[At<'_>], table: &SignalTable) {
         let (sends, _) = self.role.areas();
         let written = table.signals.iter().enumerate();
@@ -126,7 +126,7 @@ impl ClientOptions {
             })
             .collect();
         written.sort_unstable();
-        // The one of those before that reaches farthest.
+        // The previous variable that reaches furthest.
         let mut last: Option<(Object, usize, usize)> = None;
         for (object, first, end, index) in written {
             if let Some((before, reach, other)) = last
@@ -225,7 +225,7 @@ impl ClientOptions {
     pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
         let own = read_places(table).unwrap_or_default();
         if count == 1 {
-            // What [fieldbus] says is for the only station, too.
+            // The keys in [fieldbus] apply to a single station as well.
             let [[input, output]] = self.places[..] else {
                 return;
             };
@@ -238,7 +238,7 @@ impl ClientOptions {
         self.places.push(own);
     }
 
-    /// Reports what does not go together with the stations of the file.
+    /// Reports conflicts with the stations of the file.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         for (index, station) in table.stations.iter().enumerate() {
             for (area, key) in [(Area::Input, "input"), (Area::Output, "output")] {
@@ -298,7 +298,7 @@ fn read_address(value: &Value<'_>) -> Option<Address> {
         .ok()
 }
 
-/// Reads a host with its port, or without: then it is that of all CPUs.
+/// Reads a host with or without a port; the default is the port of all CPUs.
 fn parse_address(text: &str) -> Result<Address, AddressError> {
     let address: Address = match text.parse() {
         Err(_) if !text.contains(':') => format!("{text}:{PORT}").parse()?,

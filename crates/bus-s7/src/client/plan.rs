@@ -1,32 +1,32 @@
-//! From signals to jobs: what is written and read in one cycle, in as few jobs as the agreed length allows.
+//! Plans the jobs of a cycle: as few as the negotiated PDU length permits.
 //!
-//! What is read may be read together with bytes between that nobody asked for. What is written is what signals
-//! cover, to the bit: a byte of which signals cover some bits is written by those bits, each an item of its own.
+//! A read may include bytes between signals. A write covers exactly the bits of signals: a byte that signals
+//! cover only in part is written bit by bit, each bit an item of its own.
 
 use std::ops::Range;
 
 use crate::item::{self, Item, Object};
 use crate::pdu;
 
-/// The most items of a job that every CPU takes.
+/// The most items per job that every CPU accepts.
 const ITEMS: usize = 20;
 
-/// Bytes before the items of a job, and of an answer: header, function, number of items.
+/// Bytes before the items of a job and of an answer: header, function, number of items.
 const JOB: usize = pdu::JOB_HEADER + 2;
 const ANSWER: usize = pdu::ANSWER_HEADER + 2;
 
-/// Gaps that may be read over, in bytes. The shortest costs less than an item of its own; a longer one is read over
-/// where that saves a job.
+/// Gaps, in bytes, that may be read over. The first costs less than an item of its own; the longer ones are
+/// used if that saves a job.
 const GAPS: [usize; 4] = [item::DATA_HEADER, 16, 64, 128];
 
-/// What a job does.
+/// The direction of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Way {
     Write,
     Read,
 }
 
-/// A signal: where it lies in the frame of its station, and where in the CPU. All in bits; more than one of them are
+/// A signal: its place in its station's frame, and in the CPU, in bits. Signals of more than one bit occupy
 /// whole bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Field {
@@ -44,7 +44,7 @@ pub(super) struct Job {
     pub(super) pieces: Vec<Piece>,
 }
 
-/// One item of a job, and the bits of a station's frame that it carries.
+/// One item of a job, and the bits of a station's frame in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Piece {
     pub(super) station: usize,
@@ -52,7 +52,7 @@ pub(super) struct Piece {
     runs: Vec<Run>,
 }
 
-/// Bits that lie in the frame and in the data of an item.
+/// Consecutive bits, in the frame and in the data of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Run {
     frame: usize,
@@ -61,14 +61,14 @@ struct Run {
 }
 
 impl Piece {
-    /// Fills `data`, the item's, from a frame.
+    /// Fills the item's `data` from a frame.
     pub(super) fn gather(&self, frame: &[u8], data: &mut [u8]) {
         for run in &self.runs {
             carry(frame, run.frame, data, run.data, run.bits);
         }
     }
 
-    /// Takes `data`, the item's, over into a frame.
+    /// Copies the item's `data` into a frame.
     pub(super) fn scatter(&self, data: &[u8], frame: &mut [u8]) {
         for run in &self.runs {
             carry(data, run.data, frame, run.frame, run.bits);
@@ -87,7 +87,7 @@ fn carry(from: &[u8], at: usize, to: &mut [u8], into: usize, bits: usize) {
     }
 }
 
-/// What cannot be divided: the bytes of a value or of BOOLs side by side, or one bit.
+/// What cannot be split: the bytes of a value, or of adjacent BOOLs, or one bit.
 struct Cell {
     station: usize,
     object: Object,
@@ -96,7 +96,7 @@ struct Cell {
     fields: Vec<Field>,
 }
 
-/// The jobs that carry `fields`, none of which, nor its answer, is longer than `limit`.
+/// The jobs that transfer `fields`; neither a job nor its answer is longer than `limit`.
 pub(super) fn jobs(way: Way, fields: &[Field], limit: usize) -> Vec<Job> {
     let cells = cells(way, fields);
     let plan = |gap| pack(way, pieces(way, &cells, gap, limit), limit);
@@ -111,7 +111,7 @@ pub(super) fn jobs(way: Way, fields: &[Field], limit: usize) -> Vec<Job> {
 
 fn cells(way: Way, fields: &[Field]) -> Vec<Cell> {
     let mut sorted = fields.to_vec();
-    // The BOOLs of a byte are neighbours, even where somebody reads them as a word, too.
+    // Keeps the BOOLs of a byte adjacent, even if the byte is also part of a word.
     sorted.sort_by_key(|field| {
         let Field { first, bits, .. } = *field;
         (field.station, field.object, first / 8, bits > 1, first)
@@ -148,7 +148,7 @@ fn cells(way: Way, fields: &[Field]) -> Vec<Cell> {
     cells
 }
 
-/// Cells that follow one another, or have a gap of `gap` bytes at most, are one item.
+/// Adjacent cells, or cells with a gap of at most `gap` bytes, become one item.
 fn pieces(way: Way, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
     let room = room(way, [JOB, ANSWER], limit);
     let mut pieces: Vec<Piece> = Vec::new();
@@ -176,7 +176,7 @@ fn pieces(way: Way, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
             });
             pieces.last_mut().expect("it was pushed")
         };
-        // The data of a bit are a byte with the bit as its lowest.
+        // The data of a bit are one byte, with the bit as its lowest.
         let begin = piece.item.byte * 8 + usize::from(piece.item.bit);
         for field in &cell.fields {
             let run = Run {
@@ -194,7 +194,7 @@ fn pieces(way: Way, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
 }
 
 impl Run {
-    /// Whether both are one run of whole bytes.
+    /// Whether both form one run of whole bytes.
     const fn is_followed_by(self, next: Self) -> bool {
         self.bits > 1
             && next.bits > 1
@@ -205,7 +205,7 @@ impl Run {
 
 /// Puts each piece into the first job that has room for it.
 fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
-    // Each with its length and that of its answer.
+    // Each with its length and the length of its answer.
     let mut jobs: Vec<(Job, [usize; 2])> = Vec::new();
     for piece in pieces {
         let bytes = piece.item.range().len();
@@ -231,14 +231,14 @@ fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
     jobs.into_iter().map(|(job, _)| job).collect()
 }
 
-/// How many bytes one more item of a job may have.
+/// The most data bytes that one more item of a job can have.
 fn room(way: Way, [job, answer]: [usize; 2], limit: usize) -> usize {
     let room = match way {
         Way::Write => limit.saturating_sub(job + item::ADDRESS + item::DATA_HEADER),
         Way::Read if job + item::ADDRESS > limit => 0,
         Way::Read => limit.saturating_sub(answer + item::DATA_HEADER),
     };
-    // An odd one is filled up.
+    // Data of odd length are padded.
     room / 2 * 2
 }
 

@@ -19,7 +19,7 @@ pub enum Refusal {
         /// Why.
         code: Code,
     },
-    /// A job as a whole, by class and code.
+    /// A whole job, with error class and code.
     Job(u16),
     /// The transport connection, with the reason.
     Connection(u8),
@@ -85,7 +85,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// What to do about an item that was refused.
+/// The remedy for a refused item.
 const fn right(object: Object, code: Code) -> &'static str {
     match (object, code) {
         (Object::Block(_), Code::ADDRESS) => {

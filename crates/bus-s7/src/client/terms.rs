@@ -1,4 +1,4 @@
-//! What a dialog begins with, what it tells, and how it ends.
+//! The parameters of a dialog, its news, and how it ends.
 
 use std::fmt;
 
@@ -8,29 +8,29 @@ use crate::{Fault, Tsap};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{BusError, PlcState};
 
-/// What both ends of a connection, or this one, have agreed upon.
+/// The parameters of a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Terms {
-    /// This end.
+    /// The local TSAP.
     pub calling: Tsap,
-    /// The CPU.
+    /// The CPU's TSAP.
     pub called: Tsap,
-    /// The longest unit that is asked for.
+    /// The longest PDU that is requested.
     pub pdu: u16,
-    /// How long an answer may take.
+    /// The time-out of an answer.
     pub patience: Nanos,
-    /// Whether the CPU is asked who it is.
+    /// Whether the CPU is asked for its identity.
     pub asks_who: bool,
 }
 
 /// Why a connection ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// The peer does not keep to the protocol.
+    /// The peer violates the protocol.
     Broken(Fault),
-    /// It does, and declined.
+    /// The peer refused.
     Refused(Refusal),
-    /// It does not answer.
+    /// The peer does not answer.
     Silent(Nanos),
 }
 
@@ -56,13 +56,14 @@ impl From<Fault> for End {
     }
 }
 
-/// What the owner of a dialog has to look at.
+/// What the owner of a dialog must handle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum News {
-    /// The connection stands, with units of this length at most; the CPU says who it is, or nothing.
+    /// The connection is up, with PDUs of at most this length, and with the CPU's identity if it was asked
+    /// for.
     Met(u16, Option<Identity>),
-    /// What is to be written has been, and what is to be read.
+    /// The cycle is complete.
     Done,
-    /// The CPU says whether it runs; nothing where it does not say.
+    /// The CPU's operating state; `None` if it does not report it.
     State(Option<PlcState>),
 }

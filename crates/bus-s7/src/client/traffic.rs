@@ -1,21 +1,21 @@
-//! The frames of all stations, and the jobs that carry them.
+//! The frames of all stations, and the jobs that transfer them.
 
 use super::plan::{self, Field, Job, Piece, Way};
 use super::{Frames, Refusal};
 use crate::item::{self, Code};
 use crate::pdu::function;
 
-/// The frames of all stations, and the jobs that carry them.
+/// The frames of all stations, and the jobs that transfer them.
 #[derive(Debug)]
 pub(super) struct Traffic {
     fields: Frames,
     pub(super) jobs: Vec<Job>,
-    /// The frames of this cycle, by station: those to be written, and those read.
+    /// The frames of this cycle by station: those to be written, and those read.
     pub(super) out: Vec<Box<[u8]>>,
     pub(super) into: Vec<Box<[u8]>>,
     /// What the CPU refused in this cycle, by station.
     pub(super) refused: Vec<Option<Refusal>>,
-    /// Stations that the cycles leave out.
+    /// Stations that are excluded from the cycles.
     pub(super) suspended: Vec<bool>,
     pub(super) may_write: bool,
 }
@@ -38,7 +38,7 @@ impl Traffic {
         }
     }
 
-    /// Divides what is to be carried into jobs with units of at most `limit` bytes.
+    /// Plans the jobs, with PDUs of at most `limit` bytes.
     pub(super) fn plan(&mut self, limit: usize) {
         let active = |fields: &[Field]| -> Vec<Field> {
             let fields = fields.iter();
@@ -53,7 +53,7 @@ impl Traffic {
         self.jobs = jobs;
     }
 
-    /// Takes down that the CPU refused a piece, unless it did not.
+    /// Records the CPU's answer to a piece; returns whether it was accepted.
     pub(super) fn judge(&mut self, job: usize, piece: usize, code: Code) -> bool {
         let Job { way, pieces } = &self.jobs[job];
         let piece = &pieces[piece];
@@ -74,7 +74,7 @@ pub(super) fn function_of(way: Way, pieces: &[Piece]) -> [u8; 2] {
     [code, u8::try_from(pieces.len()).expect("20 at most")]
 }
 
-/// Appends the data of these items, from the frames.
+/// Appends the data of these items, taken from the frames.
 pub(super) fn write_data(pieces: &[Piece], frames: &[Box<[u8]>], out: &mut Vec<u8>) {
     let begin = out.len();
     for piece in pieces {

@@ -2,7 +2,7 @@ use super::*;
 use crate::hex;
 use crate::szl::{self, Identity};
 
-/// Inputs that count up, outputs and DB 1 over the same bytes, four flags; one job after the other.
+/// Inputs that count up, outputs and DB 1 on the same bytes, four bytes of flags; one job after another.
 #[derive(Default)]
 struct Bytes {
     outputs: [u8; 32],
@@ -62,7 +62,7 @@ impl Line {
         }
     }
 
-    /// A client that may send jobs.
+    /// A client after negotiation.
     fn agreed(pdu: u16) -> Self {
         let mut line = Self::new();
         line.ask("03 00 00 16 11 e0 0000 0001 00 c1 02 0100 c2 02 0101 c0 01 0a");
@@ -82,7 +82,7 @@ impl Line {
         Ok((taken, reply))
     }
 
-    /// Asks with a whole packet, and gives the answer.
+    /// Sends a whole packet, and returns the answer.
     #[track_caller]
     fn ask(&mut self, packet: &str) -> Vec<u8> {
         let packet = hex(packet);
@@ -91,7 +91,7 @@ impl Line {
         reply
     }
 
-    /// Asks with a unit, and gives the unit of the answer.
+    /// Sends a PDU, and returns the PDU of the answer.
     #[track_caller]
     fn job(&mut self, unit: &str) -> Vec<u8> {
         let unit = hex(unit);
@@ -108,7 +108,7 @@ impl Line {
         bytes.to_vec()
     }
 
-    /// Does a job with these parameters and data.
+    /// Sends a job with these parameters and data.
     #[track_caller]
     fn do_job(&mut self, parameters: &str, data: &str) -> Vec<u8> {
         let lengths = [parameters, data].map(|text| hex(text).len());
@@ -119,7 +119,7 @@ impl Line {
     }
 }
 
-/// The unit of an answer to job 7.
+/// The PDU of an answer to job 7.
 fn answer(error: &str, parameters: &str, data: &str) -> Vec<u8> {
     let [p, d] = [parameters, data].map(|text| hex(text).len());
     hex(&format!(
@@ -374,7 +374,7 @@ fn who_breaks_the_protocol_is_told_how() {
     }
 }
 
-/// A question about the system, with its answer's parameters from the sequence number on, and its data.
+/// Sends a userdata request; returns the parameters of the answer, from the sequence number on, and its data.
 #[track_caller]
 fn question(line: &mut Line, parameters: &str, data: &str) -> (Vec<u8>, Vec<u8>) {
     let [p, d] = [parameters, data].map(|text| hex(text).len());

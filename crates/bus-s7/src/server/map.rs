@@ -1,4 +1,4 @@
-//! From the objects of a CPU to the frames of stations.
+//! Maps the objects of a CPU to the frames of stations.
 
 use tickbus_image::signal::{Area, SignalTable};
 
@@ -6,7 +6,7 @@ use super::ServerOptions;
 use crate::Tsap;
 use crate::item::{Code, Object};
 
-/// A piece of a station's area.
+/// A range of a station's area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) station: usize,
@@ -15,10 +15,10 @@ pub(super) struct Place {
     pub(super) length: usize,
 }
 
-/// Where the objects of a server lie.
+/// The places of a server's objects.
 #[derive(Debug)]
 pub(super) struct Map {
-    /// The data blocks in order of their numbers, and their lengths for those who ask.
+    /// The data blocks in order of their numbers, and their lengths for clients that ask.
     blocks: Vec<(u16, Place)>,
     lengths: Vec<(u16, usize)>,
     stations: Vec<Cpu>,
@@ -29,12 +29,12 @@ pub(super) struct Map {
 struct Cpu {
     inputs: usize,
     outputs: usize,
-    /// Rack and slot that it is in.
+    /// Its rack and slot.
     slot: Option<(u8, u8)>,
 }
 
 impl Map {
-    /// The map that `options` describe, which [fit](ServerOptions::fit) the table.
+    /// The map for `options`, which must [fit](ServerOptions::fit) the table.
     pub(super) fn new(options: &ServerOptions, table: &SignalTable) -> Self {
         let stations = table
             .stations
@@ -66,7 +66,7 @@ impl Map {
         }
     }
 
-    /// The station whose inputs and outputs a client means that asked for this end.
+    /// The station whose inputs and outputs belong to the TSAP that a client connected to.
     pub(super) fn station_of(&self, called: Tsap) -> Option<usize> {
         if self.stations.len() == 1 {
             return Some(0);
@@ -77,7 +77,7 @@ impl Map {
             .position(|station| station.slot == Some(slot))
     }
 
-    /// Where an object lies, for a client that means `station`.
+    /// The place of an object for a client connected to `station`.
     pub(super) fn place(&self, object: Object, station: Option<usize>) -> Result<Place, Code> {
         let area = match object {
             Object::Inputs => Area::Input,

@@ -1,4 +1,4 @@
-//! The bus of kind `s7-server`: this end is a CPU, whose memory clients read and write.
+//! The bus of kind `s7-server`: acts as a CPU whose memory clients read and write.
 
 mod map;
 mod options;
@@ -17,7 +17,7 @@ use super::{Conversation, Fault, Memory, transport};
 use map::{Map, Place};
 pub use options::{Block, ServerOptions};
 
-/// How long a client may take for a packet that it has begun, or to read an answer.
+/// How long a client may take to complete a packet, or to read an answer.
 const PATIENCE: Nanos = Nanos::from_secs(5);
 
 /// The bus of kind `s7-server`.
@@ -79,36 +79,36 @@ struct Service {
     facts: Facts,
     clients: usize,
     memory: Shared,
-    /// How many clients there were.
+    /// The number of clients so far.
     welcomed: u64,
 }
 
-/// What all clients see.
+/// The state shared by all clients.
 #[derive(Debug)]
 struct Shared {
     map: Map,
     role: Role,
     stations: Box<[Station]>,
     flags: Box<[u8]>,
-    /// Whether a write is an event even where it changes nothing.
+    /// Whether a write is an event even if it changes nothing.
     every_write: bool,
-    /// The client and the time of the jobs for which the frames that go out were taken: jobs that come together
-    /// see the same.
+    /// The client and the time for which the outgoing frames were taken: jobs that arrive together see the
+    /// same values.
     batch: Option<(u64, Nanos)>,
 }
 
 #[derive(Debug)]
 struct Station {
-    /// What clients have written; at first the fail-safe values.
+    /// The values written by clients, initially the fail-safe values.
     written: Box<[u8]>,
-    /// What they read of the other area, in this batch.
+    /// The values of the other area that clients read in this batch.
     outgoing: Box<[u8]>,
     taken: bool,
-    /// The bits that this job has written.
+    /// The bits written by the current job.
     changed: Vec<Range<usize>>,
-    /// Whether this job reads or writes anything here.
+    /// Whether the current job reads or writes anything of this station.
     addressed: bool,
-    /// Whether anybody has ever written.
+    /// Whether any client has ever written.
     has_writer: bool,
 }
 
@@ -119,7 +119,7 @@ struct Client {
     number: u64,
     /// The stations that it has written to.
     writes: Box<[bool]>,
-    /// What goes out to it in answers: station and bits.
+    /// What answers to it carry: station and bits.
     carried: Vec<(usize, Range<usize>)>,
 }
 
@@ -182,7 +182,7 @@ impl tcp::Service for Service {
 }
 
 impl Shared {
-    /// Jobs of a client that came at `now`.
+    /// Jobs of a client arrived at `now`.
     fn begin(&mut self, client: &mut Client, now: Nanos) {
         let batch = Some((client.number, now));
         if self.batch != batch {
@@ -195,16 +195,16 @@ impl Shared {
     }
 }
 
-/// The memory as one client's job sees it.
+/// The memory during one client's job.
 struct Jobs<'a> {
     shared: &'a mut Shared,
-    /// Whose inputs and outputs the client means.
+    /// The station whose inputs and outputs the client is connected to.
     station: Option<usize>,
     writes: &'a mut [bool],
     carried: &'a mut Vec<(usize, Range<usize>)>,
     port: &'a mut Port,
     now: Nanos,
-    /// An injected fault swallows the answer.
+    /// An injected fault loses the answer.
     lost: bool,
 }
 
@@ -223,7 +223,7 @@ impl Jobs<'_> {
         Ok((place, begin..begin + range.len()))
     }
 
-    /// The bytes that a job writes; of them, these bits.
+    /// The bytes that a job writes; only `bits` of them change.
     fn change(
         &mut self,
         object: Object,
@@ -244,7 +244,7 @@ impl Jobs<'_> {
         Ok(&mut station.written[range])
     }
 
-    /// The bytes that a job reads; of them, these bits go out.
+    /// The bytes that a job reads; only `bits` of them are sent.
     fn look(
         &mut self,
         object: Object,
@@ -313,7 +313,7 @@ impl Memory for Jobs<'_> {
                     self.port.received(index, self.now, &station.written);
                 }
             } else if (addressed || alone) && (self.writes[index] || !station.has_writer) {
-                // Whoever only looks does not make the values of another one younger.
+                // A client that only reads must not make the values of one that writes look recent.
                 self.port.touch(index, self.now);
             }
         }

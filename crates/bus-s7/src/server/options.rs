@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus `s7-server`.
+//! The options of the bus `s7-server` in a driver.cfg.
 
 use crate::tsap::{RACK, SLOT};
 use crate::{pdu, read_pdu};
@@ -7,51 +7,50 @@ use tickbus_fieldbus::read_events;
 use tickbus_fieldbus::tcp::{Address, AddressError};
 use tickbus_image::signal::{AREA_LIMIT, Area, SignalTable};
 
-/// Where a server listens unless a driver.cfg says otherwise: on this machine alone, at a port that needs no
-/// privilege.
+/// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1102);
 
-/// Bytes of flags, unless a driver.cfg says otherwise.
+/// The default number of bytes of flags.
 const FLAGS: usize = 256;
 
-/// The most clients at once, unless a driver.cfg says otherwise.
+/// The default number of clients.
 const CLIENTS: usize = 64;
 
-/// What a driver.cfg says to the bus `s7-server`.
+/// The options of the bus `s7-server`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServerOptions {
     /// Where to listen.
     pub address: Address,
     /// The data blocks.
     pub blocks: Vec<Block>,
-    /// How many bytes of flags there are.
+    /// The number of bytes of flags.
     pub flags: usize,
-    /// The longest unit that is agreed to.
+    /// The longest PDU that is agreed to.
     pub pdu: u16,
-    /// The most clients at once.
+    /// The most clients at the same time.
     pub clients: usize,
-    /// Rack and slot of each station; empty where there are no `[[station]]` tables.
+    /// Rack and slot of each station; empty if there are no `[[station]]` tables.
     pub slots: Vec<Option<(u8, u8)>>,
-    /// Whether every change that a client makes is reported as an event, beside the image.
+    /// Whether every change by a client is reported as an event, in addition to the image.
     pub events: bool,
-    /// Whether every write is, changed or not.
+    /// Whether every write is reported, changed or not.
     pub every_write: bool,
 }
 
-/// A data block: a piece of an area of a station.
+/// A data block: a range of an area of a station.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
     /// Its number.
     pub number: u16,
-    /// Whose bytes it has.
+    /// The area that it is a part of.
     pub area: Area,
-    /// The station's name; none where there is one station.
+    /// The station's name; `None` if there is a single station.
     pub station: Option<String>,
-    /// The first byte of the area that it has.
+    /// Its first byte in the area.
     pub offset: usize,
-    /// How many bytes it has; none for all up to the end of the area.
+    /// Its number of bytes; `None` to the end of the area.
     pub length: Option<usize>,
-    /// Where it stands in the text, for complaints.
+    /// Its offset in the text, for mistakes.
     at: usize,
 }
 
@@ -70,11 +69,11 @@ impl Block {
 }
 
 impl ServerOptions {
-    /// Takes another address than the driver.cfg names.
+    /// Replaces the address of the driver.cfg.
     ///
     /// # Errors
     ///
-    /// The text is no address.
+    /// The text is not an address.
     pub fn set_address(&mut self, address: &str) -> Result<(), String> {
         self.address = address
             .parse()
@@ -143,7 +142,7 @@ impl ServerOptions {
         self.slots.push(place);
     }
 
-    /// Reports what does not go together with the stations of the file.
+    /// Reports conflicts with the stations of the file.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         for block in &self.blocks {
             let wrong = |what: String, right: String| collector.report(block.at, what, right);

@@ -14,7 +14,7 @@ fn session(sending: Sending) -> Session {
     Session::new(Terms { sending, ..TERMS }, Nanos::ZERO)
 }
 
-/// The owner of a socket, who has no socket: its image is one byte, sent twice.
+/// The owner of an imaginary socket; its image is one byte, sent twice.
 impl Session {
     fn hear(&mut self, now: i64, mut bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut records = Vec::new();
@@ -31,8 +31,8 @@ impl Session {
         records
     }
 
-    /// Makes and writes what is due, as long as the system takes any of `room` more bytes; gives what
-    /// it took, and how many records it now has whole.
+    /// Makes and writes what is due, as long as the system accepts any of `room` more bytes; returns what it
+    /// accepted, and how many whole records that makes.
     fn speak(&mut self, now: i64, image: u8, room: usize) -> (Vec<u8>, usize) {
         let (mut taken, mut whole) = (Vec::new(), 0);
         loop {
@@ -53,7 +53,7 @@ impl Session {
         }
     }
 
-    /// All times up to `until` at which a record goes out, waiting for the deadlines alone.
+    /// All times up to `until` at which a record is sent, when only waiting for deadlines.
     fn sends_until(&mut self, until: i64, image: impl Fn(i64) -> u8) -> Vec<i64> {
         let (mut times, mut now) = (Vec::new(), 0);
         while now <= until {
@@ -315,7 +315,7 @@ fn how_a_peer_left_depends_on_what_it_had_sent() {
     );
 }
 
-/// What happens to one connection.
+/// An event in the life of a connection.
 #[derive(Clone, Debug)]
 enum Step {
     Time(i64),
@@ -350,8 +350,8 @@ fn terms() -> impl Strategy<Value = Terms> {
 }
 
 proptest! {
-    /// Whatever happens: no panic; the peer gets whole records, each of one image; replies are as many
-    /// as records came; no deadline lies behind.
+    /// Whatever happens: no panic; the peer gets whole records, each of one image; there are as many replies
+    /// as received records; no deadline is in the past.
     #[test]
     fn the_stream_out_is_whole_records(
         terms in terms(), steps in proptest::collection::vec(step(), 0..100),

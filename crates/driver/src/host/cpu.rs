@@ -27,11 +27,11 @@ pub(super) struct Cpu {
     /// The areas that it writes and reads.
     pub(super) areas: (Area, Area),
     pub(super) tally: Arc<Tally>,
-    /// The faults to inject at this end.
+    /// The faults injected at this end.
     pub(super) faults: Option<FrameFaults>,
     pub(super) tape: Option<Tape>,
     beats: FrameBeats,
-    /// The other stations, each with a program of its own of the same kind.
+    /// The other stations, each with its own instance of the program.
     others: Vec<Other>,
 }
 
@@ -59,7 +59,7 @@ impl Other {
         }
     }
 
-    /// One scan; gives the age of its data, and whether they count.
+    /// One scan; returns the age of its data, and whether they are valid.
     fn scan(
         &mut self,
         (now, max_age): (Nanos, Nanos),
@@ -79,7 +79,8 @@ impl Other {
         let valid = image.is_valid();
         let arrival = image.read(now, &mut Taking { inputs, tape: None });
         tally.count((*station, reads), &inputs.before, &inputs.bytes);
-        // A frame that was written after the peer stopped may have been read: asked once more.
+        // The PLC may have stopped between the check and the read, and the frame may be from after that:
+        // checked again.
         let alive = valid && image.is_valid() && arrival.age <= max_age;
         outputs_before.copy_from_slice(outputs);
         program.scan(&mut Scan {
@@ -100,7 +101,7 @@ fn frame(config: &Config, station: usize, area: Area) -> Box<[u8]> {
     vec![0; area_bytes(&config.table, station, area)].into()
 }
 
-/// The inputs as the program sees them, and as it saw them a scan before.
+/// The inputs as the program sees them, and as it saw them in the previous scan.
 pub(super) struct Inputs {
     pub(super) bytes: Box<[u8]>,
     before: Box<[u8]>,
@@ -115,7 +116,7 @@ impl Inputs {
     }
 }
 
-/// Takes the inputs over, and their edges where they are recorded.
+/// Takes over the inputs, and their edges if they are recorded.
 struct Taking<'a> {
     inputs: &'a mut Inputs,
     tape: Option<&'a mut Tape>,
@@ -134,8 +135,9 @@ impl Receiver for Taking<'_> {
 }
 
 impl Cpu {
-    /// Inputs, program, outputs: one scan at `now`. `in_time` is false when it comes so late that the peer has
-    /// been given fail-safe values: then the program has to begin as after a broken line.
+    /// Inputs, program, outputs: one scan at `now`. `in_time` is false when it comes so late that the peer
+    /// has received fail-safe values in the meantime: the program must then start over as after a broken
+    /// line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {
         let Self {
             program,
@@ -168,7 +170,7 @@ impl Cpu {
             faults.received(&mut inputs.bytes);
         }
         tally.count((0, *reads), &inputs.before, &inputs.bytes);
-        // As of the other stations, whose scan says why.
+        // Checked twice as for the other stations, see `scan` above.
         let alive = in_time && valid && station.is_valid() && arrival.age <= *max_age;
         outputs_before.copy_from_slice(outputs);
         program.scan(&mut Scan {
@@ -204,8 +206,8 @@ impl Cpu {
     }
 }
 
-/// Makes the half of a line that has the program: its processor, the bus's end of its image, its tally. A program
-/// that can serve several stations serves all of them.
+/// Creates the program's half of a line: the CPU, the bus's end of its image, its tally. A program that can
+/// serve several stations serves all of them.
 pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
     let table = &config.table;
     let tally = Arc::new(Tally::new(table));
@@ -245,7 +247,7 @@ mod tests {
     use std::sync::Mutex;
     use tickbus_plc::Program;
 
-    /// Takes down what each scan is told.
+    /// Records what each scan is told.
     struct Witness(Arc<Mutex<Vec<bool>>>);
 
     impl Program for Witness {
@@ -276,7 +278,7 @@ mod tests {
         let (mut cpu, mut bus) = half(program, &config, Role::Controller);
         for (millis, in_time) in [(10, true), (500, false), (510, true)] {
             let now = Nanos::from_millis(millis);
-            // The peer is quicker than the scan that was held up.
+            // The peer is faster than the delayed scan.
             bus.stations[0].received(now, &[1]);
             cpu.scan(now, in_time);
         }

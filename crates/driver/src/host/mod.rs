@@ -1,4 +1,4 @@
-//! A PLC program at an end of a bus: scanned by a thread of its own, or by the simulation's tick.
+//! A PLC program at one end of a bus: scanned by its own thread, or by the simulation's tick.
 
 mod cpu;
 mod stepped;
@@ -22,20 +22,20 @@ pub(super) use stepped::SteppedHost;
 pub(super) use tally::Tally;
 pub(super) use thread::{HostTally, HostThread, Hosted};
 
-/// A PLC program at one end of a bus, scanned on its interval: a PLC without its box.
+/// A PLC program at one end of a bus, scanned at a fixed interval: a PLC without its hardware.
 ///
-/// In the role Device, a program takes the machine's place: `%Q` are its inputs, `%I` its outputs.
+/// In the role Device, a program replaces the machine: `%Q` are its inputs, `%I` its outputs.
 #[derive(Debug)]
 pub struct Host(HostThread);
 
 impl Host {
-    /// Opens the bus that `config` describes and starts scanning `program` every `interval`. It does not
-    /// wait for the peer: scans begin at once, and say that nobody is there.
+    /// Opens the bus that `config` describes and starts scanning `program` every `interval`. It does not wait
+    /// for the peer: scans begin at once, and are told that the peer is not there.
     ///
     /// # Errors
     ///
-    /// Program and signal table do not fit, the bus is one that a simulation must step, the recording cannot be
-    /// made, or the system refused a thread.
+    /// Program and signal table do not fit, the bus must be stepped by a simulation, the recording cannot be
+    /// created, or the system refused a thread.
     pub fn open(
         config: &Config,
         mut program: Box<dyn Program>,
@@ -70,13 +70,13 @@ impl Host {
             .map_err(DriverError::Thread)
     }
 
-    /// How the line is doing.
+    /// The state of the line.
     pub fn link(&self) -> Link {
         self.0.status.observe_call(self.0.told.clock.now());
         self.0.status.link()
     }
 
-    /// What was counted, and how the line is doing, one `key=value` a line.
+    /// The counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         let now = self.0.told.clock.now();
         let mut text = String::new();
@@ -95,17 +95,17 @@ impl Host {
         self.0.board.list()
     }
 
-    /// Scans so far, and how many of them found the data stale.
+    /// The number of scans so far, and of those with stale data.
     pub fn scans(&self) -> (u64, u64) {
         self.0.told.tally.scans()
     }
 
-    /// Why the program does not scan any more, if it does not: it panicked, or a scan does not end.
+    /// Why the program is no longer scanned, if so: it panicked, or a scan does not end.
     pub fn fault(&self) -> Option<String> {
         self.0.told.fault()
     }
 
-    /// Stops scanning and closes the bus. Why the program did not end, if it did not.
+    /// Stops scanning and closes the bus. Returns why the program did not end, if so.
     pub fn close(mut self) -> Option<String> {
         self.0.end()
     }

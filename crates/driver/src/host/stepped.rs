@@ -1,4 +1,4 @@
-//! A program that is scanned by the tick, on simulation time.
+//! A program scanned by the tick, in simulation time.
 
 use std::sync::Arc;
 
@@ -10,20 +10,20 @@ use tickbus_plc::Program;
 use super::Tally;
 use super::cpu::{Cpu, half};
 
-/// The most scans that one exchange makes up for: 1,000 s of scans every 10 ms. A longer step is a wrong
-/// time, and would keep the tick for as long as it takes to scan through it.
+/// The most scans that one exchange catches up on: 1,000 s of scans every 10 ms. A longer step is taken for a
+/// wrong time; scanning through it would block the tick for as long as that takes.
 const MOST_SCANS: i64 = 100_000;
 
-/// A hosted program that is scanned by the tick, on simulation time.
+/// A hosted program scanned by the tick, in simulation time.
 pub(crate) struct SteppedHost {
     cpu: Cpu,
     port: Port,
     interval: Nanos,
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
-    /// Whether the program was sent what the machine wrote last.
+    /// Whether the program was sent the machine's latest values.
     carried: bool,
-    /// One frame on its way from one port to the other.
+    /// A frame in transit from one port to the other.
     wire: Box<[u8]>,
 }
 
@@ -59,7 +59,7 @@ impl SteppedHost {
     }
 }
 
-/// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
+/// Transfers the frames that `from` sends to `to`; false if an injected fault loses them.
 fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) -> bool {
     if !from.sends(now) {
         return false;
@@ -92,7 +92,8 @@ impl Stepped for SteppedHost {
                  hosted program; hand in the nanoseconds since the simulation began, tick by tick",
             )));
         }
-        // Counted, since at the end of all time the next scan is due at the same time as the last.
+        // Counted rather than compared, since at the largest time the next scan would be due when the last
+        // one was.
         let scans = if late < Nanos::ZERO {
             0
         } else {
@@ -100,8 +101,8 @@ impl Stepped for SteppedHost {
         };
         for _ in 0..scans {
             if self.carried {
-                // Between two ticks simulation time passes and nothing else: the machine is there all along,
-                // however large the steps are.
+                // Between two ticks only simulation time passes: the machine is there all along, however
+                // large the steps are.
                 (0..self.port.stations()).for_each(|station| self.port.touch(station, due));
             }
             self.cpu.scan(due, true);

@@ -1,4 +1,4 @@
-//! What a hosted program has done, in numbers.
+//! The counters of a hosted program.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,13 +7,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tickbus_base::time::{Nanos, Spans};
 use tickbus_image::signal::{Area, DataType, SignalTable};
 
-/// What the hosted program has seen and made, for comparison with the other end.
+/// What the hosted program has seen and sent, to be compared with the other end.
 #[derive(Debug)]
 pub(crate) struct Tally {
     scans: AtomicU64,
-    /// Scans that found the data stale.
+    /// Scans with stale data.
     stale: AtomicU64,
-    /// Age of the data that the scans found.
+    /// Age of the data in the scans.
     age: Mutex<Spans>,
     bits: Box<[Bit]>,
 }
@@ -64,7 +64,7 @@ impl Tally {
         }
     }
 
-    /// Takes down a scan whose data were of `age`.
+    /// Records a scan whose data were of `age`.
     pub(super) fn scanned(&self, age: Nanos, alive: bool) {
         self.scans.fetch_add(1, Ordering::Relaxed);
         if alive {
@@ -75,11 +75,11 @@ impl Tally {
     }
 
     fn lock_age(&self) -> MutexGuard<'_, Spans> {
-        // A histogram is whole between any two of its changes.
+        // A histogram is consistent after every change, so a poisoned lock is safe to use.
         self.age.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Scans so far, and how many of them found the data stale.
+    /// The number of scans so far, and of those with stale data.
     pub(super) fn scans(&self) -> (u64, u64) {
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         (count(&self.scans), count(&self.stale))

@@ -1,4 +1,4 @@
-//! A program that is scanned on its interval, by a thread of its own.
+//! A program scanned at a fixed interval by its own thread.
 
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,15 +20,15 @@ use tickbus_record as record;
 use super::Tally;
 use super::cpu::{Cpu, half};
 
-/// The longest time that a scan is waited for. A PLC's own watchdog stops it far earlier.
+/// The longest time that a scan may take before it counts as hung. A PLC's own watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
 
-/// Since when the program has been in a scan.
+/// The start of the current scan.
 #[derive(Debug)]
 struct Scanning(AtomicI64);
 
 impl Scanning {
-    /// No time at all.
+    /// No scan is running.
     const NONE: i64 = i64::MIN;
 
     fn set(&self, since: Option<Nanos>) {
@@ -36,7 +36,7 @@ impl Scanning {
         self.0.store(since, Ordering::Relaxed);
     }
 
-    /// How long the present scan has taken, once that is too long.
+    /// How long the current scan has taken, if that is too long.
     fn too_long(&self, now: Nanos) -> Option<Nanos> {
         let since = self.0.load(Ordering::Relaxed);
         let span = now - Nanos(since);
@@ -48,11 +48,11 @@ impl Scanning {
 pub(crate) struct Hosted {
     pub(crate) program: Box<dyn Program>,
     pub(crate) interval: Nanos,
-    /// Where its scans are recorded.
+    /// The recording of its scans.
     pub(crate) tape: Option<Tape>,
 }
 
-/// What a program on a thread of its own tells of itself, to any thread.
+/// What a program's thread publishes about itself.
 #[derive(Clone, Debug)]
 pub(crate) struct HostTally {
     pub(super) tally: Arc<Tally>,
@@ -63,7 +63,7 @@ pub(crate) struct HostTally {
     pub(super) clock: Arc<dyn Clock>,
 }
 
-/// A program on a thread of its own, with the bus thread of its end of the line; dropping it stops both.
+/// A program on its own thread, and the bus thread of its end of the line; dropping it stops both.
 #[derive(Debug)]
 pub(crate) struct HostThread {
     pub(crate) told: HostTally,
@@ -78,8 +78,8 @@ pub(crate) struct HostThread {
 }
 
 impl HostThread {
-    /// Starts scanning the `hosted` program as the end with `role`, with `bus` between it and its peer.
-    /// `name` is the thread's.
+    /// Starts scanning the `hosted` program as the end with `role`, with `bus` between it and its peer. The
+    /// thread is called `name`.
     pub(crate) fn start(
         hosted: Hosted,
         name: String,
@@ -100,7 +100,7 @@ impl HostThread {
         let (now, limit) = (Arc::clone(&clock), Some(watchdog));
         let mut port = Port::new(bus_end, now, role, limit, status.clone());
         let board = Arc::<Board>::default();
-        // A program behind the bus of a driver is not the end whose faults these are.
+        // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
         if role == config.role {
             let (faults, board) = (&config.faults, Arc::clone(&board));
             let inputs = &cpu.inputs.bytes;
@@ -151,7 +151,7 @@ impl HostThread {
 }
 
 impl HostTally {
-    /// Appends what the program has counted, and its fault.
+    /// Appends the program's counters, and its fault.
     pub(crate) fn write(&self, text: &mut String) {
         self.tally.write(text);
         if let Some(report) = &self.report {
@@ -179,7 +179,7 @@ impl HostTally {
 }
 
 impl HostThread {
-    /// Stops scanning. Why the program did not end, if it did not: its thread is then left behind.
+    /// Stops scanning. Returns why the program did not end, if so: its thread is then left behind.
     pub(super) fn end(&mut self) -> Option<String> {
         let thread = self.thread.take()?;
         self.stop.stop();
@@ -207,7 +207,7 @@ fn scan_until_stopped(
     stop: &Stop,
     scanning: &Scanning,
 ) {
-    // Like a PLC: a scan that comes late is late, and none is made up for.
+    // As in a PLC, a late scan is late, and missed ones are not made up for.
     let mut pace = Pace::new(clock.now(), interval);
     let mut last = None;
     while !stop.is_stopped() {

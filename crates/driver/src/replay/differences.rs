@@ -1,4 +1,4 @@
-//! The list of what differed in a replay: a file beside the recording.
+//! The list of differences found by a replay: a file beside the recording.
 
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
@@ -7,16 +7,16 @@ use std::path::{Path, PathBuf};
 use tickbus_image::signal::Slot;
 use tickbus_record::{Kind, Tick};
 
-/// The most differences that are listed; the others are counted.
+/// The most differences listed; further ones are counted.
 const MOST_LISTED: u64 = 100_000;
 
-/// How many of them go to the log, too.
+/// How many of them are logged as well.
 const MOST_LOGGED: u64 = 10;
 
-/// Up to how many the file gets each at once, for those who watch.
+/// Up to this number, each is written to the file at once, so that it can be watched.
 const FLUSHED: u64 = 1_000;
 
-/// The list of what differed.
+/// The list of differences.
 pub(super) struct Differences {
     recording: PathBuf,
     path: PathBuf,
@@ -25,7 +25,7 @@ pub(super) struct Differences {
 }
 
 impl Differences {
-    /// Begins the list for the recording at `path`, in `<path>.diff`.
+    /// Starts the list for the recording at `path`, in `<path>.diff`.
     pub(super) fn new(recording: &Path) -> Self {
         let mut path = recording.to_owned().into_os_string();
         path.push(".diff");
@@ -89,17 +89,17 @@ impl Differences {
         }
     }
 
-    /// Makes what is listed so far visible, as long as it is little.
+    /// Flushes the list to the file, as long as it is short.
     pub(super) fn flush(&mut self) {
         if let Some(file) = &mut self.file
             && self.listed <= FLUSHED
         {
-            // What fails here fails again, and is told, at the next write.
+            // An error here recurs at the next write, and is reported there.
             let _ = file.flush();
         }
     }
 
-    /// Ends the list with what was counted.
+    /// Ends the list with the totals.
     pub(super) fn end(&mut self, compared: u64, differences: u64) {
         self.write(&format!("# ticks={compared} differences={differences}\n"));
         if let Some(file) = &mut self.file {

@@ -1,4 +1,4 @@
-//! One station of a replay: the frames that it receives again, and those that it should send.
+//! One station of a replay: the frames that it receives again, and those that it is expected to send.
 
 use crate::frames::{area_bytes, directions};
 use tickbus_base::time::Nanos;
@@ -9,13 +9,13 @@ use tickbus_record::{Kind, Tick};
 
 use super::UNCHANGED;
 
-/// The most edges of one signal in one tick: more than any bus brings.
+/// The most edges of one signal in one tick; no bus carries more.
 const MOST_EDGES: f64 = 10_000.0;
 
 /// A latched bit that this end receives.
 struct Latched {
     bit: LatchedBit,
-    /// The column that counts its edges.
+    /// The column with its edge count.
     edges: Option<usize>,
 }
 
@@ -31,22 +31,22 @@ pub(super) struct Station {
     send: Plan,
     latched: Vec<Latched>,
     sent: Vec<Sent>,
-    /// The frame that was received last, and the one that is made.
+    /// The last received frame, and the one being made.
     fed: Box<[u8]>,
     frame: Box<[u8]>,
-    /// The frame that this end sends now.
+    /// The last frame that this end sent.
     seen: Box<[u8]>,
-    /// What this end made of the recorded values, pulses, holding and all: an image of its own.
+    /// An image of its own that turns recorded values into the expected frame, with pulses and hold times.
     expected: (TickStation, BusStation),
-    /// Bits with edges in the present tick: byte, mask, how often it toggles, its level before.
+    /// Bits with edges in the current tick: byte, mask, number of toggles, previous level.
     toggling: Vec<(usize, u8, usize, bool)>,
     /// Slots for the comparison.
     slots: [Vec<Slot>; 2],
 }
 
 impl Station {
-    /// The stations of the driver that `config` describes; `edges` has, per signal, the column that counts
-    /// its edges.
+    /// The stations of the driver that `config` describes; `edges` has, per signal, the column with its edge
+    /// count.
     pub(super) fn all(config: &Config, edges: &[Option<usize>]) -> Vec<Self> {
         let (tx, rx) = config.role.areas();
         let directions = directions(&config.table, config.role);
@@ -85,13 +85,13 @@ impl Station {
             .collect()
     }
 
-    /// Hands to `receive` the frames that make this driver show what is in `slots`, and count the edges that
-    /// `present` counts: its own status is `status`, and `after` is the tick behind it, with its status. An
-    /// exchange that found nothing new gets no frame, unless it shows something new all the same.
+    /// Hands to `receive` the frames that make this driver show the values in `slots` and count the edges in
+    /// `present`, which comes with its own status; `after` is the following tick with its status. An exchange
+    /// that found nothing new gets no frame, unless it shows a change nevertheless.
     ///
     /// # Errors
     ///
-    /// There are more edges than any bus brings.
+    /// There are more edges than any bus carries.
     pub(super) fn feed(
         &mut self,
         slots: &[Slot],
@@ -101,8 +101,8 @@ impl Station {
         mut receive: impl FnMut(&[u8]),
     ) -> Result<(), String> {
         self.receive.encode(slots, &mut self.frame);
-        // What a latched bit shows was shaped: a pulse that was over is shown for one tick. The frames to
-        // hand in are those that make the driver shape it again.
+        // The recorded level of a latched bit was shaped: a pulse that was over is shown for one tick. The
+        // frames must make the driver shape it in the same way.
         self.toggling.clear();
         let mut frames = 1;
         for latched in &self.latched {
@@ -127,7 +127,7 @@ impl Station {
             }
             let was = self.fed[byte] & mask != 0;
             let shown = self.frame[byte] & mask != 0;
-            // A pulse that was over falls back in a tick for which no frame came.
+            // A pulse that was over falls back in a tick without a frame.
             let falls_back = after.is_some_and(|(status, tick)| {
                 let column = columns[latched.bit.signal];
                 let next = column.map(|column| tick.values[column].real() != 0.0);
@@ -142,7 +142,7 @@ impl Station {
             return Ok(());
         }
         for left in (0..frames).rev() {
-            // All bits end together, so that some begin later.
+            // All bits reach their final level together, so bits with fewer toggles start later.
             for (byte, mask, toggles, was) in &self.toggling {
                 let done = toggles.saturating_sub(left);
                 set(&mut self.frame, *byte, *mask, *was != (done % 2 == 1));
@@ -153,13 +153,13 @@ impl Station {
         Ok(())
     }
 
-    /// Takes note of what this end sends.
+    /// Records the frame that this end sends.
     pub(super) fn sees(&mut self, frame: &[u8]) {
         self.seen.copy_from_slice(frame);
     }
 
-    /// Compares what this end sends with what it should, which follows from the recorded `slots`, and tells
-    /// every signal that differs.
+    /// Compares what this end sends with what is expected from the recorded `slots`, and calls back for every
+    /// signal that differs.
     pub(super) fn compare(
         &mut self,
         now: Nanos,
@@ -184,8 +184,8 @@ impl Station {
 }
 
 impl Latched {
-    /// The level at the end of a tick with `count` edges that matter, at least one, and how often the level
-    /// changed on its way there from `was`. The tick showed `shown`.
+    /// The level at the end of a tick with `count` edges that matter, at least one, and the number of toggles
+    /// from the level `was` to it. The tick showed `shown`.
     fn way(&self, was: bool, shown: bool, count: usize, falls_back: bool) -> (bool, usize) {
         let counted = match self.bit.latch {
             Latch::Both => return (was != (count % 2 == 1), count),
@@ -193,7 +193,8 @@ impl Latched {
             Latch::Falling => false,
         };
         let level = counted != (shown == counted && falls_back);
-        // Before each edge that counts there is one that does not, but for the first if it begins there.
+        // An edge that counts is always preceded by one that does not, except the first if the level already
+        // allows it.
         let toggles = 2 * count - usize::from(was != counted) + usize::from(level != counted);
         (level, toggles)
     }
@@ -211,7 +212,7 @@ fn set(frame: &mut [u8], byte: usize, mask: u8, level: bool) {
 mod tests {
     use super::*;
 
-    /// Walks the way, and counts.
+    /// Replays the toggles, and counts the edges.
     #[test]
     fn ways_have_the_edges_that_they_should() {
         for latch in [Latch::Rising, Latch::Falling, Latch::Both] {

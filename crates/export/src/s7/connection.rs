@@ -4,10 +4,10 @@ use std::net::IpAddr;
 
 use tickbus_fieldbus::tcp::{Address, Host};
 
-/// What stands for the address of the simulator's computer while nobody has put in the right one.
+/// A placeholder for the address of the simulator's computer, which the user has to replace.
 const SOMEBODY: [u8; 4] = [192, 168, 0, 20];
 
-/// Statements that fill in `#Connection` once; `address` is that of the driver.cfg.
+/// Statements that fill in `#Connection` once; `address` is the one in the driver.cfg.
 pub(super) fn lines(address: &Address, plc_dials: bool, notes: &mut Vec<String>) -> Vec<String> {
     let port = address.port;
     let stated = address;

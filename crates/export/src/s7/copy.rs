@@ -1,4 +1,4 @@
-//! The blocks for the beginning and the end of OB1.
+//! The blocks to be called at the beginning and at the end of OB1.
 
 use super::link::counting;
 use super::members::Path;
@@ -56,7 +56,7 @@ fn function(
     line(text, &format!("FUNCTION \"{name}\" : Void"));
     line(text, "{ S7_Optimized_Access := 'TRUE' }");
     line(text, "VERSION : 0.1");
-    // 64 bits have no address of their own in %I and %Q: they go as two halves.
+    // 64-bit values cannot be addressed in %I and %Q: they are copied as two halves.
     let is_long = |place: &Place<'_>| {
         place.data_type().width() == Width::Long
             && matches!(Path::of(place, plan.cpu), Path::Value(_))
@@ -72,7 +72,7 @@ fn function(
     line(text, "END_FUNCTION");
 }
 
-/// The bit string of the same width, if the type is not one itself.
+/// The bit string of the same width, unless the type is one.
 fn bits(data_type: DataType) -> Option<&'static str> {
     Some(match data_type {
         DataType::Bool | DataType::Byte | DataType::Word | DataType::Dword | DataType::Lword => {
@@ -85,7 +85,7 @@ fn bits(data_type: DataType) -> Option<&'static str> {
     })
 }
 
-/// Copies a value from the image into %I.
+/// Copies a value from the image to %I.
 fn put(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     let remark = format!("   // \"{}\"", place.signal.name);
     match Path::of(place, plan.cpu) {
@@ -115,7 +115,7 @@ fn put(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     }
 }
 
-/// Copies a value from %Q into the image.
+/// Copies a value from %Q to the image.
 fn take(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     let remark = format!("   // \"{}\"", place.signal.name);
     match Path::of(place, plan.cpu) {
@@ -145,14 +145,14 @@ fn take(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     }
 }
 
-/// Whether the driver's `alive` wants this signal to change while the PLC's program runs.
+/// Whether the driver's `alive` requires this signal to change while the PLC's program runs.
 fn is_watched(place: &Place<'_>, plan: &Plan<'_>) -> bool {
     let signals = &plan.config.table.signals;
     let mut alive = plan.config.life_signs.alive.iter();
     alive.any(|alive| std::ptr::eq(&raw const signals[alive.signal], place.signal))
 }
 
-/// Changes the value of a signal in every scan: a BOOL toggles, others count and begin again at 100.
+/// Changes the value of a signal in every scan: a BOOL toggles, others count up and restart at 100.
 fn count(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
     let (value, kind) = counting(plan, &plan.outputs, place);
     let remark = format!("   // \"{}\": alive in driver.cfg", place.signal.name);

@@ -55,7 +55,7 @@ fn structure(text: &mut String, name: &str, members: &[Member]) {
     line(text, "");
 }
 
-/// A data block with one image at offset 0, so that a client of the PLC finds each byte where it is on the bus.
+/// A data block with one image at offset 0, so that a client of the PLC finds each byte at its bus offset.
 fn block(text: &mut String, image: &Image<'_>) {
     line(text, &format!("DATA_BLOCK \"{}\"", image.block));
     line(text, "{ S7_Optimized_Access := 'FALSE' }");

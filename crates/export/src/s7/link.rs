@@ -1,4 +1,4 @@
-//! The block that talks to the simulation: one body for each bus.
+//! The block that communicates with the simulation: one body per bus.
 
 use super::members::Path;
 use super::{Image, Plan, line, modbus, s7comm, socket, source};
@@ -11,28 +11,29 @@ use tickbus_driver_cfg::Options;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{DataType, Width};
 
-/// A body: what it declares and what it does.
+/// A body: its declarations and statements.
 #[derive(Default)]
 pub(super) struct Body {
-    /// What it is, for the head.
+    /// Its description, for the head.
     pub(super) what: String,
     /// Lines between `VAR` and `END_VAR`.
     pub(super) variables: Vec<String>,
     /// Lines between `VAR_TEMP` and `END_VAR`.
     pub(super) temporary: Vec<String>,
     pub(super) code: Vec<String>,
-    /// It counts images that came, in `Received`.
+    /// It counts received images in `Received`.
     pub(super) receives: bool,
-    /// It counts images that went, in `Sent`.
+    /// It counts sent images in `Sent`.
     pub(super) sends: bool,
-    /// What is TRUE in each call in which the simulation was heard of; empty where nothing here can know.
+    /// An expression that is TRUE in each call in which something was received from the simulation; empty if
+    /// the block cannot know.
     pub(super) heard: String,
-    /// The driver counts signals up by which the PLC sees that the simulation ticks.
+    /// The driver has heartbeat signals, by which the PLC sees that the simulation ticks.
     pub(super) has_heartbeat: bool,
 }
 
 impl Body {
-    /// Declarations of the members that the control block has beside `Simulated`: those that something sets.
+    /// The declarations of the control block's members that some statement sets, in addition to `Simulated`.
     pub(super) fn status(&self) -> Vec<&'static str> {
         let members = [
             (
@@ -84,7 +85,8 @@ pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
     body
 }
 
-/// Declares and sets `Alive`: by the heartbeats of the driver.cfg if it has some, else by what the bus has heard.
+/// Declares and sets `Alive`: by the heartbeats in the driver.cfg if there are any, else by what the bus has
+/// received.
 fn watch(plan: &Plan<'_>, body: &mut Body) {
     let Config {
         life_signs,
@@ -106,7 +108,7 @@ fn watch(plan: &Plan<'_>, body: &mut Body) {
         let number = watched.len() + 1;
         let (value, kind) = counting(plan, &plan.inputs, place);
         body.variables.push(format!("Last_beat_{number} : {kind};"));
-        // A beat may come late, and a few be missed.
+        // A beat may be late, and a few may be missed.
         let within = timing.max_age.max(beat.every.times(5));
         let last = format!("#Last_beat_{number}");
         watched.push((
@@ -148,8 +150,8 @@ fn watch(plan: &Plan<'_>, body: &mut Body) {
     }
 }
 
-/// What changes of a signal with every count, and its type: the signal itself or its least significant byte, where the
-/// simulation reads or writes it.
+/// The part of a signal that changes with every count, and its type: the signal itself or its least
+/// significant byte, at the place that the simulation reads or writes.
 pub(super) fn counting(
     plan: &Plan<'_>,
     image: &Image<'_>,
@@ -179,7 +181,7 @@ pub(super) fn text(plan: &Plan<'_>, body: &Body) -> String {
     let mut text = source(plan, &body.what);
     let name = format!("{}_link", plan.prefix);
     line(&mut text, &format!("FUNCTION_BLOCK \"{name}\""));
-    // Standard access: what the communication blocks send and receive lies as it is declared.
+    // With standard access, the data that the communication blocks send and receive are arranged as declared.
     line(&mut text, "{ S7_Optimized_Access := 'FALSE' }");
     line(&mut text, "VERSION : 0.1");
     for (kind, lines) in [("VAR", &body.variables), ("VAR_TEMP", &body.temporary)] {
@@ -218,7 +220,7 @@ pub(super) fn text(plan: &Plan<'_>, body: &Body) -> String {
     text
 }
 
-/// What is to be set in the project beside the sources.
+/// The settings to be made in the project in addition to the sources.
 pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
     match &plan.config.bus {
         Options::Socket(options) => socket::steps(plan, options),
@@ -233,7 +235,7 @@ pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
     }
 }
 
-/// A bus for which there is no block: the user's own goes here.
+/// A bus without a block: the user has to add one here.
 pub(super) fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
     notes.push(format!(
         "the bus \"{kind}\" has no block of its own for S7: what brings the images is to be written by hand"
@@ -247,7 +249,7 @@ pub(super) fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
     }
 }
 
-/// The CPU is the OPC UA server, which carries single variables by name: those of both images.
+/// The CPU is the OPC UA server, which gives access to single variables by name: those of both images.
 fn opcua_server(plan: &Plan<'_>) -> Body {
     Body {
         what: "OPC UA carries the members of both images by themselves; no call is needed here."
@@ -264,7 +266,8 @@ fn opcua_server(plan: &Plan<'_>) -> Body {
     }
 }
 
-/// The CPU is the OPC UA client: TIA Portal makes the calls from what the simulation's server shows.
+/// The CPU is the OPC UA client: TIA Portal generates the calls from the address space of the simulation's
+/// server.
 fn opcua_client(plan: &Plan<'_>, address: &str) -> Body {
     Body {
         what: "The PLC is the OPC UA client: its calls are made in TIA Portal.".to_owned(),

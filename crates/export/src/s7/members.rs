@@ -1,7 +1,8 @@
-//! Members of S7 structures with standard (non-optimised) access, laid so that each signal gets its own offset.
+//! Members of S7 structures with standard (non-optimised) access, arranged so that each signal gets its own
+//! offset.
 //!
-//! The rules of that layout: BOOLs fill the bits of a byte one after another; a value of one byte begins on a byte;
-//! wider ones and arrays on an even byte; structures and arrays end on an even byte.
+//! The rules of that layout: consecutive BOOLs fill the bits of a byte; a value of one byte starts at any
+//! byte; wider values and arrays start at an even byte; structures and arrays end at an even byte.
 
 use super::Cpu;
 use crate::record::{Place, Record};
@@ -13,24 +14,24 @@ use tickbus_image::signal::{ByteOrder, DataType, Width};
 pub(super) struct Member {
     pub(super) name: String,
     pub(super) kind: Kind,
-    /// Its first byte and bit, counted from the start of the structure.
+    /// Its first byte and bit, from the start of the structure.
     pub(super) byte: usize,
     pub(super) bit: u8,
-    /// What is to be known about it.
+    /// Its comment.
     pub(super) remark: String,
 }
 
-/// What a member is.
+/// The contents of a member.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A value of an elementary type.
     Value(DataType),
-    /// Nobody's bytes, of which there is an even number.
+    /// An even number of unused bytes.
     Bytes(usize),
 }
 
-/// Whether a member of the signal's own type holds its value: of a type that the CPU has, in the byte order of S7, and
-/// where S7 puts such a value. The others lie there as bytes.
+/// Whether a single member of the signal's own type can hold its value: the CPU has the type, the byte order
+/// is that of S7, and the place is one where S7 puts such a value. Other values are arrays of bytes.
 fn is_native(place: &Place<'_>, cpu: Cpu) -> bool {
     place.size() == 1
         || (place.signal.order == ByteOrder::Abcd
@@ -38,17 +39,17 @@ fn is_native(place: &Place<'_>, cpu: Cpu) -> bool {
             && (cpu.has_long() || place.data_type().width() != Width::Long))
 }
 
-/// Where a signal's value is in the structure.
+/// How to access a signal's value in the structure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Path {
     /// One member of its own type.
     Value(String),
-    /// A member for each byte, the first byte of the bus first.
+    /// One member per byte, in bus order.
     Bytes(Vec<String>),
 }
 
 impl Path {
-    /// Where the value of `place` is.
+    /// The members of `place`.
     pub(super) fn of(place: &Place<'_>, cpu: Cpu) -> Self {
         let name = &place.name;
         if is_native(place, cpu) {
@@ -61,7 +62,7 @@ impl Path {
         )
     }
 
-    /// Its members.
+    /// The members' names.
     pub(super) fn members(&self) -> &[String] {
         match self {
             Self::Value(name) => std::slice::from_ref(name),
@@ -70,7 +71,7 @@ impl Path {
     }
 }
 
-/// Members in the making.
+/// The list of members while it is built.
 #[derive(Debug, Default)]
 pub(super) struct Members {
     list: Vec<Member>,
@@ -125,7 +126,7 @@ impl Members {
         self.at += bits;
     }
 
-    /// Reserves what lies before bit `to`.
+    /// Inserts reserve bytes up to bit `to`.
     fn fill(&mut self, to: usize) {
         while self.at < to {
             let (byte, bit) = (self.at / 8, self.at % 8);
@@ -144,7 +145,7 @@ impl Members {
         }
     }
 
-    /// All members, with the reserve up to the end of the `bytes`.
+    /// All members, with reserve bytes up to `bytes`.
     fn finish(mut self, bytes: usize) -> Vec<Member> {
         self.fill(self.at.next_multiple_of(8));
         self.fill(bytes * 8);

@@ -1,7 +1,8 @@
-//! SCL sources for TIA Portal, for an S7-1500 or an S7-1200, and the tags as it imports them.
+//! SCL sources for TIA Portal, for an S7-1500 or an S7-1200, and the tags in TIA Portal's import format.
 //!
-//! Three sources, in the order in which TIA Portal is to read them: the types and data blocks of both images, the
-//! block that talks to the simulation, and the two that go at the beginning and the end of OB1.
+//! Three sources, in the order in which TIA Portal has to read them: the types and data blocks of both
+//! images, the block that communicates with the simulation, and the two blocks for the beginning and the end
+//! of OB1.
 
 mod connection;
 mod copy;
@@ -23,7 +24,7 @@ use members::{Member, Members};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Area, Width};
 
-/// The CPUs that there are sources for.
+/// The supported CPUs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Cpu {
     S71500,
@@ -38,14 +39,14 @@ impl Cpu {
         }
     }
 
-    /// Whether values of 64 bits can lie in %I, %Q and blocks with standard access. An S7-1200 has no `LWord`, `LInt`
-    /// and `ULInt` at all, and its `LReal` has no address.
+    /// Whether 64-bit values can be in %I, %Q and blocks with standard access. An S7-1200 has no `LWord`,
+    /// `LInt` and `ULInt` at all, and its `LReal` cannot be addressed.
     const fn has_long(self) -> bool {
         matches!(self, Self::S71500)
     }
 
-    /// The most bytes that one GET brings, and one PUT takes. An S7-1200 fails above these (system manual V4.2.3, PUT
-    /// and GET with `ADDR_1` alone). An S7-1500 agrees to larger units: 400 bytes are below what one of 480 holds.
+    /// The most bytes of one GET and one PUT. An S7-1200 fails above these (system manual V4.2.3, PUT and GET
+    /// with `ADDR_1` only). An S7-1500 negotiates a larger PDU: 400 bytes fit into one of 480.
     const fn get_and_put(self) -> (usize, usize) {
         match self {
             Self::S71500 => (400, 400),
@@ -54,11 +55,11 @@ impl Cpu {
     }
 }
 
-/// Everything that the texts need to know.
+/// The input of all texts.
 struct Plan<'a> {
     config: &'a Config,
     cpu: Cpu,
-    /// What the names of all blocks begin with.
+    /// The prefix of all block names.
     prefix: String,
     inputs: Image<'a>,
     outputs: Image<'a>,
@@ -89,7 +90,7 @@ impl<'a> Image<'a> {
         }
     }
 
-    /// A member, with quotation marks.
+    /// A member in quotation marks.
     fn member(&self, name: &str) -> String {
         format!("\"{}\".Image.\"{name}\"", self.block)
     }
@@ -125,7 +126,7 @@ pub(super) fn export(config: &Config, cpu: Cpu) -> Export {
     Export { files, notes }
 }
 
-/// What is to be known of values that the CPU has no type for.
+/// A note about values for which the CPU has no type.
 fn long_values(plan: &Plan<'_>) -> Option<String> {
     let images = [&plan.inputs, &plan.outputs];
     let places = images.into_iter().flat_map(|image| &image.record.places);
@@ -142,7 +143,7 @@ fn long_values(plan: &Plan<'_>) -> Option<String> {
     })
 }
 
-/// The head of a source. It begins with the mark by which TIA Portal knows UTF-8.
+/// The head of a source. It starts with a byte order mark, by which TIA Portal recognises UTF-8.
 fn source(plan: &Plan<'_>, what: &str) -> String {
     let mut text = String::from("\u{feff}");
     for head in head_lines(plan, what) {
@@ -163,7 +164,7 @@ fn head_lines(plan: &Plan<'_>, what: &str) -> Vec<String> {
     lines
 }
 
-/// Adds a line; sources have the line ends of Windows.
+/// Adds a line; sources have Windows line ends.
 fn line(text: &mut String, content: &str) {
     write!(text, "{content}\r\n").expect("a String takes all");
 }

@@ -1,4 +1,4 @@
-//! Modbus TCP: `MB_CLIENT` where the simulation serves, `MB_SERVER` where it dials.
+//! Modbus TCP: `MB_CLIENT` if the simulation is the server, `MB_SERVER` if it connects.
 
 use super::Plan;
 use super::connection;
@@ -6,15 +6,15 @@ use super::link::{Body, by_hand};
 use tickbus_bus_modbus::{ClientOptions, Line, ServerOptions, Table};
 use tickbus_image::signal::Area;
 
-/// The most registers that one request reads, and writes.
+/// The most registers of one read request, and of one write request.
 const READ: usize = 125;
 const WRITE: usize = 123;
 
-/// What `MB_MODE` calls function codes 4 and 16 with wire addresses, which begin at 0.
+/// `MB_MODE` for function codes 4 and 16 with wire addresses, which start at 0.
 const INPUT_REGISTERS: u8 = 104;
 const HOLDING_REGISTERS: u8 = 116;
 
-/// The simulation serves: the PLC asks for its inputs and writes its outputs, in turns.
+/// The simulation is the server: the PLC reads its inputs and writes its outputs alternately.
 pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<String>) -> Body {
     let Line::Tcp(address) = &options.line else {
         return by_hand("modbus-server on a serial line", notes);
@@ -54,7 +54,8 @@ pub(super) fn client(plan: &Plan<'_>, options: &ServerOptions, notes: &mut Vec<S
     }
 }
 
-/// One request after another; each is held until its answer has come, and rests for one call.
+/// One request after another; each is held until its answer has arrived, followed by one call without a
+/// request.
 fn turns(plan: &Plan<'_>, inputs: usize, outputs: usize) -> Vec<String> {
     let prefix = &plan.prefix;
     let mut code = vec![
@@ -139,7 +140,7 @@ fn turns(plan: &Plan<'_>, inputs: usize, outputs: usize) -> Vec<String> {
     code
 }
 
-/// The simulation dials: the PLC serves one array of registers.
+/// The simulation connects: the PLC serves an array of registers.
 pub(super) fn server(plan: &Plan<'_>, options: &ClientOptions, notes: &mut Vec<String>) -> Body {
     let Line::Tcp(address) = &options.line else {
         return by_hand("modbus-client on a serial line", notes);
@@ -239,7 +240,7 @@ fn registers(plan: &Plan<'_>, area: Area) -> usize {
     image.record.bytes.div_ceil(2)
 }
 
-/// Both images, and over each the same bytes as words. The bytes of a structure fill whole words.
+/// Both images, each overlaid by an array of words. The bytes of a structure fill whole words.
 fn views(plan: &Plan<'_>, variables: &mut Vec<String>, inputs: usize, outputs: usize) {
     for (name, image, words) in [
         ("Incoming", &plan.inputs, inputs),

@@ -1,4 +1,4 @@
-//! S7 communication: `PUT` and `GET` where the simulation serves, nothing where it dials.
+//! S7 communication: `PUT` and `GET` if the simulation is the server, nothing if it connects.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use tickbus_bus_s7::{ClientOptions, ServerOptions, Start, Variable};
 use tickbus_driver_cfg::Options;
 use tickbus_image::signal::Area;
 
-/// The simulation serves as a CPU: its I and Q are the images.
+/// The simulation is a CPU: its I and Q are the images.
 pub(super) fn puts_and_gets(
     plan: &Plan<'_>,
     options: &ServerOptions,
@@ -61,7 +61,7 @@ pub(super) fn puts_and_gets(
     }
 }
 
-/// The calls that carry one image, one after another.
+/// The calls that transfer one image, one after another.
 struct Jobs<'a> {
     /// `GET` or `PUT`.
     block: &'static str,
@@ -89,7 +89,7 @@ impl<'a> Jobs<'a> {
         }
     }
 
-    /// What a call says when it has done its job.
+    /// The output of a call that reports completion.
     fn done(&self) -> &'static str {
         if self.block == "GET" { "NDR" } else { "DONE" }
     }
@@ -107,8 +107,8 @@ impl<'a> Jobs<'a> {
         format!("{block}_{number}")
     }
 
-    /// Declares the calls and makes them. What a call carries is declared as bytes over the image: PUT and GET want
-    /// the same length and type at both ends.
+    /// Declares and makes the calls. Their data are declared as bytes over the image: PUT and GET require the
+    /// same length and type at both ends.
     fn write(&self, plan: &Plan<'_>, variables: &mut Vec<String>, code: &mut Vec<String>) {
         if self.parts.is_empty() {
             return;
@@ -202,8 +202,8 @@ impl<'a> Jobs<'a> {
     }
 }
 
-/// The variable of the CPU that the simulation reads or writes itself for a signal: one that `[fieldbus.at]` names, or one
-/// of the process image. Copying would undo that.
+/// The CPU variable that the simulation itself reads or writes for a signal: named in `[fieldbus.at]`, or
+/// part of the process image. Copying would overwrite it.
 pub(super) fn direct(plan: &Plan<'_>, place: &Place<'_>) -> Option<Variable> {
     let Options::S7Client(options) = &plan.config.bus else {
         return None;
@@ -213,7 +213,7 @@ pub(super) fn direct(plan: &Plan<'_>, place: &Place<'_>) -> Option<Variable> {
     (has_line || !matches!(variable.object, Object::Block(_))).then_some(variable)
 }
 
-/// Each image with the place where driver.cfg has it.
+/// Each image with its place according to the driver.cfg.
 fn places<'p>(
     plan: &'p Plan<'_>,
     options: &ClientOptions,
@@ -226,7 +226,7 @@ fn places<'p>(
     })
 }
 
-/// The simulation dials and reads and writes the data blocks by itself.
+/// The simulation connects, and reads and writes the data blocks itself.
 pub(super) fn nothing(plan: &Plan<'_>, options: &ClientOptions) -> Body {
     let mut code =
         vec![";   // The simulation reads and writes by itself, as driver.cfg says:".to_owned()];
@@ -259,7 +259,7 @@ pub(super) fn nothing(plan: &Plan<'_>, options: &ClientOptions) -> Body {
     }
 }
 
-/// What is to be set in the project.
+/// The settings to be made in the project.
 pub(super) fn steps_for_puts_and_gets() -> Vec<String> {
     vec![
         "Devices & networks > Connections > S7 connection: partner unspecified, the IP address of the simulator's computer, \
@@ -268,7 +268,7 @@ pub(super) fn steps_for_puts_and_gets() -> Vec<String> {
     ]
 }
 
-/// What is to be set in the project.
+/// The settings to be made in the project.
 pub(super) fn steps_for_nothing(plan: &Plan<'_>, options: &ClientOptions) -> Vec<String> {
     let mut steps = vec![
         "CPU properties > Protection & Security > Connection mechanisms: permit access with PUT/GET communication."

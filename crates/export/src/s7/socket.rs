@@ -6,10 +6,10 @@ use super::link::{Body, time};
 use tickbus_base::time::Nanos;
 use tickbus_bus_socket::{Options, TcpRole};
 
-/// The cycle of the socket bus, where a driver.cfg states none.
+/// The default cycle of the socket bus.
 const CYCLE: Nanos = Nanos::from_millis(10);
 
-/// The longest record that every CPU takes.
+/// The longest record that every CPU supports.
 const LONGEST: usize = 8192;
 
 #[expect(
@@ -120,7 +120,7 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         code,
         receives: received > 0,
         sends: sent > 0,
-        // That TCP has taken a record tells nothing of the other end.
+        // That TCP has accepted a record says nothing about the other end.
         heard: if received > 0 {
             "#Receive.DONE".to_owned()
         } else {

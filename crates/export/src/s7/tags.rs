@@ -1,6 +1,6 @@
 //! The tags in the format SDF, as TIA Portal exports and imports a tag table.
 //!
-//! A line has nine cells, all in quotes: name, address, type, three flags (visible in an HMI, accessible from it,
+//! Each line has nine quoted cells: name, address, type, three flags (visible in an HMI, accessible from it,
 //! retentive), comment, supervision, writable from an HMI.
 
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::symbols::comment;
 use tickbus_driver_cfg::Options;
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 
-/// Whether a signal lies where `[fieldbus.at]` says, and not at its address.
+/// Whether a signal is at a place from `[fieldbus.at]`, rather than at its address.
 pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
     match &plan.config.bus {
         Options::S7Client(options) => options.variables.contains_key(&signal.name),
@@ -22,7 +22,7 @@ pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
     }
 }
 
-/// The file. Signals that lie elsewhere have their tags in the PLC's program already.
+/// The file. Signals with such a place already have tags in the PLC's program.
 pub(super) fn file(plan: &Plan<'_>) -> File {
     let mut text = String::new();
     for (image, area) in [(&plan.inputs, Area::Input), (&plan.outputs, Area::Output)] {
@@ -45,7 +45,7 @@ pub(super) fn file(plan: &Plan<'_>) -> File {
     File { name, text }
 }
 
-/// A value of 64 bits where no type has them: two tags of 32 bits each, in the order in which they lie.
+/// A 64-bit value if no type exists: two tags of 32 bits each, in order of their addresses.
 fn halves(text: &mut String, place: &Place<'_>, area: Area, comment: &str) {
     let kind = spelling(DataType::Dword);
     for (half, byte) in [("first half", place.byte), ("second half", place.byte + 4)] {

@@ -1,4 +1,5 @@
-//! For CODESYS and TwinCAT: a list of global variables, two functions and two programs, as one file of `PLCopen` XML.
+//! For CODESYS and TwinCAT: a list of global variables, two functions and two programs, in one file of
+//! `PLCopen` XML.
 
 mod link;
 mod modbus;
@@ -16,7 +17,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::Options;
 use tickbus_image::signal::DataType;
 
-/// The editor that a file is for: both read the same XML, but have libraries of their own.
+/// The target editor: both read the same XML, but have different libraries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Editor {
     /// CODESYS V3, and editors made from it.
@@ -50,7 +51,7 @@ pub(crate) fn export(config: &Config, editor: Editor) -> Export {
     let prefix = block_prefix(&config.name);
     let list = format!("{prefix}_io");
     let (begin, end) = (format!("{prefix}_begin"), format!("{prefix}_end"));
-    // Modbus carries each station from a register of its own on; a record over TCP has no gaps.
+    // In Modbus each station starts at its own register; a record over TCP has no gaps.
     let aligned = match config.bus {
         Options::ModbusServer(_) | Options::ModbusClient(_) => 2,
         _ => 1,
@@ -196,7 +197,7 @@ pub(crate) fn export(config: &Config, editor: Editor) -> Export {
     }
 }
 
-/// A REAL out of its bits and back: the same memory, seen as both.
+/// A REAL from its bits and back: the same memory, viewed as both types.
 fn functions() -> [Unit; 2] {
     [
         (REAL_OF, "REAL", "bits", "DWORD", "A REAL out of its bits."),
@@ -243,7 +244,7 @@ fn globals(records: &[Record<'_>; 2], link: &Link) -> Vec<Variable> {
     all
 }
 
-/// What is done while the simulation stands in, and where the user's own goes.
+/// The statements while the simulation is used, and the place for the user's own statements otherwise.
 fn simulated(list: &str, lines: &[String], other: &str) -> Vec<String> {
     let mut all = vec![format!("IF {list}.Simulated THEN")];
     all.extend(lines.iter().map(|line| format!("    {line}")));

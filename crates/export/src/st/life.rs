@@ -1,5 +1,5 @@
-//! Signs of life: the heartbeat of the simulation, which the program watches, and the signal that the simulation watches,
-//! which the program counts up.
+//! Life signs: the simulation's heartbeat, which the program watches, and the signal that the simulation
+//! watches, which the program counts up.
 
 use crate::record::{Place, Record};
 use tickbus_base::time::Nanos;
@@ -10,34 +10,35 @@ use tickbus_image::signal::{DataType, Signal};
 /// How many beats may be missed.
 const MISSED: i64 = 5;
 
-/// The variable that tells whether the simulation lives.
+/// The variable that tells whether the simulation is alive.
 pub(super) const ALIVE: &str = "Alive";
 
-/// What a program says of signs of life.
+/// A program's code for life signs.
 #[derive(Debug, Default)]
 pub(super) struct Life {
     /// Local variables: names and types.
     pub(super) locals: Vec<(String, &'static str)>,
-    /// Once the inputs are there.
+    /// Statements after the inputs are read.
     pub(super) before: Vec<String>,
-    /// Before the outputs go.
+    /// Statements before the outputs are written.
     pub(super) after: Vec<String>,
 }
 
-/// The local variables that watch the heartbeat with a number from 1.
+/// The local variables that watch the heartbeat with this number, from 1.
 fn watching(number: usize) -> [String; 3] {
     ["Silence", "Beat", "Is_beating"].map(|name| format!("{name}_{number}"))
 }
 
-/// Names that [`Life::of`] declares.
+/// Names declared by [`Life::of`].
 pub(super) fn declared(config: &Config) -> impl Iterator<Item = String> {
     let beats = 1..=config.life_signs.heartbeat.len();
     beats.flat_map(watching).chain([ALIVE.to_owned()])
 }
 
 impl Life {
-    /// `kind` is the type of a signal's variable, and `variable` how the program writes it; `alive` and `simulated` are those of these names;
-    /// `is_known` says that `alive` tells already whether anything comes.
+    /// `kind` is the type of a signal's variable, and `variable` how the program writes it; `alive` and
+    /// `simulated` are the variables of these names; `is_known` says that `alive` is already set according to
+    /// whether anything is received.
     pub(super) fn of(
         config: &Config,
         records: &[Record<'_>; 2],
@@ -98,7 +99,7 @@ impl Life {
     }
 }
 
-/// The statement that makes a value another one, in whatever type it has.
+/// A statement that changes a value of any type.
 fn counted(data_type: DataType, name: &str) -> String {
     let (unsigned, own) = match data_type {
         DataType::Bool => return format!("{name} := NOT {name};"),
@@ -111,7 +112,7 @@ fn counted(data_type: DataType, name: &str) -> String {
         own @ (DataType::Dword | DataType::Dint) => ("UDINT", own),
         own @ (DataType::Lword | DataType::Lint) => ("ULINT", own),
     };
-    // Unsigned numbers begin anew after the highest one.
+    // Unsigned numbers wrap around after the highest one.
     format!("{name} := {unsigned}_TO_{own}({own}_TO_{unsigned}({name}) + 1);")
 }
 

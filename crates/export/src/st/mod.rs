@@ -1,7 +1,7 @@
 //! Structured Text: for CODESYS and TwinCAT, and for `OpenPLC` and others that compile with `iec2c`.
 //!
-//! Both get the records as 16-bit registers, as Modbus carries them, and copy between these and one variable for each
-//! signal.
+//! Both have the records as 16-bit registers, as Modbus transfers them, and copy between these and one
+//! variable per signal.
 
 pub(super) mod codesys;
 mod life;
@@ -17,10 +17,10 @@ use super::record::{Place, Record};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Area, DataType, Width};
 
-/// Names that the sources use for themselves.
+/// Names that the sources use themselves.
 const TAKEN: [&str; 6] = ["Simulated", "In", "Out", "bits_32", "bits_64", "Hardware"];
 
-/// The names that a source declares beside its signals: those of all, and `more`.
+/// The names that a source declares in addition to its signals: the common ones, and `more`.
 fn taken(more: impl IntoIterator<Item = String>) -> Names {
     let mut names = Names::default();
     for name in TAKEN {
@@ -32,8 +32,7 @@ fn taken(more: impl IntoIterator<Item = String>) -> Names {
     names
 }
 
-/// Both records, each station from a multiple of `aligned` bytes on; no two signals have one name, whatever their
-/// direction.
+/// Both records, each station at a multiple of `aligned` bytes; names are unique across both directions.
 fn records<'a>(config: &'a Config, aligned: usize, names: &mut Names) -> [Record<'a>; 2] {
     [Area::Input, Area::Output].map(|area| Record::aligned(&config.table, area, aligned, names))
 }
@@ -43,7 +42,7 @@ fn add(text: &mut String, content: &str) {
     writeln!(text, "{content}").expect("a String takes all");
 }
 
-/// The variables that the statements for a record of outputs need: name and type.
+/// The variables used by the statements for a record of outputs: name and type.
 fn temporaries(outputs: &Record<'_>) -> Vec<(&'static str, &'static str)> {
     let has = |width| {
         let mut places = outputs.places.iter();
@@ -59,12 +58,12 @@ fn temporaries(outputs: &Record<'_>) -> Vec<(&'static str, &'static str)> {
 
 /// A comment of IEC 61131-3.
 fn comment(text: &str) -> String {
-    // Comments do not nest everywhere.
+    // Not every compiler supports nested comments.
     let text = text.replace("(*", "( *").replace("*)", "* )");
     format!("(* {text} *)")
 }
 
-/// The head of a source; each station begins at a multiple of `aligned` bytes.
+/// The head of a source; each station starts at a multiple of `aligned` bytes.
 fn source(config: &Config, aligned: usize, what: &str, editor: &str, compiled: &str) -> String {
     let mut lines = head(config, what, editor, compiled);
     lines.extend(Record::stations_aligned(&config.table, aligned));
@@ -77,7 +76,7 @@ fn source(config: &Config, aligned: usize, what: &str, editor: &str, compiled: &
     text
 }
 
-/// What is to be known about a signal's variable.
+/// The comment of a signal's variable.
 fn remark(place: &Place<'_>) -> String {
     let mut text = place.remark();
     if place.data_type() == DataType::Lreal {
@@ -86,7 +85,7 @@ fn remark(place: &Place<'_>) -> String {
     text
 }
 
-/// The statements that bring the inputs, and those that take the outputs, with these ways to write registers.
+/// The statements that copy the inputs, and those that copy the outputs, given how registers are written.
 fn copies(
     [inputs, outputs]: &[Record<'_>; 2],
     variable: &dyn Fn(&str) -> String,

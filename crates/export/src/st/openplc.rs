@@ -1,4 +1,4 @@
-//! One program for `OpenPLC`, or for whatever else compiles with `iec2c`.
+//! One program for `OpenPLC` or anything else that compiles with `iec2c`.
 
 mod hosted;
 mod polled;
@@ -19,7 +19,7 @@ const EDITOR: &str = "OpenPLC, or another editor that compiles with iec2c";
 const COMPILED: &str =
     "Programs like this one are compiled by iec2c in our tests; no OpenPLC has run this one.";
 
-/// The configuration and the resource. `OpenPLC` looks for the C files of these names and of no others.
+/// The configuration and the resource. `OpenPLC` only looks for C files with these names.
 const CONFIGURATION: [&str; 2] = ["Config0", "Res0"];
 
 /// The task of the program.
@@ -29,7 +29,7 @@ const TASK: &str = "every_scan";
 ///
 /// # Errors
 ///
-/// On a bus that `OpenPLC` does not speak from this end, or an image for which it has no room.
+/// On a bus that `OpenPLC` does not support at this end, or with an image that is too large for it.
 pub(crate) fn export(config: &Config) -> Result<Export, Mistakes> {
     let mut notes = Vec::new();
     let text = match &config.bus {
@@ -65,7 +65,7 @@ pub(crate) fn export(config: &Config) -> Result<Export, Mistakes> {
     })
 }
 
-/// A bus that `OpenPLC` does not speak from this end.
+/// The refusal of a bus that `OpenPLC` does not support at this end.
 fn refusal(config: &Config, why: &str) -> Mistakes {
     Mistakes::of_file(
         &config.path.display().to_string(),
@@ -78,14 +78,14 @@ fn refusal(config: &Config, why: &str) -> Mistakes {
     )
 }
 
-/// What the program and its instance are called. A program must be called like no variable of any library: its name
-/// is a word of the language from there on.
+/// The names of the program and its instance. The program's name must differ from the variables of all
+/// libraries: from its declaration on it is a keyword.
 fn program(config: &Config) -> [String; 2] {
     let prefix = block_prefix(&config.name);
     ["program", "instance"].map(|what| legal(&format!("{prefix}_{what}")))
 }
 
-/// Every name that the text declares beside its signals and registers.
+/// All names that the text declares in addition to its signals and registers.
 fn declared(config: &Config) -> impl Iterator<Item = String> {
     let fixed = [TASK, super::registers::REAL_OF, super::registers::BITS_OF];
     let fixed = fixed.into_iter().chain(CONFIGURATION).map(str::to_owned);

@@ -1,7 +1,7 @@
 //! Values in an array of 16-bit registers, as expressions and statements of Structured Text.
 //!
-//! Register n holds bytes 2n (its high byte) and 2n + 1 of a record. Only what IEC 61131-3 has is used, so that CODESYS
-//! and `iec2c` both read it: bit strings, shifts and conversions between types.
+//! Register n holds bytes 2n (high byte) and 2n + 1 of a record. Only bit strings, shifts and type
+//! conversions of IEC 61131-3 are used, so that both CODESYS and `iec2c` accept the code.
 
 use crate::record::Place;
 use tickbus_image::signal::{DataType, Width};
@@ -9,11 +9,12 @@ use tickbus_image::signal::{DataType, Width};
 /// How a program writes register n.
 pub(super) type Register<'r> = &'r dyn Fn(usize) -> String;
 
-/// The function from DWORD to REAL that the sources bring along, and the one back.
+/// The function from DWORD to REAL that comes with the sources, and its inverse.
 pub(super) const REAL_OF: &str = "tickbus_real";
 pub(super) const BITS_OF: &str = "tickbus_bits";
 
-/// The type of a signal's variable. A 64-bit float is not made from bits without pointers: its bits are told.
+/// The type of a signal's variable. A 64-bit float cannot be made from bits without pointers: its variable
+/// has the bits.
 pub(super) fn kind(place: &Place<'_>) -> DataType {
     match place.data_type() {
         DataType::Lreal => DataType::Lword,
@@ -21,7 +22,7 @@ pub(super) fn kind(place: &Place<'_>) -> DataType {
     }
 }
 
-/// The expression that is the value of a signal.
+/// An expression for the value of a signal.
 pub(super) fn value(place: &Place<'_>, register: Register<'_>) -> String {
     let data_type = kind(place);
     let size = place.size();
@@ -67,7 +68,7 @@ pub(super) fn value(place: &Place<'_>, register: Register<'_>) -> String {
     }
 }
 
-/// The statements that put a signal's value into registers that were zero before.
+/// The statements that put a signal's value into registers, which must be zero before.
 pub(super) fn put(place: &Place<'_>, name: &str, register: Register<'_>) -> Vec<String> {
     let data_type = kind(place);
     let size = place.size();
@@ -116,7 +117,7 @@ pub(super) fn put(place: &Place<'_>, name: &str, register: Register<'_>) -> Vec<
         }
         None => bits,
     };
-    // What lies `shift` bits up, `wide` bits of it, as a WORD.
+    // `wide` bits from bit `shift` on, as a WORD.
     let piece = |shift: usize, wide: usize| {
         let shifted = if shift == 0 {
             source.clone()
@@ -163,7 +164,7 @@ fn mask(place: &Place<'_>) -> String {
     format!("WORD#16#{:04X}", 1_u32 << bit)
 }
 
-/// A byte of the record as a WORD.
+/// A byte of the record, as a WORD.
 fn byte(register: Register<'_>, byte: usize) -> String {
     let register = register(byte / 2);
     if byte.is_multiple_of(2) {
@@ -173,7 +174,7 @@ fn byte(register: Register<'_>, byte: usize) -> String {
     }
 }
 
-/// Two bytes of the record as a WORD.
+/// Two bytes of the record, as a WORD.
 fn word(register: Register<'_>, high: usize, low: usize) -> String {
     if high / 2 == low / 2 {
         let register = register(high / 2);
@@ -191,7 +192,7 @@ fn word(register: Register<'_>, high: usize, low: usize) -> String {
     }
 }
 
-/// A bit string as a value of another type of its width.
+/// Converts a bit string to another type of its width.
 fn converted(bits: &str, data_type: DataType, expression: &str) -> String {
     if data_type.name() == bits {
         expression.to_owned()
@@ -200,7 +201,7 @@ fn converted(bits: &str, data_type: DataType, expression: &str) -> String {
     }
 }
 
-/// A value as the bit string of its width.
+/// Converts a value to the bit string of its width.
 fn back(bits: &str, data_type: DataType, name: &str) -> String {
     if data_type.name() == bits {
         name.to_owned()

@@ -1,27 +1,27 @@
-//! An image in Modbus telegrams: which registers go in which request.
+//! Splits an image into Modbus telegrams: which registers are in which request.
 
 use tickbus_bus_modbus::ServerOptions;
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Area;
 
-/// The most registers that one telegram reads, and writes.
+/// The most registers of one read telegram, and of one write telegram.
 const TELEGRAM: [usize; 2] = [125, 123];
 
-/// What one request in each direction carries of one station, inputs first.
+/// What one request in each direction transfers of one station, inputs first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Telegrams {
     /// The unit.
     pub(super) unit: u8,
     /// Its first registers in the tables of the unit.
     pub(super) first: [usize; 2],
-    /// The same registers in the record of all stations, in which each begins with a register of its own.
+    /// The same registers in the record of all stations, where each starts at its own register.
     pub(super) record: [usize; 2],
-    /// How many.
+    /// The number of registers.
     pub(super) count: [usize; 2],
 }
 
 impl Telegrams {
-    /// All that there are, station by station.
+    /// All requests, station by station.
     pub(super) fn all(config: &Config, options: &ServerOptions) -> Vec<Self> {
         let mut all = Vec::new();
         let mut record = [0, 0];

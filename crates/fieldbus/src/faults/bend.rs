@@ -8,24 +8,24 @@ use tickbus_image::signal::{DataType, Latch, Signal, Slot};
 #[derive(Debug)]
 pub(super) struct Bend {
     slot: usize,
-    /// The slot that counts the signal's edges, where this end reads it and it is latched.
+    /// The slot that counts the signal's edges, if this end reads it and it is latched.
     edges: Option<(usize, Latch)>,
     kind: Kind,
     change: Change,
     random: Random,
-    /// Where the value is stuck.
+    /// The value at which it is stuck.
     held: Slot,
-    /// The level shown last, as far as edges are counted.
+    /// The level shown last, which new edges are compared with.
     level: bool,
-    /// The true value and the true count of edges, while others stand in their slots.
+    /// The true value and the true edge count, while the bent ones are in their slots.
     truth: Option<(Slot, Slot)>,
 }
 
-/// What the slot holds.
+/// The type of value in the slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Bit,
-    /// Bits as a number: all of them set are this one.
+    /// A bit string as a number; this is the number with all bits set.
     Bits(u32),
     Real,
     Signed,
@@ -47,7 +47,7 @@ impl Kind {
 }
 
 impl Bend {
-    /// The signal stands in `slot`; its edges, if this end reads it and it is latched, in `edges`.
+    /// `slot` holds the signal; `edges` counts its edges, if this end reads it and it is latched.
     pub(super) fn new(
         signal: &Signal,
         (slot, edges): (usize, Option<usize>),
@@ -71,7 +71,7 @@ impl Bend {
         self.slot
     }
 
-    /// The fault begins on the true values.
+    /// The fault begins; the slots hold the true values.
     pub(super) fn begin(&mut self, slots: &[Slot]) {
         let slot = slots[self.slot];
         self.level = slot.real() != 0.0;
@@ -81,14 +81,14 @@ impl Bend {
         };
     }
 
-    /// Puts the wrong value into its slot.
+    /// Replaces the value in its slot by the bent one.
     pub(super) fn bend(&mut self, slots: &mut [Slot]) {
         let truth = slots[self.slot];
         let bent = self.bent(truth);
         slots[self.slot] = bent;
         let mut counted = Slot::default();
         if let Some((edges, latch)) = self.edges {
-            // What the simulation does not see as an edge must not be counted as one.
+            // An edge that the simulation is not shown must not be counted either.
             let level = bent.real() != 0.0;
             let is_edge = level != self.level
                 && match latch {
@@ -105,7 +105,7 @@ impl Bend {
         self.truth = Some((truth, counted));
     }
 
-    /// Puts the true value back, if the wrong one stands there.
+    /// Puts the true value back, if the bent one is in its slot.
     pub(super) fn straighten(&mut self, slots: &mut [Slot]) {
         if let Some((truth, counted)) = self.truth.take() {
             slots[self.slot] = truth;
@@ -134,7 +134,7 @@ impl Bend {
             Kind::Bit => Slot::from_real(f64::from(u8::from(truth.real() == 0.0))),
             Kind::Bits(all) => {
                 let all = f64::from(all);
-                // As the codec rounds and saturates it.
+                // Rounded and saturated as by the codec.
                 Slot::from_real(all - truth.real().round().clamp(0.0, all))
             }
             Kind::Signed | Kind::Unsigned => Slot::from_unsigned(!truth.unsigned()),

@@ -1,4 +1,4 @@
-//! What the two sides of the faults tell each other, and whoever asks.
+//! What the tick and the bus tell each other about faults, and tell any other thread that asks.
 
 use std::fmt::{self, Write as _};
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU64, Ordering};
@@ -9,12 +9,12 @@ use super::list::Moment;
 use tickbus_base::os::{is_told, is_told_rarely};
 use tickbus_base::time::Nanos;
 
-/// Where a fault stands in its life.
+/// The state of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// It has not begun, or may begin again.
     Waiting,
-    /// It does its harm.
+    /// It has its effect.
     Active,
     /// It is over for good.
     Over,
@@ -36,25 +36,25 @@ impl Phase {
 /// One fault as others see it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Injected {
-    /// Its number, from 1, in the order of injection.
+    /// Its number, from 1, in order of injection.
     pub id: u32,
     /// Its name.
     pub name: String,
     /// Its kind, as a driver.cfg names it.
     pub kind: &'static str,
-    /// What it does, in words.
+    /// What it does, as text.
     pub what: String,
-    /// Where it stands.
+    /// Its state.
     pub phase: Phase,
     /// How often it has begun.
     pub begun: u64,
-    /// When it last began or ended, since the first tick.
+    /// When it last began or ended, as time since the first tick.
     pub since: Nanos,
     /// The number of that tick.
     pub tick: u64,
 }
 
-/// What is known of one fault; the tick writes, everyone reads.
+/// The state of one fault; the tick writes it, any thread reads it.
 #[derive(Debug)]
 pub(super) struct Cell {
     id: u32,
@@ -65,7 +65,7 @@ pub(super) struct Cell {
     begun: AtomicU64,
     since: AtomicI64,
     tick: AtomicU64,
-    /// Beginnings and ends so far, and how many of them the log knows of.
+    /// Beginnings and ends so far, and how many of them were logged.
     changes: AtomicU64,
     told: AtomicU64,
 }
@@ -96,7 +96,7 @@ impl Cell {
         let _ = write!(text, "\"{}\" ({})", self.name, self.kind);
     }
 
-    /// How long that is, in bytes.
+    /// The length of that text in bytes.
     pub(super) fn title_len(&self) -> usize {
         self.name.len() + self.kind.len() + "\"\" ()".len()
     }
@@ -127,11 +127,11 @@ impl Cell {
         }
     }
 
-    /// What the log is to know of its beginnings and ends since the last time.
+    /// The log message about what has begun or ended since the last call.
     fn news(&self, driver: &str) -> Option<String> {
         let changes = self.changes.load(Ordering::Acquire);
         let told = self.told.swap(changes, Ordering::Relaxed);
-        // Nothing is made for a log that nobody keeps: on a stepped bus this is the tick.
+        // No text is made if the log drops it: on a stepped bus this runs within the tick.
         if told >= changes || !is_told(changes) || !log::log_enabled!(log::Level::Warn) {
             return None;
         }
@@ -152,7 +152,7 @@ impl Cell {
     }
 }
 
-/// Says that not every change is told any more.
+/// Says that not every change is logged any more.
 struct Often(u64);
 
 impl fmt::Display for Often {
@@ -168,10 +168,10 @@ impl fmt::Display for Often {
     }
 }
 
-/// What the tick, the bus and whoever asks know of a driver's faults.
+/// What the tick, the bus and other threads share about a driver's faults.
 #[derive(Debug, Default)]
 pub struct Board {
-    /// Grows with every change; zero while there has never been a fault.
+    /// Incremented by every change; zero as long as there has never been a fault.
     news: AtomicU64,
     cells: Mutex<Vec<Arc<Cell>>>,
     /// Line faults on their way to the bus.
@@ -184,7 +184,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// A number that grows with every change; zero while there has never been a fault.
+    /// A number that every change increments; zero as long as there has never been a fault.
     #[inline]
     pub fn news(&self) -> u64 {
         self.news.load(Ordering::Acquire)
@@ -196,7 +196,7 @@ impl Board {
         self.news.fetch_add(1, Ordering::Release);
     }
 
-    /// Takes the oldest fault that is over off the list; tells whether there was one.
+    /// Removes the oldest fault that is over from the list; tells whether there was one.
     pub(super) fn forget_one(&self) -> Option<u32> {
         let mut cells = self.cells();
         let found = cells.iter().position(|cell| cell.phase() == Phase::Over)?;
@@ -211,14 +211,14 @@ impl Board {
         self.news.fetch_add(1, Ordering::Release);
     }
 
-    /// Line faults that the bus has not yet taken over.
+    /// Takes the line faults that the bus has not adopted yet.
     pub fn take_line_faults(&self) -> Vec<LineFault> {
         std::mem::take(&mut *self.mailbox())
     }
 
     /// Writes to the log what has begun and ended since the last time.
     pub fn tell(&self, driver: &str) {
-        // Written when others have the list again: nobody waits for whoever reads the log.
+        // Logged after the lock is released: no thread may wait for a slow reader of the log.
         let news: Vec<String> = self
             .cells()
             .iter()
@@ -229,12 +229,12 @@ impl Board {
         }
     }
 
-    /// All faults, in the order of injection; those that are long over may be missing.
+    /// All faults in order of injection; those that ended long ago may be missing.
     pub fn list(&self) -> Vec<Injected> {
         self.cells().iter().map(|cell| cell.seen()).collect()
     }
 
-    /// Appends what there is to know, one `key=value` a line; nothing if there was never a fault.
+    /// Appends the state of all faults, one `key=value` per line; nothing if there was never a fault.
     pub fn write(&self, text: &mut String) {
         if self.news() == 0 {
             return;
@@ -265,7 +265,7 @@ impl Board {
     }
 
     fn cells(&self) -> MutexGuard<'_, Vec<Arc<Cell>>> {
-        // A list is whole between any two of its changes.
+        // The list is consistent after every single change, so a poisoned lock is safe to use.
         self.cells.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -15,11 +15,11 @@ pub struct Condition {
     signal: usize,
     relation: Relation,
     number: Number,
-    /// Numbers that differ by no more are equal: a scaled value hardly ever hits a number exactly.
+    /// Numbers that differ by at most this are equal: a scaled value hardly ever equals a number exactly.
     tolerance: f64,
 }
 
-/// What a slot is compared with, by what the slot holds.
+/// The number that a slot is compared with, of the slot's type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Number {
     Real(f64),
@@ -62,7 +62,7 @@ impl Condition {
     pub fn parse(text: &str, table: &SignalTable) -> Result<Self, (String, String)> {
         let text = text.trim();
         let position = |name: &str| table.position(name);
-        // A name may have a sign in it.
+        // A name may contain a comparison operator.
         if let Some(signal) = position(text) {
             return Self::of_bool(text, signal, &table.signals[signal]);
         }
@@ -116,7 +116,7 @@ impl Condition {
         })
     }
 
-    /// Refuses what can never become true, or never false.
+    /// Rejects a condition that can never become true, or never false.
     fn check_reach(&self, number: f64, signal: &Signal) -> Result<(), Wrong> {
         let (low, high) = value_limits(signal);
         let (number, tolerance) = (number, self.tolerance);
@@ -154,7 +154,7 @@ impl Condition {
         let (less, equal) = match self.number {
             Number::Real(number) => {
                 let value = slot.real();
-                // NaN is neither.
+                // NaN is neither equal nor unequal.
                 let equal = (value - number).abs() <= self.tolerance;
                 (value < number && !equal, equal)
             }
@@ -186,7 +186,7 @@ impl fmt::Display for Condition {
     }
 }
 
-/// The number of a condition, as its signal's slot holds numbers, and as a double.
+/// The number of a condition as its signal's slot would hold it, and as a double.
 #[expect(
     clippy::cast_precision_loss,
     reason = "to be compared with the ends of ranges"
@@ -230,7 +230,7 @@ fn number_of(text: &str, signal: &Signal) -> Result<(Number, f64), Wrong> {
     Ok((Number::Real(number), number))
 }
 
-/// What to say of a name that no signal of `table` has, and what would be right.
+/// What is wrong with a name that no signal of `table` has, and what would be right.
 pub fn unknown(name: &str, table: &SignalTable) -> (String, String) {
     const MOST: usize = 20;
     let names: Vec<&str> = table.signals.iter().map(|s| s.name.as_str()).collect();
@@ -277,7 +277,7 @@ mod tests {
                 assert!(!holds(&text, [0.0, f64::NAN, 0.0, 0.0]), "{text}");
             }
         }
-        // A scaled value hits a number within half a step.
+        // A scaled value matches a number within half a step.
         let step = 250.0 / 27_648.0;
         assert!(holds("level == 100", [0.0, 100.0 + step * 0.4, 0.0, 0.0]));
         assert!(!holds("level == 100", [0.0, 100.0 + step * 0.6, 0.0, 0.0]));

@@ -18,9 +18,9 @@ pub struct Fault {
     pub begin: Begin,
     /// When it ends by itself.
     pub lasts: Lasts,
-    /// How often it may begin; more than once only with [`Begin::When`]. Positive.
+    /// How many times it may begin; more than once only with [`Begin::When`]. Positive.
     pub times: u64,
-    /// Where its chance comes from.
+    /// The seed of its random numbers.
     pub seed: u64,
 }
 
@@ -29,43 +29,43 @@ pub struct Fault {
 pub enum Effect {
     /// It changes the value of the signal with this index in the signal table.
     Signal(usize, Change),
-    /// It troubles the line.
+    /// It disturbs the line.
     Line(Trouble),
 }
 
 /// How the value of a signal is changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// It stays at a value; `None`: at the one that it has when the fault begins.
+    /// It is stuck at a value; `None`: at the value it has when the fault begins.
     Stuck(Option<Slot>),
-    /// The opposite: of a BOOL, or of each bit of a bit string.
+    /// The inverse of a BOOL, or of each bit of a bit string.
     Invert,
-    /// So much is added, in the signal's unit.
+    /// This is added, in the signal's unit.
     Offset(f64),
-    /// Something between minus and plus so much is added, anew at every tick.
+    /// A random number between minus and plus this is added, a new one at every tick.
     Noise(f64),
-    /// A BOOL is inverted with this chance, anew at every tick.
+    /// A BOOL is inverted with this probability, decided anew at every tick.
     Flicker(f64),
 }
 
 /// What a fault does to the frames of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trouble {
-    /// What comes in is held back for so long.
+    /// Incoming frames are held back for this long.
     Delay(Nanos),
-    /// What goes out is held back for so long.
+    /// Outgoing frames are held back for this long.
     SlowAnswers(Nanos),
-    /// A cycle's frames are lost with this chance.
+    /// The frames of a cycle are lost with this probability.
     Drop(f64, Direction),
-    /// A cycle's frames come once more with this chance.
+    /// The frames of a cycle are repeated with this probability.
     Duplicate(f64, Direction),
-    /// Nothing goes out, and nothing comes in.
+    /// Nothing is sent or received.
     LinkDown,
-    /// The station with this index is gone.
+    /// The station with this index does not respond.
     StationDown(usize),
 }
 
-/// Which frames are meant, as seen from this end.
+/// Which frames are affected, as seen from this end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
     /// Those that this end receives.
@@ -78,12 +78,12 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Whether received frames are meant.
+    /// Whether received frames are affected.
     pub const fn comes_in(self) -> bool {
         matches!(self, Self::In | Self::Both)
     }
 
-    /// Whether sent frames are meant.
+    /// Whether sent frames are affected.
     pub const fn goes_out(self) -> bool {
         matches!(self, Self::Out | Self::Both)
     }
@@ -94,13 +94,13 @@ impl Direction {
 pub enum Begin {
     /// At the next tick.
     AtOnce,
-    /// So long after the first tick.
+    /// This long after the first tick.
     At(Nanos),
     /// At the tick with this number; the first is 1.
     Tick(u64),
     /// When the condition becomes true.
     When(Condition),
-    /// When the condition becomes true; and it ends when the condition becomes false.
+    /// When the condition becomes true; it ends when the condition becomes false.
     While(Condition),
 }
 
@@ -109,9 +109,9 @@ pub enum Begin {
 pub enum Lasts {
     /// Until it is ended, or its condition ends it.
     UntilEnded,
-    /// So long.
+    /// For this long.
     For(Nanos),
-    /// So many ticks.
+    /// For this many ticks.
     Ticks(u64),
 }
 
@@ -132,7 +132,7 @@ impl Fault {
         }
     }
 
-    /// What it does, in words: `"LA1 bottom" is stuck at 1`.
+    /// What it does, as text: `"LA1 bottom" is stuck at 1`.
     pub fn what(&self, table: &SignalTable) -> String {
         match self.effect {
             Effect::Signal(index, change) => {

@@ -10,7 +10,7 @@ use super::{Board, Effect, Fault, LIMIT, LineFault, Phase};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
-/// Which tick it is.
+/// A tick: its time and its number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moment {
     /// Time since the first tick.
@@ -19,20 +19,21 @@ pub struct Moment {
     pub tick: u64,
 }
 
-/// Where the values of an end stand: slots in the order of the signal table, then some that count edges.
+/// How the values of one end are arranged: slots in the order of the signal table, then those that count
+/// edges.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots<'a> {
     /// The signals.
     pub table: &'a SignalTable,
     /// The area that this end writes.
     pub writes: Area,
-    /// Per signal, the slot that counts its edges, if there is one. May be shorter than the table.
+    /// Per signal, the slot that counts its edges, if any. May be shorter than the table.
     pub edges: &'a [Option<usize>],
 }
 
 /// The faults of one end. Its tick calls [`begin_tick`](Self::begin_tick), [`sending`](Self::sending), sends,
-/// calls [`sent`](Self::sent), receives, and calls [`received`](Self::received). One that answers within itself
-/// receives first.
+/// calls [`sent`](Self::sent), receives, and calls [`received`](Self::received). If the simulation answers
+/// within its tick, receiving comes first.
 #[derive(Debug)]
 pub struct Faults {
     entries: Vec<Entry>,
@@ -51,16 +52,16 @@ struct Entry {
 
 #[derive(Debug)]
 enum Kind {
-    /// Bends what this end writes.
+    /// Bends a value that this end writes.
     Written(Bend),
-    /// Bends what it reads.
+    /// Bends a value that this end reads.
     Read(Bend),
-    /// Is done elsewhere, by whoever looks at the board.
+    /// Has its effect in the bus, by way of the board.
     Line,
 }
 
 impl Faults {
-    /// No faults yet; `board` is where it will tell of them.
+    /// An empty list, which publishes its state on `board`.
     pub fn new(board: Arc<Board>) -> Self {
         Self {
             entries: Vec::new(),
@@ -115,18 +116,18 @@ impl Faults {
         Ok(id)
     }
 
-    /// Ends a fault at the next tick; false if there is none with this number.
+    /// Ends a fault at the next tick; false if no fault has this number.
     pub fn end(&mut self, id: u32) -> bool {
         let found = self.entries.iter_mut().find(|entry| entry.id == id);
         found.map(|entry| entry.schedule.end()).is_some()
     }
 
-    /// A tick begins: what was bent is true again, and faults begin and end.
+    /// Begins a tick: restores bent values, then faults begin and end.
     ///
-    /// Conditions are judged on true values: of what this end writes, those of this tick (of the tick before where
-    /// the tick receives first); of what it reads, those of the tick before.
+    /// Conditions are judged on true values: what this end writes as of this tick (or the previous one, if
+    /// the tick receives first), what it reads as of the previous tick.
     pub fn begin_tick(&mut self, moment: Moment, slots: &mut [Slot]) {
-        // Time that jumps back would begin nothing and end nothing.
+        // If time jumped back, no fault would begin or end until it has caught up.
         self.time = self.time.max(moment.time);
         let moment = Moment {
             time: self.time,
@@ -153,7 +154,7 @@ impl Faults {
         }
     }
 
-    /// What is about to be sent stands in the slots: it is bent.
+    /// The slots are about to be sent: bends them.
     pub fn sending(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
             if let (true, Kind::Written(bend)) = (entry.schedule.is_active(), &mut entry.kind) {
@@ -162,7 +163,8 @@ impl Faults {
         }
     }
 
-    /// The signals that are bent at this moment, by their index; those that this end writes or reads.
+    /// The signals that are bent at this moment, by index; those that this end writes, or those that it
+    /// reads.
     pub fn active(&self, written: bool) -> impl Iterator<Item = usize> {
         let active = self
             .entries
@@ -175,7 +177,7 @@ impl Faults {
         })
     }
 
-    /// What was to be sent is sent: the simulation finds its own values again.
+    /// Everything is sent: restores the simulation's own values.
     pub fn sent(&mut self, slots: &mut [Slot]) {
         for entry in self.entries.iter_mut().rev() {
             if let Kind::Written(bend) = &mut entry.kind {
@@ -184,7 +186,7 @@ impl Faults {
         }
     }
 
-    /// What came in stands in the slots: it is bent.
+    /// The slots hold what was received: bends them.
     pub fn received(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
             if let (true, Kind::Read(bend)) = (entry.schedule.is_active(), &mut entry.kind) {

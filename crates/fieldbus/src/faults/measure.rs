@@ -7,12 +7,12 @@ use tickbus_image::signal::Signal;
 pub(super) fn split(text: &str) -> Option<(f64, &str)> {
     const LONGEST: usize = 64;
     let text = text.trim();
-    // The longest beginning that is a number: `2e3 mm` has an `e` in its number, `2 mm` none.
+    // The longest prefix that is a number: in `2e3 mm` the `e` belongs to it, in `2 mm` there is none.
     let ends = text.char_indices().map(|(at, c)| at + c.len_utf8());
     let ends: Vec<usize> = ends.take(LONGEST).collect();
     let begins = |end: &usize| {
         let (number, rest) = text.split_at(*end);
-        // Rust's words for numbers that are none.
+        // Excludes what Rust parses but nobody means by a number: `inf`, `nan`.
         let digits = number.ends_with(|c: char| c.is_ascii_digit() || c == '.');
         let number = number.parse::<f64>().ok();
         number
@@ -22,7 +22,7 @@ pub(super) fn split(text: &str) -> Option<(f64, &str)> {
     ends.iter().rev().find_map(begins)
 }
 
-/// Whether `unit` is the signal's; else what is wrong, and what would be right.
+/// Whether `unit` is the signal's; if not, what is wrong and what would be right.
 pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), (String, String)> {
     match signal.unit.as_deref() {
         _ if unit.is_empty() => Ok(()),

@@ -1,10 +1,9 @@
-//! Faults that are asked for: wrong values of signals and troubles of the line, to see what a PLC program
-//! makes of them.
+//! Injected faults: wrong values of signals and trouble on the line, to test how a PLC program reacts.
 //!
-//! Nothing here does any I/O or reads a clock. [`Faults`] is the tick's side: it knows when each fault begins
-//! and ends, and bends the slots of an exchange. [`Wires`] is the bus's side: it loses, repeats and holds back
-//! frames. Both share a [`Board`], on which the tick says what is active, so that neither waits for the other.
-//! What is left to chance comes from a seed: the same seed gives the same run.
+//! Nothing here does any I/O or reads a clock. [`Faults`] is the tick's side: it decides when each fault
+//! begins and ends, and bends the slots of an exchange. [`Wires`] is the bus's side: it loses, repeats and
+//! delays frames. Both share a [`Board`], on which the tick publishes what is active, so that neither waits
+//! for the other. Random numbers come from a seed: the same seed gives the same run.
 
 mod bend;
 mod board;

@@ -1,11 +1,11 @@
-//! Chance that can be repeated.
+//! Reproducible random numbers.
 
-/// Numbers that look like chance and are the same for the same seed: `SplitMix64` of Steele, Lea and Flood.
+/// Pseudo-random numbers from a seed: `SplitMix64` of Steele, Lea and Flood.
 #[derive(Clone, Debug)]
 pub(super) struct Random(u64);
 
 impl Random {
-    /// The numbers of the fault with number `id`: faults with one seed do not all throw alike.
+    /// The numbers for the fault with number `id`, so that faults with the same seed draw different ones.
     pub(super) fn new(seed: u64, id: u32) -> Self {
         let mut random = Self(seed ^ u64::from(id).wrapping_mul(0xA24B_AED4_963E_E407));
         random.next();
@@ -20,18 +20,18 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// From 0 up to, and without, 1.
+    /// Uniform in [0, 1).
     #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// From -1 up to, and without, 1.
+    /// Uniform in [-1, 1).
     pub(super) fn around_zero(&mut self) -> f64 {
         self.unit().mul_add(2.0, -1.0)
     }
 
-    /// True with this chance.
+    /// True with probability `chance`.
     pub(super) fn happens(&mut self, chance: f64) -> bool {
         self.unit() < chance
     }

@@ -1,8 +1,8 @@
-//! Frames that are held back, in order.
+//! A queue of frames that are held back.
 
 use tickbus_base::time::Nanos;
 
-/// A fixed number of frames of one size, with the time that each was taken at.
+/// A fixed number of frames of one size, each with the time at which it was put in.
 #[derive(Debug)]
 pub(super) struct Ring {
     size: usize,
@@ -12,11 +12,11 @@ pub(super) struct Ring {
     count: usize,
 }
 
-/// Frames that a ring holds, if they are small.
+/// The most frames that a ring holds.
 const FRAMES: usize = 4096;
-/// Frames that it holds, however large they are.
+/// The fewest frames that it holds, however large they are.
 const LEAST_FRAMES: usize = 64;
-/// What it may weigh otherwise.
+/// The memory in bytes that a ring may take; within the two limits above it sets the number of frames.
 const BYTES: usize = 8 << 20;
 
 impl Ring {
@@ -43,12 +43,12 @@ impl Ring {
         self.count == self.taken.len()
     }
 
-    /// Whether there is room for no more than two frames.
+    /// Whether at most two more frames fit.
     pub(super) fn is_nearly_full(&self) -> bool {
         self.count + 2 >= self.taken.len()
     }
 
-    /// Puts a frame behind the others.
+    /// Appends a frame.
     ///
     /// # Panics
     ///
@@ -61,7 +61,7 @@ impl Ring {
         self.count += 1;
     }
 
-    /// The oldest frame, and when it was taken.
+    /// The oldest frame, and when it was put in.
     pub(super) fn front(&self) -> Option<(Nanos, &[u8])> {
         let bytes = &self.bytes[self.first * self.size..];
         (self.count > 0).then(|| (self.taken[self.first], &bytes[..self.size]))
@@ -95,7 +95,7 @@ mod tests {
                 ring.pop();
                 next += 1;
             }
-            // The next round begins elsewhere.
+            // The next round starts at another index.
             ring.push(Nanos::ZERO, &[0, 0]);
             ring.pop();
         }

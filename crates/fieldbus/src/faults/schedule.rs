@@ -4,21 +4,21 @@ use super::list::Moment;
 use super::{Begin, Fault, Lasts};
 use tickbus_image::signal::Slot;
 
-/// Where a fault stands in its life, tick by tick.
+/// The life of a fault, tick by tick.
 #[derive(Debug)]
 pub(super) struct Schedule {
     begin: Begin,
     lasts: Lasts,
-    /// How often it may still begin.
+    /// How many more times it may begin.
     left: u64,
     state: State,
-    /// It is to end at the next tick, whatever else.
+    /// It has to end at the next tick in any case.
     told_to_end: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// `was` is what its condition was at the tick before.
+    /// `was` is the value of its condition at the previous tick.
     Waiting {
         was: bool,
     },
@@ -26,7 +26,7 @@ enum State {
     Over,
 }
 
-/// What a tick brought.
+/// What happened at a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     Nothing,
@@ -52,7 +52,7 @@ impl Schedule {
         matches!(self.state, State::Active(_))
     }
 
-    /// Lets it end at the next tick.
+    /// Makes it end at the next tick.
     pub(super) fn end(&mut self) {
         self.told_to_end = true;
     }
@@ -103,7 +103,7 @@ impl Schedule {
         }
     }
 
-    /// Whether it has lasted long enough, and what its condition is.
+    /// Whether it is to end at this tick, and the value of its condition.
     fn is_up(&self, since: Moment, moment: Moment, slots: &[Slot]) -> (bool, bool) {
         let (ends, is) = match &self.begin {
             Begin::While(condition) => {
@@ -159,7 +159,8 @@ mod tests {
         Condition::parse("a == 1", &table()).expect("a condition")
     }
 
-    /// Runs a fault over the levels of a signal, a tick of 10 ms each; `#` where it is active.
+    /// Runs a fault over the levels of a signal, one per tick of 10 ms; `#` marks the ticks at which it is
+    /// active.
     fn run(begin: Begin, lasts: Lasts, times: u64, levels: &str) -> String {
         let fault = Fault {
             name: "x".to_owned(),
@@ -203,7 +204,7 @@ mod tests {
                 "0000000",
                 "..##...",
             ),
-            // Between two ticks: from the next one on.
+            // A time between two ticks takes effect at the later one.
             (
                 Begin::At(span(15)),
                 Lasts::For(span(15)),
@@ -214,7 +215,7 @@ mod tests {
             (Begin::When(when()), ever, 1, "00110000", "..######"),
             (Begin::When(when()), three, 1, "0010001000", "..###....."),
             (Begin::When(when()), three, 2, "0010001000", "..###.###."),
-            // A condition that is true already must become false before it can become true.
+            // A condition that is true from the start must become false before it can become true.
             (Begin::When(when()), three, 2, "1111110110", "###....###"),
             (
                 Begin::While(when()),

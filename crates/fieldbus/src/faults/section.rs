@@ -1,4 +1,4 @@
-//! The `[[fault]]` sections: of a driver.cfg, of a file of their own, or handed in one by one.
+//! The `[[fault]]` sections: of a driver.cfg, of a separate file, or handed in one at a time.
 
 mod effect;
 
@@ -26,10 +26,10 @@ const KINDS: [(&str, &[&str]); 10] = [
 ];
 
 const KIND: &str = "write the kind of fault, such as kind = \"stuck\"";
-/// What is right where a signal is named.
+/// The remedy where a signal should be named.
 const SIGNAL: &str = "name the signal that is wrong, such as signal = \"LA1 bottom\"";
 
-/// Reads the faults of a file of their own.
+/// Reads the faults of a separate file.
 ///
 /// # Errors
 ///
@@ -48,11 +48,11 @@ pub fn read_file(file: &str, text: &str, table: &SignalTable) -> Result<Vec<Faul
     }
 }
 
-/// Reads one fault, with or without the header of its section: `kind = "link-down"`.
+/// Reads one fault, with or without its section header: `kind = "link-down"`.
 ///
 /// # Errors
 ///
-/// With every mistake in the text, which they call `fault`.
+/// With every mistake in the text; they call the file `fault`.
 pub fn read_one(text: &str, table: &SignalTable) -> Result<Fault, Mistakes> {
     let mut collector = Collector::new("fault", text);
     let fault = read_text(&mut collector, text, |root| {
@@ -76,7 +76,8 @@ pub fn read_one(text: &str, table: &SignalTable) -> Result<Fault, Mistakes> {
     }
 }
 
-/// Reads `[[fault]]` sections and reports their mistakes. Without a table, as far as it goes.
+/// Reads `[[fault]]` sections and reports their mistakes. Without a table, checks only what does not need
+/// one.
 pub fn read_sections(sections: Vec<Table<'_>>, table: Option<&SignalTable>) -> Vec<Fault> {
     if let Some(first) = sections.get(LIMIT) {
         first.wrong(
@@ -151,7 +152,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// The keys that belong to some kinds only.
+    /// The keys that only some kinds have.
     fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 8] {
         [
             ("signal", self.signal.as_ref()),
@@ -230,7 +231,7 @@ fn kind_of(value: &Value<'_>) -> Option<&'static str> {
     value.choice("kinds of faults", &kinds)
 }
 
-/// Reports keys that stand at a fault of another kind.
+/// Reports keys that do not belong to faults of this kind.
 fn check_keys(kind: &str, keys: &Keys<'_>) {
     for (key, value) in keys.of_kinds() {
         let belongs = |(_, keys): &&(&str, &[&str])| keys.contains(&key);

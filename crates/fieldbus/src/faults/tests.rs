@@ -11,7 +11,7 @@ use tickbus_image::signal::{
     Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Slot, Station,
 };
 
-/// `run` and `level` are written by a machine, the others read.
+/// A machine writes `run` and `level` and reads the others.
 pub(super) fn table() -> SignalTable {
     let signal = |name: &str, area, byte, data_type| Signal {
         name: name.to_owned(),
@@ -54,13 +54,13 @@ pub(super) fn table() -> SignalTable {
 
 const SIGNALS: usize = 5;
 
-/// A machine's end, whose peer sends what it is told.
+/// A machine's end of the line, whose peer sends what the test says.
 struct End {
     table: SignalTable,
     faults: Faults,
     board: Arc<Board>,
     tick: u64,
-    /// Signals, and the edges of the latched one.
+    /// One per signal, and one for the edges of the latched signal.
     slots: [Slot; SIGNALS + 1],
 }
 
@@ -88,8 +88,8 @@ impl End {
         self.faults.add(&fault, slots).expect("there is room")
     }
 
-    /// One tick of 10 ms: what was sent of the signals that this end writes; `arrives` puts into the slots what
-    /// comes in, if anything does.
+    /// One tick of 10 ms; returns what was sent of the signals that this end writes. `arrives` puts received
+    /// values into the slots, if any arrive.
     fn tick(&mut self, arrives: impl FnOnce(&mut [Slot])) -> [f64; 2] {
         self.tick += 1;
         let moment = Moment {
@@ -161,7 +161,7 @@ fn what_is_read_is_bent_for_the_reader_and_true_again_at_once() {
         end.inject("kind = \"offset\"\nsignal = \"whole\"\nby = 2"),
         end.inject("kind = \"invert\"\nsignal = \"word\""),
     ];
-    // Nothing new arrives, and yet offsets do not add up.
+    // Nothing new arrives, yet offsets must not accumulate.
     for _ in 0..3 {
         end.tick(nothing);
         assert_eq!(end.slots[2].real(), 0.0);
@@ -298,8 +298,8 @@ proptest! {
         prop_assert!(first.iter().any(|sent| sent[0] == 0.0));
     }
 
-    /// Whatever faults come and go, the simulation's own values stay its own, and what is read is true as soon
-    /// as all faults are over.
+    /// Whatever faults come and go, they never change the simulation's own values, and read values are true
+    /// as soon as all faults are over.
     #[test]
     fn nothing_is_left_behind(
         steps in prop::collection::vec((0..8_usize, -100.0..100.0_f64, any::<bool>()), 1..80),

@@ -1,4 +1,4 @@
-//! Frames of the line, lost, repeated and held back.
+//! Frames that are lost, repeated or held back on the line.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,10 +10,11 @@ use super::ring::Ring;
 use super::{Board, Phase, Trouble};
 use tickbus_base::time::Nanos;
 
-/// How long a pulse holds up the frames behind it while the peer reads other bits only. Peers poll faster than that.
+/// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
+/// often than that.
 const PATIENCE: Nanos = Nanos::from_secs(1);
 
-/// One trouble of the line, as the bus's side has it.
+/// One line fault on the bus's side.
 #[derive(Debug)]
 pub struct LineFault {
     trouble: Trouble,
@@ -31,103 +32,103 @@ impl LineFault {
     }
 }
 
-/// What the active faults come to.
+/// The combined effect of the active faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Sum {
-    /// Nothing goes out or comes in.
+    /// Nothing is sent or received.
     down: bool,
-    /// So long is held back what comes in.
+    /// How long incoming frames are held back.
     delay: Nanos,
-    /// So long is held back what goes out.
+    /// How long outgoing frames are held back.
     slow: Nanos,
 }
 
-/// What becomes of a frame that came in.
+/// What happens to an incoming frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// It never came.
+    /// It is lost.
     Lost,
-    /// It is handed in as often as this.
+    /// It is delivered this many times.
     Passes(u32),
-    /// It waits; see [`Wires::release`].
+    /// It has to wait; see [`Wires::release`].
     Held,
 }
 
-/// The line between an image and its bus, with all that can happen to it.
+/// The line between an image and its bus, with its injected faults.
 #[derive(Debug)]
 pub struct Wires {
     board: Arc<Board>,
     faults: Vec<LineFault>,
     stations: Vec<Wire>,
     sum: Sum,
-    /// What chance has decided for the frames of the cycle that comes in.
+    /// What was decided at random for the frames of the current incoming cycle.
     fate: Fate,
-    /// Whether it has decided that the frames of the cycle that goes out repeat those of the last one.
+    /// Whether the frames of the current outgoing cycle repeat those of the previous one.
     repeats: bool,
-    /// The active troubles, in words.
+    /// The active faults, as text.
     active: String,
 }
 
-/// One station's part of the line.
+/// The part of the line that belongs to one station.
 #[derive(Debug)]
 struct Wire {
     dead: bool,
-    /// Whether its part of the cycle that comes in, and of the one that goes out, is over: when it comes again, another
-    /// cycle has begun, whichever station is the first of it.
+    /// Whether the station has had its turn in the current incoming, and in the current outgoing cycle. When
+    /// it comes again, the next cycle has begun, whichever station is its first.
     came: bool,
     went: bool,
     out: Outgoing,
-    /// Received frames that wait.
+    /// Received frames that are held back.
     waiting: Option<Ring>,
     rx_len: usize,
 }
 
-/// Frames on their way out.
+/// Outgoing frames.
 #[derive(Debug)]
 struct Outgoing {
-    /// The latched bits, whose every change has to be seen by the peer.
+    /// The mask of latched bits: the peer has to see each of their changes.
     latched: Box<[u8]>,
-    /// The image's newest bytes.
+    /// The newest bytes of the image.
     newest: Box<[u8]>,
-    /// What the bus is given.
+    /// The bytes that the bus sends.
     current: Box<[u8]>,
-    /// What the peer got last.
+    /// The bytes that the peer received last.
     sent: Box<[u8]>,
-    /// The bits that the peer reads: all, until it leaves one out for [`PATIENCE`].
+    /// The mask of bits that the peer reads: all, until it has not read one for [`PATIENCE`].
     read: Box<[u8]>,
-    /// Whether the peer has read anything since `current` took its place, and since when a pulse in it has held up
-    /// the frames behind it nonetheless.
+    /// Whether the peer has read anything since `current` was set, and since when a pulse in it has held up
+    /// the frames behind it nevertheless.
     reads: bool,
     held_up: Option<Nanos>,
-    /// Changes that wait.
+    /// Changes that are held back.
     waiting: Option<Ring>,
-    /// Whose bytes the bus was given: that decides who is told that they were sent.
+    /// The origin of the bytes that the bus was given: decides who is told that they were sent.
     given: Given,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Given {
-    /// The image's: it keeps its pulses until they were sent.
+    /// The image: it keeps its pulses until they were sent.
     Image,
-    /// Held ones: the image has let go of them long ago.
+    /// The ring: the image has released these bytes long ago.
     Held,
-    /// Old ones, so that the bus has something to send.
+    /// Neither: old bytes, so that the bus has something to send.
     Nothing,
 }
 
-/// What one station's frames are like.
+/// The shape of one station's frames.
 #[derive(Clone, Debug)]
 pub struct Shape {
     /// What it sent last.
     pub last_sent: Box<[u8]>,
-    /// The bits of it whose every change has to be seen by the peer.
+    /// The mask of the bits of which the peer has to see each change.
     pub latched: Box<[u8]>,
     /// Size of the frames that come in, in bytes.
     pub rx_len: usize,
 }
 
 impl Wires {
-    /// The line of stations of these shapes, with nothing wrong yet.
+    /// The line to stations of these shapes, without any fault.
     pub fn new(board: Arc<Board>, stations: impl Iterator<Item = Shape>) -> Self {
         let wire = |shape: Shape| Wire {
             dead: false,
@@ -158,7 +159,7 @@ impl Wires {
         }
     }
 
-    /// Takes over a fault, with all the memory that it will need.
+    /// Adopts a fault, and allocates everything that it will need.
     pub fn adopt(&mut self, fault: LineFault) {
         for wire in &mut self.stations {
             match fault.trouble {
@@ -172,7 +173,7 @@ impl Wires {
                 _ => {}
             }
         }
-        // Room for all of them at once, so that a tick that lets one begin need not make it.
+        // Reserved for all of them now, so that a tick at which one begins need not allocate.
         let titles = self.faults.iter().chain([&fault]);
         let room = titles.map(|fault| fault.cell.title_len() + 2).sum();
         self.active.clear();
@@ -180,10 +181,10 @@ impl Wires {
         self.faults.push(fault);
     }
 
-    /// Looks which faults are active.
+    /// Looks up which faults are active.
     pub fn look(&mut self) {
         let mut sum = Sum::default();
-        // Chance decides anew: of a fault that is over nothing is left behind.
+        // Decided anew: a fault that is over must not leave anything behind.
         (self.fate, self.repeats) = (Fate::Passes(1), false);
         for wire in &mut self.stations {
             (wire.dead, wire.came, wire.went) = (false, true, true);
@@ -222,14 +223,15 @@ impl Wires {
         self.sum.down
     }
 
-    /// Throws for the active faults that `is_meant` picks the chance of.
+    /// Draws for each active fault for which `is_meant` gives a probability; tells whether any of them hits.
     fn throw(faults: &mut [LineFault], is_meant: impl Fn(Trouble) -> Option<f64>) -> bool {
         let mut happens = false;
         for fault in faults {
             if fault.cell.phase() == Phase::Active
                 && let Some(chance) = is_meant(fault.trouble)
             {
-                // Each one throws, whatever the others threw: its numbers stay its own.
+                // Every fault draws, whether or not another one hit: its sequence of numbers must not depend
+                // on the others.
                 happens |= fault.random.happens(chance);
             }
         }
@@ -248,7 +250,7 @@ impl Wires {
         lost
     }
 
-    /// Whether the frames that went out last go out again in place of new ones. Decided once for all stations of a
+    /// Whether the previous frames are sent again instead of new ones. Decided once for all stations of a
     /// cycle.
     pub fn repeats(&mut self, station: usize) -> bool {
         if std::mem::replace(&mut self.stations[station].went, true) {
@@ -266,19 +268,19 @@ impl Wires {
         self.repeats
     }
 
-    /// Whether nothing of the station gets through.
+    /// Whether nothing gets through to or from the station.
     pub fn is_cut(&self, station: usize) -> bool {
         self.sum.down || self.stations[station].dead
     }
 
-    /// What the bus sends where nothing of the station gets through: what it sent before.
+    /// What the bus sends while the station is cut off: the bytes that it sent before.
     pub fn frozen(&mut self, station: usize) -> &[u8] {
         let out = &mut self.stations[station].out;
         out.given = Given::Nothing;
         &out.current
     }
 
-    /// Takes the image's bytes on their way out; true if the image may take them for sent.
+    /// Takes the image's outgoing bytes; true if the image may regard them as sent.
     pub fn takes(&mut self, station: usize, now: Nanos, image: &[u8]) -> bool {
         let slow = self.sum.slow;
         let out = &mut self.stations[station].out;
@@ -294,12 +296,12 @@ impl Wires {
         true
     }
 
-    /// What goes out: the same as last time, or what [`takes`](Self::takes) made of it.
+    /// The bytes to send: the same as last time, or those chosen by [`takes`](Self::takes).
     pub fn outgoing(&self, station: usize) -> &[u8] {
         &self.stations[station].out.current
     }
 
-    /// The peer has what the bus was given last; true if the image has to know.
+    /// The peer has received what the bus was given last; true if the image must be told.
     pub fn sent(&mut self, station: usize) -> bool {
         let out = &mut self.stations[station].out;
         if out.given != Given::Nothing {
@@ -309,7 +311,7 @@ impl Wires {
         out.given == Given::Image
     }
 
-    /// As [`sent`](Self::sent), for a peer that has these bits alone (bit n of byte k is 8k + n).
+    /// As [`sent`](Self::sent), for a peer that received only these bits (bit n of byte k is 8k + n).
     pub fn sent_bits(&mut self, station: usize, bits: &Range<usize>) -> bool {
         let out = &mut self.stations[station].out;
         if out.given != Given::Nothing {
@@ -323,7 +325,7 @@ impl Wires {
         out.given == Given::Image
     }
 
-    /// Decides what becomes of a frame that came in at `now`, and keeps it if it has to wait.
+    /// Decides what happens to a frame that arrived at `now`, and stores it if it has to wait.
     pub fn arrives(&mut self, station: usize, now: Nanos, bytes: &[u8]) -> Fate {
         if !self.sum.down && std::mem::replace(&mut self.stations[station].came, true) {
             for (index, wire) in self.stations.iter_mut().enumerate() {
@@ -344,7 +346,8 @@ impl Wires {
             return self.fate;
         }
         for _ in 0..times {
-            // Who hands frames in releases before; a ring that is full nonetheless keeps its order.
+            // Callers release before they hand in, so the ring has room; if it is full even so, order is kept
+            // and the frame lost.
             if !ring.is_full() {
                 ring.push(now, bytes);
             }
@@ -372,8 +375,8 @@ impl Wires {
         }
     }
 
-    /// The next received frame whose time has come by `now`. When the ring has hardly room left, the oldest
-    /// goes early: the order stays, and every edge is counted.
+    /// The next held frame that is due by `now`. When the ring is nearly full, the oldest frame is released
+    /// early: the order is kept, and every edge is counted.
     pub fn release(&mut self, station: usize, now: Nanos, into: &mut [u8]) -> bool {
         let delay = self.sum.delay;
         let Some(ring) = &mut self.stations[station].waiting else {
@@ -395,13 +398,13 @@ impl Wires {
         true
     }
 
-    /// Whether received frames of the station wait.
+    /// Whether received frames of the station are held back.
     pub fn holds_back(&self, station: usize) -> bool {
         let ring = self.stations[station].waiting.as_ref();
         ring.is_some_and(|ring| !ring.is_empty())
     }
 
-    /// When the next received frame has waited long enough; [`Nanos::MAX`] if none waits.
+    /// When the next received frame is due; [`Nanos::MAX`] if none is held back.
     pub fn due(&self) -> Nanos {
         let rings = self
             .stations
@@ -412,21 +415,21 @@ impl Wires {
         dues.min().unwrap_or(Nanos::MAX)
     }
 
-    /// The active troubles, in words: `"cable" (link-down)`.
+    /// The active faults, as text: `"cable" (link-down)`.
     pub fn active(&self) -> &str {
         &self.active
     }
 }
 
 impl Outgoing {
-    /// Whether the image's bytes go straight to the bus.
+    /// Whether the image's bytes go to the bus directly.
     fn is_through(&self, slow: Nanos) -> bool {
         slow == Nanos::ZERO
             && self.waiting.as_ref().is_none_or(Ring::is_empty)
             && !(self.given == Given::Held && self.has_unseen(&self.current))
     }
 
-    /// Whether a latched bit of `current`, which the peer has not seen, would be lost if `next` took its place.
+    /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
     fn loses(&self, next: &[u8]) -> bool {
         let bytes = self.current.iter().zip(&self.sent).zip(next);
         let mut bits = bytes.zip(self.watched());
@@ -441,8 +444,8 @@ impl Outgoing {
         bytes.map(|(latched, read)| latched & read)
     }
 
-    /// Whether the peer has read on for so long without the pulse in `current` that it does not read that at all.
-    /// What it does read must not wait for ever.
+    /// Whether the peer has polled for [`PATIENCE`] without reading the pulse in `current`: it does not read
+    /// that bit, and the bits that it does read must not wait forever.
     fn is_left_out(&mut self, now: Nanos) -> bool {
         if !self.reads {
             return false;
@@ -457,13 +460,13 @@ impl Outgoing {
         true
     }
 
-    /// Whether `bytes` have a latched bit that differs from what the peer has seen.
+    /// Whether a latched bit of `bytes` differs from what the peer has seen.
     fn has_unseen(&self, bytes: &[u8]) -> bool {
         let mut bits = bytes.iter().zip(&self.sent).zip(self.watched());
         bits.any(|((bytes, sent), watched)| (bytes ^ sent) & watched != 0)
     }
 
-    /// Holds the image's bytes back and finds what is due by `now`; true if something had to go early.
+    /// Holds the image's bytes back and finds what is due by `now`; true if something was sent early.
     fn hold(&mut self, now: Nanos, slow: Nanos, image: &[u8]) -> bool {
         let mut hurried = false;
         self.given = Given::Held;
@@ -491,7 +494,7 @@ impl Outgoing {
             self.advance();
         }
         if slow == Nanos::ZERO {
-            // The fault is over: values are true at once, edges are shown one by one.
+            // The fault is over: values are current at once, edges are shown one at a time.
             let bytes = self.current.iter_mut().zip(&self.newest);
             for ((current, newest), latched) in bytes.zip(&self.latched) {
                 *current = (*current & latched) | (newest & !latched);
@@ -500,7 +503,7 @@ impl Outgoing {
         hurried
     }
 
-    /// The oldest change that waits becomes what the bus is given.
+    /// Makes the oldest held change the bytes that the bus sends.
     fn advance(&mut self) {
         if let Some(ring) = &mut self.waiting
             && let Some((_, next)) = ring.front()

@@ -12,12 +12,12 @@ pub struct FreeLoopback {
     cycle: Nanos,
 }
 
-/// Where the end comes from.
+/// How the end is obtained.
 #[derive(Debug)]
 enum Place {
-    /// A link to join by its name.
+    /// By joining the link of this name.
     Named(String),
-    /// An end that was handed in.
+    /// It was handed in.
     Given(End),
 }
 
@@ -30,7 +30,7 @@ impl FreeLoopback {
         }
     }
 
-    /// A loopback over an end that exists already.
+    /// A loopback over an existing end.
     pub fn over(end: End, cycle: Nanos) -> Self {
         Self {
             place: Place::Given(end),
@@ -49,7 +49,7 @@ impl Free for FreeLoopback {
     }
 }
 
-/// Exchanges frames every `cycle`, on deadlines that do not drift.
+/// Exchanges frames every `cycle`, on deadlines without drift.
 fn serve(end: &mut End, cycle: Nanos, port: &mut Port, stop: &Stop) {
     port.opening("waiting for the other end of the link");
     let mut pace = Pace::new(port.clock().now(), cycle);

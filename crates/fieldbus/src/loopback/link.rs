@@ -1,4 +1,4 @@
-//! The line of a loopback: two ends in one process that meet by a name.
+//! The line of a loopback: two ends in one process that find each other by a name.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use crate::{BusError, Port, Role};
 use tickbus_base::time::Nanos;
 
-/// The links that have a name, for as long as one of their ends lives.
+/// The named links, as long as one of their ends exists.
 static LINKS: Mutex<Option<HashMap<String, Weak<Mutex<Line>>>>> = Mutex::new(None);
 
 #[derive(Debug, Default)]
 struct Line {
-    /// One for each role, in the order of [`lane`].
+    /// One per role, in the order of [`lane`].
     lanes: [Lane; 2],
 }
 
@@ -21,7 +21,7 @@ struct Lane {
     attached: bool,
     /// Sizes of the frames that the end sends and receives, per station.
     sizes: Vec<(usize, usize)>,
-    /// The frames sent last, of all stations.
+    /// The last frames sent, of all stations.
     frames: Vec<Vec<u8>>,
     /// The other end has not taken the frames yet.
     waiting: bool,
@@ -41,20 +41,20 @@ fn other(role: Role) -> Role {
     }
 }
 
-/// One end of a link; dropping it frees the place.
+/// One end of a link; dropping it frees its place.
 #[derive(Debug)]
 pub struct End {
     line: Arc<Mutex<Line>>,
     role: Role,
     /// Whether this end has sent anything that the other end may have taken.
     sent: bool,
-    /// Whether the other end has been there.
+    /// Whether the other end has been present.
     met: bool,
 }
 
-/// Makes a link that has no name, and both its ends: that of the Device and that of the Controller.
+/// Creates a link without a name, with both its ends: the Device's and the Controller's.
 ///
-/// `sizes` are the bytes that the Device sends and receives, per station.
+/// `sizes` are the numbers of bytes that the Device sends and receives, per station.
 pub fn private_link(sizes: &[(usize, usize)]) -> (End, End) {
     let line = Arc::default();
     let attach =
@@ -70,7 +70,7 @@ fn swapped(sizes: &[(usize, usize)]) -> Vec<(usize, usize)> {
 }
 
 impl End {
-    /// Attaches to the link called `name`, as the end that `port` serves.
+    /// Joins the link called `name`, as the end that `port` serves.
     ///
     /// # Errors
     ///
@@ -131,7 +131,7 @@ impl End {
         self.offer(now, port);
     }
 
-    /// Takes what the other end sent.
+    /// Takes what the other end has sent.
     pub fn take(&mut self, now: Nanos, port: &mut Port) {
         if !self.meets(now, port) {
             return;
@@ -149,8 +149,8 @@ impl End {
 
     /// Offers what the port has.
     ///
-    /// Frames that the other end has not taken yet are overwritten, since the newest counts; their
-    /// pulses are not confirmed before it has taken a frame that shows them.
+    /// Frames that the other end has not taken are overwritten, since only the newest matter; their pulses
+    /// are not confirmed until it takes a frame that shows them.
     pub fn offer(&mut self, now: Nanos, port: &mut Port) {
         if !self.meets(now, port) {
             return;
@@ -180,7 +180,7 @@ impl End {
             self.met = true;
             return true;
         }
-        // What the former other end did not take is old news to the next one.
+        // Frames that the previous other end did not take are outdated for the next one.
         line.lanes[lane(self.role)].waiting = false;
         self.sent = false;
         drop(line);
@@ -199,6 +199,6 @@ impl Drop for End {
 }
 
 fn lock(line: &Mutex<Line>) -> MutexGuard<'_, Line> {
-    // Frames are copied whole under the lock; a panic of the other end leaves them readable.
+    // Frames are copied whole under the lock, so they are readable even after a panic of the other end.
     line.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,8 +1,8 @@
 //! The loopback: both ends of the line in one process.
 //!
-//! Two drivers meet by the name of a link, one as Device, one as Controller; or a PLC program is
-//! hosted at the other end. It is a real bus in all but the wire: frames of fixed size, a cycle of its
-//! own, pulses confirmed when the other end has taken them.
+//! Two drivers meet by the name of a link, one as Device, one as Controller; or a PLC program is hosted at
+//! the other end. Except for the wire it is a real bus: frames of fixed size, its own cycle, and pulses that
+//! are confirmed when the other end has taken them.
 
 mod free;
 mod link;
@@ -14,5 +14,5 @@ pub use stepped::SteppedLoopback;
 
 use tickbus_base::time::Nanos;
 
-/// The bus cycle of a loopback whose driver.cfg states none.
+/// The default bus cycle of a loopback.
 pub const CYCLE: Nanos = Nanos::from_millis(1);

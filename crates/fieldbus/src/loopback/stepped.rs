@@ -1,11 +1,11 @@
-//! The loopback as a bus on the tick's own thread.
+//! The loopback as a bus on the ticking thread.
 
 use crate::{BusError, Port, Stepped};
 use tickbus_base::time::Nanos;
 
 use super::link::End;
 
-/// A stepped loopback: each end exchanges on its own tick, so the order of the ticks alone decides
+/// A stepped loopback: each end exchanges within its own tick, so that only the order of the ticks decides
 /// what is seen.
 #[derive(Debug)]
 pub struct SteppedLoopback {

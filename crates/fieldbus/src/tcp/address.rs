@@ -1,4 +1,4 @@
-//! Hosts and ports, as a driver.cfg and a command line write them.
+//! Hosts and ports, as written in a driver.cfg and on a command line.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -6,29 +6,29 @@ use std::str::FromStr;
 
 use tickbus_base::toml_text::{Value, shown};
 
-/// The longest name of a host, as DNS has it.
+/// The longest host name in DNS.
 const HOST_LIMIT: usize = 253;
 
-/// A host and a port of it.
+/// A host and a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Address {
     /// The host.
     pub host: Host,
-    /// The port; 0 lets the system choose one, where somebody listens.
+    /// The port; when listening, 0 lets the system choose one.
     pub port: u16,
 }
 
 /// A host, by number or by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Host {
-    /// By number.
+    /// By its address.
     Ip(IpAddr),
-    /// By a name that has to be looked up.
+    /// By a name that must be looked up.
     Name(String),
 }
 
 impl Address {
-    /// A port of this machine, for this machine alone.
+    /// A port on this machine, reachable only from this machine.
     pub const fn local(port: u16) -> Self {
         Self {
             host: Host::Ip(IpAddr::V4(Ipv4Addr::LOCALHOST)),
@@ -36,7 +36,7 @@ impl Address {
         }
     }
 
-    /// Reads the value of the key `address`, and reports what is wrong with it.
+    /// Reads the value of the key `address`, and reports mistakes in it.
     pub fn read(value: &Value<'_>) -> Option<Self> {
         let text = value.text("write a host and a port in quotes, such as \"127.0.0.1:20030\"")?;
         text.parse()
@@ -44,11 +44,11 @@ impl Address {
             .ok()
     }
 
-    /// Checks that an end that makes the connection can use it.
+    /// Checks that it can be connected to.
     ///
     /// # Errors
     ///
-    /// Port 0 is no port that somebody listens on.
+    /// Nothing can listen on port 0.
     pub fn check_dialled(&self) -> Result<(), AddressError> {
         if self.port == 0 {
             return Err(AddressError {
@@ -62,7 +62,7 @@ impl Address {
     }
 }
 
-/// Why a text is no address.
+/// Why a text is not an address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; {right}")]
 pub struct AddressError {
@@ -92,7 +92,7 @@ impl FromStr for Address {
                 "write an IPv6 address in brackets, such as \"[::1]:20030\"",
             );
         }
-        // A sign is none of the digits that `parse` alone would let through.
+        // `parse` alone would accept a plus sign.
         let port = digits.parse().ok().filter(|_| !digits.starts_with('+'));
         let Some(port) = port else {
             let what = format!("\"{}\" is no port", shown(digits));
@@ -130,7 +130,7 @@ impl FromStr for Host {
         if let Ok(ip) = text.parse::<Ipv4Addr>() {
             return Ok(Self::Ip(ip.into()));
         }
-        // The name that every machine has for itself needs no look-up, and is one address, not two.
+        // This name means this machine everywhere; one address without a look-up, rather than two.
         if text.eq_ignore_ascii_case("localhost") {
             return Ok(Self::Ip(Ipv4Addr::LOCALHOST.into()));
         }

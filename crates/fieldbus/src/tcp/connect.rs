@@ -1,4 +1,4 @@
-//! Making a connection.
+//! Connecting.
 
 use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, TcpStream};
@@ -16,13 +16,13 @@ use super::{Address, no_wait};
 /// How long an address has to answer. The system itself would try for minutes.
 const PATIENCE: Nanos = Nanos::from_secs(5);
 
-/// Connects, without waiting for more than some seconds, and without blocking; `None` when `stop` came first.
+/// Connects without blocking, within a few seconds; `None` if `stop` came first.
 ///
-/// The stream is as the system gives it, but that it never waits; see [`prepare`](super::prepare).
+/// The stream is non-blocking, and otherwise as the system creates it; see [`prepare`](super::prepare).
 ///
 /// # Errors
 ///
-/// The host is not known, or nobody answers there.
+/// The host is unknown, or does not answer.
 pub fn connect(
     address: &Address,
     poller: &mut Poller,
@@ -41,7 +41,7 @@ pub fn connect(
     Ok(Some((stream, peer)))
 }
 
-/// Tries one address of a host after the other; `None` when `stop` came first.
+/// Tries the addresses of a host one after another; `None` if `stop` came first.
 fn reach_any(
     addresses: &[SocketAddr],
     poller: &mut Poller,
@@ -83,8 +83,8 @@ fn reach(
             if let Some(error) = stream.take_error()? {
                 return Err(error);
             }
-            // A port that nobody listens on may connect to itself, if the system happens to choose it
-            // for this end.
+            // If the system happens to choose the destination port for this end, the socket connects to
+            // itself.
             if stream.local_addr()? == stream.peer_addr()? {
                 return Err(ErrorKind::ConnectionRefused.into());
             }
@@ -97,7 +97,7 @@ fn reach(
     Ok(None)
 }
 
-/// Begins to connect, and does not wait.
+/// Starts to connect, without waiting.
 fn begin(address: SocketAddr) -> io::Result<TcpStream> {
     let socket = Socket::new(
         Domain::for_address(address),

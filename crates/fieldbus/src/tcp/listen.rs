@@ -1,4 +1,4 @@
-//! Waiting for connections.
+//! Listening for connections.
 
 use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, TcpListener};
@@ -9,11 +9,11 @@ use tickbus_base::time::Stop;
 use super::Address;
 use super::resolve::resolve;
 
-/// Listens on `address`, without blocking; gives what was bound; `None` when `stop` came first.
+/// Listens on `address`, without blocking; returns what was bound, or `None` if `stop` came first.
 ///
 /// # Errors
 ///
-/// The host is not known, or the address cannot be listened on.
+/// The host is unknown, or the address cannot be listened on.
 pub fn listen(
     address: &Address,
     port: &mut Port,
@@ -47,7 +47,7 @@ pub fn listen(
     Ok(Some((listener, bound)))
 }
 
-/// Counts a client for which the system gave no socket, and tells the log.
+/// Counts a client for which the system had no socket, and logs that.
 pub fn not_accepted(error: &io::Error, port: &Port) {
     port.count("clients.not_accepted");
     port.log(
@@ -59,7 +59,7 @@ pub fn not_accepted(error: &io::Error, port: &Port) {
     );
 }
 
-/// Whether accepting failed for a reason that lies with the one client.
+/// Whether accepting failed for a reason that concerns only this client.
 pub fn is_of_the_client(error: &io::Error) -> bool {
     matches!(
         error.kind(),

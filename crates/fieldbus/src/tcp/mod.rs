@@ -1,5 +1,4 @@
-//! TCP, for all buses that go over it: addresses, making and awaiting connections, and a server for many
-//! clients.
+//! TCP for all buses that use it: addresses, connecting and listening, and a server for many clients.
 
 mod address;
 mod connect;
@@ -17,7 +16,7 @@ pub use server::serve;
 pub use server::{Limits, Service};
 pub use stream::{bow_out, is_for_later, prepare};
 
-/// The system does not let this thread wait, or not for this socket.
+/// The system cannot wait on this thread, or for this socket.
 pub fn no_wait(error: &std::io::Error) -> BusError {
     BusError::Link(format!(
         "the system cannot wait for the socket ({error}); close other programs or raise the limit of \

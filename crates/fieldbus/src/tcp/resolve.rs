@@ -1,4 +1,4 @@
-//! From a host to its addresses.
+//! Resolving hosts.
 
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs as _};
@@ -9,14 +9,14 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 
 use super::{Address, Host};
 
-/// All addresses of a host, with its port; `None` when `stop` came first.
+/// All addresses of a host, with its port; `None` if `stop` came first.
 ///
-/// A name is looked up on a thread of its own, as nothing ends a look-up: closing leaves it behind, to
-/// end by itself.
+/// A name is looked up on a separate thread, because a look-up cannot be cancelled: closing leaves the thread
+/// behind, to end by itself.
 ///
 /// # Errors
 ///
-/// The name is not known, or cannot be looked up.
+/// The name is unknown, or cannot be looked up.
 pub(super) fn resolve(
     address: &Address,
     clock: &dyn Clock,
@@ -38,7 +38,7 @@ pub(super) fn resolve(
         let (stop, target) = (stop.clone(), (name.clone(), address.port));
         move || {
             let found = target.to_socket_addrs().map(Iterator::collect);
-            // Nobody may be left to tell.
+            // The receiver may be gone.
             let _ = sender.send(found);
             stop.wake();
         }
@@ -99,7 +99,7 @@ mod tests {
     fn a_stop_waits_for_no_look_up() {
         let stop = Stop::new();
         stop.stop();
-        // Whichever of the two is first: neither is waited for longer than the other.
+        // Either result is fine: neither is waited for any longer than the other.
         let found = resolve(&named("localhost"), &*Manual::new(), &stop);
         assert!(matches!(found, Ok(None | Some(_))));
     }

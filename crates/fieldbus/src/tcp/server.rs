@@ -1,4 +1,4 @@
-//! A server for many clients, over whatever protocol its [`Service`] speaks.
+//! A server for many clients, for any protocol that implements [`Service`].
 
 use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -11,48 +11,48 @@ use super::{
     Address, bow_out, is_for_later, is_of_the_client, listen, no_wait, not_accepted, prepare,
 };
 
-/// The key of the listener in the poll set; those of clients are their places.
+/// The key of the listener in the poll set; a client's key is its place.
 const LISTENER: usize = usize::MAX - 1;
 
-/// So many clients are accepted at most before others are looked at.
+/// At most this many clients are accepted per turn, before others are served.
 const ACCEPTS: usize = 32;
 
-/// For how long nobody is accepted after the system gave no socket.
+/// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// What a server allows its clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// The longest telegram of the protocol, in bytes. A client that sends so many bytes which are none yet
-    /// breaks the protocol.
+    /// The longest telegram of the protocol, in bytes. A client that sends this many bytes without a complete
+    /// telegram violates the protocol.
     pub telegram: usize,
-    /// How many clients are served at once.
+    /// How many clients are served at the same time.
     pub clients: usize,
-    /// How long a client may take for a telegram that it has begun, or to read an answer.
+    /// How long a client may take to complete a telegram, or to read an answer.
     pub patience: Nanos,
 }
 
-/// A protocol, as a server speaks it with each of its clients: bytes in, bytes out, and the image behind the
-/// port. It does no I/O of its own.
+/// A protocol as the server speaks it with each client: bytes in, bytes out, and the image behind the port.
+/// It does no I/O itself.
 pub trait Service {
-    /// What is remembered of one client.
+    /// The state of one client.
     type Client;
 
-    /// What the server allows.
+    /// The limits for clients.
     fn limits(&self) -> Limits;
 
     /// A client has connected.
     fn welcome(&mut self, now: Nanos) -> Self::Client;
 
-    /// Looks at the bytes of a client that have come and are not consumed.
+    /// Examines the bytes received from a client and not yet consumed.
     ///
-    /// Gives how many of them the telegram at their beginning has, and appends the answer to `reply` if there
-    /// is one; 0 when the telegram is not whole yet. It is called again until it gives 0.
+    /// Returns the length of the telegram at their beginning, and appends the answer, if any, to `reply`; 0
+    /// if the telegram is not complete yet. It is called again until it returns 0.
     ///
     /// # Errors
     ///
-    /// The client does not keep to the protocol. It is dropped, and others are served on; what it was sent
-    /// in `reply` still goes out.
+    /// The client violates the protocol. It is disconnected, after what is in `reply` was sent; others are
+    /// served as before.
     fn telegram(
         &mut self,
         client: &mut Self::Client,
@@ -62,12 +62,12 @@ pub trait Service {
         port: &mut Port,
     ) -> Result<usize, BusError>;
 
-    /// The system has taken all answers that the last calls of [`telegram`](Self::telegram) for this client
-    /// made. It is not called for answers that had to wait for a slow client.
+    /// The system has accepted all answers made by the last calls of [`telegram`](Self::telegram) for this
+    /// client. Not called for answers that had to wait for a slow client.
     fn replied(&mut self, client: &mut Self::Client, port: &mut Port);
 }
 
-/// Serves all clients that come, until `stop`. What one of them does is no matter for the others.
+/// Serves all clients until `stop`. No client affects another one.
 ///
 /// # Errors
 ///
@@ -105,7 +105,7 @@ pub fn serve<S: Service>(
     Ok(())
 }
 
-/// So many bytes are read from a client at most before others are looked at.
+/// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 4096;
 
 struct Server<'a, S: Service> {
@@ -115,27 +115,27 @@ struct Server<'a, S: Service> {
     listener: TcpListener,
     set: PollSet,
     clients: Clients<S::Client>,
-    /// What is read, from one client after the other.
+    /// The receive buffer, shared by all clients.
     buffer: Box<[u8]>,
-    /// What is answered, to one client after the other.
+    /// The answer to the current client.
     reply: Vec<u8>,
     ready: Vec<Ready>,
-    /// Until when nobody is accepted, after the system could not.
+    /// Until when no client is accepted, after the system had no socket.
     deaf_until: Option<Nanos>,
-    /// When and why the last one that spoke took leave, while it may yet come back: many a client connects anew
-    /// for each request, and its line is no broken one.
+    /// When and why the last client that had spoken left, as long as it may come back: some clients connect
+    /// anew for every request, which does not make the line broken.
     gone: Option<(Nanos, BusError)>,
 }
 
-/// The clients, each at a place of its own; places are used again.
+/// The clients, each at an index; indices are reused.
 struct Clients<C> {
     places: Vec<Option<Client<C>>>,
     free: Vec<usize>,
-    /// How many there are.
+    /// The number of clients.
     count: usize,
-    /// How many of them have said anything that made sense.
+    /// The number of clients that have sent a valid telegram.
     speakers: usize,
-    /// How many of them somebody waits for.
+    /// The number of clients that owe something: the rest of a telegram, or reading an answer.
     awaited: usize,
 }
 
@@ -143,14 +143,14 @@ struct Client<C> {
     stream: TcpStream,
     peer: SocketAddr,
     state: C,
-    /// When it was last heard of: a whole telegram, or its coming.
+    /// When it was last heard from: a complete telegram, or its connection.
     heard: Nanos,
     speaks: bool,
-    /// Bytes of a telegram that is not whole yet.
+    /// Bytes of an incomplete telegram.
     begun: Vec<u8>,
-    /// Bytes of an answer that the system has not taken yet.
+    /// Bytes of an answer that the system has not accepted yet.
     unsent: Vec<u8>,
-    /// Since when either of them has waited.
+    /// Since when either of them has been waiting.
     waits_since: Option<Nanos>,
 }
 
@@ -191,7 +191,7 @@ impl<C> Clients<C> {
         places.filter_map(|(place, client)| Some((place, client.as_ref()?)))
     }
 
-    /// Whoever has been silent for longest.
+    /// The client that has been silent for longest.
     fn most_silent(&self) -> Option<(usize, Nanos)> {
         let times = self.iter().map(|(place, client)| (place, client.heard));
         times.min_by_key(|(_, heard)| *heard)
@@ -237,7 +237,7 @@ impl<S: Service> Server<'_, S> {
         Ok(())
     }
 
-    /// When something is due even if nobody says anything.
+    /// The next time at which something is due even without traffic.
     fn deadline(&self, port: &Port) -> Nanos {
         let mut deadline = port.due().min(self.deaf_until.unwrap_or(Nanos::MAX));
         if self.clients.speakers > 0 {
@@ -254,7 +254,7 @@ impl<S: Service> Server<'_, S> {
         deadline
     }
 
-    /// Reads from a client, answers it, or goes on with an answer that had to wait.
+    /// Reads from a client and answers it, or continues an answer that had to wait.
     fn attend(
         &mut self,
         place: usize,
@@ -267,14 +267,14 @@ impl<S: Service> Server<'_, S> {
         };
         if !client.unsent.is_empty() {
             if is_writable && client.write_on()? {
-                // What it has begun has its time from now on, since nobody read the rest of it.
+                // Its incomplete telegram is timed from now on, since the server has not read from it before.
                 client.waits_since = (!client.begun.is_empty()).then_some(now);
                 self.clients.awaited -= usize::from(client.waits_since.is_none());
                 let client = &*client;
                 let heard = self.set.change(place, &client.stream, Interest::Read);
                 heard.map_err(|error| no_wait(&error))?;
             }
-            // Who does not read is not read.
+            // A client that does not read its answers is not read from.
             return Ok(());
         }
         let count = match client.stream.read(&mut self.buffer) {
@@ -284,7 +284,7 @@ impl<S: Service> Server<'_, S> {
             Err(error) => return Err(client.broke(&error)),
         };
         if port.is_down(now) {
-            // The cable is out: nothing arrives, and half of a telegram helps nobody.
+            // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();
             self.clients.awaited -= usize::from(client.waits_since.take().is_some());
             return Ok(());
@@ -304,7 +304,7 @@ impl<S: Service> Server<'_, S> {
         };
         if telegrams > 0 {
             client.heard = now;
-            // What is begun now is another telegram, with a time of its own.
+            // The incomplete part belongs to another telegram, which has its own time.
             client.waits_since = client.waits_since.map(|_| now);
             if !client.speaks {
                 client.speaks = true;
@@ -324,7 +324,7 @@ impl<S: Service> Server<'_, S> {
         }
     }
 
-    /// Sends what was answered, and takes note of what the client owes now.
+    /// Sends the answers, and updates what the client owes.
     fn send(&mut self, place: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(client) = self.clients.places[place].as_mut() else {
             return Ok(());
@@ -355,7 +355,7 @@ impl<S: Service> Server<'_, S> {
         Ok(())
     }
 
-    /// Drops those who have been waited for too long.
+    /// Disconnects clients that have kept the server waiting too long.
     fn judge(&mut self, now: Nanos, port: &mut Port) {
         if self.clients.awaited == 0 {
             return;
@@ -380,7 +380,7 @@ impl<S: Service> Server<'_, S> {
                 Err(error) => {
                     not_accepted(&error, port);
                     self.deaf_until = Some(now + PAUSE);
-                    // Removing cannot fail.
+                    // Removing from the set cannot fail.
                     let _ = self.listen(false);
                     return;
                 }
@@ -400,7 +400,7 @@ impl<S: Service> Server<'_, S> {
     }
 
     fn welcome(&mut self, stream: TcpStream, peer: SocketAddr, now: Nanos, port: &mut Port) {
-        // Gone again before it was there, if it cannot be prepared.
+        // If it cannot be prepared, it is gone already.
         if let Err(error) = prepare(&stream, self.limits.patience) {
             log::debug!("the connection with {peer} broke at once: {error}");
             return;
@@ -437,7 +437,7 @@ impl<S: Service> Server<'_, S> {
         log::debug!("{peer} has connected");
     }
 
-    /// Ends the client that has been silent for longest, if that is long enough.
+    /// Disconnects the client that has been silent for longest, if that is long enough.
     fn make_room(&mut self, now: Nanos, port: &mut Port) -> bool {
         let Some((place, heard)) = self.clients.most_silent() else {
             return false;
@@ -490,7 +490,8 @@ impl<S: Service> Server<'_, S> {
 }
 
 impl<C> Client<C> {
-    /// Takes in `bytes`, and answers the telegrams that they complete into `reply`. Gives how many there were.
+    /// Takes in `bytes` and answers the telegrams that they complete into `reply`. Returns the number of
+    /// telegrams.
     fn hear<S: Service<Client = C>>(
         &mut self,
         bytes: &[u8],
@@ -500,7 +501,7 @@ impl<C> Client<C> {
         reply: &mut Vec<u8>,
         port: &mut Port,
     ) -> Result<usize, (usize, BusError)> {
-        // The usual client sends whole telegrams, which need not be copied.
+        // Clients usually send whole telegrams, which need not be copied.
         let mut begun = std::mem::take(&mut self.begun);
         let bytes = if begun.is_empty() {
             bytes
@@ -530,7 +531,7 @@ impl<C> Client<C> {
         Ok(telegrams)
     }
 
-    /// Goes on with an answer; whether that was all of it.
+    /// Continues an answer; returns whether all of it was sent.
     fn write_on(&mut self) -> Result<bool, BusError> {
         match self.stream.write(&self.unsent) {
             Ok(count) => {
@@ -575,7 +576,7 @@ impl<C> Client<C> {
     }
 }
 
-/// The error of a service, with the name of the client.
+/// The error of a service, with the client's address.
 fn of_peer(peer: SocketAddr, error: &BusError) -> BusError {
     let named = |text: &str| format!("{peer}: {text}");
     match error {

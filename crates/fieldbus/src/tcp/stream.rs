@@ -1,4 +1,4 @@
-//! What every connection needs of the system.
+//! System settings that every connection needs.
 
 use std::io::{self, ErrorKind, Read as _};
 use std::net::{Shutdown, TcpStream};
@@ -7,16 +7,16 @@ use socket2::SockRef;
 
 use tickbus_base::time::Nanos;
 
-/// So many times a socket is read at most when it is closed.
+/// How many times a socket is read at most while it is being closed.
 const READS: usize = 64;
 
-/// The longest that the system is asked to be patient: it takes no times beyond some hours.
+/// The longest time-out that is set: systems accept no more than some hours.
 const LONGEST: Nanos = Nanos::from_secs(3600);
 
-/// Takes leave in good order before a connection is closed: unread bytes would make the system reset it,
-/// and the peer lose what it has not read yet.
+/// Closes the sending direction before a connection is closed: with unread bytes the system would reset the
+/// connection, and the peer would lose what it has not read yet.
 pub fn bow_out(mut stream: &TcpStream) {
-    // What fails here has failed already.
+    // If this fails, the connection has failed already.
     let _ = stream.shutdown(Shutdown::Write);
     let mut unread = [0; 4096];
     for _ in 0..READS {
@@ -26,12 +26,12 @@ pub fn bow_out(mut stream: &TcpStream) {
     }
 }
 
-/// Whether it did not fail, and only has to be tried again when the socket is ready.
+/// Whether this is no failure, and the call has to be repeated when the socket is ready.
 pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
-/// Makes the system send at once, never wait, and give up after `patience` a peer whose cable was pulled.
+/// Makes the system send at once, never block, and give up after `patience` on a peer whose cable was pulled.
 pub fn prepare(stream: &TcpStream, patience: Nanos) -> io::Result<()> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
@@ -39,7 +39,7 @@ pub fn prepare(stream: &TcpStream, patience: Nanos) -> io::Result<()> {
     let socket = SockRef::from(stream);
     #[cfg(any(target_os = "linux", target_os = "android"))]
     socket.set_tcp_user_timeout(Some(limit))?;
-    // For a peer that has nothing to say; whole seconds are all that the system knows.
+    // Keep-alive, for a peer that has nothing to send; the system counts it in whole seconds.
     let pause = limit.max(std::time::Duration::from_secs(1));
     let keepalive = socket2::TcpKeepalive::new()
         .with_time(pause)

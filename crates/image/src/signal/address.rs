@@ -65,12 +65,12 @@ impl Width {
         }
     }
 
-    /// In how many bytes those bits lie: one for a bit.
+    /// The number of bytes that contain those bits: one for a bit.
     pub const fn bytes(self) -> usize {
         self.bits().div_ceil(8)
     }
 
-    /// The type of an address that states none: BOOL, BYTE, WORD, DWORD or LWORD.
+    /// The default type of a signal at such an address: BOOL, BYTE, WORD, DWORD or LWORD.
     pub const fn data_type(self) -> DataType {
         match self {
             Self::Bit => DataType::Bool,
@@ -94,12 +94,12 @@ pub enum Addressing {
     /// Bytes, as Siemens does: `%IW2` is bytes 2 and 3.
     #[default]
     Bytes,
-    /// Elements of the address's own size, as CODESYS does: `%IW1` is bytes 2 and 3. The first
-    /// number of a bit address is a byte here, too.
+    /// Elements of the address's own size, as CODESYS does: `%IW1` is bytes 2 and 3. The first number of a
+    /// bit address counts bytes even so.
     Elements,
 }
 
-/// A place in the process image of one station.
+/// An address in the process image of one station.
 ///
 /// Its text form counts bytes: `%QX1.0` is bit 0 of byte 1, `%IW4` bytes 4 and 5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -114,7 +114,7 @@ pub struct Address {
     pub bit: u8,
 }
 
-/// Why a text is not an address, and what would be one.
+/// Why a text is not an address, and what would be right.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; {right}")]
 pub struct AddressError {
@@ -138,7 +138,7 @@ impl Address {
     ///
     /// # Errors
     ///
-    /// When the text is no address of a PLC's inputs or outputs, or one beyond [`AREA_LIMIT`].
+    /// When the text is not an address of a PLC's inputs or outputs, or is beyond [`AREA_LIMIT`].
     pub fn parse(text: &str, addressing: Addressing) -> Result<Self, AddressError> {
         let shown = shorten(text);
         let upper = text.trim().to_ascii_uppercase();
@@ -205,7 +205,7 @@ impl Address {
         })
     }
 
-    /// The first of its bits and the one after its last, counted from the start of the area.
+    /// The range of its bits, counted from the start of the area.
     pub fn bits(self) -> std::ops::Range<usize> {
         let start = self.byte * 8 + usize::from(self.bit);
         start..start + self.width.bits()
@@ -214,7 +214,7 @@ impl Address {
 
 const EXAMPLES: &str = "addresses look like %QX1.0 (bit), %IB4 (byte), %QW2 (word), %ID8, %IL16";
 
-/// The bit of an address: there for `X` alone, 0 to 7.
+/// The bit number of an address: only `X` has one, from 0 to 7.
 fn bit_of(
     area: Area,
     width: Width,
@@ -262,7 +262,7 @@ fn bit_of(
     }
 }
 
-/// An area that no fieldbus carries, or none at all.
+/// The error for an area that no fieldbus carries, or that does not exist.
 fn foreign_area(shown: &str, rest: &str, letter: Option<char>) -> AddressError {
     match letter {
         Some('M') => AddressError::new(
@@ -284,13 +284,13 @@ fn foreign_area(shown: &str, rest: &str, letter: Option<char>) -> AddressError {
     }
 }
 
-/// A decimal number without sign; what does not fit becomes a number beyond every limit.
+/// A decimal number without sign; one that does not fit becomes a number beyond every limit.
 fn number(text: &str) -> Option<usize> {
     let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     digits.then(|| text.parse().unwrap_or(usize::MAX / 16))
 }
 
-/// The text as a message may show it.
+/// The text as messages quote it.
 fn shorten(text: &str) -> String {
     tickbus_base::toml_text::shown(text)
 }

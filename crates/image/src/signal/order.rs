@@ -4,7 +4,7 @@ use std::fmt;
 
 /// How the bytes of a multi-byte value lie in the image; `A` is the most significant byte.
 ///
-/// For 64-bit values the letters name 16-bit words in the same manner, as Modbus gateways do.
+/// For 64-bit values the letters stand for 16-bit words in the same way, as Modbus gateways do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ByteOrder {
     /// Big-endian, as Siemens and most fieldbuses send.
@@ -19,7 +19,7 @@ pub enum ByteOrder {
 }
 
 impl ByteOrder {
-    /// All of them.
+    /// All byte orders.
     pub const ALL: [Self; 4] = [Self::Abcd, Self::Cdab, Self::Badc, Self::Dcba];
 
     /// The letters: `ABCD`, `CDAB`, `BADC` or `DCBA`.
@@ -32,10 +32,10 @@ impl ByteOrder {
         }
     }
 
-    /// Where the byte with this significance lies in the image.
+    /// The position in the image of the byte with this significance, as an offset from the value's first
+    /// byte.
     ///
-    /// `size` is that of the value in bytes: 1, 2, 4 or 8. `significance` 0 is its least significant
-    /// byte. The answer is an offset from the value's first byte.
+    /// `size` is that of the value in bytes: 1, 2, 4 or 8. `significance` 0 is its least significant byte.
     pub const fn byte_position(self, size: usize, significance: usize) -> usize {
         let big_endian = size - 1 - significance;
         if size < 2 {
@@ -49,8 +49,8 @@ impl ByteOrder {
         }
     }
 
-    /// Where bit `bit` of a value of `size` bytes lies: byte offset from the value's first byte, and
-    /// bit within that byte.
+    /// The position of bit `bit` of a value of `size` bytes: byte offset from the value's first byte, and bit
+    /// within that byte.
     ///
     /// Bit n of a big-endian WORD at byte k is byte k + 1 − n/8, bit n mod 8.
     pub const fn bit_position(self, size: usize, bit: usize) -> (usize, usize) {
@@ -68,7 +68,7 @@ impl fmt::Display for ByteOrder {
 mod tests {
     use super::*;
 
-    /// The letters of a value in the order in which they lie in the image.
+    /// The letters of a value in the order of its bytes in the image.
     fn letters(order: ByteOrder, size: usize) -> String {
         let mut image = vec!['?'; size];
         for (place, letter) in ('A'..).take(size).enumerate() {

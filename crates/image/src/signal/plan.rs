@@ -1,8 +1,8 @@
 //! The codec plan: how slots become frame bytes and back, compiled once from the signal table.
 //!
-//! Compiling sorts the signals into *runs*, each converted by one loop that was generated for its
-//! type, byte order and scaling. Nothing is decided per signal any more at run time, and encoding
-//! and decoding neither allocate nor wait.
+//! Compiling sorts the signals into *runs*, each converted by one loop that is monomorphised for its type,
+//! byte order and scaling. At run time nothing is decided per signal, and encoding and decoding neither
+//! allocate nor block.
 
 mod bits;
 mod number;
@@ -15,10 +15,10 @@ use self::number::{Codec, Integer64, Number, Real, Unscaled};
 use self::run::{Gaps, Member, Run};
 use super::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot};
 
-/// What encoding had to bend, as counts.
+/// How many values could not be encoded as they were.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conversions {
-    /// Values beyond the range of their type, replaced by the nearest end of it.
+    /// Values beyond the range of their type, replaced by its nearest limit.
     pub saturated: u32,
     /// NaN values, replaced by the signal's fail-safe value.
     pub not_a_number: u32,
@@ -34,23 +34,22 @@ pub fn fail_safe_frame(table: &SignalTable, station: usize, area: Area) -> Box<[
     frame.into()
 }
 
-/// The way between slots and one frame (one area of one station).
+/// The conversion between slots and one frame (one area of one station).
 ///
-/// A raw number is (value − offset) / gain where the signal has a scale, the value itself where it
-/// has none; decoding is raw × gain + offset. While encoding,
+/// The raw number of a signal with a scale is (value − offset) / gain; without a scale it is the value
+/// itself. Decoding is raw × gain + offset. Encoding has these rules:
 ///
-/// - integers round half away from zero, and what then lies beyond the type saturates; so do
-///   infinities;
-/// - a REAL beyond ±[`f32::MAX`] and an LREAL beyond ±[`f64::MAX`] saturate there, but an infinite
-///   value stays infinite, as these types have infinities;
-/// - NaN becomes the signal's fail-safe value (zero should that be NaN as well);
-/// - a BOOL is 0 for zero of either sign and 1 for all else but NaN.
+/// - integers round half away from zero, and results beyond the type's range saturate, infinities included;
+/// - a REAL beyond ±[`f32::MAX`] and an LREAL beyond ±[`f64::MAX`] saturate there, but infinite values stay
+///   infinite, because these types have infinities;
+/// - NaN becomes the signal's fail-safe value (zero if that is NaN as well);
+/// - a BOOL is 0 for zero of either sign, and 1 for everything else except NaN.
 ///
-/// Decoding bends nothing: a REAL that is NaN or infinite comes out as it is, a BOOL as 0.0 or 1.0.
-/// An unscaled LWORD, LINT or ULINT passes as the 64 bits that it is, both ways.
+/// Decoding changes nothing: a REAL that is NaN or infinite stays so, a BOOL becomes 0.0 or 1.0. An unscaled
+/// LWORD, LINT or ULINT passes bit by bit in both directions.
 #[derive(Debug)]
 pub struct Plan {
-    /// How many slots and frame bytes the plan reaches over.
+    /// The number of slots and frame bytes that the plan needs.
     slots: usize,
     bytes: usize,
     runs: Vec<Box<dyn Run>>,
@@ -60,9 +59,9 @@ pub struct Plan {
 impl Plan {
     /// Compiles the plan for `area` of the station with index `station`.
     ///
-    /// Slot numbers are positions in `table.signals`. Frames must be as long as the station says; a
-    /// longer frame's further bytes stay untouched. Signals that overlap are the checked table's
-    /// business: here it is not defined which of them is encoded.
+    /// Slot numbers are positions in `table.signals`. Frames must be as long as the station's area; further
+    /// bytes of a longer frame are not touched. The table is expected to be checked: which of two overlapping
+    /// signals is encoded is unspecified.
     pub fn new(table: &SignalTable, station: usize, area: Area) -> Self {
         let members: Vec<Member> = (table.signals.iter().enumerate())
             .filter(|(_, signal)| signal.station == station && signal.area == area)
@@ -94,7 +93,7 @@ impl Plan {
     ///
     /// # Panics
     ///
-    /// When `frame` or `slots` is shorter than the plan was made for.
+    /// When `frame` or `slots` is shorter than the plan needs.
     pub fn encode(&self, slots: &[Slot], frame: &mut [u8]) -> Conversions {
         self.check(slots.len(), frame.len());
         let mut conversions = Conversions::default();
@@ -104,11 +103,11 @@ impl Plan {
         conversions
     }
 
-    /// Decodes `frame` into the area's slots; other slots stay untouched.
+    /// Decodes `frame` into the area's slots; other slots are not touched.
     ///
     /// # Panics
     ///
-    /// When `frame` or `slots` is shorter than the plan was made for.
+    /// When `frame` or `slots` is shorter than the plan needs.
     pub fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
         self.check(slots.len(), frame.len());
         for run in &self.runs {
@@ -120,7 +119,7 @@ impl Plan {
     ///
     /// # Panics
     ///
-    /// When `slots` is shorter than the plan was made for.
+    /// When `slots` is shorter than the plan needs.
     pub fn fail_safe(&self, slots: &mut [Slot]) {
         self.check(slots.len(), self.bytes);
         for (slot, fail_safe) in &self.fail_safes {
@@ -128,7 +127,7 @@ impl Plan {
         }
     }
 
-    /// The one check of lengths: whatever passes it stays in bounds everywhere below.
+    /// The only check of lengths: all indices below are within what it has checked.
     fn check(&self, slots: usize, bytes: usize) {
         assert!(
             slots >= self.slots && bytes >= self.bytes,
@@ -148,7 +147,7 @@ struct Kind {
 }
 
 impl Kind {
-    /// Types and orders that mean the same bytes are one kind, so that their signals share runs.
+    /// Types and orders with the same bytes are one kind, so that their signals share runs.
     fn of(signal: &Signal) -> Self {
         let scaled = signal.scale.is_some();
         let data_type = match signal.data_type {
@@ -242,7 +241,7 @@ fn gaps(members: &[Member], frame_bytes: usize) -> Vec<Range<usize>> {
     gaps
 }
 
-/// A slot or byte number as runs keep it: half as wide, so that twice as many fit into the cache.
+/// A slot or byte number as runs store it: half the size, so that twice as many fit into the cache.
 fn index(number: usize) -> u32 {
     u32::try_from(number).expect("signal tables and frames have fewer than 2^32 slots and bytes")
 }

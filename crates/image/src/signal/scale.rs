@@ -12,8 +12,8 @@ pub struct Scale {
 impl Scale {
     /// The line through two points: raw `raw[0]` is `value[0]`, raw `raw[1]` is `value[1]`.
     ///
-    /// `None` when the points give no line that can be followed both ways in doubles: equal raw or
-    /// equal values, numbers that are not finite, or a slope beyond what a double holds.
+    /// `None` when the points give no line that can be inverted in doubles: equal raw or equal values,
+    /// numbers that are not finite, or a slope beyond the range of a double.
     pub fn through(raw: [f64; 2], value: [f64; 2]) -> Option<Self> {
         let gain = (value[1] - value[0]) / (raw[1] - raw[0]);
         let offset = value[0] - raw[0] * gain;

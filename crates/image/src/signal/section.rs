@@ -10,49 +10,48 @@ pub const NAME_LIMIT: usize = 120;
 /// The longest unit, in characters.
 const UNIT_LIMIT: usize = 40;
 
-/// What is right where a station is named.
+/// The remedy where a station should be named.
 pub const STATION: &str = "write the name of a [[station]] in quotes";
 
-/// One `[[signal]]` section, read by itself.
+/// One `[[signal]]` section, read on its own.
 #[derive(Debug)]
 pub struct Section<'a> {
-    /// The signal. Its name is empty when the section has no good one, and its station is not yet
-    /// looked up.
+    /// The signal. Its name is empty when the section has no valid one, and its station is not yet looked up.
     pub signal: Signal,
-    /// Where the name stands, if it is good.
+    /// The value of `name`, if valid.
     pub name: Option<Value<'a>>,
-    /// Where the address stands.
+    /// The value of `address`.
     pub address: Value<'a>,
-    /// The station that it names.
+    /// The value of `station`.
     pub station: Option<Value<'a>>,
-    /// The structure that it is one of many signals of.
+    /// The structure that it is a part of, if any.
     pub structure: Option<Structure>,
 }
 
-/// A structure in the image that one table of the driver.cfg stands for.
+/// A structure in the image that one table of the driver.cfg describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// Which table: the `[[axis]]` tables count from 0.
+    /// Index of the table: among the `[[axis]]` tables, from 0.
     pub table: usize,
-    /// The first byte behind the structure, reserved ones included.
+    /// Offset just beyond the structure, reserved bytes included.
     pub end: usize,
 }
 
 impl Section<'_> {
-    /// The first byte behind it, or behind the structure that it is a part of.
+    /// Offset just beyond it, or beyond the structure that it is a part of.
     pub fn end(&self) -> usize {
         let signal = &self.signal;
         let own = signal.byte + signal.data_type.size_bytes();
         self.structure.map_or(own, |structure| structure.end)
     }
 
-    /// Whether its name stands in the file, and is not made of that of its table.
+    /// Whether its name is in the file, and is not derived from the name of its table.
     pub fn has_own_name(&self) -> bool {
         let name = self.name.as_ref().and_then(Value::as_text);
         name == Some(&self.signal.name)
     }
 
-    /// What the whole of its table is called, where a message is about that.
+    /// What messages call the whole table.
     pub fn title(&self) -> String {
         let name = self.name.as_ref().and_then(Value::as_text);
         match (name, self.structure) {
@@ -63,7 +62,7 @@ impl Section<'_> {
         }
     }
 
-    /// The signal as a message names it.
+    /// What messages call the signal.
     pub fn label(&self) -> String {
         let Signal { name, .. } = &self.signal;
         if name.is_empty() {
@@ -105,8 +104,8 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         check_shapes(scale.as_ref(), fail_safe.as_ref(), station.as_ref());
     }
     let (address, place) = (address?, place?);
-    // Without the address or the type the rules below would blame the wrong key, and without a line
-    // that is left out they cannot be told from broken ones.
+    // Without the address or the type the rules below would blame the wrong key, and with a broken line it is
+    // unknown whether they are violated at all.
     let data_type = match stated {
         None => place.width.data_type(),
         Some(stated) => stated?,
@@ -154,7 +153,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         ..signal
     };
     let fail_safe = match (fail_safe, scaled) {
-        // A fail-safe value cannot be judged by a scale that is wrong.
+        // With an invalid scale, a fail-safe value cannot be checked.
         (_, Some(None)) => None,
         (Some(value), _) => slot_of(&value, &signal, "fail_safe"),
         (None, _) => Some(at_rest(&signal)),
@@ -172,7 +171,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     })
 }
 
-/// Checks as much as can be told of the values of a signal that has no type.
+/// Checks what can be checked of the values of a signal whose type is unknown.
 fn check_shapes(
     scale: Option<&Value<'_>>,
     fail_safe: Option<&Value<'_>>,
@@ -189,7 +188,7 @@ fn check_shapes(
     }
 }
 
-/// A name: some printable characters, not one that tickbus keeps for itself.
+/// A name: printable characters, and not one that is reserved for tickbus.
 pub fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
     let name = value.label(NAME_LIMIT, "give the signal a name of its own")?;
     if name.starts_with("bus.") {
@@ -226,7 +225,7 @@ fn type_of(value: &Value<'_>) -> Option<DataType> {
         .ok()
 }
 
-/// What programming languages call the types.
+/// The type that programming languages call by this name.
 fn other_name(text: &str) -> Option<DataType> {
     Some(match text.to_ascii_uppercase().as_str() {
         "BIT" | "BOOLEAN" => DataType::Bool,
@@ -355,7 +354,7 @@ fn fitting_dead_band(value: &Value<'_>, band: f64, data_type: DataType) -> Optio
     Some(band)
 }
 
-/// What is right where two numbers stand.
+/// The remedy where two numbers are expected.
 const PAIR: &str = "write two numbers, such as [0, 27648]";
 
 /// A linear scale for raw values of `data_type`.
@@ -363,7 +362,7 @@ pub fn scale_of(value: &Value<'_>, data_type: DataType) -> Option<Scale> {
     drawn(value, data_type).map(|(scale, _)| scale)
 }
 
-/// A linear scale for raw values of `data_type`, and the two values that it was drawn through, the lower one first.
+/// A linear scale for raw values of `data_type`, and the two values of its points, the lower one first.
 fn drawn(value: &Value<'_>, data_type: DataType) -> Option<(Scale, [f64; 2])> {
     const SHAPE: &str = "write scale = { raw = [0, 27648], value = [0.0, 250.0] }";
     if data_type == DataType::Bool {
@@ -421,7 +420,7 @@ fn drawn(value: &Value<'_>, data_type: DataType) -> Option<(Scale, [f64; 2])> {
     None
 }
 
-/// A list of two numbers, each with where it stands; `right` says what one looks like.
+/// A list of two numbers, each with its value in the file; `right` shows an example.
 pub fn pair_of<'a>(value: &Value<'a>, right: &str) -> Option<[(f64, Value<'a>); 2]> {
     let list = value.list(right)?;
     let length = list.len();
@@ -462,14 +461,14 @@ fn raw_range(data_type: DataType) -> String {
     }
 }
 
-/// What a signal shows when all its bits are zero: what a bus delivers of a device that is gone.
+/// The value of a signal whose bits are all zero, as a bus delivers for a device that is gone.
 fn at_rest(signal: &Signal) -> Slot {
     signal
         .scale
         .map_or_else(Slot::default, |scale| Slot::from_real(scale.offset))
 }
 
-/// A value of `signal`, in its unit, as its slot holds it; messages call the value `key`.
+/// A value of `signal`, in its unit, as its slot holds it; messages call the key `key`.
 pub fn slot_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
     if signal.data_type == DataType::Bool {
         return bit_of(value, key);
@@ -513,7 +512,7 @@ pub fn value_limits(signal: &Signal) -> (f64, f64) {
     (ends[0].min(ends[1]), ends[0].max(ends[1]))
 }
 
-/// What values `signal` takes, in words.
+/// The values that `signal` accepts, in words.
 pub fn value_range(signal: &Signal) -> String {
     if signal.scale.is_none() {
         return raw_range(signal.data_type);
@@ -558,7 +557,7 @@ fn integer_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
             );
             return None;
         }
-        // Saturates beyond the range of an i128, and is then out of every range.
+        // The conversion saturates at the range of an i128, which is beyond every type's range.
         #[expect(clippy::cast_possible_truncation, reason = "whole, and saturating")]
         let whole = number as i128;
         if !range.contains(&whole) {

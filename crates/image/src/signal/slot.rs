@@ -2,8 +2,8 @@
 
 /// One value, as 64 bits.
 ///
-/// A slot holds an IEEE 754 double, except for an unscaled LWORD, LINT or ULINT, whose 64 bits do not
-/// fit into one and stand there as an integer ([`Signal::is_integer_slot`](super::Signal)).
+/// A slot holds an IEEE 754 double, except for an unscaled LWORD, LINT or ULINT: a double cannot represent
+/// all of their 64 bits, so their slots hold an integer ([`Signal::is_integer_slot`](super::Signal)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Slot(pub u64);

@@ -3,7 +3,7 @@
 use super::{Address, Area, ByteOrder, DataType, Scale, Slot};
 use tickbus_base::time::Nanos;
 
-/// Which edges of a BOOL signal must not get lost between two exchanges.
+/// Which edges of a BOOL signal must not be lost between two exchanges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Latch {
     /// From 0 to 1.
@@ -17,7 +17,7 @@ pub enum Latch {
 /// One signal of the process image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
-    /// Its name, unique in the table; `bus.` as a beginning is reserved.
+    /// Its name, unique in the table; names that start with `bus.` are reserved.
     pub name: String,
     /// Index of its station in [`SignalTable::stations`].
     pub station: usize,
@@ -27,27 +27,27 @@ pub struct Signal {
     pub byte: usize,
     /// Bit within that byte, 0 to 7; 0 unless the type is BOOL.
     pub bit: u8,
-    /// How the bits are read.
+    /// The type of its bits.
     pub data_type: DataType,
-    /// How the bytes lie; irrelevant for one byte and less.
+    /// The order of its bytes; irrelevant for types of up to one byte.
     pub order: ByteOrder,
-    /// Engineering units; `None` gives the raw value.
+    /// Conversion to engineering units; `None` for raw values.
     pub scale: Option<Scale>,
     /// Name of the engineering unit, for people.
     pub unit: Option<String>,
-    /// Edges that must not get lost; only on BOOL.
+    /// Edges that must not be lost; only on BOOL.
     pub latch: Option<Latch>,
-    /// On a `%I`: how long a latched pulse is held at least, beyond the one completed exchange that
+    /// On a `%I`: how long a latched pulse is held at least, in addition to the one completed exchange that
     /// always carries it.
     pub hold: Nanos,
-    /// What stands here when the data are stale (`%Q`) or the simulation has stopped (`%I`), in
-    /// engineering units; the same kind of slot as the signal's own.
+    /// The value in its place when the data are stale (`%Q`) or the simulation has stopped (`%I`), in
+    /// engineering units, as the signal's own slot would hold it.
     pub fail_safe: Slot,
-    /// By how much the value may move, in engineering units, without being news to a bus that sends
-    /// on change; zero where every change is. Never negative, and zero on a BOOL.
+    /// How far the value may move, in engineering units, before a bus that sends on change sends it; zero
+    /// sends every change. Never negative, and zero on a BOOL.
     pub dead_band: f64,
-    /// The lowest and the highest value of normal operation, in engineering units: the two values that its scale
-    /// names. What a display goes by; no value is kept within it.
+    /// The lowest and the highest value of normal operation, in engineering units: the two values that its
+    /// scale names. A hint for displays; values are not limited to it.
     pub range: Option<[f64; 2]>,
 }
 
@@ -61,7 +61,7 @@ impl Signal {
             )
     }
 
-    /// Its place in the image of its station.
+    /// Its address in the image of its station.
     pub const fn address(&self) -> Address {
         Address {
             area: self.area,
@@ -72,7 +72,7 @@ impl Signal {
     }
 }
 
-/// One station (slave, unit, node) of a driver, with a frame of its own for either area.
+/// One station (slave, unit, node) of a driver, with a frame for each area.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Station {
     /// Its name, unique in the table; empty where a driver.cfg declares no station.

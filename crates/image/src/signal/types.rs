@@ -42,7 +42,7 @@ pub enum DataType {
 }
 
 impl DataType {
-    /// All of them, smallest first.
+    /// All types, smallest first.
     pub const ALL: [Self; 15] = [
         Self::Bool,
         Self::Byte,
@@ -61,7 +61,7 @@ impl DataType {
         Self::Lreal,
     ];
 
-    /// The name of the standard: `BOOL` to `LREAL`.
+    /// Its name in the standard: `BOOL` to `LREAL`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Bool => "BOOL",
@@ -82,7 +82,7 @@ impl DataType {
         }
     }
 
-    /// The width of the addresses that hold it.
+    /// The width of addresses for this type.
     pub const fn width(self) -> Width {
         match self {
             Self::Bool => Width::Bit,
@@ -93,12 +93,12 @@ impl DataType {
         }
     }
 
-    /// In how many bytes it lies: 1, 2, 4 or 8; a BOOL lies in one.
+    /// Its size in bytes: 1, 2, 4 or 8; a BOOL occupies a bit of one byte.
     pub const fn size_bytes(self) -> usize {
         self.width().bytes()
     }
 
-    /// Whether it is an integer or a bit string of more than one bit: all but BOOL, REAL and LREAL.
+    /// Whether it is an integer or a bit string of more than one bit: every type except BOOL, REAL and LREAL.
     pub const fn is_integer(self) -> bool {
         !matches!(self, Self::Bool | Self::Real | Self::Lreal)
     }
@@ -129,7 +129,7 @@ impl fmt::Display for DataType {
     }
 }
 
-/// A text that names no elementary data type.
+/// The text does not name an elementary data type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "not an elementary data type; types are BOOL, BYTE, SINT, USINT, WORD, INT, UINT, DWORD, DINT, UDINT, REAL, LWORD, LINT, ULINT, LREAL"

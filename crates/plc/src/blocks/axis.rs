@@ -1,78 +1,79 @@
-//! Commands to one axis of the axis link: what `MC_MoveAbsolute` and its like are to a drive.
+//! Commands for one axis of the axis link: the counterpart of `MC_MoveAbsolute` and similar blocks.
 
 use tickbus_axis::{Demand, Mode, Motion};
 use tickbus_base::time::Nanos;
 
-/// How long the machine may take to acknowledge a command before it is given again.
+/// How long the machine may take to acknowledge a command before the command is repeated.
 const ACKNOWLEDGE_LIMIT: Nanos = Nanos::from_secs(1);
 
-/// How `Execute` makes sure that the machine has seen its edge.
+/// How `Execute` makes sure that the machine sees its edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Execute {
-    /// It stays on for so long, as in 2018: 500 ms, and so two commands a second at most.
+    /// It stays on for this long; 500 ms in 2018, so at most two commands per second.
     Hold(Nanos),
-    /// It stays on until the machine acknowledges, and the next edge waits until that has fallen, too.
+    /// It stays on until the machine acknowledges, and the next edge waits until the acknowledge is off
+    /// again.
     Acknowledge,
 }
 
 /// One command.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisCommand {
-    /// What to do.
+    /// The mode.
     pub mode: Mode,
-    /// The numbers of it.
+    /// Its numbers.
     pub motion: Motion<f64>,
-    /// Not 0: the machine's own table has what is not stated here.
+    /// If not 0, the machine's own table provides the numbers that are missing here.
     pub number: u16,
 }
 
-/// What an axis tells, as of this scan.
+/// The feedback of an axis in this scan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisInputs {
-    /// The axis is doing well.
+    /// The axis has no fault.
     pub healthy: bool,
     /// The target of the last command is reached.
     pub in_position: bool,
-    /// The machine has taken the command.
+    /// The machine has accepted the command.
     pub acknowledge: bool,
-    /// Where the axis is.
+    /// The actual position.
     pub position: f64,
-    /// How fast it moves.
+    /// The actual speed.
     pub speed: f64,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Phase {
-    /// `Execute` is off, and its next edge would be one.
+    /// `Execute` is off, and setting it would be a new edge.
     #[default]
     Ready,
-    /// `Execute` is on, since then.
+    /// `Execute` has been on since then.
     Raised(Nanos),
-    /// `Execute` is off, and the machine may not have seen it yet.
+    /// `Execute` is off, but the machine may not have seen that yet.
     Falling,
 }
 
-/// Gives commands to one axis and knows what became of them.
+/// Sends commands to one axis and tracks their progress.
 ///
-/// A command that is [given](Self::give) while another one is on its way waits, and a newer one takes its place.
+/// A command that is [given](Self::give) while another one is in progress waits; a newer one replaces it.
 #[derive(Clone, Debug)]
 pub struct AxisControl {
     execute: Execute,
-    /// What goes to the machine, as of the last call.
+    /// The output to the machine, as of the last call.
     pub demand: Demand,
-    /// The number of the command that goes with it.
+    /// The number of the command in it.
     pub number: u16,
     phase: Phase,
     waiting: Option<AxisCommand>,
     given: Option<AxisCommand>,
-    /// The machine has the last command.
+    /// The machine has accepted the last command.
     taken: bool,
     commands: u64,
     retries: u64,
 }
 
 impl AxisControl {
-    /// An axis that was given no command yet.
+    /// An axis without a command.
     pub fn new(execute: Execute) -> Self {
         Self {
             execute,
@@ -87,49 +88,50 @@ impl AxisControl {
         }
     }
 
-    /// Wants this command next.
+    /// Queues this command.
     pub fn give(&mut self, command: AxisCommand) {
         self.waiting = Some(command);
     }
 
-    /// Ends a command that lasts: tracking, or running at a speed.
+    /// Ends a continuous command: tracking, or running at a speed.
     pub fn release(&mut self) {
         self.waiting = None;
         self.demand.tracking = false;
         self.demand.speed_control = false;
     }
 
-    /// Whether a command could go out at once, were it given now.
+    /// Whether a command given now would be sent at once.
     pub fn is_ready(&self) -> bool {
         self.waiting.is_none() && self.phase == Phase::Ready
     }
 
-    /// Whether the machine has every command that was given.
+    /// Whether the machine has accepted every command.
     pub fn is_taken(&self) -> bool {
         self.waiting.is_none() && self.taken
     }
 
-    /// Whether the last command was taken and its target is reached.
+    /// Whether the last command was accepted and its target is reached.
     pub fn is_done(&self, inputs: &AxisInputs) -> bool {
         self.is_taken() && inputs.in_position
     }
 
-    /// The last command that went out.
+    /// The last command sent.
     pub fn last(&self) -> Option<&AxisCommand> {
         self.given.as_ref()
     }
 
-    /// Commands that went out so far, those given again included.
+    /// The number of commands sent, repetitions included.
     pub fn commands(&self) -> u64 {
         self.commands
     }
 
-    /// Commands that were given again, since nothing acknowledged them in a second.
+    /// The number of commands repeated because they were not acknowledged within a second.
     pub fn retries(&self) -> u64 {
         self.retries
     }
 
-    /// Evaluates the block: one scan at `now`. Without `enable` nothing moves, and all commands are forgotten.
+    /// Evaluates the block: one scan at `now`. Without `enable` the axis stops, and all commands are
+    /// discarded.
     pub fn call(&mut self, now: Nanos, inputs: &AxisInputs, enable: bool) {
         self.demand.enable = enable;
         if !enable {
@@ -169,7 +171,7 @@ impl AxisControl {
     fn await_machine(&mut self, now: Nanos, since: Nanos, inputs: &AxisInputs) {
         let lasts = now - since;
         let (taken, over) = match self.execute {
-            // What cleared InPosition was this command; else time has to tell.
+            // It was this command that cleared InPosition; otherwise only time can tell.
             Execute::Hold(hold) => (!inputs.in_position || lasts >= hold, lasts >= hold),
             Execute::Acknowledge => (inputs.acknowledge, inputs.acknowledge),
         };
@@ -178,7 +180,7 @@ impl AxisControl {
             self.demand.execute = false;
             self.phase = Phase::Falling;
         } else if self.execute == Execute::Acknowledge && lasts >= ACKNOWLEDGE_LIMIT {
-            // The machine was restarted, or is one that does not acknowledge: the edge is made again.
+            // The machine was restarted, or does not acknowledge at all: repeat the edge.
             self.demand.execute = false;
             self.phase = Phase::Falling;
             self.retries += 1;
@@ -203,8 +205,8 @@ mod tests {
         }
     }
 
-    /// Scans `scans` times with a machine that shows Execute back after `lag` scans, giving a command whenever there
-    /// is none; counts rising edges.
+    /// Scans `scans` times with a machine that returns Execute after `lag` scans, giving a command whenever
+    /// none is pending; counts rising edges.
     fn commands_in(control: &mut AxisControl, scans: usize, lag: usize) -> u64 {
         let mut wire = vec![false; lag];
         let mut rises = 0;
@@ -236,7 +238,8 @@ mod tests {
 
     #[test]
     fn an_acknowledge_makes_the_rate_that_of_the_way_there_and_back() {
-        // Two scans there and back, for the edge and for its fall, and one in which the next command is given.
+        // Two scans for the edge and its acknowledge, two for the falling edge, and one in which the next
+        // command is given.
         let mut control = AxisControl::new(Execute::Acknowledge);
         assert_eq!(commands_in(&mut control, 1_000, 2), 200);
     }

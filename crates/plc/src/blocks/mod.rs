@@ -1,7 +1,7 @@
-//! The function blocks of IEC 61131-3 that programs here are made of, and those for the axes of the axis link.
+//! The function blocks of IEC 61131-3 that the programs here use, and blocks for the axes of the axis link.
 //!
-//! A block changes only when it is called, and knows no time but the one that the call hands in.
-//! Times are [`Nanos`](tickbus_base::time::Nanos) where the standard says `TIME`.
+//! A block only changes when it is called, and uses only the time passed to the call. Times are
+//! [`Nanos`](crate::time::Nanos) where the standard has `TIME`.
 
 mod action;
 mod axis;

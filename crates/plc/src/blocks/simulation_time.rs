@@ -1,38 +1,38 @@
-//! Whether a simulation goes on, by the time that it sends.
+//! Detects by its time whether a simulation is running.
 
 use tickbus_base::time::Nanos;
 
-/// What the time of a simulation tells.
+/// The state of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Simulation {
-    /// Nothing was seen of it yet.
+    /// Nothing has been received from it yet.
     #[default]
     Unknown,
-    /// Its time goes on.
+    /// Its time advances.
     Running,
-    /// Its time stands still: it is paused, or has ended with the line still up.
+    /// Its time stands still: it is paused, or has ended while the line stays up.
     Stopped,
 }
 
-/// Watches the time that a simulation sends: a time that goes back is a restart, one that stands still a stop.
+/// Watches the time sent by a simulation: time that goes back means a restart, time that stands still a stop.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SimulationTime {
-    /// What it tells, as of the last call.
+    /// The state as of the last call.
     pub state: Simulation,
-    /// The simulation was started again, for one call: state machines begin anew.
+    /// True for one call after the simulation was restarted: state machines must start over.
     pub restarted: bool,
     last: Option<f64>,
     moved: Nanos,
 }
 
 impl SimulationTime {
-    /// Evaluates the block with the simulation's time in seconds; it stands still once it has not changed for
-    /// longer than `limit`. A call without a time, since the line is down, changes nothing: whoever comes back with
-    /// an earlier time was restarted meanwhile.
+    /// Evaluates the block with the simulation's time in seconds; it counts as stopped when it has not
+    /// changed for longer than `limit`. A call without a time (the line is down) changes nothing: if the
+    /// simulation returns with an earlier time, it was restarted in between.
     pub fn call(&mut self, now: Nanos, seconds: Option<f64>, limit: Nanos) -> Simulation {
         self.restarted = false;
         let Some(seconds) = seconds.filter(|seconds| !seconds.is_nan()) else {
-            // Nobody is to blame for what did not come.
+            // While nothing is received, standing still cannot be judged.
             self.moved = now;
             return self.state;
         };

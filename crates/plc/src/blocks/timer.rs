@@ -1,12 +1,12 @@
 //! The timers `TON`, `TOF` and `TP`.
 //!
-//! `ET` stops at `PT`; a negative `PT` counts as 0, and a clock that steps back gives an `ET` of 0.
-//! With a `PT` of 0, `TON` is on and `TP` stays off from the first call, as the standard has it;
-//! some compilers' timers need a second call for that (`matiec`).
+//! `ET` stops at `PT`; a negative `PT` counts as 0, and a clock that steps back gives an `ET` of 0. With a
+//! `PT` of 0, `TON` is on and `TP` stays off from the first call, according to the standard; in some
+//! implementations (`matiec`) that takes a second call.
 
 use tickbus_base::time::Nanos;
 
-/// The time since `start`, within 0 and `pt`.
+/// The time since `start`, limited to the range from 0 to `pt`.
 fn elapsed(now: Nanos, start: Nanos, pt: Nanos) -> Nanos {
     (now - start).clamp(Nanos::ZERO, pt.max(Nanos::ZERO))
 }

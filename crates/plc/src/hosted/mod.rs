@@ -1,9 +1,9 @@
-//! PLC programs of the user's own: shared objects with the C interface of the open IEC 61131-3 compiler,
-//! iec2c, as `OpenPLC` and Beremiz use it, and tickbus' glue (`plc/glue`).
+//! Users' own PLC programs: shared objects with the C interface of the open IEC 61131-3 compiler iec2c, as
+//! used by `OpenPLC` and Beremiz, and tickbus' glue (`plc/glue`).
 //!
-//! The program's clock is the scan's `now`, its inputs and outputs are the variables that it has located in
-//! `%I` and `%Q`. A compiled program keeps all its state in global variables. So each [`Hosted`] loads a
-//! private copy of the file, and as many as one likes live side by side in a process.
+//! The program's clock is the scan's `now`; its inputs and outputs are the variables that it has located in
+//! `%I` and `%Q`. A compiled program keeps its state in global variables. Therefore each [`Hosted`] loads a
+//! private copy of the file, so that any number of instances can exist in one process.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
@@ -22,14 +22,14 @@ mod object;
 mod plan;
 mod table;
 
-/// The largest file that is taken for a program, in bytes.
+/// The largest file accepted as a program, in bytes.
 const FILE_LIMIT: u64 = 256 << 20;
 
 /// A compiled PLC program in a shared object.
 ///
-/// Its options, as text: `addressing` says what the numbers of its addresses count, `bytes` or `iec` (default:
-/// as the driver.cfg says, else bytes). `order` is the byte order of values for which the driver.cfg has no
-/// signal, `ABCD` (big-endian, the default) to `DCBA`. `alive` names a `%I` bit that is TRUE while the
+/// Its options, as text: `addressing` says what the numbers of its addresses count, `bytes` or `iec`
+/// (default: as the driver.cfg, else bytes). `order` is the byte order of values for which the driver.cfg has
+/// no signal, `ABCD` (big-endian, the default) to `DCBA`. `alive` names a `%I` bit that is TRUE while the
 /// machine's data are not stale.
 #[derive(Debug)]
 pub struct Hosted {
@@ -44,10 +44,10 @@ pub struct Hosted {
 }
 
 impl Hosted {
-    /// The options that it takes.
+    /// The program's options.
     const OPTIONS: [&'static str; 3] = ["addressing", "alive", "order"];
 
-    /// Whether `name` names a file with a program, and not a built-in one.
+    /// Whether `name` is the path of a file, rather than the name of a built-in program.
     pub fn is_path(name: &str) -> bool {
         let extension = Path::new(name).extension();
         let known = ["so", "dll", "dylib"];
@@ -56,11 +56,11 @@ impl Hosted {
                 .is_some_and(|own| known.iter().any(|known| own.eq_ignore_ascii_case(known)))
     }
 
-    /// Whether the options are right, as far as they alone can tell; loads nothing.
+    /// Checks the options as far as possible without loading the program.
     ///
     /// # Errors
     ///
-    /// There is no such option, or it cannot have that value.
+    /// The option does not exist, or does not accept the value.
     pub fn check_options(name: &str, options: &[(String, String)]) -> Result<(), ProgramError> {
         settings(options)
             .map(drop)
@@ -71,7 +71,7 @@ impl Hosted {
     ///
     /// # Errors
     ///
-    /// The file cannot be read, is none that can be loaded here, or has no program; or an option is wrong.
+    /// The file cannot be read, cannot be loaded here, or does not contain a program; or an option is wrong.
     pub fn load(path: &Path, options: &[(String, String)]) -> Result<Self, ProgramError> {
         let name = path.display().to_string();
         Self::try_load(path, options).map_err(|refusal| error(&name, refusal))
@@ -87,7 +87,7 @@ impl Hosted {
         })?;
         let library = Library::load(copy.path()).map_err(|words| not_loaded(&words, &copy))?;
         let (compiled, declared) = Compiled::begin(library)?;
-        // What its addresses count is not known before `fit`; one of the two ways must be possible.
+        // The addressing is unknown until `fit`; with at least one of the two the plan must be possible.
         let plan = |addressing| Plan::new(&declared, &settings, addressing, None);
         let plan = plan(Addressing::Bytes)
             .or_else(|refusal| plan(Addressing::Elements).map_err(|_| refusal))?;
@@ -201,7 +201,7 @@ fn settings(options: &[(String, String)]) -> Result<Settings, Refusal> {
     Ok(settings)
 }
 
-/// The whole file.
+/// The contents of the file.
 fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     let cannot = |error: &io::Error| match error.kind() {
         ErrorKind::NotFound => (
@@ -233,11 +233,11 @@ fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     fs::read(path).map_err(|error| cannot(&error))
 }
 
-/// What to do when the folder for temporary files is of no use.
+/// The remedy when the folder for temporary files cannot be used.
 const TEMPORARY: &str = "tickbus loads a private copy of the program; set TMPDIR (on Windows TMP) to a folder \
     with room, from which programs may be run";
 
-/// What to do about what the loader says.
+/// The refusal for a loader's message.
 fn not_loaded(words: &str, copy: &PrivateCopy) -> Refusal {
     let words = words.replace(&copy.path().display().to_string(), "it");
     let right = if words.contains("undefined symbol") {
@@ -251,8 +251,8 @@ fn not_loaded(words: &str, copy: &PrivateCopy) -> Refusal {
     (format!("cannot be loaded ({words})"), right.to_owned())
 }
 
-/// A copy of the program's file that nobody else loads, so that its global variables are its own, and that
-/// stays as it is when the file is built anew.
+/// A copy of the program's file that is loaded only once, so that its global variables are its own, and that
+/// does not change when the original file is rebuilt.
 #[derive(Debug)]
 struct PrivateCopy(Option<PathBuf>);
 
@@ -261,7 +261,7 @@ impl PrivateCopy {
         static COPIES: AtomicU64 = AtomicU64::new(0);
         let folder = std::env::temp_dir();
         let name = original.file_name().unwrap_or_default().to_string_lossy();
-        // A file of that name may have been left by another process of the same number.
+        // Another process with the same id may have left a file of that name.
         for _ in 0..1000 {
             let number = COPIES.fetch_add(1, Ordering::Relaxed);
             let path = folder.join(format!("tickbus-{}-{number}-{name}", std::process::id()));
@@ -286,8 +286,8 @@ impl PrivateCopy {
         self.0.as_deref().unwrap_or(Path::new(""))
     }
 
-    /// Once it is loaded. Where a file may be removed while it is in use, that is done at once, so that not
-    /// even a killed process leaves it behind.
+    /// The copy after loading. Where a file can be deleted while in use, that is done at once, so that even a
+    /// killed process does not leave it behind.
     fn loaded(mut self) -> Self {
         if cfg!(unix) {
             self.remove();

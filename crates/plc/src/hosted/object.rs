@@ -1,19 +1,19 @@
-//! What kind of file a program is, told from its first bytes: the system's loader says it in words that
-//! help nobody ("wrong ELF class").
+//! Determines the type of a program file from its first bytes, because the messages of the system's loader
+//! ("wrong ELF class") do not help users.
 
-/// Of what a file's first bytes must tell.
+/// The magic bytes of an ELF file.
 const ELF: &[u8] = b"\x7FELF";
 
-/// What a loadable file is for.
+/// The target of a loadable file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Machine {
     bits: u8,
     big_endian: bool,
-    /// The number of ELF for the processor.
+    /// ELF's number of the processor.
     number: u16,
 }
 
-/// The processors that are known by name, with their numbers in ELF.
+/// Known processors, with their numbers in ELF.
 const PROCESSORS: [(u16, &str); 8] = [
     (3, "x86"),
     (8, "MIPS"),
@@ -26,7 +26,7 @@ const PROCESSORS: [(u16, &str); 8] = [
 ];
 
 impl Machine {
-    /// The one that this process runs on, where it is known.
+    /// The processor of this process, if known.
     pub(super) fn own() -> Option<Self> {
         let number = match std::env::consts::ARCH {
             "x86" => 3,
@@ -56,18 +56,18 @@ impl Machine {
     }
 }
 
-/// Whether the file that begins with `bytes` can be loaded on `own`.
+/// Checks whether the file that begins with `bytes` can be loaded on `own`.
 ///
 /// # Errors
 ///
-/// What it is instead, and what would be right.
+/// What the file is instead, and what would be right.
 pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), (String, String)> {
     let build = "build a shared object from it (docs/own-plc-program.md)".to_owned();
     if bytes.is_empty() {
         return Err(("is an empty file".to_owned(), build));
     }
     let Some(own) = own else {
-        // Another system's kinds of file are left to its loader.
+        // Other systems' formats are left to their loader.
         return Ok(());
     };
     if !bytes.starts_with(ELF) {
@@ -139,8 +139,8 @@ pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), (String, S
     }
 }
 
-/// Whether all of the file is there that is to be loaded: the loader itself maps what it does not find, and
-/// the process dies when it looks there. 32-bit files are taken as they are.
+/// Whether the segments to be loaded are completely in the file: the loader maps them without checking, and
+/// the process would crash on access. 32-bit files are not checked.
 fn is_whole(bytes: &[u8], machine: Machine) -> bool {
     if machine.bits != 64 {
         return true;
@@ -200,7 +200,7 @@ mod tests {
         format!("{what}; {right}")
     }
 
-    /// A shared object for [`OWN`] with one segment, which ends where the file does.
+    /// A shared object for [`OWN`] with one segment that ends with the file.
     fn shared_object() -> Vec<u8> {
         let mut bytes = elf(2, 1, 3, 62);
         bytes.resize(200, 0);

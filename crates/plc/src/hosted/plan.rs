@@ -1,27 +1,27 @@
-//! Which variable of a program lies where in the process image.
+//! Maps the variables of a program to the process image.
 
 use super::table::{Declared, Refusal};
 use tickbus_image::signal::{Address, Addressing, Area, ByteOrder, DataType, SignalTable, Width};
 
-/// How a program is fitted to the image.
+/// The settings for fitting a program to the image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Settings {
-    /// What the numbers of its addresses count; none leaves it to the driver.cfg.
+    /// What the numbers of its addresses count; `None` leaves it to the driver.cfg.
     pub(super) addressing: Option<Addressing>,
-    /// The `%I` bit that tells the program whether the machine's data are alive.
+    /// The `%I` bit that is TRUE while the machine's data are alive.
     pub(super) alive: Option<String>,
     /// The byte order of values for which the driver.cfg has no signal.
     pub(super) order: ByteOrder,
 }
 
-/// One variable and its place.
+/// One variable and its address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Place {
-    /// Which of the declared variables.
+    /// Index of the declared variable.
     pub(super) variable: usize,
     pub(super) address: Address,
     pub(super) order: ByteOrder,
-    /// The address as the program writes it.
+    /// The address as written in the program.
     written: String,
 }
 
@@ -30,12 +30,12 @@ pub(super) struct Place {
 pub(super) struct Plan {
     pub(super) inputs: Vec<Place>,
     pub(super) outputs: Vec<Place>,
-    /// The variables that take whether the data are alive.
+    /// The variables that receive `alive`.
     pub(super) alive: Vec<usize>,
 }
 
 impl Place {
-    /// Takes the value from the image; bytes beyond its end read as 0.
+    /// Reads the value from the image; bytes beyond its end read as 0.
     pub(super) fn take(&self, image: &[u8]) -> u64 {
         let byte = |at: usize| image.get(at).copied().unwrap_or(0);
         let Address {
@@ -51,7 +51,7 @@ impl Place {
         })
     }
 
-    /// Puts the value into the image; what is beyond its end is dropped.
+    /// Writes the value to the image; bytes beyond its end are dropped.
     pub(super) fn put(&self, value: u64, image: &mut [u8]) {
         let Address {
             width, byte: first, ..
@@ -78,8 +78,8 @@ impl Place {
 }
 
 impl Plan {
-    /// Finds each variable's place. With a signal table, a variable takes the byte order of the signal that
-    /// lies on the same address, and all must lie within the image.
+    /// Determines the place of each variable. With a signal table, a variable gets the byte order of the
+    /// signal at the same address, and all variables must be within the image.
     pub(super) fn new(
         declared: &[Declared],
         settings: &Settings,
@@ -97,7 +97,8 @@ impl Plan {
                 Area::Input => &mut plan.inputs,
                 Area::Output => &mut plan.outputs,
             };
-            // Two programs of one project may declare the same variable; both declarations share a value.
+            // Two programs of a project may declare the same variable; both declarations then share one
+            // value.
             if !places.iter().any(|other| other.address == place.address) {
                 places.push(place);
             }
@@ -118,7 +119,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Every variable has a value of its own, so that of two outputs on one bit only one would count.
+    /// Each variable has its own value, so of two outputs on the same bit only one would take effect.
     fn check_overlaps(&self, addressing: Addressing) -> Result<(), Refusal> {
         let keep = "keep one of them, or move one: each is a variable of its own, and only one would count";
         let right = match addressing {
@@ -208,7 +209,7 @@ impl Plan {
         Ok(())
     }
 
-    /// How many bytes of the area the program knows.
+    /// How many bytes of the area the program uses.
     pub(super) fn bytes(&self, area: Area) -> usize {
         let places = match area {
             Area::Input => &self.inputs,
@@ -411,7 +412,7 @@ mod tests {
         assert_eq!(orders, [ByteOrder::Dcba, ByteOrder::Abcd]);
     }
 
-    /// A little-endian signal for each variable, in an image of 4 bytes each way.
+    /// One little-endian signal per variable, in an image of 4 bytes in each direction.
     fn table(declared: &[Declared]) -> SignalTable {
         let plan = plan(declared, &Settings::default()).expect("a plan");
         let all = plan.inputs.iter().chain(&plan.outputs);

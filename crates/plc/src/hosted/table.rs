@@ -1,8 +1,8 @@
-//! The table of `plc/glue/tickbus_plc.h`, and the foreign code behind it, behind safe functions.
+//! The table of `plc/glue/tickbus_plc.h`, and safe functions around the foreign code behind it.
 //!
-//! This is the one place where a PLC program's memory is touched and its functions are called. What can be
-//! checked of it is checked when it is loaded: version, sizes, and that no pointer is null. That the program
-//! keeps its hands off the rest of the process nobody can check; whoever names its file vouches for that.
+//! This is the only place where a PLC program's memory is accessed and its functions are called. Whatever can
+//! be checked is checked when it is loaded: version, sizes, and that no pointer is null. That the program
+//! does not damage the rest of the process cannot be checked; the user who names its file vouches for that.
 
 #![allow(unsafe_code, reason = "a user's program is loaded and called")]
 
@@ -12,13 +12,13 @@ use std::ptr::NonNull;
 use tickbus_base::os::Library;
 use tickbus_base::time::Nanos;
 
-/// The version of the header that is spoken here.
+/// The supported version of the header.
 pub(super) const VERSION: u32 = 1;
 
-/// The most located variables that are believed; a process image has at most a million bits.
+/// The most located variables that are plausible; a process image has at most a million bits.
 const MOST_VARIABLES: u32 = 2_000_000;
 
-/// The most numbers of one address that are believed.
+/// The most numbers of one address that are plausible.
 const MOST_NUMBERS: u32 = 64;
 
 /// Mirrors `struct tickbus_located`.
@@ -48,7 +48,7 @@ struct Table {
     scan: Option<unsafe extern "C" fn(i64, i64, u64)>,
 }
 
-/// A located variable as the program declares it.
+/// A located variable as declared by the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Declared {
     /// Its IEC type.
@@ -63,14 +63,14 @@ pub(super) struct Declared {
     pub(super) bytes: usize,
 }
 
-/// Where the value of a located variable lies.
+/// The value of a located variable.
 #[derive(Clone, Copy, Debug)]
 struct Value {
     address: NonNull<u8>,
     bytes: usize,
 }
 
-/// A compiled program in this process. Its variables are known by their places among the declarations.
+/// A compiled program in this process. Its variables are identified by their index in the declarations.
 #[derive(Debug)]
 pub(super) struct Compiled {
     values: Vec<Value>,
@@ -91,11 +91,11 @@ fn refused(what: impl Into<String>, right: &str) -> Refusal {
 }
 
 impl Compiled {
-    /// Finds the program in a library that was loaded for nobody else, and initialises it.
+    /// Finds the program in a library that was loaded only once, and initialises it.
     ///
     /// # Errors
     ///
-    /// The library has no table, or one of another version, or one that cannot be right.
+    /// The library has no table, or one of another version, or an invalid one.
     pub(super) fn begin(library: Library) -> Result<(Self, Vec<Declared>), Refusal> {
         // SAFETY: the glue exports a variable of this type under this name, in every version of the table.
         let Ok(address) = (unsafe { library.symbol::<*const Table>("tickbus_plc") }) else {
@@ -155,7 +155,7 @@ impl Compiled {
         Ok((program, declared))
     }
 
-    /// The scan interval that the program was made for; none if it does not matter to it.
+    /// The scan interval that the program was compiled for; `None` if it does not depend on it.
     pub(super) fn tick_time(&self) -> Option<Nanos> {
         let time = i64::try_from(self.tick_time).ok().map(Nanos);
         time.filter(|time| *time > Nanos::ZERO)
@@ -176,7 +176,7 @@ impl Compiled {
         unsafe { (self.scan)(seconds, nanos, tick) }
     }
 
-    /// The value of a variable, as a number without sign; 0 for one of more than 8 bytes.
+    /// The value of a variable as an unsigned number; 0 for variables of more than 8 bytes.
     pub(super) fn read(&self, variable: usize) -> u64 {
         let Value { address, bytes } = self.values[variable];
         let mut number = [0; 8];
@@ -195,7 +195,7 @@ impl Compiled {
         u64::from_ne_bytes(number)
     }
 
-    /// Changes the value of a variable to the lower bits of `number`; one of more than 8 bytes stays.
+    /// Sets a variable to the lower bits of `number`; a variable of more than 8 bytes does not change.
     pub(super) fn write(&mut self, variable: usize, number: u64) {
         let Value { address, bytes } = self.values[variable];
         let mut number = number.to_ne_bytes();
@@ -218,7 +218,7 @@ impl Compiled {
 // survive a move between two scans; the IEC compiler makes none, and a host scans on one thread.
 unsafe impl Send for Compiled {}
 
-/// Copies the declarations out of the table.
+/// Copies the declarations from the table.
 fn declarations(table: &Table) -> Result<(Vec<Declared>, Vec<Value>), Refusal> {
     let count = table.located_count;
     let broken =

@@ -1,6 +1,6 @@
 //! The program "charger": feeds blocks, centres them, and hands them to the lathe.
 //!
-//! Three chains run beside each other, and each waits for what the others leave behind:
+//! Three chains run in parallel, each waiting for what the others leave behind:
 //!
 //! | chain | steps |
 //! |---|---|
@@ -20,7 +20,7 @@ use tickbus_image::signal::{Addressing, SignalTable};
 use tickbus_plc::blocks::{AxisCommand, Simulation, SimulationTime, Ton};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
 
-/// The axes, in the order in which the program counts them.
+/// The axes, in the program's own order.
 const AXES: [(&str, Kind); 12] = [
     ("step feeder", Kind::Position),
     ("linear feeder", Kind::Position),
@@ -56,25 +56,25 @@ const ARM_BACK: f64 = 900.0;
 const ARM_CLEAR: f64 = 400.0;
 const CLAMPS_OPEN: f64 = 690.0;
 
-/// The sensors look down on a block in a V of 90 degrees from this height, in mm.
+/// The height in mm above a V-block of 90 degrees from which the sensors look down on a block.
 const SENSOR_HEIGHT: f64 = 800.0;
 
 /// The pressure that holds a block, in per cent.
 const CLAMP_TORQUE: f64 = 60.0;
 const GATE_TORQUE: f64 = 30.0;
 
-/// What a step may take, but for those that wait for a block or for the lathe.
+/// The time limit of a step, except for those that wait for a block or for the lathe.
 const LIMIT: Nanos = Nanos::from_secs(30);
-/// How long all axes have to be well before the program begins anew.
+/// How long all axes must be healthy before the program starts over.
 const WELL: Nanos = Nanos::from_secs(1);
-/// How long a clamp has to stand before it is believed.
+/// How long a clamp must stand still before its position is taken as final.
 const SETTLE: Nanos = Nanos::from_millis(100);
-/// A simulation whose time stands still for so long has stopped.
+/// A simulation whose time stands still for this long has stopped.
 const FROZEN: Nanos = Nanos::from_secs(1);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Feeding {
-    /// Nothing was done yet: everything goes to its rest.
+    /// Nothing has been done yet: all axes move to their rest positions.
     #[default]
     Rest,
     Waiting,
@@ -86,10 +86,10 @@ enum Feeding {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Centring {
-    /// The spindles let go.
+    /// The spindles release the block.
     #[default]
     Release,
-    /// All goes to where the next block is awaited.
+    /// All axes move to where the next block is awaited.
     Home,
     Waiting,
     Carry,
@@ -98,7 +98,7 @@ enum Centring {
     Grip,
     Lift,
     Present,
-    /// The block is where the clamps come.
+    /// The block is where the clamps take it.
     Held,
 }
 
@@ -109,7 +109,7 @@ enum Transfer {
     Home,
     Waiting,
     Grab,
-    /// The arm goes back with a block, since nobody knows where it stands.
+    /// The arm moves back with a block, because its position is unknown.
     Return,
     AwaitLathe,
     ToLathe,
@@ -117,7 +117,7 @@ enum Transfer {
     Open,
 }
 
-/// A step of a chain, and since when.
+/// The current step of a chain, and when it began.
 #[derive(Clone, Copy, Debug, Default)]
 struct Chain<S> {
     step: S,
@@ -130,13 +130,13 @@ impl<S: Copy + PartialEq> Chain<S> {
         self.since = None;
     }
 
-    /// How long the step has lasted.
+    /// How long the step has lasted so far.
     fn lasts(&mut self, now: Nanos) -> Nanos {
         now - *self.since.get_or_insert(now)
     }
 }
 
-/// The signals beside the axes.
+/// The signals other than the axes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Places {
     /// Steps 1 to 4, linear feeder, centring spindles, clamps, gate.
@@ -149,7 +149,7 @@ struct Places {
     lathe_holds: Place,
 }
 
-/// The charger's program; the [module](self) tells what it does.
+/// The charger's program, described at the [module](self).
 #[derive(Debug)]
 pub struct Charger {
     options: Options,
@@ -157,7 +157,7 @@ pub struct Charger {
     places: Places,
     tally: Arc<Tally>,
     time: SimulationTime,
-    /// Something is wrong, and no axis is enabled.
+    /// A fault has occurred, and no axis is enabled.
     failed: bool,
     well: Ton,
     clamped: Ton,
@@ -168,7 +168,7 @@ pub struct Charger {
     heights: [f64; 2],
 }
 
-/// A move to `position`, as fast as the axes of the charger go.
+/// A move to `position` at the highest speed of the charger's axes.
 const fn to(position: f64) -> AxisCommand {
     AxisCommand {
         mode: Mode::Position,
@@ -197,7 +197,7 @@ const fn squeeze(mode: Mode, torque: f64) -> AxisCommand {
     }
 }
 
-/// The height of a block's axis over the V that it lies in, from the distance of the sensor to its top.
+/// The height of a block's axis above the V, from the sensor's distance to its top.
 fn axis_height(distance: f64) -> f64 {
     let root = std::f64::consts::SQRT_2;
     let radius = (SENSOR_HEIGHT - distance) / (1.0 + root);
@@ -212,7 +212,7 @@ impl Charger {
     ///
     /// # Errors
     ///
-    /// There is no such option, or it cannot have that value.
+    /// The option does not exist, or does not accept the value.
     pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
         let options = Options::read(Self::NAME, &Options::CHARGER, options)?;
         let tally = tally(&AXES);
@@ -233,7 +233,7 @@ impl Charger {
         })
     }
 
-    /// Begins anew from what the sensors show.
+    /// Starts over with the state that the sensors show.
     fn restart(&mut self, io: &mut Io) {
         io.forget();
         let on = |block: usize| io.is_on(self.places.blocks[block]);
@@ -241,7 +241,7 @@ impl Charger {
         let clamped = on(6);
         let at_lathe = io.axes[ARM].inputs.position < 1.0;
         self.feeding.go(Feeding::Rest);
-        // Where the clamps come, both hold the same block; anywhere else the spindles hold another one.
+        // At the clamps' position both hold the same block; anywhere else the spindles hold another one.
         let with_clamps = clamped
             && X.into_iter()
                 .all(|axis| io.axes[axis].inputs.position < 1.0);
@@ -323,7 +323,8 @@ impl Charger {
                 (down && over && axes[LINEAR_FEEDER].is_done()).then_some(Centring::Waiting)
             }
             Centring::Waiting => {
-                // A block that has just fallen onto the feeder is still held by the step feeder's stroke.
+                // A block that has just fallen onto the feeder is still supported by the step feeder's
+                // stroke.
                 if !on_feeder || self.feeding.step != Feeding::Waiting {
                     return Nanos::ZERO;
                 }
@@ -346,7 +347,8 @@ impl Charger {
             Centring::Lift => {
                 let lifted = both(Y, pair(LIFTED));
                 if lifted && self.transfer.step != Transfer::Waiting {
-                    // Where the clamps come there is room for one block: this one waits for the arm to be back, and empty.
+                    // There is room for one block at the clamps: this one waits until the arm is back and
+                    // empty.
                     return Nanos::ZERO;
                 }
                 lifted.then_some(Centring::Present)
@@ -357,7 +359,7 @@ impl Charger {
                 (there && axes[LINEAR_FEEDER].is_done()).then_some(Centring::Held)
             }
             Centring::Held => {
-                // The clamps have it: the transfer says so by awaiting the lathe.
+                // The clamps have it when the transfer is in the step that awaits the lathe.
                 if self.transfer.step != Transfer::AwaitLathe {
                     return Nanos::ZERO;
                 }
@@ -396,7 +398,7 @@ impl Charger {
         let next = match self.transfer.step {
             Transfer::Home => {
                 clamps(axes, Mode::Open);
-                // With its jaws closed the arm would take along what it is between.
+                // With closed jaws the arm would take the block along.
                 (opened && arm_to(axes, ARM_BACK)).then_some(Transfer::Waiting)
             }
             Transfer::Waiting => {
@@ -467,7 +469,7 @@ impl Charger {
             return false;
         }
         if simulation == Simulation::Stopped {
-            // Nothing gets on, and that is nobody's fault.
+            // No chain progresses, but that is not a time-out.
             self.feeding.since = None;
             self.centring.since = None;
             self.transfer.since = None;

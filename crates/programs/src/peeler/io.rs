@@ -1,4 +1,4 @@
-//! The process image as names: axes with their blocks, and single signals.
+//! The process image by name: axes with their blocks, and single signals.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use tickbus_image::signal::{Area, Plan, SignalTable, Slot};
 use tickbus_plc::blocks::{AxisCommand, AxisControl, AxisInputs, Execute};
 use tickbus_plc::{ProgramError, Scan};
 
-/// The images, decoded, and the axes on them.
+/// The decoded images, and the axes in them.
 #[derive(Debug)]
 pub(super) struct Io {
     decode: Plan,
@@ -20,24 +20,24 @@ pub(super) struct Io {
     pub(super) axes: Vec<Axis>,
 }
 
-/// One axis: its block, what it tells, and where its fields are among the slots.
+/// One axis: its block, its feedback, and the indices of its fields in the slots.
 #[derive(Debug)]
 pub(super) struct Axis {
     pub(super) control: AxisControl,
     pub(super) inputs: AxisInputs,
-    /// The last command that the program wanted.
+    /// The last command that the program requested.
     wanted: Option<AxisCommand>,
     fields: [usize; Field::COUNT],
 }
 
-/// A field that an axis need not have.
+/// The index of an optional field that an axis does not have.
 const NOWHERE: usize = usize::MAX;
 
 /// A signal of the table.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Place(usize);
 
-/// Fields without which an axis cannot be driven.
+/// The fields that every axis must have.
 const NEEDED: [Field; 13] = [
     Field::Execute,
     Field::Tracking,
@@ -55,7 +55,8 @@ const NEEDED: [Field; 13] = [
 ];
 
 impl Io {
-    /// Finds the axes with these names and kinds; `hold` is how long `Execute` stays on, if time is to tell.
+    /// Finds the axes with these names and kinds; `hold` is how long `Execute` stays on if there is no
+    /// acknowledge.
     pub(super) fn new(
         program: &str,
         table: &SignalTable,
@@ -98,7 +99,7 @@ impl Io {
         })
     }
 
-    /// Takes the inputs over; false when the images are not those of the table.
+    /// Takes over the inputs; false if the images do not match the table.
     pub(super) fn begin(&mut self, scan: &Scan<'_>) -> bool {
         if scan.inputs.len() < self.input_bytes || scan.outputs.len() < self.output_bytes {
             return false;
@@ -121,7 +122,7 @@ impl Io {
         true
     }
 
-    /// Calls the blocks of all axes and puts the outputs onto the image.
+    /// Calls the blocks of all axes and writes the outputs to the image.
     pub(super) fn end(&mut self, scan: &mut Scan<'_>, enable: bool, tally: &Tally) {
         for (axis, tally) in self.axes.iter_mut().zip(tally.axes()) {
             let commands = axis.control.commands();
@@ -161,7 +162,7 @@ impl Io {
             .encode(&self.slots, &mut scan.outputs[..self.output_bytes]);
     }
 
-    /// Where a signal is.
+    /// The index of a signal.
     pub(super) fn place(
         program: &str,
         table: &SignalTable,
@@ -183,17 +184,17 @@ impl Io {
         self.value(place) != 0.0
     }
 
-    /// Switches a signal.
+    /// Sets a BOOL signal.
     pub(super) fn switch(&mut self, place: Place, on: bool) {
         self.slots[place.0] = Slot::from_real(f64::from(u8::from(on)));
     }
 
-    /// Whether every axis is doing well.
+    /// Whether no axis has a fault.
     pub(super) fn all_healthy(&self) -> bool {
         self.axes.iter().all(|axis| axis.inputs.healthy)
     }
 
-    /// Forgets every command.
+    /// Discards all commands.
     pub(super) fn forget(&mut self) {
         for axis in &mut self.axes {
             axis.wanted = None;
@@ -202,7 +203,7 @@ impl Io {
 }
 
 impl Axis {
-    /// Wants `command`, if it is another one than the last.
+    /// Requests `command`, unless it equals the last one.
     pub(super) fn want(&mut self, command: AxisCommand) {
         if self.wanted != Some(command) {
             self.wanted = Some(command);
@@ -210,24 +211,24 @@ impl Axis {
         }
     }
 
-    /// The same command again.
+    /// Requests the same command again.
     pub(super) fn repeat(&mut self, command: AxisCommand) {
         self.wanted = None;
         self.want(command);
     }
 
-    /// Ends what lasts.
+    /// Ends a continuous command.
     pub(super) fn release(&mut self) {
         self.wanted = None;
         self.control.release();
     }
 
-    /// Whether the axis has done what was wanted last.
+    /// Whether the axis has completed the last request.
     pub(super) fn is_done(&self) -> bool {
         self.control.is_done(&self.inputs)
     }
 
-    /// Whether the machine knows the last command, and the axis stands.
+    /// Whether the machine has accepted the last command, and the axis has stopped.
     pub(super) fn stands(&self) -> bool {
         self.control.is_taken() && self.inputs.speed.abs() < 0.5
     }
@@ -246,7 +247,7 @@ fn missing(program: &str, signal: &str) -> ProgramError {
     }
 }
 
-/// What the report needs of the axes, by their names.
+/// The report's counters for the axes with these names.
 pub(super) fn tally(axes: &[(&'static str, Kind)]) -> Arc<Tally> {
     Arc::new(Tally::new(axes.iter().map(|(name, _)| *name)))
 }

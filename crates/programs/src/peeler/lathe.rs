@@ -12,8 +12,8 @@
 //! | retract | knife and rolls draw back, the core stops | it stands |
 //! | drop | the spindles open over the core drop | they are open |
 //!
-//! While it peels, the program keeps the speed of the veneer by that of the spindles, from where the knife is: a new
-//! command whenever the speed is off by more than 1 %, as fast as `Execute` allows.
+//! While peeling, the program keeps the speed of the veneer constant by adapting the spindle speed to the
+//! knife's position: a new command whenever the speed is off by more than 1 %, as often as `Execute` permits.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ use tickbus_image::signal::{Addressing, SignalTable};
 use tickbus_plc::blocks::{AxisCommand, Ton};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
 
-/// The axes, in the order in which the program counts them.
+/// The axes, in the program's own order.
 const AXES: [(&str, Kind); 13] = [
     ("spindle left", Kind::Torque),
     ("spindle right", Kind::Torque),
@@ -63,28 +63,28 @@ const APPROACH: f64 = 160.0;
 const ROLLS_APPROACH: f64 = 165.0;
 const ROUND: f64 = 125.0;
 const CORE: f64 = 40.0;
-/// The knife is out of the way of a core that drops.
+/// From here on the knife does not obstruct a falling core.
 const CLEAR_OF_CORE: f64 = 100.0;
 const SPINDLES_OPEN: f64 = 690.0;
-/// Where spindles stand that have a block between them.
+/// The positions of spindles with a block between them.
 const ON_BLOCK: std::ops::RangeInclusive<f64> = 600.0..=690.0;
 const NOSEBAR_BACK: f64 = 20.0;
 const NOSEBAR_CLOSE: f64 = 2.0;
 
-/// The pressure that clamps a block, that which holds it afterwards, and that of the gates, in per cent.
+/// The pressure for clamping a block, the one for holding it, and that of the gates, in per cent.
 const CLAMP_TORQUE: f64 = 80.0;
 const HOLD_TORQUE: f64 = 40.0;
 const GATE_TORQUE: f64 = 30.0;
 /// How much faster than the block the rolls turn, in per cent.
 const ROLL_LEAD: f64 = 2.0;
 
-/// Veneer that a block is rounded up by, in mm for each turn.
+/// Thickness removed per turn while rounding up a block, in mm.
 const ROUND_UP: f64 = 3.0;
 
-/// Turns a second: at the beginning, and at most.
+/// Turns per second: at the beginning, and at most.
 const FIRST_TURNS: f64 = 2.0;
 const MOST_TURNS: f64 = 12.0;
-/// The speed is put right when it is off by this part of it.
+/// The relative deviation from which on the speed is corrected.
 const SPEED_BAND: f64 = 0.01;
 
 const LIMIT: Nanos = Nanos::from_secs(30);
@@ -106,7 +106,7 @@ enum Step {
     Drop,
 }
 
-/// The signals beside the axes.
+/// The signals other than the axes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Places {
     ready: Place,
@@ -115,7 +115,7 @@ struct Places {
     clear: Place,
 }
 
-/// The lathe's program; the [module](self) tells what it does.
+/// The lathe's program, described at the [module](self).
 #[derive(Debug)]
 pub struct Lathe {
     options: Options,
@@ -127,9 +127,9 @@ pub struct Lathe {
     clamped: Ton,
     step: Step,
     since: Option<Nanos>,
-    /// The spindles hold a block that the charger may let go.
+    /// The spindles hold a block that the charger may release.
     holds: bool,
-    /// Turns per second that were commanded last.
+    /// The last commanded turns per second.
     turns: f64,
 }
 
@@ -151,7 +151,7 @@ const fn to(position: f64) -> AxisCommand {
     }
 }
 
-/// Follows, with this offset, and with `torque` whatever that is to the axis.
+/// Tracking with this offset; the meaning of `torque` depends on the axis.
 const fn track(offset: f64, torque: f64) -> AxisCommand {
     AxisCommand {
         mode: Mode::Tracking,
@@ -174,7 +174,7 @@ const fn squeeze(mode: Mode, torque: f64) -> AxisCommand {
     }
 }
 
-/// Turns at so many turns a second, without an end.
+/// Turning endlessly at `turns` turns per second.
 const fn turn(turns: f64) -> AxisCommand {
     AxisCommand {
         mode: Mode::Speed,
@@ -202,7 +202,7 @@ impl Lathe {
     ///
     /// # Errors
     ///
-    /// There is no such option, or it cannot have that value.
+    /// The option does not exist, or does not accept the value.
     pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
         let options = Options::read(Self::NAME, &Options::LATHE, options)?;
         let tally = tally(&AXES);
@@ -227,8 +227,9 @@ impl Lathe {
         self.since = None;
     }
 
-    /// Begins anew. What is between the spindles is clamped on if the charger presents it, and else counts as a
-    /// core; then nobody is told that it is held, so that a charger that has it, too, keeps it.
+    /// Starts over. If the charger presents what is between the spindles, it is clamped again; otherwise it
+    /// counts as a core. In that case it is not reported as held, so that a charger that also holds it keeps
+    /// it.
     fn restart(&mut self, io: &mut Io) {
         io.forget();
         self.turns = 0.0;
@@ -244,13 +245,13 @@ impl Lathe {
         });
     }
 
-    /// The turns per second that give the veneer its speed where the knife is now.
+    /// The turns per second at which the veneer has its speed, given the knife's position.
     fn wanted_turns(&self, axes: &[Axis]) -> f64 {
         let radius = axes[KNIFE].inputs.position.max(1.0);
         (self.options.peeling_speed / (TAU * radius)).min(MOST_TURNS)
     }
 
-    /// Keeps the speed of the veneer.
+    /// Corrects the speed of the veneer.
     fn keep_speed(&mut self, axes: &mut [Axis]) {
         let wanted = self.wanted_turns(axes);
         let off = (wanted - self.turns).abs() > SPEED_BAND * wanted;
@@ -274,9 +275,9 @@ impl Lathe {
         axes[KNIFE].inputs.position > CLEAR_OF_CORE && axes[ROTATION].inputs.speed.abs() < 0.01
     }
 
-    /// Knife and rolls come near, and the block begins to turn.
+    /// Knife and rolls approach, and the block starts to turn.
     fn come_near(&mut self, axes: &mut [Axis]) {
-        // The grip is there: less pressure cracks no block.
+        // It is gripped: with less pressure the block does not crack.
         for axis in SPINDLES {
             axes[axis].want(squeeze(Mode::Close, HOLD_TORQUE));
         }
@@ -290,7 +291,7 @@ impl Lathe {
         axes[ROTATION].repeat(turn(FIRST_TURNS));
     }
 
-    /// Lets knife and rolls follow, once they are there and the block turns; tells whether they do.
+    /// Lets knife and rolls track once they are in position and the block turns; returns whether they do.
     fn begin_to_peel(axes: &mut [Axis]) -> bool {
         let there = [KNIFE, ROLLS[0], ROLLS[1], ROLLS[2]]
             .into_iter()
@@ -306,7 +307,7 @@ impl Lathe {
         there && turns
     }
 
-    /// One scan of the sequence; gives how long the step has lasted, where that matters, and may.
+    /// One scan of the sequence; returns how long the step has lasted, if that is limited, and its limit.
     fn sequence(&mut self, io: &mut Io, now: Nanos) -> (Nanos, Nanos) {
         let lasts = now - *self.since.get_or_insert(now);
         let (presented, clear) = (io.is_on(self.places.presented), io.is_on(self.places.clear));
@@ -366,7 +367,7 @@ impl Lathe {
             Step::Peel => {
                 self.keep_speed(axes);
                 let wanted = self.wanted_turns(axes);
-                // The first turns are those of a drive that still speeds up.
+                // During the first turns the drive is still accelerating.
                 if lasts > WELL && wanted < MOST_TURNS {
                     self.tally
                         .kept
@@ -441,7 +442,7 @@ impl Program for Lathe {
             clear: place("transfer clear")?,
         };
         self.io = Some(Io::new(Self::NAME, table, &AXES, self.options.hold)?);
-        // Until something was heard of the machine, it is not known to be well.
+        // Until the machine has been heard from, its health is unknown.
         self.failed = true;
         Ok(())
     }

@@ -1,10 +1,10 @@
 //! The programs "charger" and "lathe": the two PLCs of a line that peels blocks of wood into veneer.
 //!
-//! They work on the axes and signals of `plc/peeler/charger.cfg` and `lathe.cfg`, which they find by their names: any
-//! other layout of the same names does as well. Between the two go four wires, through the machine.
+//! They use the axes and signals of `plc/peeler/charger.cfg` and `lathe.cfg`, which they find by name: any
+//! other layout with the same names works as well. The two are connected by four wires, through the machine.
 //!
-//! Both begin anew, from what the sensors show, whenever the link comes back, an axis has failed and is well again, a
-//! step has taken too long, or the simulation was started again.
+//! Both start over, with the state that the sensors show, when the link returns, an axis has recovered from a
+//! fault, a step has timed out, or the simulation was restarted.
 
 mod io;
 mod options;

@@ -3,12 +3,12 @@
 use tickbus_base::time::Nanos;
 use tickbus_plc::ProgramError;
 
-/// What a user may say to either program.
+/// The options that a user may give to either program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Options {
     /// How long `Execute` stays on; `None` waits for the machine's acknowledge.
     pub(super) hold: Option<Nanos>,
-    /// After so many blocks the program is done; `None` goes on for ever.
+    /// The program is done after this many blocks; `None` for never.
     pub(super) blocks: Option<u64>,
     /// Speed of the veneer, in mm/s.
     pub(super) peeling_speed: f64,
@@ -17,12 +17,12 @@ pub(super) struct Options {
 }
 
 impl Options {
-    /// What both programs know.
+    /// The options of both programs.
     pub(super) const CHARGER: [&'static str; 2] = ["hold", "blocks"];
-    /// What the lathe knows.
+    /// The options of the lathe.
     pub(super) const LATHE: [&'static str; 4] = ["hold", "blocks", "peeling_speed", "thickness"];
 
-    /// Reads them for the program that has the options `known`.
+    /// Reads the options for the program that has the options `known`.
     pub(super) fn read(
         program: &'static str,
         known: &'static [&'static str],

@@ -1,4 +1,4 @@
-//! What the two programs tell: commands per axis, blocks, and how well the veneer's speed was kept.
+//! The report of the two programs: commands per axis, blocks, and how well the veneer's speed was kept.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
@@ -8,23 +8,23 @@ use tickbus_plc::Report;
 
 const SECOND: i64 = 1_000_000_000;
 
-/// What a program has done so far. Written by its scans, which never wait; read by whoever hosts it.
+/// What a program has done so far. Written by its scans, which never wait; read by its host.
 #[derive(Debug)]
 pub(super) struct Tally {
     axes: Box<[AxisTally]>,
-    /// Blocks that were passed on.
+    /// Blocks passed on.
     pub(super) blocks: AtomicU64,
-    /// After so many blocks all is done; 0 for never.
+    /// The program is done after this many blocks; 0 for never.
     pub(super) asked: AtomicU64,
-    /// Times that something went wrong and the sequence began anew.
+    /// How often a fault made the sequence start over.
     pub(super) faults: AtomicU64,
-    /// Times that the simulation was started again.
+    /// How often the simulation was restarted.
     pub(super) restarts: AtomicU64,
-    /// Whether a speed is kept here, and how well.
+    /// How well the speed was kept, if the program controls one.
     pub(super) kept: Kept,
 }
 
-/// How well a speed was kept, in thousandths of it.
+/// Deviations from a speed, in thousandths of it.
 #[derive(Debug, Default)]
 pub(super) struct Kept {
     samples: AtomicU64,
@@ -37,10 +37,10 @@ pub(super) struct Kept {
 pub(super) struct AxisTally {
     name: &'static str,
     commands: AtomicU64,
-    /// Least time between two commands; 0 before the second.
+    /// Shortest time between two commands; 0 before the second.
     least: AtomicI64,
     last: AtomicI64,
-    /// The second that is being counted: its beginning, and the commands in it.
+    /// The start of the second being counted, and the commands in it.
     second: AtomicI64,
     in_second: AtomicU64,
     /// Commands in the busiest second.
@@ -68,7 +68,7 @@ impl AxisTally {
 }
 
 impl Kept {
-    /// Takes down how far `actual` is from `wanted`.
+    /// Adds the deviation of `actual` from `wanted`.
     pub(super) fn sample(&self, actual: f64, wanted: f64) {
         #[expect(
             clippy::cast_possible_truncation,
@@ -81,7 +81,7 @@ impl Kept {
         self.most.fetch_max(off, Relaxed);
     }
 
-    /// Root of the mean square and greatest, in per cent; `None` before the first sample.
+    /// Root mean square and maximum, in per cent; `None` before the first sample.
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     fn per_cent(&self) -> Option<(f64, f64)> {
         let samples = self.samples.load(Relaxed);
@@ -111,12 +111,12 @@ impl Tally {
         }
     }
 
-    /// The axes, in the order of the program.
+    /// The axes, in the program's own order.
     pub(super) fn axes(&self) -> impl Iterator<Item = &AxisTally> {
         self.axes.iter()
     }
 
-    /// The busiest axis: its name, its commands in one second, and the least time between two.
+    /// The busiest axis: its name, its most commands within a second, and the shortest time between two.
     fn busiest(&self) -> Option<(&'static str, u64, Nanos)> {
         let busiest = self
             .axes

@@ -16,7 +16,7 @@ const PATTERNS: [u16; STEPS] = [
     IM1_INDEX,
     // 2: lift 1 carries it up into a sleeve of wheel 2.
     LA1_RUN | SC1,
-    // 3: lift 1 lets go and draws back a little.
+    // 3: lift 1 releases it and draws back a little.
     LA1_RUN | LA1_CODE_LOW,
     // 4: wheel 2 swaps the bottles.
     IM2_INDEX,
@@ -46,9 +46,9 @@ impl Cycle {
         }
     }
 
-    /// Solves the rungs; returns whether this scan completed a cycle.
+    /// Evaluates the rungs; returns whether this scan completed a cycle.
     ///
-    /// Unless `running`, the drum stands at step 1, and so it does in the first scan that runs.
+    /// Unless `running`, the drum is at step 1, and it still is in the first running scan.
     pub(super) fn call(&mut self, now: Nanos, running: bool, status: u16) -> bool {
         // Rung 1: a Move copies the input word.
         let complete = status;
@@ -76,7 +76,7 @@ impl Cycle {
         self.drum.q
     }
 
-    /// The active step has lasted longer than it may.
+    /// The active step has exceeded its time limit.
     pub(super) fn overdue(&self) -> bool {
         self.drum.timeout_fault
     }

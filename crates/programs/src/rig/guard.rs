@@ -1,11 +1,11 @@
-//! What stops the rig while it runs: jams and locked wheels.
+//! The conditions that stop a running rig: jams and locked wheels.
 
 use super::image::Inputs;
 use super::image::command::{IM1_INDEX, IM1_JOG, IM2_INDEX, IM2_JOG};
 use tickbus_base::time::Nanos;
 use tickbus_plc::blocks::Ton;
 
-/// A beam that is interrupted for longer than this is a jam. The machine itself says so after 1 s.
+/// A beam interrupted for longer than this is a jam. The machine itself reports it after 1 s.
 const JAM: Nanos = Nanos::from_millis(1_500);
 
 /// Watches the package sensors while the drum turns.
@@ -26,8 +26,8 @@ impl JamGuard {
 
 /// Whether `command` would turn a wheel through a lift.
 ///
-/// Every turn needs both lifts at their bottom switches, except indexing wheel 2: it goes under
-/// lift 2 and takes place while lift 1 stands in its sleeve.
+/// Every turn requires both lifts to be at their bottom switches, except indexing wheel 2: it passes under
+/// lift 2, and is done while lift 1 is in its sleeve.
 pub(super) fn wheel_locked(command: u16, inputs: Inputs) -> bool {
     let any_lift = command & (IM1_INDEX | IM1_JOG | IM2_JOG) != 0;
     let lift_2 = command & IM2_INDEX != 0;

@@ -1,11 +1,11 @@
-//! Homing: lifts down, suction off, wheels to their index zero. Homing, recovering and finalising
-//! all do this, the first two after acknowledging a fault.
+//! Homing: lifts down, suction off, wheels to their index zero. The phases home, recover and finalise all do
+//! this, the first two after acknowledging a fault.
 //!
-//! The first two also fetch down what may hang in the sleeve over lift 1. No sensor tells whether a
-//! cycle was broken off between handing a bottle over and taking the other one back, and a program
-//! that has just been switched on remembers nothing; but step 2 must find that sleeve empty. The
-//! stroke is harmless in every other case: while a bottle stands in the pocket under lift 1, nothing
-//! has been handed over, and it goes up into an empty sleeve and comes down again.
+//! The first two also bring down a bottle that may be in the sleeve over lift 1. No sensor tells whether a
+//! cycle was interrupted between handing a bottle over and taking the other one back, and a program that was
+//! just started has no memory; but step 2 must find that sleeve empty. The stroke is harmless in every other
+//! case: while a bottle is in the pocket under lift 1, nothing has been handed over, and it goes up into an
+//! empty sleeve and comes down again.
 
 use super::image::Inputs;
 use super::image::command::{
@@ -18,22 +18,22 @@ use tickbus_plc::blocks::Ton;
 const PULSE: Nanos = Nanos::from_millis(100);
 /// How long the machine may take to clear its fault.
 const CLEAR_LIMIT: Nanos = Nanos::from_secs(2);
-/// How long the lifts may take down.
+/// How long the lifts may take to go down.
 const LIFTS_LIMIT: Nanos = Nanos::from_secs(10);
-/// How long the wheels may take to their zero.
+/// How long the wheels may take to reach their zero.
 const WHEELS_LIMIT: Nanos = Nanos::from_secs(10);
 /// How long lift 1 may take up to the sleeve, or down again.
 const FETCH_LIMIT: Nanos = Nanos::from_secs(5);
-/// How long switches must show before they are believed. A lift reaches the mechanical stop, and a
-/// wheel comes to rest, only after its switch has come on.
+/// How long switches must be on before homing continues. A lift reaches the mechanical stop, and a wheel
+/// comes to rest, only after its switch has come on.
 const SETTLE: Nanos = Nanos::from_millis(300);
-/// The same for a wheel that was jogged, before anything goes through it: it stops somewhere inside its
-/// homing window, and its drive creeps from there onto the index position.
+/// As [`SETTLE`], for a jogged wheel that something will pass through: it stops anywhere inside its homing
+/// window, from where its drive creeps to the index position.
 const CREEP: Nanos = Nanos::from_millis(1_500);
-/// How long the suction cups take to let go, and a wheel that was indexing to come to rest.
+/// How long the suction cups take to release, and an indexing wheel to come to rest.
 const LET_GO: Nanos = Nanos::from_secs(1);
 
-/// Where homing stands.
+/// The step of homing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Step {
     /// Nothing to do.
@@ -45,17 +45,17 @@ enum Step {
     Clear,
     /// The lifts go down.
     Lifts,
-    /// The suction cups let go.
+    /// The suction cups release.
     LetGo,
     /// The wheels turn to their zero.
     Wheels,
     /// Lift 1 goes up to the sleeve, with suction.
     Fetch,
-    /// Lift 1 comes down with what it found.
+    /// Lift 1 comes down with whatever it has found.
     Bring,
-    /// All is home.
+    /// Homing is complete.
     Done,
-    /// It could not be done.
+    /// Homing has failed.
     Failed,
 }
 
@@ -64,9 +64,9 @@ enum Step {
 #[expect(clippy::struct_excessive_bools, reason = "each is a coil of its own")]
 pub(super) struct Homing {
     step: Step,
-    /// This homing has acknowledged a fault, so the lift drives have lost their reference.
+    /// This homing has acknowledged a fault, so that the lift drives have lost their reference.
     unreferenced: bool,
-    /// It ends with fetching down what hangs in the sleeve over lift 1.
+    /// It ends by bringing down what may be in the sleeve over lift 1.
     fetches: bool,
     /// A wheel was off its homing sensor.
     jogged: bool,
@@ -85,7 +85,7 @@ pub(super) struct Homing {
 }
 
 impl Homing {
-    /// Begins anew, with an Acknowledge pulse or without; `fetches` when a cycle may follow.
+    /// Starts over, with or without an Acknowledge pulse; `fetches` if a cycle may follow.
     pub(super) fn begin(&mut self, acknowledge: bool, not_ok: bool, fetches: bool) {
         self.step = if acknowledge {
             Step::Acknowledge
@@ -99,16 +99,16 @@ impl Homing {
         self.lower_2 = false;
     }
 
-    /// Stops, wherever it stands.
+    /// Stops at any step.
     pub(super) fn stop(&mut self) {
         self.step = Step::Idle;
         self.lower_1 = false;
         self.lower_2 = false;
     }
 
-    /// Takes the sequence on by one scan.
+    /// Advances the sequence by one scan.
     pub(super) fn call(&mut self, now: Nanos, inputs: Inputs) {
-        // The timers see the step that the scan before has left.
+        // The timers get the step as of the end of the previous scan.
         let step = self.step;
         let centred = inputs.home_1() && inputs.home_2();
         self.pulse.call(now, step == Step::Acknowledge, PULSE);
@@ -136,8 +136,8 @@ impl Homing {
             Step::Clear if !inputs.not_ok() => Step::Lifts,
             Step::Clear if self.clear.q => Step::Failed,
             Step::Lifts if inputs.not_ok() && self.unreferenced => Step::Failed,
-            // A drive that stands referenced in mid-path refuses to go further than its bottom
-            // stop. Acknowledging takes its reference, and then it makes a reference run.
+            // A referenced drive refuses to move beyond its bottom stop from the middle of its path.
+            // Acknowledging clears its reference, and then it makes a reference run.
             Step::Lifts if inputs.not_ok() => {
                 self.unreferenced = true;
                 Step::Acknowledge
@@ -157,14 +157,14 @@ impl Homing {
             other => other,
         };
 
-        // A lift that is at its bottom already is left alone: referenced, it would run into its
-        // stop. One that is not keeps running after its switch, to the stop.
+        // A lift already at its bottom is not moved: referenced, it would run into its stop. Any other lift
+        // keeps running past its switch, to the stop.
         let lowering = self.step == Step::Lifts;
         self.lower_1 = lowering && (self.lower_1 || !inputs.la1_bottom());
         self.lower_2 = lowering && (self.lower_2 || !inputs.la2_bottom());
     }
 
-    /// The bits of the command word that homing needs in this scan.
+    /// The bits of the command word needed by homing in this scan.
     pub(super) fn command(&self, inputs: Inputs) -> u16 {
         let mut word = 0;
         if self.step == Step::Acknowledge {
@@ -177,7 +177,7 @@ impl Homing {
             word |= LA2_RUN;
         }
         match self.step {
-            // The word of step 2, so the machine tells by that step's bit when it is done.
+            // The same word as in step 2, so that the machine reports by that step's bit when it is done.
             Step::Fetch => word |= LA1_RUN,
             Step::Bring => word |= LA1_RUN | LA1_CODE,
             _ => {}
@@ -193,8 +193,7 @@ impl Homing {
         word
     }
 
-    /// The suction cups that hold, where those in `held` held so far: until the lifts are down, they
-    /// go on.
+    /// The suction cups that hold: those in `held` keep holding until the lifts are down.
     pub(super) fn suction(&self, held: u16) -> u16 {
         match self.step {
             Step::LetGo | Step::Wheels | Step::Done => 0,
@@ -203,12 +202,12 @@ impl Homing {
         }
     }
 
-    /// All is home.
+    /// Homing is complete.
     pub(super) fn done(&self) -> bool {
         self.step == Step::Done
     }
 
-    /// It could not be done.
+    /// Homing has failed.
     pub(super) fn failed(&self) -> bool {
         self.step == Step::Failed
     }

@@ -1,9 +1,9 @@
-//! The layout of the rig's process image: which bit means what, once and for all.
+//! The layout of the rig's process image: the meaning of every bit.
 //!
 //! Both words are big-endian; the offsets are those of the rig's `driver.cfg`.
 
-/// Bytes of `%I`: status word, panel, a spare byte, two lift positions (which the program leaves to
-/// others: the switches tell it enough).
+/// Bytes of `%I`: status word, panel, a spare byte, two lift positions (not used by the program, for which
+/// the switches suffice).
 pub(super) const INPUT_BYTES: usize = 8;
 /// Bytes of `%Q`: command word, panel, phase, step, cycles.
 pub(super) const OUTPUT_BYTES: usize = 8;
@@ -82,7 +82,7 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    /// Takes the inputs from `%I`; missing bytes read as 0.
+    /// Reads the inputs from `%I`; missing bytes read as 0.
     pub(super) fn read(image: &[u8]) -> Self {
         let byte = |offset: usize| image.get(offset).copied().unwrap_or(0);
         Self {
@@ -141,7 +141,7 @@ impl Inputs {
         self.panel & button::LA2_BOTTOM != 0
     }
 
-    /// Lift 1 is up at the sleeve: the word of step 2 is complete, whatever it was commanded for.
+    /// Lift 1 is up at the sleeve: the word of step 2 is complete, for whatever purpose it was commanded.
     pub(super) fn fetched(self) -> bool {
         self.status & status::STEP_2 != 0
     }
@@ -163,12 +163,12 @@ pub(super) struct Outputs {
     pub(super) phase: u8,
     /// The drum's active step; 0 outside run.
     pub(super) step: u16,
-    /// Cycles completed since the program started; after 65,535 comes 0.
+    /// Cycles completed since the program started; wraps from 65,535 to 0.
     pub(super) cycles: u16,
 }
 
 impl Outputs {
-    /// Puts all outputs onto `%Q`; what is beyond its end is dropped.
+    /// Writes all outputs to `%Q`; what is beyond its end is dropped.
     pub(super) fn write(self, image: &mut [u8]) {
         let [command_high, command_low] = self.command.to_be_bytes();
         let [step_high, step_low] = self.step.to_be_bytes();

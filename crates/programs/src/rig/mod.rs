@@ -11,9 +11,9 @@
 //! | 6 finalise | homes | parked when home; abort when homing fails |
 //! | 7 parked | Parked lamp; nothing moves | home on Start |
 //!
-//! Any phase leads to initialise as soon as the peer is not alive. While it is alive, Stop is
-//! remembered from any phase but parked, until the rig is parked. Start and Reset count only where
-//! the table names them, and only at the moment they are pressed.
+//! Any phase leads to initialise as soon as the peer is not alive. While it is alive, Stop is remembered in
+//! any phase except parked, until the rig is parked. Start and Reset only have an effect in the phases named
+//! in the table, and only on the rising edge.
 //!
 //! Homing goes through these steps:
 //!
@@ -27,21 +27,20 @@
 //! | lift 1 up with suction (home and recover) | "step 2 complete" is on: it is the word of step 2 | 5 s have passed; Not OK |
 //! | lift 1 down with suction | its switch has been on for 300 ms | 5 s have passed; Not OK |
 //!
-//! The last two fetch down what may hang in the sleeve over lift 1, where step 2 of the next cycle
-//! must find none: a cycle may have been broken off while it was there.
+//! The last two bring down a bottle that may be in the sleeve over lift 1, which must be empty in step 2 of
+//! the next cycle: a cycle may have been interrupted while the bottle was there.
 //!
-//! Not OK while the lifts go down, where this homing has acknowledged nothing yet, leads back to the
+//! Not OK while the lifts go down, if this homing has not acknowledged anything yet, leads back to the
 //! Acknowledge pulse once: a drive that still has its reference refuses to pass its bottom stop.
 //!
-//! Limits while running: a package sensor on for 1.5 s is a jam; a step may take 5 s. The times of
-//! homing start in the scan after the one that begins the step, as timers do that are called once
-//! per scan.
+//! Limits while running: a package sensor on for 1.5 s is a jam; a step may take 5 s. The times of homing
+//! start in the scan after the one that begins the step, because timers are called once per scan.
 //!
-//! The outputs are made afresh in each scan. What a suction cup holds it goes on holding through
-//! abort and initialise, until the lifts are down. A program that was just switched on knows nothing
-//! of the machine, so it takes it that both cups hold something. (The rig's `driver.cfg` says the same
-//! for the time without a program: the fail-safe value of a cup is on.) The logic is kept to Booleans, timers, edges and
-//! cases, so that it can be written again in Structured Text and compared scan by scan.
+//! The outputs are computed anew in each scan. A suction cup that holds a bottle keeps holding it through
+//! abort and initialise, until the lifts are down. A program that was just started knows nothing about the
+//! machine, so it assumes that both cups hold a bottle. (In the rig's `driver.cfg` the fail-safe value of a
+//! cup is on as well, for the time without a program.) The logic is limited to Booleans, timers, edges and
+//! cases, so that it can be rewritten in Structured Text and compared scan by scan.
 
 use self::cycle::Cycle;
 use self::guard::{JamGuard, wheel_locked};
@@ -61,9 +60,9 @@ mod phase;
 #[cfg(test)]
 mod tests;
 
-/// Which digit of lift 1's code lies on the lower bit of the command word, bit 3.
+/// Which digit of lift 1's code is on the lower bit of the command word, bit 3.
 ///
-/// The protocol's table leaves it open. Only the small moves differ.
+/// The protocol's table does not say. Only the small moves differ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum La1Code {
     /// The last digit, so the code reads as a number: 01 = − small is bit 3.
@@ -77,7 +76,7 @@ impl La1Code {
     /// The values of the option `la1_code`.
     const NAMES: [&'static str; 2] = ["msb-first", "lsb-first"];
 
-    /// Puts the code of an MSB-first command word into this order.
+    /// Converts the code in an MSB-first command word to this order.
     fn ordered(self, word: u16) -> u16 {
         match self {
             Self::MsbFirst => word,
@@ -95,7 +94,7 @@ impl La1Code {
     }
 }
 
-/// The rig's program; the [module](self) tells what it does.
+/// The rig's program, described at the [module](self).
 #[derive(Clone, Debug)]
 pub struct Rig {
     la1_code: La1Code,
@@ -118,18 +117,18 @@ struct Buttons {
     reset: RTrig,
 }
 
-/// What outlives a phase.
+/// The state that survives a change of phase.
 #[derive(Clone, Copy, Debug, Default)]
 struct Memory {
-    /// A run was begun and not ended: homing leads back to it.
+    /// A run has begun and not ended: homing leads back to it.
     running: bool,
     /// Stop was pressed: homing, or the end of the cycle, leads to finalise.
     stop: bool,
-    /// A fault was not reset: not even a lost link ends it.
+    /// A fault was not reset: not even a lost link clears it.
     fault: bool,
 }
 
-/// What has happened by this scan.
+/// The events up to this scan.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -148,7 +147,7 @@ impl Rig {
     /// Its name in [`program`](super::program).
     pub const NAME: &'static str = "rig";
 
-    /// The options that it takes.
+    /// The program's options.
     const OPTIONS: [&'static str; 1] = ["la1_code"];
 
     /// The rig's program before its first scan.
@@ -166,11 +165,12 @@ impl Rig {
         }
     }
 
-    /// The same with its options as text: `la1_code` is `msb-first` (the default) or `lsb-first`.
+    /// As [`new`](Self::new), with its options as text: `la1_code` is `msb-first` (the default) or
+    /// `lsb-first`.
     ///
     /// # Errors
     ///
-    /// There is no such option, or it cannot have that value.
+    /// The option does not exist, or does not accept the value.
     pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
         let mut la1_code = La1Code::default();
         for (option, value) in options {
@@ -197,7 +197,7 @@ impl Rig {
         Ok(Self::new(la1_code))
     }
 
-    /// The phase that follows from this one, which may be the same.
+    /// The phase that follows this one; may be the same.
     fn next_phase(&self, inputs: Inputs, events: Events) -> Phase {
         match self.phase {
             Phase::Initialise if self.memory.fault => Phase::Abort,
@@ -224,7 +224,7 @@ impl Rig {
         }
     }
 
-    /// Goes to another phase.
+    /// Changes to another phase.
     fn enter(&mut self, phase: Phase, inputs: Inputs) {
         let not_ok = inputs.not_ok();
         self.homing.stop();
@@ -246,7 +246,7 @@ impl Rig {
         self.phase = phase;
     }
 
-    /// The outputs that go with the phase.
+    /// The outputs of the phase.
     fn outputs(&mut self, inputs: Inputs) -> Outputs {
         self.suction = match self.phase {
             Phase::Run => self.cycle.command() & SUCTION,
@@ -280,7 +280,7 @@ impl Rig {
 
     /// One scan, from inputs to outputs.
     fn solve(&mut self, now: Nanos, alive: bool, inputs: Inputs) -> Outputs {
-        // Every block is called in every scan, so that edges and timers never go stale.
+        // Every block is called in every scan, so that its edges and timers stay current.
         let running = self.phase == Phase::Run;
         let stop = self.buttons.stop.call(inputs.stop());
         let events = Events {

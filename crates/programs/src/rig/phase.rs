@@ -1,9 +1,9 @@
 //! The phases of the rig's program.
 
-/// What the program is about; the number is shown on `%QB3`.
+/// The phase of the program; the number is shown on `%QB3`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// No machine answers yet, or no more.
+    /// The machine does not answer yet, or no longer.
     #[default]
     Initialise = 0,
     /// Brings lifts and wheels home.
@@ -16,14 +16,14 @@ pub(super) enum Phase {
     Abort = 4,
     /// Acknowledges the fault and homes.
     Recover = 5,
-    /// Brings all home for the last time.
+    /// Brings lifts and wheels home for the last time.
     Finalise = 6,
-    /// May be switched off.
+    /// The rig may be switched off.
     Parked = 7,
 }
 
 impl Phase {
-    /// Whether the homing sequence has the word.
+    /// Whether the homing sequence controls the outputs.
     pub(super) fn homes(self) -> bool {
         matches!(self, Self::Home | Self::Recover | Self::Finalise)
     }

@@ -343,7 +343,7 @@ fn a_wheel_is_never_turned_through_a_lift() {
     assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, 0));
 }
 
-/// Loses the link for a second and finds it again.
+/// Interrupts the link for a second.
 #[track_caller]
 fn flicker(cell: &mut Cell) {
     let suction = cell.seen.word & SUCTION;
@@ -372,9 +372,9 @@ fn after_a_lost_link_a_run_goes_on_by_itself() {
     }
 }
 
-/// Switches the program off after `ran` scans of its second cycle and on again after `off` scans: the
-/// machine goes on by the last word until the data are stale, and holds by fail-safe values from then
-/// on. Then the operator presses Start, and the cell runs on.
+/// Switches the program off after `ran` scans of its second cycle and on again after `off` scans: the machine
+/// continues with the last word until the data are stale, and holds the fail-safe values from then on. Then
+/// the operator presses Start, and the cell continues.
 #[track_caller]
 fn power_cut(ran: usize, off: usize) {
     let mut cell = Cell::ready();
@@ -412,7 +412,7 @@ fn a_power_cut_at_any_moment_drops_nothing_and_leaves_no_sleeve_full() {
     }
     assert!(scans > 200, "a cycle takes {scans} scans");
     for ran in (0..scans).step_by(3) {
-        // Back before anybody noticed, just as it is noticed, and long after.
+        // Back before the data are stale, just when they become stale, and long after.
         for off in [5, 25, 150] {
             power_cut(ran, off);
         }

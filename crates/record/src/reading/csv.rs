@@ -1,4 +1,4 @@
-//! Reading CSV as tickbus wrote it.
+//! Reading CSV as written by tickbus.
 
 use std::collections::{HashMap, HashSet};
 use std::io::BufRead;
@@ -16,7 +16,7 @@ pub(super) struct CsvReader<R> {
 }
 
 impl<R: BufRead> CsvReader<R> {
-    /// Reads the header; `table` says what types the columns have.
+    /// Reads the header; `table` provides the types of the columns.
     pub(super) fn open(
         from: R,
         table: Option<&SignalTable>,
@@ -190,7 +190,7 @@ impl Cells<'_> {
     }
 }
 
-/// The cells of a header; `None` when a quotation mark stays open or stands within a cell.
+/// The cells of a header; `None` if a quotation mark is not closed or is within a cell.
 fn cells(line: &str) -> Option<Vec<String>> {
     let mut cells = Vec::new();
     let mut rest = line;
@@ -209,7 +209,7 @@ fn cells(line: &str) -> Option<Vec<String>> {
     }
 }
 
-/// The cell that begins behind a quotation mark, and what follows its other one.
+/// The cell that begins after a quotation mark, and what follows the closing one.
 fn unquoted(text: &str) -> Option<(String, &str)> {
     let (mut cell, mut rest) = (String::new(), text);
     loop {

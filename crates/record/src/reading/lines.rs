@@ -1,11 +1,11 @@
-//! Whole lines of a file that may have been cut.
+//! The complete lines of a file that may be truncated.
 
 use std::io::{self, BufRead, ErrorKind, Read};
 
-/// The longest line of a recording: a header of CSV with very many signals.
+/// The longest line of a recording: a CSV header with a great many signals.
 const LONGEST: u64 = 64 << 20;
 
-/// Hands on whole lines only: what stands behind the last end of line was cut off while it was written.
+/// Passes on complete lines only: what follows the last line end was truncated while it was written.
 pub(super) struct WholeLines<R> {
     inner: R,
     line: Vec<u8>,
@@ -25,7 +25,7 @@ impl<R: BufRead> WholeLines<R> {
         }
     }
 
-    /// Reads the next line, which then is [`line`](Self::line); false at the end.
+    /// Reads the next line, to be had from [`line`](Self::line); false at the end.
     pub(super) fn advance(&mut self) -> io::Result<bool> {
         self.line.clear();
         self.at = 0;
@@ -45,12 +45,12 @@ impl<R: BufRead> WholeLines<R> {
         Ok(false)
     }
 
-    /// The present line, with its end.
+    /// The current line, with its line end.
     pub(super) fn line(&self) -> &[u8] {
         &self.line
     }
 
-    /// The number of the present line, from 1.
+    /// The number of the current line, from 1.
     pub(super) fn number(&self) -> u64 {
         self.number
     }

@@ -1,4 +1,4 @@
-//! Reading recordings: tick by tick, in memory that does not grow.
+//! Reading recordings tick by tick, in constant memory.
 
 mod csv;
 mod lines;
@@ -19,7 +19,7 @@ use tickbus_image::signal::SignalTable;
 pub struct RecordingError {
     /// The file.
     pub file: String,
-    /// The line, from 1, where it is one line's fault.
+    /// The line, from 1, if a single line is at fault.
     pub line: Option<u64>,
     /// What is wrong.
     pub what: String,
@@ -27,12 +27,12 @@ pub struct RecordingError {
     pub right: String,
 }
 
-/// What a reader finds wrong at its present line.
+/// What a reader finds wrong at its current line.
 #[derive(Debug)]
 struct Fault {
     what: String,
     right: String,
-    /// It is no single line's fault.
+    /// No single line is at fault.
     of_file: bool,
 }
 
@@ -60,7 +60,7 @@ impl Fault {
     }
 }
 
-/// What to do about a recording that something has damaged.
+/// The remedy for a damaged recording.
 const RECORD_AGAIN: &str = "record again, or take a copy that is whole";
 
 enum Reader {
@@ -87,12 +87,12 @@ impl std::fmt::Debug for Recording {
 impl Recording {
     /// Opens the recording at `path` and reads its header.
     ///
-    /// A CSV file does not say what types its columns have: `table` does, where there is one, and else all
-    /// of them are numbers.
+    /// A CSV file does not contain the types of its columns: `table` provides them; without it all columns
+    /// are numbers.
     ///
     /// # Errors
     ///
-    /// The file cannot be read, or is no recording.
+    /// The file cannot be read, or is not a recording.
     pub fn open(path: &Path, table: Option<&SignalTable>) -> Result<Self, RecordingError> {
         let file = path.display().to_string();
         let refused = |what: String, right: &str| RecordingError {
@@ -125,11 +125,11 @@ impl Recording {
         )
     }
 
-    /// The same for a recording that comes from elsewhere; `file` is what errors call it.
+    /// As [`open`](Self::open), for a recording from another source; errors call it `file`.
     ///
     /// # Errors
     ///
-    /// It is no recording.
+    /// It is not a recording.
     pub fn read(
         file: &str,
         format: Format,
@@ -154,17 +154,17 @@ impl Recording {
         })
     }
 
-    /// What it has for every tick.
+    /// What it contains for every tick.
     pub fn columns(&self) -> &Columns {
         &self.columns
     }
 
-    /// Reads the next tick into `tick`, which must have been made for these columns and must hold the tick
-    /// before; false at the end.
+    /// Reads the next tick into `tick`, which must have been made for these columns and must hold the
+    /// previous tick; false at the end.
     ///
     /// # Errors
     ///
-    /// What stands there is no tick.
+    /// The file's next part is not a tick.
     pub fn next(&mut self, tick: &mut Tick) -> Result<bool, RecordingError> {
         let (read, line) = match &mut self.reader {
             Reader::Vcd(reader) => (reader.next(tick), reader.line()),
@@ -173,8 +173,8 @@ impl Recording {
         read.map_err(|fault| error(&self.file, fault, line))
     }
 
-    /// Why the recording ends where it does, once it has ended and as far as it says: what its recorder wrote
-    /// last, or that it was cut.
+    /// Why the recording ends where it does, as far as is known, once it has ended: the recorder's last
+    /// comment, or that it was truncated.
     pub fn ending(&self) -> String {
         match &self.reader {
             Reader::Vcd(reader) => reader.ending(),
@@ -182,8 +182,8 @@ impl Recording {
         }
     }
 
-    /// Whether the recording ends without having been ended, as after a power failure: known once it has
-    /// ended, and of a CSV file only when the cut is within a line.
+    /// Whether the recording ends without an end mark, as after a power failure: known once it has ended, and
+    /// in a CSV file only if the cut is within a line.
     pub fn is_cut(&self) -> bool {
         match &self.reader {
             Reader::Vcd(reader) => reader.is_cut(),

@@ -1,4 +1,4 @@
-//! Reading VCD as tickbus wrote it.
+//! Reading VCD as written by tickbus.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead, ErrorKind};
@@ -11,10 +11,10 @@ use crate::{Column, Columns, Kind, Tick, VERSION};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Address, DataType, Slot};
 
-/// The most columns of a recording.
+/// The largest number of columns.
 const MOST_COLUMNS: usize = 250_000;
 
-/// What a variable of the file stands for.
+/// What a variable of the file represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Variable {
     Tick,
@@ -28,7 +28,7 @@ pub(super) struct VcdReader<R> {
     parser: Parser<WholeLines<R>>,
     variables: HashMap<IdCode, Variable>,
     time: Nanos,
-    /// What the recorder wrote last.
+    /// The recorder's last comment.
     ending: Option<String>,
     cut: bool,
 }
@@ -77,7 +77,7 @@ impl<R: BufRead> VcdReader<R> {
         }
     }
 
-    /// Reads up to the end of the next tick.
+    /// Reads to the end of the next tick.
     pub(super) fn next(&mut self, tick: &mut Tick) -> Result<bool, Fault> {
         loop {
             let command = match self.parser.next() {
@@ -85,7 +85,7 @@ impl<R: BufRead> VcdReader<R> {
                 Some(Err(error)) if error.kind() != ErrorKind::UnexpectedEof => {
                     return Err(fault(&error));
                 }
-                // What follows the last whole tick is no tick.
+                // What follows the last whole tick is incomplete.
                 _ => {
                     self.cut = self.ending.is_none();
                     return Ok(false);
@@ -128,7 +128,7 @@ impl<R: BufRead> VcdReader<R> {
         }
     }
 
-    /// Takes one change over into the tick; true when it ends the tick.
+    /// Applies one change to the tick; true if it ends the tick.
     fn change(&self, id: IdCode, change: Change<'_>, tick: &mut Tick) -> Result<bool, Fault> {
         let Some(variable) = self.variables.get(&id) else {
             let what = format!("the value of \"{id}\", which the header does not have");
@@ -173,7 +173,7 @@ enum Change<'a> {
 }
 
 impl Change<'_> {
-    /// The number that the bits are.
+    /// The bits as an integer.
     fn integer(self) -> Option<u64> {
         let Self::Bits(bits) = self else {
             return None;
@@ -211,7 +211,7 @@ impl Change<'_> {
     }
 }
 
-/// What the header says, comment by comment.
+/// What the header states, comment by comment.
 #[derive(Default)]
 struct Header {
     version: Option<u32>,
@@ -244,7 +244,7 @@ impl Header {
             self.version = version.trim().parse().ok();
             return Ok(());
         }
-        // Comments of other programs are theirs.
+        // Comments of other programs are ignored.
         if self.version.is_none() {
             return Ok(());
         }
@@ -313,7 +313,7 @@ impl Header {
                 Word::Plain(_) | Word::Quoted(_) => return None,
                 Word::Pair("unit", value) => column.unit = Some(value),
                 Word::Pair("station", value) => column.station = value,
-                // A later version may say more.
+                // A later version may state more.
                 Word::Pair(..) => {}
             }
         }
@@ -326,7 +326,7 @@ impl Header {
         self.variables.insert(id, variable).is_none().then_some(())
     }
 
-    /// Whether it is whole, once it is over.
+    /// Checks the header for completeness once it is over.
     fn check(&self) -> Result<bool, Fault> {
         match self.version {
             None => {
@@ -413,7 +413,7 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// The text with its `\u{…}` taken back.
+/// The text with its `\u{…}` escapes decoded.
 fn unescaped(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;
@@ -438,7 +438,7 @@ fn cut_header() -> Fault {
     Fault::new("the recording is cut within its header", RECORD_AGAIN)
 }
 
-/// What the parser of VCD says, in our words.
+/// The VCD parser's error in our words.
 fn fault(error: &io::Error) -> Fault {
     let inner = error.get_ref().and_then(|inner| inner.downcast_ref());
     match inner {

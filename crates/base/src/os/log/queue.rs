@@ -1,4 +1,4 @@
-//! The queue before stderr: nobody who logs waits for whoever reads there, or does not.
+//! The queue before stderr: logging never waits for a slow or stuck reader of stderr.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};
@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use crate::time::Nanos;
 
-/// What the queue holds, in bytes; some thousand messages.
+/// Capacity of the queue in bytes; enough for some thousand messages.
 const MOST_BYTES: usize = 256 << 10;
 
 /// Messages on their way, and the thread that writes them. Clones share them.
@@ -16,24 +16,24 @@ pub(super) struct Queue(Arc<Shared>);
 #[derive(Debug, Default)]
 struct Shared {
     state: Mutex<State>,
-    /// Something has come, or all of it has gone.
+    /// A message was pushed, or the queue has run empty.
     changed: Condvar,
 }
 
 #[derive(Debug, Default)]
 struct State {
     messages: VecDeque<Box<[u8]>>,
-    /// Bytes of those.
+    /// Their size in bytes.
     bytes: usize,
-    /// Whether the thread has messages that are not written yet.
+    /// Whether the thread holds messages that are not written yet.
     writes: bool,
-    /// How many messages did not fit; and of those, how many the log has not told of yet.
+    /// How many messages were dropped; and how many of these the log has not reported yet.
     dropped: u64,
     untold: u64,
 }
 
 impl Queue {
-    /// An empty queue, with a thread that writes to `to` what comes, for the rest of the process.
+    /// An empty queue, and a thread that writes what arrives to `to` for the rest of the process.
     ///
     /// # Errors
     ///
@@ -49,7 +49,7 @@ impl Queue {
         Ok(queue)
     }
 
-    /// Takes a message, or drops and counts it when there is no room.
+    /// Queues a message; drops and counts it when there is no room.
     pub(super) fn push(&self, message: &[u8]) {
         let mut state = self.0.lock();
         if state.bytes + message.len() > MOST_BYTES {
@@ -67,7 +67,7 @@ impl Queue {
         self.0.lock().dropped
     }
 
-    /// Waits until all is written, but for no longer than `limit`.
+    /// Waits until everything is written, but at most `limit`.
     pub(super) fn flush_within(&self, limit: Nanos) {
         let busy = |state: &mut State| state.writes || !state.messages.is_empty();
         let waited = self
@@ -80,11 +80,11 @@ impl Queue {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // A queue is whole between any two of its changes.
+        // The queue is consistent after every single change, so a poisoned lock is safe to use.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes what comes, without end.
+    /// Writes what arrives, forever.
     fn write_all(&self, mut to: impl Write) {
         loop {
             let mut state = self.lock();
@@ -103,7 +103,7 @@ impl Shared {
             state.writes = true;
             drop(state);
             for message in messages {
-                // Where nobody reads, nobody is told either.
+                // An error cannot be reported: stderr is the only place for it.
                 let _ = to.write_all(&message);
             }
             let _ = to.flush();
@@ -122,7 +122,7 @@ mod tests {
 
     use super::*;
 
-    /// Somebody who reads a message when a test lets him.
+    /// A writer that takes a message only when the test lets it.
     struct Slow {
         may_read: Receiver<()>,
         read: Sender<Vec<u8>>,
@@ -167,7 +167,7 @@ mod tests {
         for _ in 0..1000 {
             queue.push(&message);
         }
-        // The thread may have taken the first ones before it had to wait.
+        // The thread may have taken the first messages before it was made to wait.
         let dropped = queue.dropped();
         assert!((400..=1000 - 256).contains(&dropped), "{dropped}");
         queue.flush_within(Nanos::from_millis(1));

@@ -17,13 +17,13 @@ fn piece(table: Table, wire: usize, bit: usize, bits: usize, fills: bool) -> Pie
     }
 }
 
-/// So many words of a frame, one behind the other, from a register on.
+/// The first `count` words of a frame, in consecutive registers.
 fn words(table: Table, first: usize, count: usize) -> Vec<Piece> {
     let word = |word| piece(table, (first + word) * 16, word * 16, 16, true);
     (0..count).map(word).collect()
 }
 
-/// What the queries do, as messages have it.
+/// The queries as messages show them.
 fn told(queries: &[Query]) -> Vec<String> {
     queries.iter().map(Query::to_string).collect()
 }
@@ -80,7 +80,7 @@ fn one_request_writes_and_reads_where_both_are_holding_registers() {
 
 #[test]
 fn no_value_is_divided_between_two_requests_if_that_can_be() {
-    // Values of four registers: 30 fit into a request that writes 123 of them.
+    // Values of four registers: 30 fit into a request, which writes 123 registers.
     let longs: Vec<Piece> = (0..40)
         .map(|n| piece(HOLDING, 64 * n, 64 * n, 64, true))
         .collect();
@@ -154,7 +154,7 @@ fn a_device_without_the_functions_for_many_is_written_one_by_one() {
     );
 }
 
-/// A frame's signals one behind the other, each somewhere in a table; those that are written do not meet.
+/// Consecutive signals of a frame, anywhere in a table; those that are written do not overlap.
 fn pieces(writes: bool) -> impl Strategy<Value = Vec<Piece>> {
     let one = (
         0_usize..4,
@@ -177,7 +177,7 @@ fn pieces(writes: bool) -> impl Strategy<Value = Vec<Piece>> {
             } else {
                 [1, 8, 16, 32, 64, 64][size]
             };
-            // What lies as a whole may begin at any byte, what has a place of its own at its register.
+            // A piece of a whole area may start at any byte, one with its own place only at a register.
             let within = match (table.is_bits(), bits, fills) {
                 (true, ..) => 0,
                 (_, 1, _) => within,
@@ -201,7 +201,7 @@ fn pieces(writes: bool) -> impl Strategy<Value = Vec<Piece>> {
 }
 
 proptest! {
-    /// Every signal is read and written once, nothing else is written, and the limits are kept.
+    /// Every signal is read and written once, nothing else is written, and all limits are kept.
     #[test]
     fn a_plan_carries_every_signal_once_and_touches_nothing_that_none_names(
         reads in pieces(false), writes in pieces(true), combine: bool, gap in 0_usize..600, many: bool,

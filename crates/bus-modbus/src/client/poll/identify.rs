@@ -1,4 +1,4 @@
-//! Learning who a device is, before anything is written into it.
+//! Reading the identity of a device before anything is written to it.
 
 use crate::identification::{READ_DEVICE_IDENTIFICATION, Taken};
 use crate::rtu;
@@ -9,22 +9,22 @@ use tickbus_fieldbus::{BusError, Port};
 use super::super::query::{Fault, expect};
 use super::{Asked, Poll};
 
-/// So many requests are made at most to learn who a device is.
+/// The most requests made to read an identity.
 const IDENTIFYING: usize = 8;
 
-/// How long it is until a device is asked again that did not say who it is.
+/// How long until a device that did not report its identity is asked again.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// So many times in a row a device is silent, fails or hangs up when it is asked who it is, until that counts as its
-/// answer. Each time it has answered something else before, so it is there.
+/// How many times in a row a device may be silent, fail or close the connection when asked for its identity,
+/// before it counts as a device without one. In between it answers other requests, so it is there.
 const SILENCES: u8 = 2;
 
-/// What is known of who a device is.
+/// What is known about the identity of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
-    /// It is still to be asked, not before then.
+    /// To be asked for, not before this time.
     Unknown { silences: u8, not_before: Nanos },
-    /// It said it, or said nothing.
+    /// Reported, or the device has none.
     Known,
 }
 
@@ -44,7 +44,7 @@ impl Identity {
 }
 
 impl Poll<'_> {
-    /// Asks a station who it is, from this object on.
+    /// Asks a station for its identity, starting with this object.
     pub(super) fn ask_identity(
         &mut self,
         station: usize,
@@ -61,7 +61,7 @@ impl Poll<'_> {
         });
     }
 
-    /// Who the device is came, or that it does not say.
+    /// An answer to the request for the identity arrived: a part of it, or a refusal.
     pub(super) fn identified(
         &mut self,
         station: usize,
@@ -81,7 +81,7 @@ impl Poll<'_> {
             Err(Fault::Refused(exception)) if exception.is_about_the_request() => {
                 so_far = Identification::default();
             }
-            // A device that is busy or away says who it is another time.
+            // A device that is busy or unreachable may report it later.
             Err(Fault::Refused(exception)) => {
                 if !exception.passes() {
                     self.says_nothing(station, port);
@@ -98,7 +98,7 @@ impl Poll<'_> {
         self.begin(station + 1, now, port)
     }
 
-    /// The device gave no answer when it was asked who it is, or has failed at it.
+    /// The device did not answer the request for its identity, or failed to.
     pub(super) fn says_nothing(&mut self, station: usize, port: &mut Port) {
         if let Identity::Unknown { silences, .. } = &mut self.stations[station].identity {
             *silences += 1;
@@ -108,8 +108,8 @@ impl Poll<'_> {
         }
     }
 
-    /// The device gave an answer that cannot be understood when it was asked who it is. As it does answer, it does not
-    /// count as nameless.
+    /// The device's answer to the request for its identity cannot be understood. As it does answer, it does
+    /// not count as a device without an identity.
     pub(super) fn is_unclear(&mut self, station: usize, what: &str, port: &Port) {
         if let Identity::Unknown { silences, .. } = &mut self.stations[station].identity {
             *silences = 0;
@@ -125,7 +125,7 @@ impl Poll<'_> {
         );
     }
 
-    /// Goes on with the next station, and asks this one another time who it is, if that is not known yet.
+    /// Continues with the next station, and asks this one for its identity later if it is still unknown.
     pub(super) fn ask_later(
         &mut self,
         station: usize,
@@ -148,15 +148,15 @@ impl Poll<'_> {
         self.stations[station].identity = Identity::Known;
     }
 
-    /// Who the device is may not be true any more: nothing is written until it has said it again.
+    /// The known identity may be outdated: nothing is written until the device has reported it again.
     pub(super) fn doubt(&mut self, station: usize) {
         self.guards[station].part();
         self.stations[station].identity = Identity::default();
         self.stations[station].forget_queries();
     }
 
-    /// Whether a station is to be asked who it is. After it hung up for that too often, that is its answer, for this
-    /// connection.
+    /// Whether to ask a station for its identity. If it has closed the connection too often when asked, it
+    /// counts as having none, for this connection.
     pub(super) fn may_ask(&mut self, station: usize, port: &mut Port) -> bool {
         if self.stations[station].hang_ups < SILENCES {
             return true;
@@ -166,7 +166,7 @@ impl Poll<'_> {
         false
     }
 
-    /// The connection has ended: tells whether that was when a device was asked who it is.
+    /// The connection has ended: returns whether it did while a device was being asked for its identity.
     pub(in super::super) fn hung_up(&mut self) -> bool {
         let Some(asking) = &self.asking else {
             return false;

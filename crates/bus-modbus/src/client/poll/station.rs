@@ -1,4 +1,4 @@
-//! One station, as it is polled.
+//! The polling state of one station.
 
 use crate::table::Span;
 use tickbus_base::time::Nanos;
@@ -9,26 +9,26 @@ use super::super::query::{Query, Region};
 use super::Identity;
 use super::trouble::Trouble;
 
-/// A station, as it is polled.
+/// The polling state of a station.
 #[derive(Debug)]
 pub(in super::super) struct Station {
     pub(super) unit: u8,
     reads: Vec<Piece>,
     writes: Vec<Piece>,
     pub(super) able: Abilities,
-    /// Whether the queries are those of what is known now, and whether they may write.
+    /// `Some` if the queries are up to date; then whether they may write.
     prepared: Option<bool>,
     pub(super) queries: Vec<Query>,
     pub(super) sends: Vec<u8>,
     pub(super) receives: Vec<u8>,
     pub(super) identity: Identity,
-    /// How many connections in a row ended when the device was asked who it is.
+    /// How many connections in a row ended while the device was asked for its identity.
     pub(super) hang_ups: u8,
     pub(super) trouble: Trouble,
 }
 
 impl Station {
-    /// A station that reads and writes these pieces, into a frame of so many bytes.
+    /// A station with these pieces to read and write, and a received frame of this many bytes.
     pub(in super::super) fn new(
         unit: u8,
         reads: Vec<Piece>,
@@ -50,7 +50,7 @@ impl Station {
         }
     }
 
-    /// A connection begins: nothing is known of the device.
+    /// A connection begins: nothing is known about the device.
     pub(super) fn connect(&mut self, able: Abilities) {
         self.able = able;
         self.prepared = None;
@@ -58,17 +58,17 @@ impl Station {
         self.trouble = Trouble::default();
     }
 
-    /// Whether it is left alone in this cycle.
+    /// Whether it is skipped in this cycle.
     pub(super) fn rests(&self, now: Nanos) -> bool {
         now < self.trouble.rests_until
     }
 
-    /// Whether its device is to be asked now who it is: before anything is written, and never if nothing is.
+    /// Whether to ask its device for its identity now: before anything is written, and never if nothing is.
     pub(super) fn wants_identity(&self, now: Nanos) -> bool {
         !self.writes.is_empty() && self.identity.is_due(now)
     }
 
-    /// The queries are to be made anew before the next one goes out.
+    /// Makes [`prepare`](Self::prepare) plan the queries again before the next one is sent.
     pub(super) fn forget_queries(&mut self) {
         self.prepared = None;
     }
@@ -77,7 +77,7 @@ impl Station {
         self.prepared.is_none()
     }
 
-    /// Makes the queries anew if they are not those of what is known.
+    /// Plans the queries again if they are outdated.
     pub(super) fn prepare(&mut self, may_write: bool) {
         if self.prepared.replace(may_write) == Some(may_write) {
             return;
@@ -85,7 +85,7 @@ impl Station {
         let writes: &[Piece] = if may_write { &self.writes } else { &[] };
         self.queries = queries(&self.reads, writes, &self.able);
         if self.queries.is_empty() {
-            // Whether it lives is to be known all the same.
+            // Something has to be read even so, to see whether it is alive.
             let look = |piece: &Piece| {
                 let Span { first, .. } = piece.span();
                 Query::Read(Region::new(piece.table, Span { first, count: 1 }))

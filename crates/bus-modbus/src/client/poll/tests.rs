@@ -13,7 +13,7 @@ const CYCLE: Nanos = Nanos::from_millis(10);
 const TIMEOUT: Nanos = Nanos::from_millis(100);
 const MILLISECOND: Nanos = Nanos::from_millis(1);
 
-/// What a device that reads register 5 and writes register 0 is asked.
+/// The requests to a device from which register 5 is read, and to which register 0 is written.
 const READ: &[u8] = &[3, 0, 5, 0, 1];
 const WRITE: &[u8] = &[16, 0, 0, 0, 1, 2, 0, 0];
 const WHO: &[u8] = &[43, READ_DEVICE_IDENTIFICATION, 1, 0];
@@ -33,7 +33,7 @@ fn register(first: usize) -> Piece {
     signal(Table::HoldingRegisters, first * 16, 0, 16)
 }
 
-/// The stations of a client with their guards, as they outlive connections.
+/// The stations of a client and their guards, which outlive connections.
 struct Client {
     stations: Vec<Station>,
     guards: Vec<Guard>,
@@ -43,7 +43,7 @@ struct Client {
 }
 
 impl Client {
-    /// Units from 1 on that have two bytes each way and are allowed to write into `write_to`.
+    /// Units from 1 on, with two bytes in each direction, which may write to `write_to`.
     fn new(stations: usize, reads: &[Piece], writes: &[Piece], write_to: Option<&str>) -> Self {
         for words in [
             "nothing is written into the PLC",
@@ -80,7 +80,7 @@ impl Client {
         self.connect_with(framing, Abilities::new(false, usize::MAX))
     }
 
-    /// A connection with a device that is taken to be able to do this.
+    /// A connection to a device that is assumed to have these abilities.
     fn connect_with(&mut self, framing: Framing, able: Abilities) -> Line<'_> {
         let poll = Poll::new(
             &mut self.stations,
@@ -159,7 +159,7 @@ impl Line<'_> {
         self.asked_of().1
     }
 
-    /// What unit `unit` gives for an answer.
+    /// Unit `unit` answers this.
     #[track_caller]
     fn answer_as(&mut self, unit: u8, pdu: &[u8]) {
         let mut telegram = Vec::new();
@@ -177,7 +177,7 @@ impl Line<'_> {
         self.hear(&telegram).expect("it goes on");
     }
 
-    /// These bytes come, whatever they are.
+    /// These bytes arrive.
     fn hear(&mut self, bytes: &[u8]) -> Result<(), BusError> {
         self.poll.arrived(self.now, bytes, self.port)
     }
@@ -187,14 +187,14 @@ impl Line<'_> {
         self.answer_as(1, pdu);
     }
 
-    /// Is asked for its register, and answers.
+    /// Has its register read: answers the request.
     #[track_caller]
     fn read(&mut self) {
         assert_eq!(self.asked(), READ);
         self.answer(&[3, 2, 0, 7]);
     }
 
-    /// Is written to and read.
+    /// Is written to and read: answers both requests.
     #[track_caller]
     fn write_and_read(&mut self) {
         assert_eq!(self.asked(), WRITE);
@@ -202,7 +202,7 @@ impl Line<'_> {
         self.read();
     }
 
-    /// Is asked who it is, and answers.
+    /// Reports its identity when asked.
     #[track_caller]
     fn introduce(&mut self, product: &str) {
         assert_eq!(self.asked(), WHO);
@@ -213,7 +213,7 @@ impl Line<'_> {
         self.answer(&pdu);
     }
 
-    /// Says nothing until it is too late.
+    /// Stays silent until the time-out.
     fn stay_silent(&mut self) {
         self.now = self.now + TIMEOUT + MILLISECOND;
     }
@@ -237,7 +237,7 @@ fn a_device_that_was_away_is_asked_who_it_is_before_it_is_written_to() {
     for _ in 0..3 {
         line.write_and_read();
     }
-    // It is unplugged, and another one put in its place.
+    // It is replaced by another device.
     assert_eq!(line.asked(), WRITE);
     line.stay_silent();
     line.read();
@@ -258,7 +258,7 @@ fn a_device_that_is_silent_when_asked_who_it_is_is_read_and_counts_as_nameless_a
             while line.asked() == READ {
                 line.answer(&[3, 2, 0, 7]);
             }
-            // It was asked who it is.
+            // Its identity was asked for.
             line.stay_silent();
         }
         line.write_and_read();
@@ -279,7 +279,7 @@ fn a_device_that_hangs_up_when_asked_who_it_is_is_not_asked_on_the_third_connect
     line.read();
     line.write_and_read();
     assert!(!line.poll.hung_up());
-    // It may be another device that answers the next time.
+    // The next answer may come from another device.
     let mut line = client.connect(tcp());
     line.read();
     assert_eq!(line.asked(), WHO);
@@ -293,7 +293,7 @@ fn a_late_answer_to_something_else_does_not_make_a_device_nameless() {
     assert_eq!(line.asked(), WHO);
     line.answer(&[3, 2, 0, 7]);
     assert_eq!(line.statistic("identity"), None, "it has not said it yet");
-    // What it does say comes all the same.
+    // The data that it does send are used even so.
     let identification = Identification::of_driver("7");
     let mut pdu = Vec::new();
     identification
@@ -579,7 +579,7 @@ fn a_device_that_is_busy_or_away_is_not_taken_to_lack_function_23() {
             1..=4 => assert_eq!(line.asked(), WRITE),
             5 | 6 => assert_eq!(line.asked(), BOTH),
             _ => {
-                // It is another device, perhaps, that the gateway finds there.
+                // The gateway may have found another device there.
                 line.read();
                 line.introduce("8");
                 assert_eq!(line.asked(), READ);

@@ -1,4 +1,4 @@
-//! What becomes of a station that does not answer, or refuses: it rests for a while, and the others go on.
+//! Stations that do not answer, or refuse: they are skipped for a while, and the others are polled on.
 
 use crate::Exception;
 use tickbus_base::time::Nanos;
@@ -7,20 +7,20 @@ use tickbus_fieldbus::{BusError, Port};
 use super::super::query::Query;
 use super::{Asked, Asking, Framing, Poll};
 
-/// How long a station rests that refused.
+/// How long a station is skipped after it refused.
 const REST: Nanos = Nanos::from_secs(1);
 
-/// How many times as long one rests at most that does not answer, beside others that do: each time it is asked, these
-/// wait.
+/// The longest that a silent station is skipped while others answer, as a multiple of that: each attempt
+/// makes the others wait.
 const LONGEST: i64 = 8;
 
-/// What is wrong with a station.
+/// The trouble of a station.
 #[derive(Debug, Default)]
 pub(super) struct Trouble {
     kind: Option<Kind>,
-    /// Until when it is not asked.
+    /// Until when it is skipped.
     pub(super) rests_until: Nanos,
-    /// How long it rests next, if it does not answer again.
+    /// How long it is skipped next time, if it is silent again.
     rest: i64,
 }
 
@@ -31,14 +31,14 @@ enum Kind {
 }
 
 impl Poll<'_> {
-    /// There is no answer in time to what is asked.
+    /// The answer did not arrive in time.
     pub(super) fn give_up(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(asking) = &self.asking else {
             return Ok(());
         };
         let station = asking.station;
         match asking.what {
-            // Whoever answers next may be another device.
+            // The next answer may come from another device.
             Asked::Query(_) => self.doubt(station),
             Asked::Identity { .. } => self.says_nothing(station, port),
         }
@@ -46,7 +46,7 @@ impl Poll<'_> {
         self.miss(&format!("did not answer within {within}"), now, port)
     }
 
-    /// There is no good answer to what is asked: goes on with the next station, unless nobody answers at all.
+    /// There is no valid answer to the request: continues with the next station, unless none of them answers.
     pub(super) fn miss(&mut self, what: &str, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(Asking {
             station,
@@ -78,7 +78,7 @@ impl Poll<'_> {
             if matches!(self.framing, Framing::Tcp { .. }) {
                 return Err(error);
             }
-            // Nobody has to wait for them: as soon as the line is whole again, it is seen.
+            // They keep no other station waiting, and are tried at once so that a repaired line is noticed.
             for polled in &mut *self.stations {
                 polled.trouble.rests_until = now;
             }
@@ -104,7 +104,7 @@ impl Poll<'_> {
         }
         let query = &self.stations[station].queries[index];
         if query.is_look() && exception.is_about_the_request() {
-            // It lives, and nothing has to be there to be read.
+            // It is alive, and the element that was read need not exist.
             return self.go_on(station, index + 1, now, port);
         }
         let right = match (exception, query) {
@@ -131,7 +131,7 @@ impl Poll<'_> {
             exception,
             Exception::GATEWAY_PATH_UNAVAILABLE | Exception::GATEWAY_TARGET_FAILED
         ) {
-            // It is not the device itself that says so: whoever answers next may be another one.
+            // The gateway says so, not the device: the next answer may come from another device.
             port.count("modbus-client.unanswered");
             self.doubt(station);
         }
@@ -140,25 +140,25 @@ impl Poll<'_> {
             exception,
             Exception::ACKNOWLEDGE | Exception::SERVER_DEVICE_BUSY
         ) {
-            // That may be over in the next cycle.
+            // It may be ready in the next cycle.
             self.stations[station].trouble.rests_until = now;
         }
         Ok(())
     }
 
-    /// Whether the device can be asked in another way, which is taken from now on.
+    /// Whether the device can be asked in another way; if so, that is used from now on.
     fn adapts(&mut self, station: usize, index: usize, exception: Exception, port: &Port) -> bool {
         let unit = self.named(station);
         let polled = &mut self.stations[station];
         let (query, able) = (&polled.queries[index], &mut polled.able);
         let is_unknown = exception == Exception::ILLEGAL_FUNCTION;
         let instead = match query {
-            // Many a server does not know it, or knows it for some registers alone.
+            // Some servers do not have it, or only for some registers.
             Query::Both { .. } if !exception.passes() => {
                 able.combine = false;
                 "it is asked in two requests"
             }
-            // Some say of a place that is not there that they have failed.
+            // Some report a failure where an address does not exist.
             Query::Read(read)
                 if read.joined
                     && (exception.is_about_the_request()
@@ -185,7 +185,7 @@ impl Poll<'_> {
         true
     }
 
-    /// A station answered, but not with what it was asked for.
+    /// A station answered, but not with the requested data.
     pub(super) fn declined(
         &mut self,
         station: usize,
@@ -214,7 +214,7 @@ impl Poll<'_> {
         self.begin(station + 1, now, port)
     }
 
-    /// A station is in order.
+    /// A station works.
     pub(super) fn recovered(&mut self, station: usize) {
         self.stations[station].trouble = Trouble::default();
         self.lost = false;
@@ -227,7 +227,7 @@ impl Poll<'_> {
     }
 }
 
-/// The log hears of a station that is in trouble beside others that are not.
+/// Logs that a station has trouble while others work.
 fn tell(error: &BusError, rest: Nanos, port: &Port) {
     port.log(
         log::Level::Warn,

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 const HOLDING: Table = Table::HoldingRegisters;
 
-/// So many bytes of a frame, from the first on, in pieces of a byte, where an image lies as a whole.
+/// The first bytes of a frame in pieces of one byte, as of an area placed as a whole.
 fn image(table: Table, first: usize, bytes: usize) -> Vec<Piece> {
     let piece = |byte| Piece {
         table,
@@ -25,7 +25,7 @@ fn region(table: Table, first: usize, bytes: usize) -> Region {
     region
 }
 
-/// Both halves of the codec, each against the other.
+/// The two halves of the codec against each other.
 #[test]
 fn a_server_answers_what_a_client_asks() {
     let image_bytes: Vec<u8> = (0..=255).chain(0..=254).collect();

@@ -30,7 +30,7 @@ fn dialog(asks_who: bool) -> Dialog {
     frames.dialog(terms, Nanos::ZERO)
 }
 
-/// What the dialog has to say.
+/// The bytes that the dialog sends.
 fn said(dialog: &mut Dialog) -> Vec<u8> {
     let said = dialog.to_write().to_vec();
     dialog.wrote(said.len());
@@ -51,7 +51,7 @@ const AGREED: &str = "03 00 00 1b 02 f0 80 32 03 0000 0001 0008 0000 00 00 f0 00
 const WRITTEN: &str = "03 00 00 16 02 f0 80 32 03 0000 0002 0002 0001 00 00 05 01 ff";
 const READ: &str = "03 00 00 1d 02 f0 80 32 03 0000 0003 0002 0008 00 00 04 01 ff 04 0020 01020304";
 
-/// A dialog that may write, and has written and read nothing yet.
+/// A dialog that may write, before its first cycle.
 fn met() -> Dialog {
     let mut dialog = dialog(false);
     said(&mut dialog);
@@ -99,7 +99,7 @@ fn answers_come_in_any_pieces() {
     for cut in 0..=whole.len() {
         let mut dialog = met();
         dialog.begin(Nanos::ZERO);
-        // The second answer would come before its question was written, which is no matter here.
+        // The second answer arrives before its request was written, which does not matter here.
         let mut news = dialog.hear(Nanos::ZERO, &whole[..cut]).expect("right");
         if news.is_none() {
             news = dialog.hear(Nanos::ZERO, &whole[cut..]).expect("right");
@@ -141,7 +141,7 @@ fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
         &mut dialog,
         "03 00 00 21 02 f0 80 32 07 0000 0002 0008 0008 0001120411440100 ff 09 0004 0011 0000",
     );
-    // It comes in two units, of which the first has the order number.
+    // It arrives in two PDUs; the first has the order number.
     let order = "0011 0000 001c 0001 0001 36455337203531352d32414d30312d3041423020";
     hears(
         &mut dialog,
@@ -159,7 +159,7 @@ fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
         "03 00 00 27 02 f0 80 32 07 0000 0003 000c 000a 0001120812840101 07 00 0000 ff 09 0006 000000000000",
     )
     .expect("right");
-    // The other one it does not have.
+    // The CPU does not have the other one.
     let news = {
         said(&mut dialog);
         hears(
@@ -229,7 +229,7 @@ fn an_item_that_is_refused_is_told_and_the_rest_of_the_cycle_is_done() {
             ..
         })
     ));
-    // Left out, there is nothing to do; and taken in again, it is as it was.
+    // While excluded there is nothing to transfer; included again, it is as before.
     dialog.suspend(0, true);
     assert_eq!(dialog.begin(Nanos::ZERO), Some(News::Done));
     assert_eq!(dialog.refusal(0), None);
@@ -268,7 +268,7 @@ fn a_cpu_is_asked_whether_it_runs() {
 #[test]
 fn what_is_no_answer_to_what_was_asked_ends_the_connection() {
     for text in [
-        // Another reference, function, number of items or codes; a question; twice.
+        // Wrong reference, function, number of items or codes; a request instead; an answer sent twice.
         "03 00 00 16 02 f0 80 32 03 0000 0009 0002 0001 00 00 05 01 ff",
         "03 00 00 16 02 f0 80 32 03 0000 0002 0002 0001 00 00 04 01 ff",
         "03 00 00 17 02 f0 80 32 03 0000 0002 0002 0002 00 00 05 02 ffff",

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Signals of one kind side by side in the frame of a station, from `first` on in data block 10.
+/// Adjacent signals of one size in a station's frame, from `first` on in data block 10.
 fn run(station: usize, first: usize, bytes: usize) -> Vec<Field> {
     let field = |byte: usize| Field {
         station,
@@ -78,7 +78,7 @@ fn what_fits_into_one_job_is_one_job_and_long_runs_are_cut_between_values() {
     let two = [run(0, 0, 134), run(1, 134, 130)].concat();
     assert_eq!(jobs(Way::Read, &two, 480).len(), 1);
     assert_eq!(jobs(Way::Read, &run(0, 0, 462), 480).len(), 1);
-    // Numbers of 8 bytes from an odd byte on: 462 bytes would fit.
+    // Values of 8 bytes from an odd byte on: 462 bytes would fit.
     let numbers = (0..58).map(|index| Field {
         bits: 64,
         frame: index * 64 + 8,
@@ -99,13 +99,13 @@ fn what_fits_into_one_job_is_one_job_and_long_runs_are_cut_between_values() {
 
 #[test]
 fn sparse_values_are_read_in_fewer_jobs_where_gaps_are_read_over() {
-    // 40 words, each 10 bytes from the last: 19 items fill a job of 240 bytes.
+    // 40 words, each 10 bytes after the previous one: 19 items fill a job of 240 bytes.
     let fields: Vec<Field> = (0..40).flat_map(|index| run(0, index * 10, 2)).collect();
     assert_eq!(jobs(Way::Read, &fields, 240).len(), 2);
     assert_eq!(jobs(Way::Read, &fields, 480).len(), 1);
 }
 
-/// Signals that overlap nowhere, in the frames or in the CPU.
+/// Signals that do not overlap in the frames or in the CPU.
 fn signals() -> impl Strategy<Value = Vec<Field>> {
     let one = (0..3_usize, 0..3_u16, 0..400_usize, 0..8_usize, 0..5_usize);
     prop::collection::vec(one, 0..150).prop_map(|all| {
@@ -130,7 +130,7 @@ fn signals() -> impl Strategy<Value = Vec<Field>> {
                 taken.insert(bit);
             });
             let frame: &mut usize = &mut frames[station];
-            // A BOOL leaves the rest of its byte free now and then.
+            // Some BOOLs leave the rest of their byte unused.
             if bits > 1 {
                 *frame = frame.next_multiple_of(8);
             }
@@ -157,7 +157,7 @@ fn lengths(job: &Job) -> [usize; 2] {
     }
 }
 
-/// A CPU and the frames of three stations, every bit of which tells where it is.
+/// A CPU and the frames of three stations, in which every bit encodes its position.
 const BYTES: usize = 512;
 const OBJECTS: [Object; 3] = [Object::Inputs, Object::Flags, Object::Block(2)];
 
@@ -199,7 +199,7 @@ proptest! {
                 let range = begin + range.start..begin + range.end;
                 match (way, piece.item.bit()) {
                     (Way::Write, None) => {
-                        // A byte that were not filled would be seen as zero.
+                        // A byte that is not filled would be found to be zero.
                         let mut data = vec![0; range.len()];
                         piece.gather(&frames[piece.station], &mut data);
                         cpu[range].copy_from_slice(&data);

@@ -1,4 +1,4 @@
-//! What brings the registers and takes them away, for each bus.
+//! How the registers are received and sent, per bus.
 
 use super::{Editor, modbus, socket, tcpip};
 use crate::plcopen::{Kind, Variable, variable};
@@ -10,34 +10,34 @@ use tickbus_driver_cfg::Options;
 use tickbus_fieldbus::tcp::{Address, Host};
 use tickbus_image::signal::Area;
 
-/// The cycle of the socket bus, where a driver.cfg states none.
+/// The default cycle of the socket bus.
 const CYCLE: Nanos = Nanos::from_millis(10);
 
-/// Statements, and the variables that they need.
+/// Statements, and the variables that they use.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Part {
     pub(super) locals: Vec<Variable>,
     pub(super) lines: Vec<String>,
 }
 
-/// How the registers come and go.
+/// How the registers are received and sent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Link {
-    /// Global variables beside those of signals.
+    /// Global variables in addition to those of signals.
     pub(super) globals: Vec<Variable>,
     /// Before the inputs are copied.
     pub(super) before: Part,
     /// After the outputs are copied.
     pub(super) after: Part,
-    /// What is to be set in the editor.
+    /// The settings to be made in the editor.
     pub(super) steps: Vec<String>,
-    /// What a person should know.
+    /// What the user should know.
     pub(super) notes: Vec<String>,
-    /// The variables of signals come and go by themselves: there are no registers to copy from and to.
+    /// The editor transfers the variables of signals itself: there are no registers to copy.
     pub(super) is_by_name: bool,
 }
 
-/// What the texts for records over TCP need to know.
+/// The parameters of the texts for records over TCP.
 #[derive(Clone, Debug)]
 pub(super) struct Stream<'a> {
     /// The list of global variables.
@@ -45,7 +45,7 @@ pub(super) struct Stream<'a> {
     /// The simulation's host and port.
     pub(super) host: String,
     pub(super) port: u16,
-    /// Bytes of a record from the simulation, and of one to it.
+    /// Size in bytes of a record from the simulation, and of one to it.
     pub(super) bytes: [usize; 2],
     pub(super) cycle: Nanos,
     pub(super) max_age: Nanos,
@@ -85,7 +85,7 @@ impl Link {
                 "So in driver.cfg write inputs = \"holding-register offset:0\" and outputs = \"input-register offset:0\"."
                     .to_owned(),
             ]),
-            // Registers that nothing fills would wipe what OPC UA has written.
+            // Copying registers that are never received would overwrite what OPC UA has written.
             Options::OpcuaClient(_) | Options::OpcuaServer(_) => Self {
                 is_by_name: true,
                 ..Self::of_steps([format!(
@@ -115,7 +115,7 @@ impl Link {
         }
     }
 
-    /// The counters and the sign of life of a route that sees what comes and goes.
+    /// The counters and the life sign, for links that can tell what is received and sent.
     pub(super) fn counters() -> Vec<Variable> {
         [
             (ALIVE, "BOOL", "the simulation was heard of lately"),
@@ -135,7 +135,7 @@ impl Link {
     }
 }
 
-/// The simulation's host as the PLC dials it; one that listens everywhere does not say where it is.
+/// The simulation's host as the PLC connects to it; a wildcard address does not tell where it is.
 pub(super) fn dialled(address: &Address) -> String {
     match &address.host {
         Host::Ip(ip) if !ip.is_unspecified() => ip.to_string(),
@@ -144,7 +144,7 @@ pub(super) fn dialled(address: &Address) -> String {
     }
 }
 
-/// What is to be known of an address that the PLC can reach only on the computer of the simulation itself.
+/// The note for an address that the PLC can only reach on the simulation's own computer.
 pub(super) fn loopback_note(address: &Address) -> Option<String> {
     let is_loopback = match &address.host {
         Host::Ip(ip) => ip.is_loopback(),
@@ -158,7 +158,7 @@ pub(super) fn loopback_note(address: &Address) -> Option<String> {
     })
 }
 
-/// What tells that nothing came for too long.
+/// The statements that detect that nothing has been received for too long.
 pub(super) fn silence(list: &str, max_age: Nanos) -> [String; 2] {
     [
         format!(
@@ -169,7 +169,7 @@ pub(super) fn silence(list: &str, max_age: Nanos) -> [String; 2] {
     ]
 }
 
-/// Registers out of the bytes of a record, or back.
+/// Converts the bytes of a record to registers, or back.
 pub(super) fn registers(list: &str, count: usize, incoming: bool) -> [String; 3] {
     let last = count.saturating_sub(1);
     let body = if incoming {

@@ -1,4 +1,5 @@
-//! The editor's own Modbus client, which is set in the device tree (CODESYS), or called (TwinCAT's TF6250).
+//! The editor's own Modbus client, which is configured in the device tree (CODESYS) or called (TwinCAT's
+//! TF6250).
 
 use super::Editor;
 use super::link::{Link, dialled, loopback_note};

@@ -1,4 +1,4 @@
-//! Records over TCP in CODESYS: the library CAA Net Base Services, which every CODESYS has.
+//! Records over TCP in CODESYS, by the library CAA Net Base Services, which is always installed.
 
 use super::link::{Link, Part, Stream, registers, silence};
 use crate::plcopen::{Kind, variable};

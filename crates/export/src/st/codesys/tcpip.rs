@@ -1,4 +1,4 @@
-//! Records over TCP in TwinCAT: the library `Tc2_TcpIp` of TF6310.
+//! Records over TCP in TwinCAT, by the library `Tc2_TcpIp` of TF6310.
 
 use super::link::{Link, Part, Stream, registers, silence};
 use crate::plcopen::{Kind, variable};

@@ -1,4 +1,4 @@
-//! A program that tickbus itself hosts: located variables are the image.
+//! A program hosted by tickbus: its located variables are the image.
 
 use super::{COMPILED, EDITOR, configuration, declared, program, remarks};
 use crate::record::Place;
@@ -110,7 +110,7 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> Result<String, M
     for line in life.before.iter().chain(&life.after) {
         add(&mut text, &format!("  {line}"));
     }
-    // A program without a statement is none for iec2c, nor is a lone semicolon a statement.
+    // iec2c accepts neither a program without statements nor a lone semicolon.
     add(
         &mut text,
         "  (* Your program goes here, before this line. *)",
@@ -121,7 +121,7 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> Result<String, M
     Ok(text)
 }
 
-/// Whether one of both ends counts a signal up.
+/// Whether either end counts a signal up.
 fn is_life_sign(config: &Config, signal: &Signal) -> bool {
     let signs = &config.life_signs;
     let beats = signs.heartbeat.iter().map(|beat| beat.signal);
@@ -129,7 +129,7 @@ fn is_life_sign(config: &Config, signal: &Signal) -> bool {
     counted.any(|index| std::ptr::eq(&raw const config.table.signals[index], signal))
 }
 
-/// The address of a signal, counted in elements of its size; `None` where it begins between two of them.
+/// The address of a signal in elements of its size; `None` if it starts between two of them.
 fn element(place: &Place<'_>) -> Option<String> {
     let (area, byte) = (place.signal.area, place.byte);
     if place.data_type() == DataType::Bool {

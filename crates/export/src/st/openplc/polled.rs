@@ -1,7 +1,7 @@
 //! `OpenPLC` as a Modbus client of the simulation: registers of slave devices.
 //!
-//! Limits from `modbus_master.cpp` of `OpenPLC` v3: one request for each device and table, which libmodbus refuses
-//! beyond the registers of one telegram, and one array of 400 registers for all devices.
+//! Limits from `modbus_master.cpp` of `OpenPLC` v3: one request per device and table, which libmodbus refuses
+//! if it exceeds the registers of a telegram, and one array of 400 registers for all devices.
 
 use super::wired::{self, Wires};
 use crate::st::telegrams::Telegrams;
@@ -11,13 +11,13 @@ use tickbus_bus_modbus::{Line, ServerOptions};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Area;
 
-/// Where `OpenPLC` puts the first register of its first slave device.
+/// The first register of the first slave device in `OpenPLC`.
 const FIRST: usize = 100;
 
-/// The registers of all devices that it has room for, in each direction.
+/// The number of registers of all devices together, in each direction.
 const ROOM: usize = 400;
 
-/// `max_age` of a driver.cfg that bears `OpenPLC`'s polling on a busy machine: ten of its default periods.
+/// A `max_age` that tolerates `OpenPLC`'s polling on a busy machine: ten of its default periods.
 const MAX_AGE: Nanos = Nanos::from_secs(1);
 
 pub(super) fn text(
@@ -93,7 +93,7 @@ pub(super) fn text(
     Ok(wired::text(config, &wires))
 }
 
-/// Which kind of device it is, and where it is found.
+/// The type of the device, and its address.
 fn place(line: &Line) -> String {
     match line {
         Line::Tcp(address) => format!(

@@ -1,7 +1,7 @@
-//! REAL and its bits in the arithmetic that IEC 61131-3 has.
+//! Converts REALs and their bits using only the arithmetic of IEC 61131-3.
 
-/// The numbers of a REAL out of its bits and back, in the arithmetic that IEC 61131-3 has: `iec2c` converts a DWORD to
-/// the REAL of the same value, not of the same bits.
+/// Functions from the bits of a REAL to its value and back, using only the arithmetic of IEC 61131-3: `iec2c`
+/// converts a DWORD to the REAL of the same value, not of the same bits.
 pub(super) const FUNCTIONS: &str = "\
 FUNCTION tickbus_real : REAL
   VAR_INPUT

@@ -1,7 +1,7 @@
 //! `OpenPLC` as a Modbus server: the simulation reads and writes its holding registers.
 //!
-//! Its table, from `modbus.cpp` of `OpenPLC` v3: holding registers 0 to 1023 are `%QW0` to `%QW1023`, 1024 to 2047 are
-//! `%MW0` to `%MW1023`; further on lie parts of wider variables.
+//! Its table, from `modbus.cpp` of `OpenPLC` v3: holding registers 0 to 1023 are `%QW0` to `%QW1023`, 1024 to
+//! 2047 are `%MW0` to `%MW1023`; beyond are parts of wider variables.
 
 use super::wired::{self, Wires};
 use tickbus_base::toml_text::Mistakes;
@@ -9,7 +9,7 @@ use tickbus_bus_modbus::{ClientOptions, Table};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Area;
 
-/// Registers of `%QW`, and as many of `%MW`.
+/// Number of registers of `%QW`, and also of `%MW`.
 const WORDS: usize = 1024;
 
 pub(super) fn text(config: &Config, options: &ClientOptions) -> Result<String, Mistakes> {

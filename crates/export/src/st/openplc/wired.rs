@@ -9,17 +9,17 @@ use crate::st::{add, comment, copies, records, remark, source, taken, temporarie
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::DataType;
 
-/// Where the registers of both images are, and how they get there.
+/// The addresses of both images' registers, and how they are transferred.
 pub(super) struct Wires {
-    /// What the program is, for its head.
+    /// The program's description, for its head.
     pub(super) what: &'static str,
-    /// What is to be set in the runtime, line by line.
+    /// The settings to be made in the runtime, line by line.
     pub(super) steps: Vec<String>,
     /// The addresses of the registers of both images, inputs first.
     pub(super) addresses: [Vec<String>; 2],
 }
 
-/// What registers are called, inputs first.
+/// The names of registers, inputs first.
 const CALLED: [&str; 2] = ["in", "out"];
 
 pub(super) fn text(config: &Config, wires: &Wires) -> String {
@@ -117,7 +117,7 @@ pub(super) fn text(config: &Config, wires: &Wires) -> String {
     }
     guarded(&mut text, &take);
     if bring.is_empty() && take.is_empty() {
-        // A program without a statement is none for iec2c.
+        // iec2c does not accept a program without statements.
         add(&mut text, "  RETURN;");
     }
     add(&mut text, "END_PROGRAM");

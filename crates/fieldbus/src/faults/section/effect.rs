@@ -1,4 +1,4 @@
-//! What a fault does: the keys that belong to its kind.
+//! The effect of a fault: the keys of its kind.
 
 use super::{Keys, SIGNAL};
 use crate::faults::condition::unknown;
@@ -8,11 +8,11 @@ use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
 use tickbus_image::signal::section::{slot_of, value_limits, value_range};
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
-/// The longest that frames may be held back.
+/// The longest delay.
 const LONGEST: Nanos = Nanos::from_secs(60);
 
-/// Reads the effect of a fault of `kind`, and reports its mistakes; `whole` tells whether a key that is not
-/// there was not written either.
+/// Reads the effect of a fault of `kind` and reports its mistakes; with `whole` no line of the section was
+/// left out, so that a key that is absent was not written.
 pub(super) fn read_effect(
     kind: &str,
     keys: &Keys<'_>,
@@ -53,7 +53,7 @@ fn read_hold(keys: &Keys<'_>) -> Option<Nanos> {
     Some(by)
 }
 
-/// The chance, or the usual one where none is stated; `None` when it is wrong, too.
+/// The probability, or the default if there is one and none is stated; `None` if that makes it invalid.
 fn read_chance(keys: &Keys<'_>, usual: Option<f64>) -> Option<f64> {
     const RIGHT: &str = "write a chance above 0 and up to 1, such as 0.1 for one in ten";
     let Some(value) = &keys.chance else {
@@ -224,7 +224,7 @@ fn read_noise(place: &Value<'_>, keys: &Keys<'_>, signal: &Signal, whole: bool) 
     Some(Change::Noise(amplitude))
 }
 
-/// Refuses a step that is wider than all that the signal can show, or too small to be seen in it.
+/// Rejects a step that is larger than the signal's whole range, or too small to have an effect.
 fn check_step(value: &Value<'_>, step: f64, signal: &Signal) -> Option<()> {
     let (low, high) = value_limits(signal);
     let least = match signal.scale {

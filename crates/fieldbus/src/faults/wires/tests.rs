@@ -5,7 +5,7 @@ use crate::faults::list::Moment;
 use crate::faults::{Begin, Direction, Effect, Fault, Faults, Lasts, Slots};
 use tickbus_image::signal::{Area, SignalTable};
 
-/// A line of one station with one latched byte and one other, and the tick that rules its faults.
+/// A line of one station with one latched byte and one other byte, and the tick that controls its faults.
 struct Rig {
     faults: Faults,
     board: Arc<Board>,
@@ -70,7 +70,7 @@ impl Rig {
         self.wires.look();
     }
 
-    /// One cycle of sending: what goes out, and whether the image may take it for sent.
+    /// One cycle of sending: the bytes sent, and whether the image may regard them as sent.
     fn send(&mut self, now: i64, image: [u8; 2], taken: bool) -> ([u8; 2], bool) {
         let repeats = self.wires.repeats(0);
         let mut confirmed = !repeats && self.wires.takes(0, Nanos(now), &image);
@@ -81,7 +81,7 @@ impl Rig {
         (out, confirmed)
     }
 
-    /// Hands a frame to the line, and gives what comes out of it at `now`.
+    /// Hands a frame to the line; returns what is delivered at `now`.
     fn receive(&mut self, now: i64, frame: Option<u8>) -> Vec<u8> {
         let mut come = self.released(now);
         if let Some(frame) = frame
@@ -210,7 +210,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     let slow = rig.add(Trouble::SlowAnswers(Nanos(10)), 1);
     rig.send(0, [1, 5], false);
     rig.send(1, [0, 6], false);
-    // A peer that reads nothing may come back.
+    // A peer that stopped polling may come back.
     let long = PATIENCE.0 * 5;
     assert_eq!(rig.send(20, [0, 6], false).0, [1, 5]);
     assert_eq!(rig.send(long, [0, 6], false).0, [1, 5]);
@@ -223,7 +223,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     assert_eq!(rig.send(after + 20, [0, 8], false).0, [0, 8]);
     rig.end(slow);
     assert_eq!(rig.send(after + 21, [1, 9], false), ([1, 9], false));
-    // Once it has read it, it waits again.
+    // Once it has been read, it waits for the peer again.
     rig.wires.sent_bits(0, &(0..1));
     rig.add(Trouble::SlowAnswers(Nanos(10)), 1);
     rig.send(after + 30, [0, 0], false);
@@ -348,7 +348,7 @@ proptest! {
         let mut now = 0;
         let (mut confirmed, mut seen) = (vec![0], vec![0]);
         let mut slow = None;
-        // An image shows a level until it may take it for sent.
+        // An image shows a level until it may regard it as sent.
         let mut pending: Option<u8> = None;
         for (pause, level, taken, what) in levels {
             now += pause;

@@ -10,8 +10,8 @@ use tickbus_base::time::{Clock, Manual, Monotonic};
 use tickbus_image::image;
 use tickbus_test_log as logged;
 
-/// Telegrams of a length byte and so many more, which come back; one of 255 is against the protocol, and one
-/// of 200 is answered by a great deal.
+/// Telegrams of a length byte and as many bytes, which are echoed; a length of 255 violates the protocol, and
+/// 200 gets a very long answer.
 struct Echo;
 
 const LIMITS: Limits = Limits {
@@ -61,18 +61,18 @@ impl Service for Echo {
 
 const MAX_AGE: Nanos = Nanos::from_secs(3600);
 
-/// A server on a thread, on a clock that stands still.
+/// A server on its own thread, with a clock that stands still.
 struct Running {
     clock: Arc<Manual>,
     stop: Stop,
     status: LinkStatus,
     address: SocketAddr,
     thread: Option<JoinHandle<Result<(), BusError>>>,
-    /// Looks after the log, once the thread has ended.
+    /// Checks the log once the thread has ended.
     _logged: logged::Watch,
 }
 
-/// Waits in real time have an end.
+/// Waits with a limit in real time.
 struct Waiting {
     clock: Arc<Monotonic>,
     limit: Nanos,
@@ -142,7 +142,7 @@ impl Running {
         }
     }
 
-    /// Lets time pass once the server waits for nothing but that.
+    /// Advances the clock once the server waits for nothing else.
     fn pass(&self, span: Nanos) {
         self.until(|server| server.clock.is_settled(1));
         self.clock.advance(span);
@@ -253,7 +253,7 @@ fn half_a_telegram_has_its_time() {
     ask(&mut good, &[1, 1]);
     ask(&mut slow, &[1, 1]);
     slow.write_all(&[5, 1]).expect("the server reads");
-    // An answer to another says that the half has been read, or will be before the time is judged.
+    // The answer to another client shows that the half has been read, or will be before the time is checked.
     ask(&mut good, &[1, 2]);
     server.until(|server| {
         server.clock.advance(Nanos::from_millis(10));
@@ -287,7 +287,7 @@ fn who_does_not_read_is_not_read_and_dropped_in_the_end() {
     let mut greedy = vec![0; 200];
     greedy[0] = 199;
     let waiting = Waiting::begin();
-    // Until the system takes no more: then the server has stopped reading.
+    // Until the system accepts no more: the server has then stopped reading.
     while server.fact("clients.dropped").is_none() {
         waiting.check("a server that reads for ever");
         if (&slow).write(&greedy).is_err() {

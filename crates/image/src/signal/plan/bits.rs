@@ -1,4 +1,4 @@
-//! Runs of BOOL signals: whole bytes of them, and the bytes that only some bits of are signals.
+//! Runs of BOOL signals: bytes that are all signals, and bytes of which only some bits are.
 
 use std::array;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use super::run::{Member, Run};
 use super::{Conversions, index};
 use crate::signal::Slot;
 
-/// Lays out `members`, all BOOL. Every byte that holds one is encoded whole, by one run.
+/// Arranges `members`, all BOOL, into runs. A byte with any of them is encoded as a whole, by one run.
 pub(super) fn lay_out(members: &[Member]) -> Vec<Box<dyn Run>> {
     let mut members = members.to_vec();
     members.sort_by_key(|(_, signal)| (signal.byte, signal.bit));
@@ -59,7 +59,7 @@ impl Octet {
 }
 
 impl Octets {
-    /// Encodes values of which some are NaN.
+    /// Encodes values some of which are NaN.
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
@@ -95,7 +95,7 @@ impl Run for Octets {
     }
 }
 
-/// Bytes with fewer signals, or with signals in another order.
+/// Bytes with fewer than eight signals, or with signals in another order.
 #[derive(Debug, Default)]
 struct Partials {
     bytes: Vec<Partial>,
@@ -164,7 +164,7 @@ fn is_high(slot: Slot) -> bool {
     high(slot, false, &mut Conversions::default())
 }
 
-/// Whether a BOOL is 1: for every value but zero; for NaN as `fail_safe` says, and that is counted.
+/// Whether a BOOL is 1: for every value except zero; NaN takes `fail_safe`, and is counted.
 fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     let value = slot.real();
     if value.is_nan() {
@@ -175,8 +175,8 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0, and whether any of them is NaN; if one is, the
-/// byte is wrong.
+/// Eight slots as one byte, the first slot as bit 0, and whether any of them is NaN; if so, the byte is
+/// invalid.
 #[inline]
 fn pack(slots: &[Slot; 8]) -> (u8, bool) {
     let [low, high] = [0, 4].map(|first| f64x4::new(array::from_fn(|i| slots[first + i].real())));
@@ -185,7 +185,7 @@ fn pack(slots: &[Slot; 8]) -> (u8, bool) {
     (byte, (low.is_nan() | high.is_nan()).any())
 }
 
-/// The same with a look at each value; NaN slots take their bit from `fail_safe` and are counted.
+/// As [`pack`], checking each value; NaN slots take their bit from `fail_safe` and are counted.
 fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
     (0..8).zip(slots).fold(0, |byte, (bit, slot)| {
         let fail_safe = fail_safe >> bit & 1 == 1;
@@ -193,7 +193,7 @@ fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> 
     })
 }
 
-/// The slots of four bits, the first of bit 0.
+/// The slots of four bits, bit 0 first.
 static NIBBLES: [[Slot; 4]; 16] = {
     let mut nibbles = [[Slot::from_real(0.0); 4]; 16];
     let mut nibble = 0;
@@ -210,7 +210,7 @@ static NIBBLES: [[Slot; 4]; 16] = {
     nibbles
 };
 
-/// One byte as eight slots, bit 0 as the first.
+/// One byte as eight slots, bit 0 first.
 fn unpack(byte: u8, slots: &mut [Slot; 8]) {
     let (low, high) = slots.split_at_mut(4);
     low.copy_from_slice(&NIBBLES[usize::from(byte & 15)]);

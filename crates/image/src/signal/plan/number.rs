@@ -7,19 +7,19 @@ use super::Conversions;
 use super::word::Word;
 use crate::signal::{Scale, Slot};
 
-/// The way between a slot and a word of one type, scaled or not.
+/// The conversion between a slot and a word of one type, scaled or not.
 ///
-/// Encoding has two speeds. [`Codec::raw`], [`Codec::fits`] and [`Codec::word`] have no branches, so
-/// that loops over them become vector code; [`Codec::bend`] is for a value that does not fit.
+/// Encoding has a fast and a slow path. [`Codec::raw`], [`Codec::fits`] and [`Codec::word`] have no branches,
+/// so that loops over them are vectorised; [`Codec::bend`] handles a value that does not fit.
 pub(super) trait Codec: Debug + Send + Sync + 'static {
-    /// What stands on the wire.
+    /// The type on the wire.
     type Word: Word;
-    /// The number between the slot and the word: scaled back, not yet rounded.
+    /// The number between slot and word: unscaled, not yet rounded.
     type Raw: Copy;
-    /// What is kept of each signal's scale.
+    /// What the codec stores of each signal's scale.
     type Scale: Copy + Debug + Send + Sync + 'static;
 
-    /// What this codec keeps of a signal's scale.
+    /// Converts a signal's scale to what the codec stores.
     fn scale(scale: Option<Scale>) -> Self::Scale;
 
     /// The raw number of `slot`.
@@ -42,7 +42,7 @@ pub(super) trait Codec: Debug + Send + Sync + 'static {
     /// The slot that `word` stands for.
     fn decode(word: Self::Word, scale: Self::Scale) -> Slot;
 
-    /// The word of `slot`, whatever it holds.
+    /// The word of `slot`, whether its value fits or not.
     fn encode(
         slot: Slot,
         scale: Self::Scale,
@@ -57,14 +57,14 @@ pub(super) trait Codec: Debug + Send + Sync + 'static {
         }
     }
 
-    /// The word of a signal's fail-safe value; zero where that is NaN itself.
+    /// The word of a signal's fail-safe value; zero if that is NaN.
     fn fail_safe(slot: Slot, scale: Self::Scale) -> Self::Word {
         let zero = Self::word(Self::raw(Slot::from_real(0.0), Self::scale(None)));
         Self::encode(slot, scale, zero, &mut Conversions::default())
     }
 }
 
-/// Slots that hold the 64 bits of an integer: unscaled LWORD, LINT and ULINT.
+/// Slots that hold a 64-bit integer: unscaled LWORD, LINT and ULINT.
 #[derive(Debug)]
 pub(super) struct Integer64;
 
@@ -142,9 +142,9 @@ impl<N: Number, S: Scaling> Codec for Real<N, S> {
     }
 }
 
-/// The step between engineering units and raw numbers.
+/// The conversion between engineering units and raw numbers.
 pub(super) trait Scaling: Copy + Debug + Send + Sync + 'static {
-    /// From a signal's scale, which is there exactly if the scaling needs it.
+    /// From a signal's scale, which is present exactly if the scaling needs it.
     fn of(scale: Option<Scale>) -> Self;
 
     /// Engineering units to raw, not yet rounded.
@@ -180,8 +180,8 @@ impl Scaling for Scale {
         })
     }
 
-    // A division, not a product with the reciprocal: it undoes `value` to within a few units in the
-    // last place, so every raw number comes back after rounding.
+    // A division rather than a multiplication by the reciprocal: it inverts `value` to within a few units in
+    // the last place, so every raw number survives the round trip after rounding.
     fn raw(self, value: f64) -> f64 {
         (value - self.offset) / self.gain
     }
@@ -191,9 +191,9 @@ impl Scaling for Scale {
     }
 }
 
-/// A number type of the wire.
+/// A number type on the wire.
 pub(super) trait Number: Debug + Send + Sync + 'static {
-    /// Its bits.
+    /// The integer that has its bits.
     type Word: Word;
     /// The most negative finite number, as near as a double comes.
     const LOWEST: f64;
@@ -212,10 +212,10 @@ pub(super) trait Number: Debug + Send + Sync + 'static {
     fn from_word(word: Self::Word) -> f64;
 }
 
-/// Moves `raw` away from zero so far that cutting its fraction rounds it half away from zero.
+/// Moves `raw` away from zero, so that truncating it rounds half away from zero.
 ///
-/// What is added is the greatest double below one half. A plain half would carry
-/// 0.49999999999999994 up to 1, and odd integers beyond 2^52 to their even neighbour.
+/// It adds the greatest double below one half. A plain half would round 0.49999999999999994 up to 1, and odd
+/// integers beyond 2^52 to their even neighbour.
 fn nudge(raw: f64) -> f64 {
     raw + 0.499_999_999_999_999_94_f64.copysign(raw)
 }
@@ -256,7 +256,7 @@ macro_rules! integer {
     };
 }
 
-// The bounds are the first doubles that would no longer be cut to a number of the type.
+// The bounds are the first doubles that truncation would no longer bring into the type's range.
 integer!(i8 as u8, -129.0, 128.0);
 integer!(u8 as u8, -1.0, 256.0);
 integer!(i16 as u16, -32_769.0, 32_768.0);

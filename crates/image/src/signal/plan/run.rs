@@ -13,13 +13,13 @@ use crate::signal::{Signal, Slot};
 /// A signal and its slot number.
 pub(super) type Member<'a> = (usize, &'a Signal);
 
-/// Fewer neighbours than this are not worth a loop of their own.
+/// Fewer adjacent signals than this are not worth a loop of their own.
 const SHORTEST_DENSE: usize = 4;
 
-/// How many values a dense run encodes before it looks whether all of them fitted.
+/// How many values a dense run encodes before it checks whether all of them fitted.
 const BLOCK: usize = 32;
 
-/// Some signals that are converted by the same instructions.
+/// Signals that are converted by the same instructions.
 pub(super) trait Run: Debug + Send + Sync {
     /// Encodes the run's slots into their bytes of the frame.
     fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions);
@@ -42,7 +42,7 @@ impl Run for Gaps {
     fn decode(&self, _: &[u8], _: &mut [Slot]) {}
 }
 
-/// Lays out `members`, all of codec `C` and order `O` and in slot order: neighbours in both slots and
+/// Arranges `members`, all of codec `C` and order `O` and in slot order: those adjacent both in slots and in
 /// bytes become dense runs, all others share a scattered one.
 pub(super) fn lay_out<C: Codec, O: Order>(members: &[Member]) -> Vec<Box<dyn Run>> {
     let mut runs: Vec<Box<dyn Run>> = Vec::new();
@@ -62,7 +62,7 @@ pub(super) fn lay_out<C: Codec, O: Order>(members: &[Member]) -> Vec<Box<dyn Run
     runs
 }
 
-/// What a run keeps of its signals, in its own order.
+/// What a run stores of its signals, in its own order.
 #[derive(Debug)]
 struct Values<C: Codec> {
     scales: Box<[C::Scale]>,
@@ -104,7 +104,7 @@ impl<C: Codec, O: Order> Dense<C, O> {
         }
     }
 
-    /// Encodes values one by one, with a look at each.
+    /// Encodes values one by one, checking each.
     #[inline(never)]
     fn one_by_one(
         slots: &[Slot],
@@ -125,7 +125,7 @@ impl<C: Codec, O: Order> Run for Dense<C, O> {
         let Values { scales, fail_safes } = &self.values;
         let slots = &slots[self.slot..][..scales.len()];
         let bytes = &mut frame[self.byte..][..scales.len() * Self::BYTES];
-        // Blocks of a length that the compiler knows become vector code without remainders.
+        // Blocks of a constant length become vector code without remainders.
         let (slot_blocks, last_slots) = slots.as_chunks::<BLOCK>();
         let (scale_blocks, last_scales) = scales.as_chunks::<BLOCK>();
         let (fail_safe_blocks, last_fail_safes) = fail_safes.as_chunks::<BLOCK>();
@@ -162,7 +162,7 @@ impl<C: Codec, O: Order> Run for Dense<C, O> {
     }
 }
 
-/// Where one signal of a scattered run stands.
+/// The slot and the byte of one signal of a scattered run.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     slot: u32,

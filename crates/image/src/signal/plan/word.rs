@@ -1,4 +1,4 @@
-//! The words of the wire, and the ways their bytes lie.
+//! The words on the wire, and their byte orders.
 
 use std::fmt::Debug;
 
@@ -10,7 +10,7 @@ pub(super) trait Word: Copy + Debug + Send + Sync + 'static {
     /// The same word, least significant byte first.
     fn reverse_bytes(self) -> Self;
 
-    /// The same word, least significant 16-bit word first, the bytes of each as they were.
+    /// The same word, least significant 16-bit word first, the bytes within each word unchanged.
     fn reverse_words(self) -> Self;
 
     /// Reads a big-endian word; `bytes` is exactly [`Word::BYTES`] long.
@@ -56,10 +56,10 @@ word!(u64, value => {
     ((halves & EVEN_WORDS) << 16) | ((halves >> 16) & EVEN_WORDS)
 });
 
-/// A byte order, known when the code is generated.
+/// A byte order, known at compile time.
 pub(super) trait Order: Debug + Send + Sync + 'static {
-    /// Makes a value the word whose big-endian bytes stand on the wire, and the other way round:
-    /// every byte order is its own inverse.
+    /// Converts a value to the word whose big-endian bytes are on the wire, and back: every byte order is its
+    /// own inverse.
     fn arrange<W: Word>(word: W) -> W;
 }
 

@@ -1,16 +1,17 @@
 //! Where the bottles are, and what must not happen to them.
 //!
-//! Of wheel 1 only the pocket under lift 1 counts: each index brings a full one from the infeed.
+//! Of wheel 1 only the pocket under lift 1 is modelled: each index brings a full one from the infeed.
 
 use super::plant::{BIG, Lift, Wheel};
 
 /// How near a cup must be to a pocket or sleeve, in micrometres.
 const REACH: i32 = 1_000;
 
-/// How far below its sleeves wheel 2 reaches.
+/// How far wheel 2 reaches below its sleeves.
 const CLEARANCE: i32 = 5_000;
 
-/// Height of a bottle: what stands this far under a full sleeve with a bottle on it hits it.
+/// Height of a bottle: a lift with a bottle on it that is this far below a full sleeve hits the sleeve's
+/// bottle.
 const BOTTLE: i32 = 60_000;
 
 /// The bottles of the cell.
@@ -64,7 +65,7 @@ impl Bottles {
         self.grip(lifts);
     }
 
-    /// A cup with vacuum takes the bottle that it stands under, unless that is on its way.
+    /// A cup with vacuum takes the bottle that it is under, unless that is moving.
     fn grip(&mut self, lifts: [&Lift; 2]) {
         for cup in 0..2 {
             if self.vacuum[cup]
@@ -79,7 +80,7 @@ impl Bottles {
         }
     }
 
-    /// What lift 1 meets on its way.
+    /// What lift 1 collides with on its way.
     fn lift_1(&mut self, position: i32) {
         let before = std::mem::replace(&mut self.position, position);
         let contact = BIG - BOTTLE;
@@ -94,7 +95,7 @@ impl Bottles {
         }
     }
 
-    /// The pocket or sleeve at which a cup stands.
+    /// The pocket or sleeve at which a cup is.
     fn seat(&mut self, cup: usize, lifts: [&Lift; 2]) -> Option<&mut bool> {
         let low = lifts[cup].position <= REACH;
         let high = lifts[cup].position >= BIG - REACH;

@@ -18,15 +18,15 @@ pub(super) const ABORT: u8 = 4;
 pub(super) const RECOVER: u8 = 5;
 pub(super) const PARKED: u8 = 7;
 
-/// What the machine gets while no data come, by the rig's `driver.cfg`.
+/// The machine's inputs while it receives no data, according to the rig's `driver.cfg`.
 const FAIL_SAFE: u16 = SC1 | SC2;
 
-/// Data older than this, in scans, are stale.
+/// The age, in scans, from which on data are stale.
 const STALE_SCANS: usize = 25;
 
 const SCANS_PER_SECOND: usize = 100;
 
-/// The outputs of one scan, taken apart.
+/// The outputs of one scan, by meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Seen {
     pub(super) word: u16,
@@ -48,7 +48,7 @@ impl Seen {
         }
     }
 
-    /// Checks what must hold in every scan, whatever the inputs were.
+    /// Checks what must hold in every scan, for any inputs.
     #[track_caller]
     pub(super) fn check(self, inputs: &[u8]) {
         let on = |bits: u16| self.word & bits != 0;
@@ -96,8 +96,8 @@ impl Seen {
     }
 }
 
-/// Names a file with the rig's program from `plc/rig/rig.st`, compiled. Then every test of the rig has it run
-/// beside the built-in one, and all outputs must be equal in every scan; `tools/test` does that.
+/// Names a file with the rig's program from `plc/rig/rig.st`, compiled. If set, every test of the rig runs it
+/// in parallel with the built-in one, and all outputs must be equal in every scan; `tools/test` does that.
 const COMPILED: &str = "TICKBUS_RIG_PROGRAM";
 
 /// The compiled program, if one was named.
@@ -108,7 +108,7 @@ fn twin(la1_code: La1Code) -> Option<Hosted> {
     Some(twin.unwrap_or_else(|error| panic!("{COMPILED}: {error}")))
 }
 
-/// The program, the plant, and all that was seen of them.
+/// The program, the plant, and everything observed.
 #[derive(Debug)]
 pub(super) struct Cell {
     pub(super) rig: Rig,
@@ -168,8 +168,8 @@ impl Cell {
         });
     }
 
-    /// Switches the program off for some scans, and a new one on, which remembers nothing. Until its
-    /// data are stale, the machine goes on by the last word.
+    /// Switches the program off for some scans, and a new one on, which has no memory. Until its data are
+    /// stale, the machine continues with the last word.
     pub(super) fn power_cut(&mut self, off: usize) {
         for scan in 0..off {
             let stale = scan >= STALE_SCANS;
@@ -184,7 +184,7 @@ impl Cell {
         self.phases = vec![0];
     }
 
-    /// One scan with inputs from anywhere; the plant stays as it is.
+    /// One scan with arbitrary inputs; the plant does not move.
     pub(super) fn scan_inputs(&mut self, inputs: [u8; 3]) {
         let bytes = [inputs[0], inputs[1], inputs[2], 0, 0, 0, 0, 0];
         let mut twins_outputs = self.outputs;
@@ -231,7 +231,7 @@ impl Cell {
         self.scan();
     }
 
-    /// Scans until it is so, for a minute at most.
+    /// Scans until `so` holds, for a minute at most.
     #[track_caller]
     pub(super) fn until(&mut self, what: &str, so: impl Fn(&Self) -> bool) {
         for _ in 0..60 * SCANS_PER_SECOND {

@@ -1,8 +1,7 @@
-//! A small machine that does what the rig's program says, enough to test the program with.
+//! A small machine that obeys the rig's program, detailed enough to test the program.
 //!
-//! It knows the rules that matter to the program: moves start on edges, unreferenced lifts only
-//! make reference runs, faults are latched, bottles are where they were put. It is called once per
-//! scan of 10 ms.
+//! It implements the rules that matter to the program: moves start on edges, unreferenced lifts only make
+//! reference runs, faults are latched, bottles are where they were put. It is called once per scan of 10 ms.
 
 use super::bottles::Bottles;
 use crate::rig::image::command::{
@@ -10,7 +9,7 @@ use crate::rig::image::command::{
     LA1_RUN, LA2_RUN, LA2_UP, SC1, SC2,
 };
 
-/// The words of the cycle, by the protocol.
+/// The words of the cycle, from the protocol.
 pub(super) const WORDS: [u16; 6] = [0x0001, 0x0024, 0x000C, 0x0080, 0x3C34, 0x343C];
 
 pub(super) const BIG: i32 = 200_000;
@@ -26,7 +25,7 @@ const MARGIN: i32 = 10_000;
 pub(super) struct Lift {
     pub(super) position: i32,
     pub(super) referenced: bool,
-    /// It cannot move on, and its beam is blocked.
+    /// It is blocked, and so is its beam.
     pub(super) jammed: bool,
     top: i32,
     target: Option<i32>,
@@ -49,8 +48,8 @@ impl Lift {
     fn step(&mut self, by: Option<i32>, down: i32) -> bool {
         if self.at_bottom() && self.target.is_none() {
             self.referenced = true;
-            // It sinks onto its stop, as in the reference simulator when the run command falls
-            // (`LiftDrive.stop`). Nobody could send it there: referenced, it refuses to go down.
+            // It sinks onto its stop, as in the reference simulator when the run command drops
+            // (`LiftDrive.stop`). It could not be commanded to go there: referenced, it refuses to go down.
             if !self.jammed {
                 self.position = 0;
             }
@@ -153,7 +152,7 @@ pub(super) struct Plant {
     pub(super) not_ok: bool,
     /// It raises Not OK by itself when a lift is jammed.
     pub(super) sees_jams: bool,
-    /// It never says that a step is complete.
+    /// It never reports a step as complete.
     pub(super) mute: bool,
     /// The code of lift 1 comes LSB first.
     pub(super) lsb_first: bool,

@@ -1,4 +1,4 @@
-//! Whatever happens, the program stays within its bounds, and an operator gets it home again.
+//! Whatever happens, the program stays within its bounds, and an operator can bring it home again.
 //!
 //! [`Seen::check`](super::cell::Seen::check) holds in every scan of these tests.
 
@@ -72,8 +72,8 @@ fn park(cell: &mut Cell) {
     }
 }
 
-/// The reference run of lift 1 reaches the bottom switch half a millimetre above the stop, and just then
-/// something makes the program drop the run command.
+/// The reference run of lift 1 reaches the bottom switch half a millimetre above the stop, and at that moment
+/// the program is made to drop the run command.
 #[test]
 fn a_reference_run_that_ends_on_the_switch_parks_lift_1_on_its_stop() {
     let not_ok = Trouble::Noise([128, 0, 0]);
@@ -99,7 +99,7 @@ fn a_reference_run_that_ends_on_the_switch_parks_lift_1_on_its_stop() {
     }
 }
 
-/// A case that the test below once found.
+/// A case that the test below has found.
 #[test]
 fn noise_in_the_scan_in_which_lift_1_meets_its_switch_parks_it_on_its_stop() {
     let not_ok = Trouble::Noise([128, 0, 0]);

@@ -36,7 +36,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
      * Opens the driver that a file describes.
      *
      * @param cfg the driver.cfg
-     * @throws FieldbusException as {@link Tickbus#open} says
+     * @throws FieldbusException as {@link Tickbus#open}
      */
     public FieldbusDriver(Path cfg) {
         bus = Tickbus.open(cfg);
@@ -71,7 +71,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
      * One tick, at the time last given by {@link #simulationTime}.
      *
      * @throws IllegalArgumentException if there are more or fewer values than components to write
-     * @throws FieldbusException if the fieldbus failed for good, or the driver was left by {@link #exit}
+     * @throws FieldbusException if the fieldbus failed for good, or the driver was closed by {@link #exit}
      */
     @Override
     public void updateComponentValues(double[] value) {
@@ -85,9 +85,9 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     }
 
     /**
-     * Takes what has come from the fieldbus; {@link #updateComponentValues} then only sends.
+     * Takes what has arrived from the fieldbus; {@link #updateComponentValues} then only sends.
      *
-     * @throws FieldbusException if the fieldbus failed for good, or the driver was left by {@link #exit}
+     * @throws FieldbusException if the fieldbus failed for good, or the driver was closed by {@link #exit}
      */
     @Override
     public void updateHardwareInputs() {

@@ -1,6 +1,6 @@
 package tickbus;
 
-/** The cheapest native call there is, for benchmarks: it is an inner matter of the package. */
+/** The cheapest native call possible, for benchmarks; package-private in the library. */
 public final class NativeBaseline {
     private NativeBaseline() {
     }
@@ -11,7 +11,7 @@ public final class NativeBaseline {
     }
 
     /**
-     * Crosses into the native library, does nothing there, and comes back.
+     * Calls the native library, which does nothing, and returns.
      *
      * @return 0
      */

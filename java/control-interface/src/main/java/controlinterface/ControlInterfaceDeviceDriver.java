@@ -22,10 +22,10 @@ public abstract class ControlInterfaceDeviceDriver {
     }
 
     /**
-     * Asks, before the machine's step, for what the hardware says now. A driver that can tell it answers with
-     * {@link #deliverHardwareInputs} before it returns, and then only sends in the {@link #updateComponentValues} of
-     * this tick: so the machine answers the hardware within one tick. A driver that leaves this as it is delivers in
-     * {@code updateComponentValues}, as in 2003; a simulator need not call it.
+     * Asks, before the machine's step, for the current values of the hardware. A driver that has them calls {@link
+     * #deliverHardwareInputs} before it returns, and then only sends in the {@link #updateComponentValues} of this
+     * tick, so that the machine answers the hardware within one tick. A driver that does not override this method
+     * delivers in {@code updateComponentValues}, as in 2003; a simulator need not call it.
      *
      * @throws RuntimeException if the hardware failed for good; the simulator then ends the run
      */
@@ -33,18 +33,17 @@ public abstract class ControlInterfaceDeviceDriver {
     }
 
     /**
-     * One tick: takes the simulation's values, exchanges them with the hardware, and answers with
-     * {@link #deliverHardwareInputs} before it returns, unless it did so in the {@link #updateHardwareInputs} of this
-     * tick.
+     * One tick: takes the simulation's values, exchanges them with the hardware, and calls {@link
+     * #deliverHardwareInputs} before it returns, unless it did so in the {@link #updateHardwareInputs} of this tick.
      *
      * @param value one value per component that the simulation writes, in component order; 0 and 1 for
-     *     Booleans. The array belongs to the simulator and is used again at the next tick.
+     * Booleans. The array belongs to the simulator and is reused at the next tick.
      * @throws RuntimeException if the hardware failed for good; the simulator then ends the run
      */
     public abstract void updateComponentValues(double[] value);
 
     /**
-     * The driver's answer: hands one tick's values to the simulator. Does nothing before {@link #connect}.
+     * The driver's answer: passes the values of one tick to the simulator. Does nothing before {@link #connect}.
      *
      * @param inputs one value per component that the simulation reads, in component order
      */
@@ -62,11 +61,11 @@ public abstract class ControlInterfaceDeviceDriver {
     }
 
     /**
-     * Tells the driver what time it is in the simulation; called before each
-     * {@link #updateHardwareInputs} with the time at the beginning of the tick, and before each
-     * {@link #updateComponentValues} with that at its end. Drivers that keep no simulation time leave it as it is.
+     * Tells the driver the simulation time: before each {@link #updateHardwareInputs} the time at the beginning of
+     * the tick, before each {@link #updateComponentValues} the time at its end. A driver that does not use simulation
+     * time need not override it.
      *
-     * @param nanos nanoseconds since the simulation began, never falling
+     * @param nanos nanoseconds since the simulation began, never decreasing
      */
     public void simulationTime(long nanos) {
     }
@@ -80,7 +79,7 @@ public abstract class ControlInterfaceDeviceDriver {
     public abstract List<HardwareComponent> components();
 
     /**
-     * The number that the driver's {@code .cfg} file gives it.
+     * The number in the driver's {@code .cfg} file.
      *
      * @return the id, unique among the drivers in the folder
      */
@@ -94,7 +93,7 @@ public abstract class ControlInterfaceDeviceDriver {
     public abstract String name();
 
     /**
-     * What the driver counted so far. May be slow; not for every tick.
+     * The driver's counters. May be slow; not to be called on every tick.
      *
      * @return names and values as text, in an order fit for printing; empty if the driver counts nothing
      */
@@ -102,6 +101,6 @@ public abstract class ControlInterfaceDeviceDriver {
         return Map.of();
     }
 
-    /** Closes the hardware. The simulator calls it once at its end; further calls do nothing. */
+    /** Closes the hardware. The simulator calls it once when it ends; further calls do nothing. */
     public abstract void exit();
 }

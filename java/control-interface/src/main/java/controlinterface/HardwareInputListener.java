@@ -1,13 +1,13 @@
 package controlinterface;
 
-/** Whoever wants the values that a driver read from its hardware: the simulator. */
+/** Receives the values that a driver has read from its hardware; implemented by the simulator. */
 @FunctionalInterface
 public interface HardwareInputListener {
     /**
-     * Takes one tick's values.
+     * Takes the values of one tick.
      *
      * @param inputs one value per component that the simulation reads, in component order; 0 and 1 for
-     *     Booleans. The array belongs to the driver and is used again at the next tick: copy what you keep.
+     * Booleans. The array belongs to the driver and is reused at the next tick: copy what you keep.
      */
     void hardwareInputs(double[] inputs);
 }

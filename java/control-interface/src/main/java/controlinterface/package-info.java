@@ -1,5 +1,5 @@
 /**
- * The simulator's control interface: what a simulator asks of a device driver and what the driver answers.
+ * The simulator's control interface: what a simulator requires of a device driver.
  *
  * <p>The 2003 thesis by Hammarlund and Persson drops a Java class into the {@code DeviceDriver} folder of
  * a simulation program; the class extends the program's driver base class and names three calls:

@@ -5,7 +5,7 @@ import java.io.UncheckedIOException;
 import java.nio.file.Files;
 import java.nio.file.Path;
 
-/** Writes the driver.cfg of a benchmark: a mirror PLC, and as many signals each way as asked for. */
+/** Writes the driver.cfg of a benchmark: a mirror PLC, and the given number of signals in each direction. */
 final class BenchCfg {
     /** Simulation time per tick, and the scan interval of the stepped PLC: each tick gets a fresh frame. */
     static final long TICK_NANOS = 1_000_000;
@@ -25,7 +25,7 @@ final class BenchCfg {
         return write(text);
     }
 
-    /** Signals of type REAL, named likewise. */
+    /** Signals of type REAL, with the same names. */
     static Path reals(String mode, int eachWay) {
         StringBuilder text = head(mode);
         for (int i = 0; i < eachWay; i++) {

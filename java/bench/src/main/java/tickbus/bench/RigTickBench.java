@@ -17,7 +17,7 @@ import tickbus.NativeBaseline;
 import tickbus.Signal;
 import tickbus.Tickbus;
 
-/** The rig's tick, 16 bits each way, beside the native call that does nothing. */
+/** The rig's tick, 16 bits in each direction, compared with a native call that does nothing. */
 @BenchmarkMode(Mode.AverageTime)
 @OutputTimeUnit(TimeUnit.NANOSECONDS)
 @Fork(value = 3, jvmArgsAppend = "--enable-native-access=ALL-UNNAMED")
@@ -54,14 +54,14 @@ public class RigTickBench {
         private long now;
         private int pattern;
 
-        /** For the states below. */
+        /** For the subclasses below. */
         protected Bits() {
         }
 
         /**
-         * When the bus runs.
+         * How the bus is clocked.
          *
-         * @return as driver.cfg says it
+         * @return as in driver.cfg
          */
         protected abstract String mode();
 
@@ -112,7 +112,7 @@ public class RigTickBench {
         }
     }
 
-    /** Each tick runs a bus cycle and a scan of the mirror PLC, on the tick's thread. */
+    /** Each tick runs a bus cycle and a scan of the mirror PLC, on the ticking thread. */
     @State(Scope.Thread)
     public static class Stepped extends Bits {
         /** Made by JMH. */
@@ -125,7 +125,7 @@ public class RigTickBench {
         }
     }
 
-    /** The bus and the PLC run on threads of their own. */
+    /** The bus and the PLC run on their own threads. */
     @State(Scope.Thread)
     public static class Free extends Bits {
         /** Made by JMH. */
@@ -222,7 +222,7 @@ public class RigTickBench {
     }
 
     /**
-     * The same, and every tick brings a fresh frame: the time holds the bus cycle and the PLC's scan as well.
+     * The same with a fresh frame in every tick: the time includes the bus cycle and the PLC's scan.
      *
      * @param bits the signals
      * @return for JMH

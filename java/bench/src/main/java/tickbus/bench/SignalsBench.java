@@ -15,7 +15,7 @@ import org.openjdk.jmh.annotations.TearDown;
 import org.openjdk.jmh.annotations.Warmup;
 import tickbus.Tickbus;
 
-/** What a tick costs with more and more REAL signals, and thus its fixed part and its slope. */
+/** The cost of a tick with increasing numbers of REAL signals: its fixed part and its slope. */
 @BenchmarkMode(Mode.AverageTime)
 @OutputTimeUnit(TimeUnit.NANOSECONDS)
 @Fork(value = 3, jvmArgsAppend = "--enable-native-access=ALL-UNNAMED")

@@ -1,2 +1,2 @@
-/** Benchmarks of the tick, seen from Java. All that are to be compared run in one JMH run. */
+/** Benchmarks of the tick as seen from Java. Those to be compared run in a single JMH run. */
 package tickbus.bench;

@@ -15,8 +15,8 @@ public final class Await {
     /**
      * Lets ticks pass until the condition holds; none if it does already.
      *
-     * @param ticks fails if so many have not been enough; at least 1
-     * @return how many it took
+     * @param ticks fails if the condition does not hold after this many ticks; at least 1
+     * @return the number of ticks it took
      */
     public long within(long ticks) {
         plc.limited(this);
@@ -36,8 +36,9 @@ public final class Await {
     /**
      * Lets ticks pass until the condition holds; none if it does already.
      *
-     * @param duration fails if so much simulation time has not been enough, such as {@code "80ms"}; at least one tick
-     * @return how many ticks it took
+     * @param duration fails if the condition does not hold after this much simulation time, such as {@code "80ms"};
+     * at least one tick
+     * @return the number of ticks it took
      */
     public long within(String duration) {
         plc.limited(this);
@@ -49,7 +50,7 @@ public final class Await {
         return within(ticks);
     }
 
-    /** The failure of a test that never gave the limit. */
+    /** The failure of a test that never called {@code within}. */
     AssertionFailedError unlimited() {
         return new AssertionFailedError("await(" + condition.subject() + " " + condition.expected()
             + ") was given no limit, so that it never waited; add .within(…)");

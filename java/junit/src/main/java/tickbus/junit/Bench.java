@@ -10,7 +10,7 @@ import org.opentest4j.AssertionFailedError;
 import tickbus.FieldbusException;
 import tickbus.Tickbus;
 
-/** All that stands on the bench for one test: the line with the program behind it, the machine, the PLC's outside. */
+/** Everything that a test runs on: the line with the program behind it, the machine, the PLC under test. */
 final class Bench {
     private final Tickbus bus;
     private final Plc plc;
@@ -73,12 +73,12 @@ final class Bench {
         return machine;
     }
 
-    /** Ends the test's run; of a failed one, keeps what there is and says where it stood. */
+    /** Ends the test's run; if it failed, keeps the recording and reports the state. */
     void close(ExtensionContext context) {
         Throwable failure = context.getExecutionException().orElse(null);
         AssertionFailedError unfinished = failure == null ? plc.unfinished() : null;
         Map<String, String> statistics;
-        // After a defect of the library there are no statistics, and the driver is to be closed all the same.
+        // After a defect in the library there are no statistics, but the driver has to be closed even so.
         try (bus) {
             statistics = bus.statistics();
         } catch (FieldbusException e) {
@@ -92,7 +92,7 @@ final class Bench {
         }
     }
 
-    /** Where a test stood when it failed; in its stack trace, and no failure of its own. */
+    /** The state of a test when it failed; shown in the stack trace, but not itself a failure. */
     private static final class Note extends RuntimeException {
         private static final long serialVersionUID = 1L;
 

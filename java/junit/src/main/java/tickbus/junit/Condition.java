@@ -9,7 +9,7 @@ import java.util.stream.Collectors;
 import java.util.stream.Stream;
 
 /**
- * Something that can be so or not at the end of a tick, mostly of one signal. To be imported statically:
+ * Something that is true or false at the end of a tick, usually about one signal. To be imported statically:
  *
  * <pre>{@code
  * plc.expect(on("Running lamp"));
@@ -56,7 +56,7 @@ public abstract class Condition {
      *
      * @param signal a name of driver.cfg
      * @param value in the signal's unit
-     * @param tolerance by how much it may differ, at most
+     * @param tolerance the largest deviation
      * @return the condition
      */
     public static Condition near(String signal, double value, double tolerance) {
@@ -237,18 +237,18 @@ public abstract class Condition {
         };
     }
 
-    /** A condition on the signals of one PLC. */
+    /** A condition bound to the signals of one PLC. */
     abstract static class Bound {
         abstract boolean holds();
 
-        /** What it is about, as a failure's sentence begins. */
+        /** Its subject, at the beginning of a failure's sentence. */
         abstract String subject();
 
         abstract String expected();
 
         abstract String seen();
 
-        /** The signals that it looks at. */
+        /** The signals that it depends on. */
         List<Watch> watches() {
             return List.of();
         }
@@ -332,7 +332,7 @@ public abstract class Condition {
 
                 @Override
                 String subject() {
-                    // Of two that must hold together, those that do not are the news.
+                    // Of two conditions that must hold together, only those that do not are reported.
                     return wrong().map(Bound::subject).collect(Collectors.joining(join()));
                 }
 

@@ -12,7 +12,7 @@ final class Durations {
     private Durations() {
     }
 
-    /** Nanoseconds, 0 or more; throws {@link IllegalArgumentException} if the text is no duration. */
+    /** Nanoseconds, 0 or more; throws {@link IllegalArgumentException} if the text is not a duration. */
     static long parse(String text) {
         Matcher matcher = FORM.matcher(text.strip());
         if (!matcher.matches()) {
@@ -38,7 +38,7 @@ final class Durations {
         };
     }
 
-    /** With the unit that suits it: {@code 2ms}, {@code 1.5s}. */
+    /** With a suitable unit: {@code 2ms}, {@code 1.5s}. */
     static String text(long nanos) {
         for (String unit : UNITS) {
             if (nanos >= unit(unit)) {

@@ -1,6 +1,8 @@
 package tickbus.junit;
 
-/** A condition that holds now, and may have to for longer: {@code plc.expect(off("Not OK")).during("5s")}. */
+/**
+ * A condition that holds now, and may be required to keep holding: {@code plc.expect(off("Not OK")).during("5s")}.
+ */
 public final class Expectation {
     private final Plc plc;
     private final Condition.Bound condition;

@@ -11,8 +11,8 @@ import tickbus.FieldbusException;
 import tickbus.Tickbus;
 
 /**
- * What is kept of a test. The folder is what the configuration parameter or system property {@code tickbus.reports}
- * names, else the one beside the build tool's own reports.
+ * What is kept of a test. The folder is named by the configuration parameter or system property {@code
+ * tickbus.reports}, otherwise it is the one beside the build tool's own reports.
  */
 final class Keep {
     private static final String FOLDER = "tickbus.reports";
@@ -33,7 +33,7 @@ final class Keep {
         String test = context.getRequiredTestClass().getName() + "." + context.getRequiredTestMethod().getName();
         Matcher invocation = INVOCATION.matcher(context.getUniqueId());
         String number = invocation.find() ? "-" + invocation.group(1) : "";
-        // Dollars of nested classes are a nuisance in shells.
+        // Dollar signs of nested classes are inconvenient in shells.
         return new Keep(when, folder(context).resolve(test.replace('$', '.') + number + ".vcd"));
     }
 
@@ -47,7 +47,7 @@ final class Keep {
         }).toAbsolutePath().normalize();
     }
 
-    /** The table that stands instead of driver.cfg's own: what the plant records is not the tests'. */
+    /** Replaces driver.cfg's own table: tests must not write to the plant's recording. */
     String table() {
         if (recording == null) {
             return "[record]\nfile = \"none.vcd\"\nwhen = \"never\"\n";
@@ -62,7 +62,7 @@ final class Keep {
     }
 
     /**
-     * Keeps what is to be kept once the driver is closed, and says what there is.
+     * Keeps what has to be kept after the driver is closed, and returns a description.
      *
      * @param failure of the test; null if it passed
      */
@@ -79,14 +79,14 @@ final class Keep {
                 context.publishReportEntry("tickbus.report", page.toString());
                 return told + "; report: " + page;
             } catch (FieldbusException e) {
-                // The test's own failure is the news; this one stands beside it.
+                // The test's own failure is what matters; this one is only mentioned.
                 return told + "; no report: " + e.getMessage();
             }
         }
         try {
             Files.deleteIfExists(recording);
         } catch (IOException e) {
-            // A file too many does no harm, and the next run overwrites it.
+            // A superfluous file does no harm, and the next run overwrites it.
             context.publishReportEntry("tickbus.recording", recording + " could not be deleted: " + e);
         }
         return "";

@@ -1,7 +1,7 @@
 package tickbus.junit;
 
 /**
- * A model of the machine that the PLC controls: as much of it as the tests need.
+ * A model of the machine that the PLC controls, as detailed as the tests need.
  *
  * <pre>{@code
  * final class Lift implements Machine {
@@ -20,8 +20,7 @@ package tickbus.junit;
 @FunctionalInterface
 public interface Machine {
     /**
-     * Called once, before the first tick: the place to look signals up ({@link Plc#signal}) and to set what is there
-     * from the beginning.
+     * Called once, before the first tick: looks up signals ({@link Plc#signal}) and sets initial values.
      *
      * @param plc the PLC that it is connected to
      */
@@ -29,8 +28,8 @@ public interface Machine {
     }
 
     /**
-     * One tick: reads what the PLC has commanded ({@code %Q}), moves on, and sets what its sensors show ({@code %I}).
-     * It must not let time pass itself.
+     * One tick: reads what the PLC has commanded ({@code %Q}), moves on, and sets the sensors ({@code %I}). It must
+     * not let time pass itself.
      *
      * @param plc the PLC
      * @param simulationNanos the time at the end of this step, in nanoseconds since the test began;

@@ -13,26 +13,26 @@ import tickbus.Signal;
 import tickbus.Tickbus;
 
 /**
- * The PLC under test, from outside: its inputs to be set, its outputs to be looked at, and the time to be let pass.
+ * The PLC under test, from outside: sets its inputs, reads its outputs, and lets time pass.
  *
- * <p>A tick is: the machine takes a step on what the PLC commands, its sensors and whatever the test has forced go to
- * the PLC, the PLC scans if its scan is due by now, and its outputs come back. All this happens on the calling thread;
+ * <p>In each tick the machine takes a step with the PLC's commands, its sensors and all forced values are sent to the
+ * PLC, the PLC is scanned if a scan is due, and its outputs come back. All this happens on the calling thread;
  * between two calls time stands still.
  *
- * <p>A failure tells the tick, the simulation time, the signal, what was expected and what was seen, and the last
- * changes of that signal. It is an {@link AssertionFailedError}.
+ * <p>A failure is an {@link AssertionFailedError} that reports the tick, the simulation time, the signal, the
+ * expected and the actual value, and the last changes of that signal.
  *
- * <p>{@link PlcTest} makes one for each test. For one thread at a time.
+ * <p>{@link PlcTest} creates one for each test. Not thread-safe.
  */
 public final class Plc {
-    /** How long {@link #press} holds a button: as long as a finger does, and longer than any scan. */
+    /** How long {@link #press} holds a button: about as long as a finger does, and longer than any scan. */
     private static final String PRESS = "200ms";
 
-    /** What the test holds at a value, whatever the machine says. */
+    /** A value that the test forces, whatever the machine sets. */
     private record Forced(Signal signal, double value) {
     }
 
-    /** A condition that has to hold from now on. */
+    /** A condition that must hold from now on. */
     private record Standing(Condition.Bound condition, long since) {
     }
 
@@ -57,9 +57,9 @@ public final class Plc {
     }
 
     /**
-     * Connects a machine, beside those that are connected already.
+     * Connects a machine, in addition to those already connected.
      *
-     * @param machine steps from now on with every tick
+     * @param machine takes a step with every tick from now on
      * @return this
      */
     public Plc connect(Machine machine) {
@@ -75,7 +75,7 @@ public final class Plc {
      * A signal's handle, which is faster than its name in a {@link Machine} that reads or writes it on every tick.
      *
      * @param name as in driver.cfg
-     * @return always the same one
+     * @return always the same object
      * @throws IllegalArgumentException if there is none; the message has the nearest names
      */
     public Signal signal(String name) {
@@ -101,7 +101,7 @@ public final class Plc {
     }
 
     /**
-     * What driver and PLC program have counted so far, as {@link Tickbus#statistics}.
+     * The counters of the driver and the PLC program, as {@link Tickbus#statistics}.
      *
      * @return unmodifiable, in an order fit for printing
      */
@@ -111,7 +111,7 @@ public final class Plc {
 
     /**
      * Sets an input of the PLC ({@code %I}), to be sent with the next tick. A machine that sets the same signal
-     * overwrites it then; see {@link #force}.
+     * overwrites it; see {@link #force}.
      *
      * @param signal as in driver.cfg
      * @param value in the signal's unit
@@ -134,7 +134,7 @@ public final class Plc {
     }
 
     /**
-     * Holds an input of the PLC at a value, whatever the machine sets, until {@link #release}.
+     * Forces an input of the PLC to a value, whatever the machine sets, until {@link #release}.
      *
      * @param signal as in driver.cfg
      * @param value in the signal's unit
@@ -149,7 +149,7 @@ public final class Plc {
     }
 
     /**
-     * Holds an input of the PLC on or off; as {@link #force(String, double)}.
+     * Forces an input of the PLC on or off; as {@link #force(String, double)}.
      *
      * @param signal as in driver.cfg
      * @param on true for 1
@@ -225,7 +225,7 @@ public final class Plc {
     // Faults
 
     /**
-     * Injects a fault: a sensor that is stuck, a line that is down. It can begin with the next tick.
+     * Injects a fault, such as a stuck sensor or a broken line. It can begin with the next tick.
      *
      * <pre>{@code
      * InjectedFault wire = plc.inject("""
@@ -235,8 +235,9 @@ public final class Plc {
      *     """);
      * }</pre>
      *
-     * @param fault the keys of a {@code [[fault]]} section of driver.cfg, one a line; times count from the first tick
-     * @return the fault, to be ended; what is not ends with the test
+     * @param fault the keys of a {@code [[fault]]} section of driver.cfg, one per line; times count from the first
+     * tick
+     * @return the fault, for ending it; otherwise it ends with the test
      * @throws tickbus.FieldbusException with every mistake in the text, and what would be right
      */
     public InjectedFault inject(String fault) {
@@ -244,7 +245,7 @@ public final class Plc {
     }
 
     /**
-     * The faults that driver.cfg has, and those that were injected.
+     * The faults in driver.cfg, and those that were injected.
      *
      * @return in the order of injection
      */
@@ -290,7 +291,7 @@ public final class Plc {
     }
 
     /**
-     * How many ticks have passed.
+     * The number of ticks so far.
      *
      * @return 0 before the first
      */
@@ -299,16 +300,16 @@ public final class Plc {
     }
 
     /**
-     * How much simulation time has passed.
+     * The simulation time so far.
      *
-     * @return nanoseconds: ticks times step
+     * @return nanoseconds: ticks times tick length
      */
     public long simulationNanos() {
         return ticks * stepNanos;
     }
 
     /**
-     * The simulation time of a tick.
+     * The simulation time per tick.
      *
      * @return nanoseconds
      */
@@ -362,7 +363,7 @@ public final class Plc {
     }
 
     /**
-     * Fails at the first tick from now on at whose end the condition does not hold, until the test ends.
+     * Requires the condition at the end of every tick from now on, until the test ends.
      *
      * @param condition from {@link Condition}'s methods
      * @return this
@@ -375,7 +376,7 @@ public final class Plc {
     }
 
     /**
-     * Fails at the first tick from now on at whose end the condition holds, until the test ends.
+     * Forbids the condition at the end of every tick from now on, until the test ends.
      *
      * @param condition from {@link Condition}'s methods
      * @return this
@@ -385,10 +386,10 @@ public final class Plc {
     }
 
     /**
-     * Begins to wait for a condition; the limit comes with {@link Await#within(long)}.
+     * Starts to wait for a condition; {@link Await#within(long)} sets the limit.
      *
      * @param condition from {@link Condition}'s methods
-     * @return to be given its limit; a test that forgets to fails
+     * @return for setting the limit; a test that does not set it fails
      */
     public Await await(Condition condition) {
         Await await = new Await(this, condition.bind(this));
@@ -426,12 +427,12 @@ public final class Plc {
         return nanos / stepNanos + (nanos % stepNanos == 0 ? 0 : 1);
     }
 
-    /** Where the test stands, for people. */
+    /** The current tick and time, for people. */
     String where() {
         return "tick " + ticks + " (" + Durations.text(simulationNanos()) + ")";
     }
 
-    /** How long so many ticks are, for people. */
+    /** The duration of a number of ticks, for people. */
     String span(long count) {
         return count + (count == 1 ? " tick (" : " ticks (") + Durations.text(count * stepNanos) + ")";
     }
@@ -439,14 +440,14 @@ public final class Plc {
     Watch watch(String name) {
         Watch watch = byName.get(Objects.requireNonNull(name, "signal"));
         if (watch == null) {
-            // Says which names are near.
+            // Reports similar names.
             bus.signal(name);
             throw new IllegalArgumentException("there is no signal '" + name + "'");
         }
         return watch;
     }
 
-    /** The failure of a test that was about to wait and did not; null of others. */
+    /** The failure of a test that called await without a limit; null otherwise. */
     AssertionFailedError unfinished() {
         return open.isEmpty() ? null : open.iterator().next().unlimited();
     }

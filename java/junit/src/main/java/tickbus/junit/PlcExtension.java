@@ -7,7 +7,7 @@ import org.junit.jupiter.api.extension.ParameterContext;
 import org.junit.jupiter.api.extension.ParameterResolutionException;
 import org.junit.jupiter.api.extension.ParameterResolver;
 
-/** Gives tests their {@link Plc}, and their machine; {@link PlcTest} brings it along. */
+/** Passes their {@link Plc} and machine to tests; used through {@link PlcTest}. */
 public final class PlcExtension implements BeforeEachCallback, AfterEachCallback, ParameterResolver {
     private static final ExtensionContext.Namespace NAMESPACE = ExtensionContext.Namespace.create(PlcExtension.class);
 

@@ -24,14 +24,14 @@ import org.junit.jupiter.api.extension.ExtendWith;
  * }
  * }</pre>
  *
- * <p>Every test gets a program, a machine and a time of its own; nothing is left over from the test before. Simulation
- * time stands still unless the test lets it pass, and then passes as fast as the processor can compute it. The same
- * test gives the same run, bit for bit.
+ * <p>Every test has its own program, machine and time; nothing is left over from the previous test. Simulation time
+ * stands still unless the test lets it pass, and then passes as fast as it can be computed. The same test always
+ * gives the same run, bit for bit.
  *
- * <p>On a class it serves all its tests, those in nested classes, too. On a method it makes that method a test, and what
- * it leaves out is taken from the class. (With {@code @ParameterizedTest} or {@code @RepeatedTest}, put it on the class:
- * on the method it would be a test beside them.) It can be put on an annotation of your own, such as
- * {@code @CellTest}, which then stands for it.
+ * <p>On a class it applies to all its tests, including those in nested classes. On a method it makes that method a
+ * test; omitted elements are taken from the class. (With {@code @ParameterizedTest} or {@code @RepeatedTest}, put it
+ * on the class: on the method it would be an additional test.) It can be used as a meta-annotation, such as on an
+ * annotation of your own called {@code @CellTest}.
  */
 @Documented
 @Inherited
@@ -48,9 +48,9 @@ public @interface PlcTest {
     String config() default "";
 
     /**
-     * The PLC program at the other end of the line, whatever bus driver.cfg names.
+     * The PLC program at the other end of the line, whatever the bus in driver.cfg.
      *
-     * @return its name, or its file; empty takes the one that driver.cfg names itself
+     * @return its name, or its file; empty for the one named in driver.cfg
      */
     String program() default "";
 
@@ -64,7 +64,7 @@ public @interface PlcTest {
     /**
      * The scan interval of the program.
      *
-     * @return such as {@code "10ms"}, which it is if empty
+     * @return such as {@code "10ms"}, the default
      */
     String scan() default "";
 
@@ -76,19 +76,19 @@ public @interface PlcTest {
     String step() default "";
 
     /**
-     * The machine that the PLC controls; it needs a constructor without parameters. Test methods can have it as a
+     * The machine that the PLC controls; it needs a constructor without parameters. Test methods may have it as a
      * parameter.
      *
-     * @return {@link Machine} itself for none: then the test is the machine
+     * @return {@link Machine} itself for none: the test then plays the machine
      */
     Class<? extends Machine> machine() default Machine.class;
 
     /**
-     * When the recording of a test is kept. It lies in {@code tickbus/} beside the reports of Maven or Gradle, or where
-     * the system property {@code tickbus.reports} says; the failure tells. Nothing is recorded to the file that
-     * driver.cfg itself names.
+     * When the recording of a test is kept. It is written to {@code tickbus/} beside the reports of Maven or Gradle,
+     * or to the folder in the system property {@code tickbus.reports}; failures name it. The file named in driver.cfg
+     * is never written to.
      *
-     * @return one; none for that of the class around it, or {@link Recording#ON_FAILURE}
+     * @return at most one; if empty, as for the enclosing class, or {@link Recording#ON_FAILURE}
      */
     Recording[] recording() default {};
 }

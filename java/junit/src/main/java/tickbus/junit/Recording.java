@@ -4,8 +4,8 @@ package tickbus.junit;
 public enum Recording {
     /** When the test fails, which is the default. */
     ON_FAILURE,
-    /** Whatever comes of the test. */
+    /** Whether the test passes or fails. */
     ALWAYS,
-    /** There is none, which makes ticks a little faster. */
+    /** Never; without a recording, ticks are a little faster. */
     NEVER
 }

@@ -13,12 +13,12 @@ import org.junit.jupiter.api.extension.ExtensionContext;
 import org.junit.platform.commons.support.AnnotationSupport;
 import tickbus.Tickbus;
 
-/** What the annotations of one test say, taken together. */
+/** The combined annotations of one test. */
 final class Setup {
     private static final long DEFAULT_STEP = 1_000_000;
 
     private final Class<?> testClass;
-    /** From the method outwards: the first that says something counts. */
+    /** From the method outwards: the first one that states an element wins. */
     private final List<PlcTest> annotations;
 
     private Setup(Class<?> testClass, List<PlcTest> annotations) {
@@ -26,7 +26,7 @@ final class Setup {
         this.annotations = annotations;
     }
 
-    /** The annotations of a test: its method's, its class's, those of the classes around it. */
+    /** The annotations of a test: on its method, its class, and the enclosing classes. */
     static Setup of(ExtensionContext context) {
         List<PlcTest> found = new ArrayList<>();
         find(context.getElement().orElse(null)).ifPresent(found::add);
@@ -41,7 +41,7 @@ final class Setup {
         return AnnotationSupport.findAnnotation(element, PlcTest.class);
     }
 
-    /** Opens driver.cfg with the program at its other end, and what more tables there are. */
+    /** Opens driver.cfg with the program at its other end, and with further tables. */
     Tickbus open(String moreTables) {
         return Tickbus.open(config(), fieldbus() + moreTables);
     }
@@ -95,7 +95,7 @@ final class Setup {
             + " on the class path; paths begin at the working directory, which is that of the Maven module");
     }
 
-    /** The [fieldbus] table that puts the line on simulation time. */
+    /** The [fieldbus] table that puts the line into simulation time. */
     private String fieldbus() {
         String program = text(PlcTest::program);
         if (program.isEmpty()) {
@@ -125,12 +125,12 @@ final class Setup {
         return table.toString();
     }
 
-    /** Whether a program is meant by its file and not by its name. */
+    /** Whether a program is given as a file rather than by name. */
     private static boolean isFile(String program) {
         return program.contains("/") || program.contains("\\") || program.matches(".*\\.(so|dll|dylib)");
     }
 
-    /** A file as seen from the working directory; driver.cfg may be elsewhere. */
+    /** A file relative to the working directory, as an absolute path; driver.cfg may be elsewhere. */
     private static String absolute(String file) {
         return Path.of(file).toAbsolutePath().normalize().toString();
     }

@@ -5,7 +5,7 @@ final class Toml {
     private Toml() {
     }
 
-    /** A text in quotes, whatever is in it. */
+    /** Any text as a quoted TOML string. */
     static String text(String content) {
         StringBuilder text = new StringBuilder("\"");
         for (int i = 0; i < content.length(); i++) {

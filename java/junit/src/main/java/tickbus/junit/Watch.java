@@ -3,14 +3,14 @@ package tickbus.junit;
 import java.math.BigDecimal;
 import tickbus.Signal;
 
-/** What a signal was at the ends of the ticks, as far back as a failure tells. Allocates nothing on a tick. */
+/** The recent history of a signal, for failure messages. Allocates nothing on a tick. */
 final class Watch {
-    /** How many changes are kept. */
+    /** How many changes are remembered. */
     private static final int KEPT = 8;
 
     private final Signal signal;
     private final boolean bit;
-    /** Not every value of the type is a double. */
+    /** Whether the type has values that a double cannot represent. */
     private final boolean wide;
     private final long[] ticks = new long[KEPT];
     private final double[] from = new double[KEPT];
@@ -62,17 +62,17 @@ final class Watch {
         exact = wide ? signal.getLong() : 0;
     }
 
-    /** How often it went from 0 to anything else. */
+    /** How often it changed from 0 to another value. */
     long rises() {
         return rises;
     }
 
-    /** How often it went to 0. */
+    /** How often it changed to 0. */
     long falls() {
         return falls;
     }
 
-    /** Its value as of now, for people. */
+    /** Its current value, for people. */
     String text() {
         return text(signal.get());
     }
@@ -84,13 +84,13 @@ final class Watch {
         return number(of) + (signal.unit().isEmpty() ? "" : " " + signal.unit());
     }
 
-    /** A number as people write it: no exponent for what is short, no fraction for what is whole. */
+    /** A number for people: no exponent if it is short, no fraction if it is an integer. */
     static String number(double of) {
         boolean plain = Double.isFinite(of) && Math.abs(of) < 1e15 && (of == 0 || Math.abs(of) >= 1e-6);
         return plain ? new BigDecimal(Double.toString(of)).stripTrailingZeros().toPlainString() : Double.toString(of);
     }
 
-    /** The last changes, one line. */
+    /** The last changes, as one line. */
     String history(long stepNanos) {
         StringBuilder text = new StringBuilder("last changes of ").append(quoted()).append(" (")
             .append(signal.address()).append("): ");

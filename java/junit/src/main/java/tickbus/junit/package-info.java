@@ -1,5 +1,5 @@
 /**
- * PLC programs tested with JUnit: the program and a machine model run in one process, tick by tick, on simulation
+ * Testing PLC programs with JUnit: the program and a machine model run in one process, tick by tick, in simulation
  * time.
  *
  * <p>Begin with {@link tickbus.junit.PlcTest}.

@@ -18,12 +18,12 @@ import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.ValueSource;
 import tickbus.InjectedFault;
 
-/** Tests that {@link PlcTestTest} runs; many of them are meant to fail. */
+/** Tests run by {@link PlcTestTest}; many of them are expected to fail. */
 final class Samples {
     private Samples() {
     }
 
-    /** An annotation of a user's own. */
+    /** A user-defined annotation. */
     @Retention(RetentionPolicy.RUNTIME)
     @PlcTest(config = "line.cfg", step = "2ms")
     @interface LineTest {
@@ -128,7 +128,7 @@ final class Samples {
         void aMethodAddsToItsClass(Plc plc, Lift lift, Machine same) {
             check(plc.stepNanos() == 5_000_000 && lift == same);
             plc.force("Start", true).tick(11);
-            // The first exchange brings Run, so the lift has had ten steps with it.
+            // The first exchange delivers Run, so the lift has taken ten steps with it.
             check(lift.height == 110);
         }
 
@@ -267,7 +267,7 @@ final class Samples {
         }
     }
 
-    /** A machine that cannot be made without help. */
+    /** A machine without a default constructor. */
     static final class Needy implements Machine {
         Needy(int size) {
             if (size < 0) {

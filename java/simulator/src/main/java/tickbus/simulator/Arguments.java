@@ -54,7 +54,7 @@ public final class Arguments {
      * Whether a flag is given.
      *
      * @param name with its dashes
-     * @return true if it is
+     * @return true if it is given
      */
     public boolean has(String name) {
         return flags.contains(name) || values.containsKey(name);
@@ -65,7 +65,7 @@ public final class Arguments {
      *
      * @param name with its dashes
      * @return its value
-     * @throws UsageException if it is not given or no path
+     * @throws UsageException if it is missing or not a path
      */
     public Path path(String name) {
         String value = values.get(name);
@@ -83,9 +83,9 @@ public final class Arguments {
      * A duration.
      *
      * @param name with its dashes
-     * @param otherwise what it is if it is not given
+     * @param otherwise its default
      * @return nanoseconds, above 0
-     * @throws UsageException if it is no duration or 0
+     * @throws UsageException if it is not a duration, or 0
      */
     public long duration(String name, String otherwise) {
         try {
@@ -103,7 +103,7 @@ public final class Arguments {
      * A count.
      *
      * @param name with its dashes
-     * @param otherwise what it is if it is not given
+     * @param otherwise its default
      * @return 1 to 1,000,000
      * @throws UsageException if it is anything else
      */

@@ -40,7 +40,7 @@ public final class DeviceDriverFolder {
     }
 
     /**
-     * Looks at what is in a folder and opens nothing.
+     * Reads what is in a folder, without opening any driver.
      *
      * @param folder the folder
      * @return what was found

@@ -9,10 +9,10 @@ import java.util.regex.Pattern;
 /**
  * Reads one thing from a driver's {@code .cfg}: the {@code id} under {@code [driver]}.
  *
- * <p>The rest of the file is the driver's own affair, and the driver reads it with all care; the simulator
- * only has to know, before it opens anything, that no two files claim the same id. So this is no TOML
- * reader. It takes the plain form, a line {@code id = 4711} (decimal, a sign and {@code _} between digits
- * allowed, a comment behind it allowed) below a line {@code [driver]} and above the next table header.
+ * <p>The driver reads the rest of the file itself; the simulator only needs to make sure, before it opens anything,
+ * that no two files have the same id. So this is not a TOML reader. It accepts the plain form, a line {@code id =
+ * 4711} (decimal, with optional sign, {@code _} between digits, and a trailing comment) below a line {@code [driver]}
+ * and above the next table header.
  */
 final class DriverId {
     /** Some editors begin a file in UTF-8 with it. */

@@ -86,7 +86,7 @@ public final class DriverSet implements AutoCloseable {
         try {
             loader.close();
         } catch (IOException e) {
-            // The class loader's open jar files are the JVM's to close; nothing depends on it.
+            // The JVM closes the class loader's open jar files; nothing depends on that.
             if (failure != null) {
                 failure.addSuppressed(e);
             }

@@ -41,7 +41,7 @@ public final class Main {
     private static final Map<String, Supplier<Machine>> MACHINES = Map.of("rig", Rig::new, "peeler", Peeler::new,
             "none", NoMachine::new);
 
-    /** A machine may have many variables that a plant does not use. */
+    /** A machine may have many variables that a plant does not use; only the first ones are listed. */
     private static final int MOST_NOTES = 10;
 
     private Main() {
@@ -109,7 +109,7 @@ public final class Main {
         long duration = arguments.has("--duration") ? arguments.duration("--duration", "") : Long.MAX_VALUE;
         var control = arguments.path("--control");
         var folder = arguments.path("--drivers");
-        // Closed in reverse order: the guard holds the JVM until the drivers are closed.
+        // Closed in reverse order: the guard keeps the JVM from ending until the drivers are closed.
         try (ShutdownGuard guard = new ShutdownGuard();
                 Simulator simulator = new Simulator(DeviceDriverFolder.scan(folder).open(), machine, control, step,
                         TimeSource.system())) {

@@ -4,7 +4,7 @@ import java.util.List;
 
 /** A machine without variables: for control tables that only link drivers with one another. */
 public final class NoMachine implements Machine {
-    /** There is nothing to set up. */
+    /** Nothing to set up. */
     public NoMachine() {
     }
 

@@ -3,11 +3,10 @@ package tickbus.simulator;
 /**
  * Deadlines of real-time mode: start, start + step, start + 2 steps, and so on.
  *
- * <p>Deadlines are counted from the start and not from the tick before, so nothing drifts. A tick that is
- * late by less than a step is followed by the next at that one's own time. After a longer stall the
- * deadlines that passed meanwhile are dropped, and ticks go on at the times of the same grid: nothing
- * catches up in a burst. Each tick advances the simulation by one step, so simulation time then lags behind
- * the clock by what was dropped.
+ * <p>Deadlines are counted from the start and not from the previous tick, so there is no drift. A tick that is late
+ * by less than a step is followed by the next one at its own time. After a longer stall the missed deadlines are
+ * dropped, and ticks continue on the same grid: there is no catching up in a burst. Since each tick advances the
+ * simulation by one step, simulation time then lags behind the clock by what was dropped.
  */
 final class Pacer {
     private final TimeSource time;
@@ -45,7 +44,7 @@ final class Pacer {
         }
     }
 
-    /** Begins a new grid at the next call, after a pause that was meant. */
+    /** Starts a new grid at the next call, after an intended pause. */
     void restart() {
         started = false;
     }
@@ -55,7 +54,7 @@ final class Pacer {
         return lateTicks;
     }
 
-    /** Ticks that never started because their time passed in a stall. */
+    /** Ticks that were dropped because their time had passed in a stall. */
     long droppedTicks() {
         return droppedTicks;
     }

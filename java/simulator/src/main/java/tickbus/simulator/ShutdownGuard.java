@@ -4,12 +4,11 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 
 /**
- * Lets a run end in good order when the JVM is told to end, by Ctrl-C or by a signal:
- * tells the run, and holds the JVM until the run has closed its drivers.
+ * Ends a run properly when the JVM is told to end, by Ctrl-C or by a signal: tells the run, and keeps the JVM from
+ * ending until the run has closed its drivers.
  *
- * <p>The drivers are closed by the thread that ticks them, never by the JVM's shutdown thread, because a
- * driver must not be closed in the middle of an exchange. If a driver hangs, the JVM ends nevertheless after
- * a grace time.
+ * <p>The drivers are closed by the thread that ticks them, never by the JVM's shutdown thread, because a driver must
+ * not be closed during an exchange. If a driver hangs, the JVM ends even so after a grace period.
  */
 public final class ShutdownGuard implements AutoCloseable {
     private static final long GRACE_SECONDS = 5;
@@ -19,7 +18,7 @@ public final class ShutdownGuard implements AutoCloseable {
     private final Thread hook;
     private volatile boolean triggered;
 
-    /** Watches over a run from here on; make it before the drivers are opened. */
+    /** Guards a run from now on; create it before the drivers are opened. */
     public ShutdownGuard() {
         hook = new Thread(this::end, "shutdown guard");
         Runtime.getRuntime().addShutdownHook(hook);
@@ -40,17 +39,17 @@ public final class ShutdownGuard implements AutoCloseable {
     /**
      * Whether the JVM is ending. The run asks before every tick.
      *
-     * @return true from the moment that it was told to
+     * @return true once it was told to
      */
     public boolean triggered() {
         return triggered;
     }
 
     /**
-     * Whether the JVM is ending, or begins to within a time.
+     * Waits for the JVM to begin to end.
      *
      * @param millis how long to wait for that
-     * @return true as soon as it was told to
+     * @return true as soon as it was told to, false after the time
      */
     public boolean triggers(long millis) {
         try {
@@ -68,7 +67,7 @@ public final class ShutdownGuard implements AutoCloseable {
         try {
             Runtime.getRuntime().removeShutdownHook(hook);
         } catch (IllegalStateException e) {
-            // The JVM is ending already, and the hook runs; it has just been let go.
+            // The JVM is ending already, and the hook is running; it was just released.
         }
     }
 }

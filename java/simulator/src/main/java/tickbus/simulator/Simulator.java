@@ -14,15 +14,15 @@ import tickbus.simulator.text.Durations;
 /**
  * Ticks a machine and its drivers.
  *
- * <p>One tick: each driver delivers what its hardware says, that goes through the control table to the machine, the
- * machine takes one step, what it shows goes through the control table to the drivers, and these send it. So the machine
- * answers the hardware within the tick. A driver that delivers only after it has sent, as those of 2003, is seen by the
- * machine one tick later. A tick allocates nothing.
+ * <p>One tick: each driver delivers the current hardware values, which go through the control table to the machine;
+ * the machine takes one step; its outputs go through the control table to the drivers, which send them. So the
+ * machine answers the hardware within the tick. The values of a driver that delivers only after sending, like those
+ * of 2003, reach the machine one tick later. A tick allocates nothing.
  *
- * <p>One thread ticks and closes; {@link #stop} may be called from any.
+ * <p>One thread ticks and closes; {@link #stop} may be called from any thread.
  */
 public final class Simulator implements AutoCloseable {
-    /** One driver's place in the tick. */
+    /** One driver's part of the tick. */
     private static final class Seat {
         final ControlInterfaceDeviceDriver driver;
         final int firstDestination;
@@ -49,8 +49,7 @@ public final class Simulator implements AutoCloseable {
     private volatile boolean stopped;
 
     /**
-     * Connects drivers and machine. The simulator owns the drivers from here on, and closes them if this
-     * fails.
+     * Connects drivers and machine. The simulator owns the drivers from now on, and closes them if this fails.
      *
      * @param drivers open drivers
      * @param machine the machine
@@ -147,8 +146,7 @@ public final class Simulator implements AutoCloseable {
     }
 
     /**
-     * Ticks until told otherwise: until {@code more} says false, {@link #stop} was called, or the thread is
-     * interrupted.
+     * Ticks until {@code more} returns false, {@link #stop} is called, or the thread is interrupted.
      *
      * @param mode how ticks follow one another
      * @param more asked before every tick
@@ -164,7 +162,7 @@ public final class Simulator implements AutoCloseable {
         }
     }
 
-    /** Makes {@link #run} return after the present tick; from any thread. */
+    /** Makes {@link #run} return after the current tick; from any thread. */
     public void stop() {
         stopped = true;
     }
@@ -183,7 +181,7 @@ public final class Simulator implements AutoCloseable {
      *
      * @param name {@code <driver id>:<component>}, {@code machine:<variable>} or a variable of the table
      * @return gives the value as of the last tick
-     * @throws IllegalArgumentException if there is none of that name
+     * @throws IllegalArgumentException if nothing has this name
      */
     public DoubleSupplier probe(String name) {
         return table.probe(name);
@@ -244,7 +242,7 @@ public final class Simulator implements AutoCloseable {
     }
 
     /**
-     * Ticks that real-time mode started a step or more after their time.
+     * Ticks that started, in real-time mode, a step or more after their time.
      *
      * @return 0 or more
      */
@@ -253,7 +251,7 @@ public final class Simulator implements AutoCloseable {
     }
 
     /**
-     * Ticks that real-time mode left out because their time had passed in a stall.
+     * Ticks that real-time mode dropped because their time had passed in a stall.
      *
      * @return 0 or more
      */
@@ -264,7 +262,7 @@ public final class Simulator implements AutoCloseable {
     /**
      * Closes every driver. Further calls do nothing.
      *
-     * @throws DriverFailure if a driver failed to close; the others are closed all the same
+     * @throws DriverFailure if a driver failed to close; the others are closed even so
      */
     @Override
     public void close() {

@@ -4,6 +4,6 @@ package tickbus.simulator;
 public enum TickMode {
     /** As fast as possible: a tick starts when the one before it is done. */
     BEST_EFFORT,
-    /** In step with the clock on the wall: a tick starts when its time has come. */
+    /** In step with the wall clock: a tick starts when its time has come. */
     REAL_TIME
 }

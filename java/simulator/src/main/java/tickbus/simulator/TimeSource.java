@@ -2,12 +2,12 @@ package tickbus.simulator;
 
 import java.util.concurrent.locks.LockSupport;
 
-/** The clock on the wall, and a way to wait for it; handed in so that tests need not wait. */
+/** The wall clock, and a way to wait for it; injected so that tests need not wait. */
 public interface TimeSource {
     /**
      * The present time.
      *
-     * @return nanoseconds since some fixed point, never falling
+     * @return nanoseconds since some fixed point, never decreasing
      */
     long nanoTime();
 
@@ -19,7 +19,7 @@ public interface TimeSource {
     void waitUntil(long nanoTime);
 
     /**
-     * The machine's own clock.
+     * The computer's own clock.
      *
      * @return reads {@link System#nanoTime} and parks the thread
      */

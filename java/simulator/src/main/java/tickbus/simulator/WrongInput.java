@@ -1,6 +1,6 @@
 package tickbus.simulator;
 
-/** The user's files or folders are not as they must be; the message says how, and what would be right. */
+/** The user's files or folders are wrong; the message says how, and what would be right. */
 public final class WrongInput extends RuntimeException {
     private static final long serialVersionUID = 1L;
 
@@ -14,7 +14,7 @@ public final class WrongInput extends RuntimeException {
     }
 
     /**
-     * For a mistake that shows as an exception.
+     * For a mistake reported by an exception.
      *
      * @param message lines for people
      * @param cause what happened

@@ -10,18 +10,18 @@ import java.util.Map;
 import tickbus.simulator.text.NearestName;
 
 /**
- * Ties rows to endpoints and puts them in order: names to numbers, every row behind those whose variables
- * it reads, and the rows that the machine's inputs need apart from all others.
+ * Binds rows to endpoints and sorts them: resolves names to numbers, puts every row after those whose variables it
+ * reads, and separates the rows that the machine's inputs depend on from all others.
  */
 final class Binder {
     /** A row whose names are resolved. */
     static final class BoundRow {
         final Row row;
         final TransferFunction function;
-        /** Positions of the sources in the table's values. */
+        /** Indices of the sources in the table's values. */
         final int[] from;
         final List<BoundRow> needs = new ArrayList<>();
-        /** Position of the result in the table's values, -1 if it has no variable. */
+        /** Index of the result in the table's values, -1 if it has no variable. */
         final int variable;
         /** Number of the destination, -1 if it has none. */
         final int destination;
@@ -98,7 +98,7 @@ final class Binder {
         return afterStep;
     }
 
-    /** Variables and where they stand in the table's values, behind the sources. */
+    /** Variables and their indices in the table's values, after the sources. */
     Map<String, Integer> variables() {
         return variables;
     }
@@ -189,7 +189,7 @@ final class Binder {
         }
     }
 
-    /** Depth first in the order of the file, so that rows that do not need one another keep that order. */
+    /** Depth-first in file order, so that independent rows keep that order. */
     private void visit(BoundRow row, List<BoundRow> path, List<BoundRow> ordered) {
         if (row.active) {
             List<BoundRow> cycle = path.subList(path.indexOf(row), path.size());

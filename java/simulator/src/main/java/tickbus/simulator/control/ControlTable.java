@@ -17,7 +17,7 @@ import tickbus.simulator.text.NearestName;
 /**
  * Connects hardware components with the machine's variables.
  *
- * <p>The file is text in UTF-8, a row per line, four columns parted by bars:
+ * <p>The file is text in UTF-8, one row per line, with four columns separated by bars:
  *
  * <pre>
  * # source                     | variable | transfer         | destination
@@ -28,7 +28,7 @@ import tickbus.simulator.text.NearestName;
  * </pre>
  *
  * <ul>
- *   <li><b>source</b>: one or several, parted by commas: {@code <driver id>:<component>},
+ * <li><b>source</b>: one or several, separated by commas: {@code <driver id>:<component>},
  *       {@code machine:<variable>}, or the name of a variable of this table. {@code const} has none.
  *   <li><b>variable</b>: a name for the row's result, so that other rows can use it; may be empty.
  *   <li><b>transfer</b>: a {@linkplain TransferFunctions transfer function}; empty copies the source.
@@ -36,13 +36,13 @@ import tickbus.simulator.text.NearestName;
  *       there is a variable. No destination is written twice.
  * </ul>
  *
- * <p>{@code #} at the start of a line or behind a blank begins a comment. A name that contains a bar, a
- * comma, or {@code #} behind a blank stands in double quotes. What no row writes stays 0.
+ * <p>{@code #} at the start of a line or after a blank begins a comment. A name that contains a bar, a comma, or
+ * {@code #} after a blank must be in double quotes. Destinations that no row writes stay 0.
  *
  * <p>Rows are computed once per tick, each after the rows whose variables it reads, otherwise in the order
- * of the file. The rows that write to the machine, and those that they need, are computed before the
- * machine's step: they see what the drivers delivered last and the machine as the previous step left it.
- * All others are computed after the step and see the machine as it is now.
+ * of the file. The rows that write to the machine, and those that they depend on, are computed before the machine's
+ * step: they see the latest values of the drivers and the machine as of the previous step. All others are computed
+ * after the step and see the machine's current state.
  */
 public final class ControlTable {
     private final Endpoints endpoints;
@@ -66,7 +66,7 @@ public final class ControlTable {
      *
      * @param file the file
      * @param endpoints what its rows may name
-     * @param stepNanos the simulation's step size in nanoseconds, above 0; delays are counted in it
+     * @param stepNanos the simulation's step size in nanoseconds, above 0; the unit of delays
      * @return the table, all values 0
      * @throws ControlTableException with all mistakes, or if the file cannot be read
      */
@@ -89,10 +89,10 @@ public final class ControlTable {
     /**
      * Reads a control table.
      *
-     * @param file what messages call the file
+     * @param file the file's name in messages
      * @param text its content
      * @param endpoints what its rows may name
-     * @param stepNanos the simulation's step size in nanoseconds, above 0; delays are counted in it
+     * @param stepNanos the simulation's step size in nanoseconds, above 0; the unit of delays
      * @return the table, all values 0
      * @throws ControlTableException with all mistakes
      */
@@ -127,7 +127,7 @@ public final class ControlTable {
         values[index] = value;
     }
 
-    /** Computes the rows that the machine's inputs need. */
+    /** Computes the rows that the machine's inputs depend on. */
     public void computeBeforeStep() {
         compute(beforeStep);
     }
@@ -162,7 +162,7 @@ public final class ControlTable {
      *
      * @param name of a source, a destination or a variable
      * @return gives the value as it is at each call; allocates nothing
-     * @throws IllegalArgumentException if there is none of that name, with the nearest one
+     * @throws IllegalArgumentException if nothing has this name; the message has the nearest one
      */
     public DoubleSupplier probe(String name) {
         Integer value = endpoints.sources().getOrDefault(name, variables.get(name));

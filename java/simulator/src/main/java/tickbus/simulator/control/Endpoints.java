@@ -12,11 +12,11 @@ import java.util.Map;
 /**
  * Everything that a control table may name: {@code <driver id>:<component>} and {@code machine:<variable>}.
  *
- * <p>Sources are numbered driver by driver in component order, then come the machine's outputs; so are
- * destinations, and then come the machine's inputs.
+ * <p>Sources are numbered driver by driver in component order, followed by the machine's outputs; destinations
+ * likewise, followed by the machine's inputs.
  */
 public final class Endpoints {
-    /** What stands before the colon of the machine's variables. */
+    /** The part before the colon in names of the machine's variables. */
     public static final String MACHINE = "machine";
 
     private final Map<String, Integer> sources = new LinkedHashMap<>();

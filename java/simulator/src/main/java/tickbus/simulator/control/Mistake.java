@@ -8,7 +8,7 @@ package tickbus.simulator.control;
  * @param what what is wrong and what would be right
  */
 public record Mistake(String file, int line, String what) {
-    /** {@code file:line: what}, as editors and compilers write it. */
+    /** {@code file:line: what}, as editors and compilers show it. */
     @Override
     public String toString() {
         return line == 0 ? file + ": " + what : file + ":" + line + ": " + what;

@@ -3,7 +3,7 @@ package tickbus.simulator.control;
 import java.util.List;
 
 /**
- * One row as it was written, quotes resolved and blanks cut off.
+ * One row as written, with quotes resolved and blanks removed.
  *
  * @param line its line number
  * @param sources names in the source column, may be empty
@@ -12,7 +12,7 @@ import java.util.List;
  * @param destination where the result goes, empty if nowhere
  */
 record Row(int line, List<String> sources, String variable, String transfer, String destination) {
-    /** How messages name the row's result. */
+    /** The row's result in messages. */
     String result() {
         return variable.isEmpty() ? destination : variable;
     }

@@ -3,7 +3,7 @@ package tickbus.simulator.control;
 import java.util.ArrayList;
 import java.util.List;
 
-/** Cuts a control table's text into rows: columns at bars, sources at commas, comments off, quotes away. */
+/** Splits a control table's text into rows: columns at bars, sources at commas, without comments and quotes. */
 final class RowReader {
     private static final int COLUMNS = 4;
 
@@ -15,7 +15,7 @@ final class RowReader {
         this.mistakes = mistakes;
     }
 
-    /** All rows that have the right form; the mistakes in the others are added to the list. */
+    /** All well-formed rows; mistakes in the others are added to the list. */
     List<Row> read(String text) {
         List<Row> rows = new ArrayList<>();
         int number = 0;

@@ -13,11 +13,11 @@ import tickbus.simulator.text.NearestName;
 /**
  * The fixed set of transfer functions.
  *
- * <p>Values are doubles; 0 is false, everything else is true, and Boolean results are 0 or 1. Before its
- * first tick every function has seen nothing but 0, so that a value that begins at 1 rises at once.
+ * <p>Values are doubles; 0 is false, everything else is true, and Boolean results are 0 or 1. Before its first tick
+ * every function is assumed to have seen 0, so that a value that starts at 1 rises at once.
  */
 public final class TransferFunctions {
-    /** More ticks than this in a delay line are taken for a slip of the pen. */
+    /** A delay of more ticks than this is taken for a mistake. */
     private static final long LONGEST_DELAY_TICKS = 1_000_000;
 
     private static final Pattern CALL = Pattern.compile("([A-Za-z-]+)\\s*(?:\\((.*)\\))?");
@@ -73,7 +73,7 @@ public final class TransferFunctions {
     }
 
     /**
-     * The set, for people.
+     * The functions, for people.
      *
      * @return a table with one line per function
      */
@@ -93,7 +93,7 @@ public final class TransferFunctions {
      * @param sources how many sources the row has
      * @param stepNanos the simulation's step size
      * @return the function
-     * @throws IllegalArgumentException with a text for people, if there is no such function or it does not
+     * @throws IllegalArgumentException with a text for people, if there is no such function or it does not fit
      *     fit
      */
     static TransferFunction read(String text, int sources, long stepNanos) {
@@ -143,7 +143,7 @@ public final class TransferFunctions {
                 return number;
             }
         } catch (NumberFormatException e) {
-            // Told below, together with the values that are numbers to Java but of no use here.
+            // Reported below, together with values that Java parses as numbers but that are useless here.
         }
         throw new IllegalArgumentException(parameter + " is \"" + text + "\"; it must be a finite number");
     }

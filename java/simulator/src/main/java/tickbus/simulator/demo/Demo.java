@@ -33,15 +33,15 @@ public final class Demo {
 
     private static final String OK_BEGINS = "demo: ok ";
 
-    /** A demo that failed on a machine that stood still meanwhile says nothing, and is begun anew. */
+    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
     private static final int ATTEMPTS = 3;
 
-    /** Step and time in it at which the rig's picture tells most: both lifts up, the lamp on. */
+    /** The step, and the time in it, at which a picture of the rig shows most: both lifts up, the lamp on. */
     private static final int PICTURE_STEP = 5;
 
     private static final long PICTURE_NANOS = 400_000_000L;
 
-    /** How long the news of a Ctrl-C may take to this process. */
+    /** How long it may take until this process is told of a Ctrl-C. */
     private static final long INTERRUPTION_MILLIS = 500;
 
     private final DemoOptions options;
@@ -119,7 +119,7 @@ public final class Demo {
 
     static int run(DemoOptions options, Opener opener, PlcMaker plc, Display display, PrintStream out,
             PrintStream err) {
-        // The guard is closed last, so that after Ctrl-C the verdict is still printed.
+        // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
             List<String> notes = new ArrayList<>();
             String verdict;
@@ -154,7 +154,7 @@ public final class Demo {
     /** Everything from opening the drivers to writing the report. */
     private String play(Opener opener, PlcMaker maker, ShutdownGuard guard, PrintStream err) {
         String verdict;
-        // The PLC is ended last: to the driver, a PLC that goes first would be one that was lost.
+        // The PLC is ended last: if it ended first, the driver would take it for lost.
         try (Ending ending = new Ending(); Simulator simulator = new Simulator(opener.open(), rig, options.control(),
                 options.stepNanos(), TimeSource.system())) {
             verdict = verdict(simulator, maker, ending, guard, err);
@@ -240,7 +240,7 @@ public final class Demo {
         try {
             plc.check();
         } catch (DemoFailure e) {
-            // Ctrl-C in a terminal reaches every process of it, and the PLC may have been the faster one.
+            // Ctrl-C in a terminal reaches all of its processes, and the PLC may have been faster.
             if (guard.triggers(INTERRUPTION_MILLIS)) {
                 throw new DemoFailure("interrupted");
             }
@@ -248,7 +248,7 @@ public final class Demo {
         }
     }
 
-    /** The verdict on a script that was played to its end. */
+    /** The verdict after a complete script. */
     private String check(Simulator simulator) {
         Counters counters = rig.counters();
         long missed = audit.missed();
@@ -321,7 +321,7 @@ public final class Demo {
         }
     }
 
-    /** The report's folder, made if it is missing. */
+    /** The report's folder, created if missing. */
     private Path folder() throws IOException {
         return Files.createDirectories(options.report().toAbsolutePath().getParent());
     }

@@ -1,13 +1,13 @@
 package tickbus.simulator.demo;
 
-/** Something that a demo must not show; the message is the reason. */
+/** Something that must not happen in a demo; the message is the reason. */
 public final class DemoFailure extends RuntimeException {
     private static final long serialVersionUID = 1L;
 
     /**
      * A failure.
      *
-     * @param reason what it must not show, for people
+     * @param reason what has happened, for people
      */
     public DemoFailure(String reason) {
         super(reason);

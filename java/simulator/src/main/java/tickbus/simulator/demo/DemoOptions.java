@@ -6,13 +6,13 @@ import tickbus.simulator.Arguments;
 import tickbus.simulator.TickMode;
 
 /**
- * What the demo is asked to do.
+ * The options of the demo.
  *
  * @param drivers the DeviceDriver folder
  * @param control the control table
  * @param report where the report goes
- * @param recording what the driver records, null if there is to be no page about it
- * @param plc the tickbus executable that is the PLC, null if the PLC is not the demo's affair
+ * @param recording what the driver records, null for no page about it
+ * @param plc the tickbus executable that is the PLC, null if the PLC is started by other means
  * @param mode how ticks follow one another
  * @param stepNanos simulation step size
  * @param cycles cycles to complete

@@ -14,12 +14,13 @@ import tickbus.simulator.Simulator;
  * Counts the rising edges of every Boolean signal at the simulation's end of the link, and compares them
  * with what the PLC's end counted: for each life of the PLC, and exactly.
  *
- * <p><b>While the PLC is there.</b> Of a signal to the PLC the simulation makes edges: they are counted in the
- * values that were handed to the driver. Of a signal from the PLC the simulation sees edges: the driver reports
- * them by the component {@code <name>.edges}, which also has those that fell between two ticks.
+ * <p><b>While the PLC is there.</b> Edges of signals to the PLC are made by the simulation: they are counted in the
+ * values handed to the driver. Edges of signals from the PLC are reported by the driver in the component {@code
+ * <name>.edges}, which includes edges between two ticks.
  *
- * <p><b>When it comes.</b> A life begins with the first tick whose data are not stale. The PLC's image begins with
- * all bits off, so a signal that is on counts once at the PLC, whatever came before. Here that tick counts so:
+ * <p><b>When it comes.</b> A life begins with the first tick whose data are not stale. The PLC's image starts with
+ * all bits off, so a signal that is on counts once at the PLC, whatever happened before. This end counts that tick as
+ * follows:
  * <ul>
  *   <li>a signal to the PLC counts once if it is on, or if it rose while there was no PLC, because the driver
  *       keeps a latched pulse for the next exchange, and however many such pulses merge into one;
@@ -27,16 +28,16 @@ import tickbus.simulator.Simulator;
  *       on when the driver saw it last, or by its fail-safe value, it counts once if it is on.
  * </ul>
  *
- * <p><b>When it goes.</b> A PLC that is killed cannot be asked any more, so it must be killed while the counts that
- * it gave last are {@linkplain #disagreement the same as here}. Nobody counts at the other end from then on. An edge
- * from the PLC that arrives nevertheless was made after its last counts: it fails the audit, which could not be exact
- * any more. So does a signal to the PLC that rises twice while the link comes up: nobody could tell whether the
+ * <p><b>When it goes.</b> A killed PLC cannot be asked any more, so it must be killed while the counts that it
+ * reported last are {@linkplain #disagreement the same as here}. After that the other end does not count any more. An
+ * edge from the PLC that still arrives was made after its last report: the audit fails, because it could not be
+ * exact. It also fails if a signal to the PLC rises twice while the link comes up: it would be unknown whether the
  * pulses merged.
  */
 final class EdgeAudit {
     private static final int STALE = 2;
 
-    /** A pulse this long before the link came up may have merged with an earlier one, or not. */
+    /** A pulse less than this before the link came up may or may not have merged with an earlier one. */
     private static final long COMING_UP_NANOS = 100_000_000L;
 
     /** A signal with its counts at both ends. */
@@ -69,7 +70,7 @@ final class EdgeAudit {
         final DoubleSupplier edges;
         private boolean high;
         private long count;
-        /** Rises to the PLC while there is none, and when the last one was. */
+        /** Rises of a signal to the PLC while there is none, and when the last one was. */
         private int pending;
         private long pendingAt;
 
@@ -168,13 +169,13 @@ final class EdgeAudit {
         return quietTicks;
     }
 
-    /** Whether the PLC gave counts after the last edge at this end. */
+    /** Whether these counts were reported after the last edge at this end. */
     boolean isNewer(Plc.Counts counts) {
         return counts.scans() >= 0 && counts.nanoTime() - lastEdgeNanoTime > 0;
     }
 
     /**
-     * What the PLC counts otherwise than this end.
+     * How the PLC's counts differ from this end's.
      *
      * @return null if nothing
      * @throws DemoFailure if it has no count for a signal
@@ -185,13 +186,13 @@ final class EdgeAudit {
         return differing.isEmpty() ? null : differing;
     }
 
-    /** The PLC was killed: its life is over with the counts that it gave last. */
+    /** The PLC was killed: its life ends with the counts that it reported last. */
     void cut(Plc.Counts last) {
         close("killed", last);
         state = State.CUT;
     }
 
-    /** The demo is over for the PLC of the last life. */
+    /** The demo has ended: so has the PLC's last life. */
     void end(Plc.Counts last) {
         close("end of the demo", last);
     }
@@ -216,7 +217,7 @@ final class EdgeAudit {
         return lines;
     }
 
-    /** The lives that are over. */
+    /** The lives that have ended. */
     List<Life> lives() {
         return List.copyOf(lives);
     }

@@ -6,8 +6,8 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * A PLC that runs somewhere out of the demo's reach: hosted by the driver itself, which tells its counts among its
- * statistics, or on its own.
+ * A PLC that the demo cannot start or stop: hosted by the driver itself, which reports its counts in its statistics,
+ * or independent.
  */
 final class HostedPlc implements Plc {
     private final ControlInterfaceDeviceDriver driver;
@@ -36,7 +36,7 @@ final class HostedPlc implements Plc {
         return counts(driver.statistics(), System.nanoTime());
     }
 
-    /** Picks the PLC's lines, {@code plc.scans} and {@code plc.rises.<signal>}, out of statistics. */
+    /** Extracts the PLC's lines, {@code plc.scans} and {@code plc.rises.<signal>}, from statistics. */
     static Counts counts(Map<String, String> statistics, long nanoTime) {
         String prefix = "plc.rises.";
         Map<String, Long> rises = new LinkedHashMap<>();
@@ -74,7 +74,7 @@ final class HostedPlc implements Plc {
 
     @Override
     public void check() {
-        // If it ends, the link tells.
+        // If it ends, the link shows that.
     }
 
     @Override

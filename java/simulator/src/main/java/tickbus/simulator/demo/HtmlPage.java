@@ -10,9 +10,9 @@ import java.util.List;
 import java.util.Map;
 import java.util.stream.Collectors;
 
-/** The page about the run, which {@code tickbus report} makes of the driver's recording once that is whole. */
+/** The page about the run, made by {@code tickbus report} from the driver's recording once that is complete. */
 public final class HtmlPage {
-    /** The PLC's output that has the number of its step. */
+    /** The PLC's output with the number of its step. */
     private static final String STEPS = "Step";
 
     /** The PLC's output that is on while there is a fault. */
@@ -21,16 +21,16 @@ public final class HtmlPage {
     private HtmlPage() {
     }
 
-    /** Keeps the statistics of the driver for the page: they are gone when it is closed. */
+    /** Saves the statistics of the driver for the page: they are not available after it is closed. */
     static void keepStatistics(DemoOptions options, Map<String, String> statistics) throws IOException {
         keepStatistics(statistics(options), statistics);
     }
 
     /**
-     * Keeps the statistics of a driver for a page.
+     * Saves the statistics of a driver for a page.
      *
      * @param file where
-     * @param statistics as the driver tells them
+     * @param statistics as reported by the driver
      * @throws IOException if the file cannot be written
      */
     public static void keepStatistics(Path file, Map<String, String> statistics) throws IOException {
@@ -43,8 +43,8 @@ public final class HtmlPage {
      * Makes the page.
      *
      * @param options where everything is
-     * @param out gets a line that tells where the page is
-     * @return what went wrong, null if nothing did
+     * @param out gets a line with the page's location
+     * @return what went wrong, or null
      */
     static String make(DemoOptions options, PrintStream out) {
         Path page = options.report().resolveSibling("report.html");
@@ -62,7 +62,7 @@ public final class HtmlPage {
      *
      * @param tickbus the tickbus command
      * @param arguments what follows {@code tickbus report}
-     * @return what went wrong, null if nothing did
+     * @return what went wrong, or null
      */
     public static String make(Path tickbus, List<String> arguments) {
         List<String> command = new ArrayList<>(List.of(tickbus.toString(), "report"));

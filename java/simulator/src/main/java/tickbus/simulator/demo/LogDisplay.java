@@ -17,7 +17,7 @@ final class LogDisplay implements Display {
 
     @Override
     public void tick(Watcher watcher, Operator operator, Plc plc) {
-        // Events say enough; a line per tick would flood the log.
+        // Events suffice; a line per tick would flood the log.
     }
 
     @Override

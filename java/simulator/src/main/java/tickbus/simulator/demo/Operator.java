@@ -14,8 +14,8 @@ import tickbus.simulator.rig.Rig;
 import tickbus.simulator.text.Durations;
 
 /**
- * The person at the panel: a script of stages, each with something to do, something to wait for, and a limit
- * in simulation time. Whatever goes wrong on the way is a {@link DemoFailure} that names the stage.
+ * The operator at the panel: a script of stages, each with an action, a condition to wait for, and a limit in
+ * simulation time. Anything that goes wrong is a {@link DemoFailure} that names the stage.
  */
 final class Operator {
     private static final long SECOND = 1_000_000_000L;
@@ -26,10 +26,10 @@ final class Operator {
     /** And how many scans of the PLC. */
     private static final int QUIET_SCANS = 3;
 
-    /** How long the counts of both ends may take to agree; then they are compared as they are. */
+    /** How long the counts of both ends may take to agree; after that they are compared as they are. */
     private static final long AGREEMENT_NANOS = 2 * SECOND;
 
-    /** Statistics are slow, so they are asked for only now and then. */
+    /** Statistics are slow, so they are read only now and then. */
     private static final int TICKS_PER_LOOK_AT_SCANS = 5;
 
     /** A part of the script; {@code faultExpected} while the jam and its recovery are under way. */
@@ -96,7 +96,7 @@ final class Operator {
                 this::settled);
     }
 
-    /** The PLC dies in the midst of a cycle, and comes back. */
+    /** The PLC is killed during a cycle, and restarted. */
     private void restart(int cycle) {
         stage("cycle " + cycle, "lift 2 to carry a bottle, and equal counts at both ends", 20,
                 () -> { }, () -> momentToKill(cycle));
@@ -146,7 +146,7 @@ final class Operator {
         return stage == null;
     }
 
-    /** What is being done and awaited. */
+    /** The current stage. */
     String stage() {
         return done() ? "done" : stage.name + ", waiting for " + stage.awaited;
     }
@@ -201,8 +201,8 @@ final class Operator {
     }
 
     /**
-     * The moment that tells most: lift 2 is under way with a bottle on its cup. It is also one at which the PLC's
-     * newest counts have every edge, because there was none for a while: afterwards it cannot be asked any more.
+     * The most revealing moment: lift 2 is moving with a bottle on its cup. The PLC's newest counts must also include
+     * every edge, which they do after a while without edges, because it cannot be asked afterwards.
      */
     private boolean momentToKill(int cycle) {
         if (watcher.cycles() >= cycle) {
@@ -220,7 +220,7 @@ final class Operator {
         return disagreement == null ? "" : ": " + disagreement;
     }
 
-    /** Whether the PLC's newest counts have every edge that this end has. */
+    /** Whether the PLC's newest counts include every edge counted at this end. */
     private boolean agreed(Plc.Counts counts) {
         disagreement = audit.isNewer(counts) ? audit.disagreement(counts) : null;
         return audit.isNewer(counts) && disagreement == null;
@@ -230,7 +230,7 @@ final class Operator {
         outage = blackout.get();
         String name = plc.name();
         plc.kill();
-        // No tick runs while the PLC dies and the driver notices, so every edge is made before or after that.
+        // No tick runs while the PLC dies and the driver notices, so no edge falls into that time.
         Watcher.Link link = awaitLoss();
         stalls.pause();
         audit.cut(plc.counts());
@@ -256,12 +256,12 @@ final class Operator {
         say("starts the PLC again (" + plc.name() + ")");
     }
 
-    /** How often the PLC was started again. */
+    /** How often the PLC was restarted. */
     int restarts() {
         return restarts;
     }
 
-    /** The time without a PLC, null if it did not come to that. */
+    /** The time without a PLC, null if there was none. */
     Outage outage() {
         return outage;
     }

@@ -19,13 +19,13 @@ import tickbus.simulator.text.Durations;
 
 /**
  * The time without a PLC, from the tick of the kill to the first tick with data of the next life: what must hold in
- * it, tick by tick, and what was measured.
+ * it at every tick, and what was measured.
  */
 final class Outage {
-    /** What the cups of the rig get while no data come; every other bit is off. See the rig's driver.cfg. */
+    /** Outputs that are on while there are no data: the rig's cups. See the rig's driver.cfg. */
     private static final Set<String> FAIL_SAFE_ON = Set.of("SC1", "SC2");
 
-    /** How much later than after max_age the data may become stale: some bus cycles and ticks. */
+    /** The tolerated delay beyond max_age until the data are stale: some bus cycles and ticks. */
     private static final long SLACK_NANOS = 50_000_000L;
 
     /** How long a drive may take to brake from full speed. */
@@ -69,7 +69,7 @@ final class Outage {
         place = "step " + watcher.step() + ", " + scene();
     }
 
-    /** Looks at everything once, after a tick. Fails if the rig is not safe. */
+    /** Checks everything once, after a tick. Fails if the rig is not safe. */
     void look(boolean staleNow) {
         if (over()) {
             return;
@@ -124,7 +124,7 @@ final class Outage {
         }
     }
 
-    /** Every place that can change, as numbers. */
+    /** Every position that can change, as numbers. */
     private double[] where() {
         List<Bottle> bottles = rig.bottles();
         double[] where = new double[4 + 2 * bottles.size()];
@@ -139,7 +139,7 @@ final class Outage {
         return where;
     }
 
-    /** Where the lifts are and what they hold, for people. */
+    /** The positions of the lifts and what they hold, for people. */
     private String scene() {
         return String.format(Locale.ROOT, "LA1 at %.0f mm with %s, LA2 at %.0f mm with %s",
                 rig.position(Lift.LA1), held(Bottle.Place.CUP1), rig.position(Lift.LA2), held(Bottle.Place.CUP2));
@@ -150,17 +150,17 @@ final class Outage {
                 .map(bottle -> "bottle " + bottle.id()).findFirst().orElse("no bottle");
     }
 
-    /** Where the kill met the cycle, for people. */
+    /** The point in the cycle at which the PLC was killed, for people. */
     String place() {
         return place;
     }
 
-    /** What the driver said about the link once the PLC was dead. */
+    /** The driver's reason for the lost link after the kill. */
     void left(String reason) {
         left = reason;
     }
 
-    /** The data are stale, fail-safe values are delivered, and nothing moves any more. */
+    /** The data are stale, fail-safe values are delivered, and nothing moves. */
     boolean standsStill() {
         return stand != null;
     }

@@ -3,14 +3,14 @@ package tickbus.simulator.demo;
 import java.util.List;
 import java.util.Map;
 
-/** The PLC at the other end of the link, as far as the demo has its hands on it and can look into it. */
+/** The PLC at the other end of the link, as far as the demo can control and observe it. */
 public interface Plc extends AutoCloseable {
     /**
-     * What the PLC had counted at one moment of its present life, that is since it was switched on.
+     * The PLC's counts at one moment of its current life, that is since it was switched on.
      *
-     * @param scans scans of its program; -1 if it does not say
-     * @param rises rising edges per Boolean signal: those that the program saw of a signal to it, and those that
-     *     it made of a signal from it; its image begins with all bits off
+     * @param scans scans of its program; -1 if it does not report them
+     * @param rises rising edges per Boolean signal: those that the program saw of signals to it, and those that it
+     * made of signals from it; its image starts with all bits off
      * @param nanoTime when the demo got them, on the clock of {@link System#nanoTime()}
      */
     record Counts(long scans, Map<String, Long> rises, long nanoTime) {
@@ -19,54 +19,54 @@ public interface Plc extends AutoCloseable {
     }
 
     /**
-     * Whether the demo can take its power and give it back.
+     * Whether the demo can switch it off and on.
      *
-     * @return false if it is out of the demo's reach
+     * @return false if the demo does not control it
      */
     boolean restartable();
 
     /**
-     * Switches it on: a new life begins, which remembers nothing of an earlier one.
+     * Switches it on: a new life begins, without any memory of an earlier one.
      *
      * @throws DemoFailure if it cannot be started
      */
     void start();
 
-    /** Takes its power away, without a warning; on return it is dead. */
+    /** Cuts its power without warning; on return it is dead. */
     void kill();
 
     /**
-     * The newest counts of the present life.
+     * The newest counts of the current life.
      *
-     * @return as told last
+     * @return as reported last
      */
     Counts counts();
 
     /**
-     * What it has told since the last call, for people.
+     * Its output for people since the last call.
      *
      * @return lines
      */
     List<String> news();
 
     /**
-     * How much longer than it should it was silent, at the most, in all its lives.
+     * The longest time by which one of its regular reports was late, over all its lives.
      *
-     * @return nanoseconds, 0 if it tells nothing regularly
+     * @return nanoseconds, 0 if it does not report regularly
      */
     long longestSilenceNanos();
 
     /**
-     * Which one it is, for people.
+     * Identifies it for people.
      *
      * @return such as {@code process 4711}
      */
     String name();
 
     /**
-     * Fails if it has ended without having been told to.
+     * Fails if it has ended on its own.
      *
-     * @throws DemoFailure with what it said last
+     * @throws DemoFailure with its last output
      */
     void check();
 

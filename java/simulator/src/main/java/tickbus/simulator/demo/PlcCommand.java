@@ -7,17 +7,17 @@ import java.util.concurrent.locks.LockSupport;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.text.Durations;
 
-/** How a PLC program is run as a process: which command, and where it connects to. */
+/** Runs a PLC program as a process: which command, and where it connects to. */
 public final class PlcCommand {
     private static final String PROGRAM = "rig";
 
-    /** How often the process tells its counts. */
+    /** How often the process reports its counts. */
     private static final long STATISTICS_NANOS = 100_000_000L;
 
-    /** The process ends by itself after so much longer than the demo may take, should nobody be left to end it. */
+    /** After this time the process ends on its own, in case nothing is left to end it. */
     private static final String LONGEST = "30min";
 
-    /** How long the driver may take until it listens. */
+    /** How long it may take until the driver listens. */
     private static final long LISTENING_NANOS = 10_000_000_000L;
 
     private PlcCommand() {
@@ -36,7 +36,7 @@ public final class PlcCommand {
      * @param executable the tickbus command
      * @param program the program's name
      * @param cfg the driver's configuration file, which serves both ends
-     * @param driver the driver, which must be listening by the time that the process starts
+     * @param driver the driver, which must be listening when the process starts
      * @param log gets the process's standard error
      * @return the process, not started yet
      */
@@ -50,7 +50,7 @@ public final class PlcCommand {
                 "--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
     }
 
-    /** Where a driver listens; its driver.cfg may leave the port to the system. */
+    /** The address on which a driver listens; its driver.cfg may leave the port to the system. */
     private static String address(ControlInterfaceDeviceDriver driver) {
         long limit = System.nanoTime() + LISTENING_NANOS;
         while (true) {

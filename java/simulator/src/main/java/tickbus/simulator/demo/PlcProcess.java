@@ -16,20 +16,20 @@ import java.util.concurrent.TimeUnit;
 import java.util.function.Supplier;
 
 /**
- * A PLC as a process of its own, such as {@code tickbus plc}: started, killed, started again, and surely ended.
+ * A PLC as a separate process, such as {@code tickbus plc}: started, killed, restarted, and reliably ended.
  *
- * <p>It prints its statistics now and then as lines {@code key=value} with an empty line behind them; a thread reads
- * these, so that the tick never waits for the process. Every other line is news for people. Its standard error goes
- * to a file.
+ * <p>It regularly prints its statistics as lines {@code key=value}, followed by an empty line; a thread reads these,
+ * so that the tick never waits for the process. Every other line is output for people. Its standard error goes to a
+ * file.
  *
- * <p>The process ends with {@link #close}; with the JVM, on whatever way that is told to end; and, should the JVM
- * itself be killed, no later than the time that its own command line gives it, since then nobody is left to end it.
+ * <p>The process ends with {@link #close}; with the JVM, however that is told to end; and, if the JVM itself is
+ * killed, after the time given on its own command line.
  */
 public final class PlcProcess implements Plc {
     private static final long SECONDS_TO_DIE = 5;
     private static final int LAST_WORDS = 5;
 
-    /** What lines for people begin with. */
+    /** The prefix of lines for people. */
     private static final String WORDS = "plc: ";
 
     private final Supplier<List<String>> command;
@@ -40,7 +40,7 @@ public final class PlcProcess implements Plc {
     private volatile Life life;
     private volatile long longestSilence;
 
-    /** One run of the process, with what it has told. */
+    /** One run of the process, and its output. */
     private final class Life {
         final Process process;
         final Thread reader;
@@ -75,7 +75,7 @@ public final class PlcProcess implements Plc {
                     }
                 }
             } catch (IOException e) {
-                // The pipe of a process that was killed.
+                // The process was killed while writing.
             }
         }
 
@@ -102,7 +102,7 @@ public final class PlcProcess implements Plc {
      *
      * @param command gives the executable and its arguments for the next life
      * @param intervalNanos how often it prints its statistics
-     * @param log gets its standard error; emptied now, added to by each life
+     * @param log gets its standard error; truncated now, appended to by each life
      */
     public PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
         this.command = command;
@@ -127,7 +127,7 @@ public final class PlcProcess implements Plc {
         ProcessBuilder builder = new ProcessBuilder(command.get())
                 .redirectInput(ProcessBuilder.Redirect.from(nothing()))
                 .redirectError(ProcessBuilder.Redirect.appendTo(log.toFile()));
-        // Its log is a file, so it may say more than what breaks.
+        // Its log is a file, so it may contain more than errors.
         builder.environment().put("TICKBUS_LOG", "info");
         Process process;
         try {
@@ -158,7 +158,7 @@ public final class PlcProcess implements Plc {
     }
 
     /**
-     * The statistics that it printed last, in its present life.
+     * The statistics that it printed last in its current life.
      *
      * @return keys and values; empty if it has printed none yet
      */
@@ -209,7 +209,7 @@ public final class PlcProcess implements Plc {
                 return "; its last words: " + String.join("; ", last);
             }
         } catch (IOException e) {
-            // It is about the process, not about its log.
+            // The exception is about the process, not about its log.
         }
         return "; it said nothing on standard error";
     }
@@ -219,12 +219,12 @@ public final class PlcProcess implements Plc {
         Life now = life;
         if (now != null && now.process.isAlive()) {
             now.killed = true;
-            // In good order first, so that the last lines are in its log.
+            // Terminated first, so that its last lines get into its log.
             now.process.destroy();
             try {
                 if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
                     destroy();
-                    // Killing is an order, not a fact.
+                    // Killing takes effect only after a moment.
                     now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS);
                 }
             } catch (InterruptedException e) {

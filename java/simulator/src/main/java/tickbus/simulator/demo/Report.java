@@ -8,7 +8,7 @@ import tickbus.simulator.rig.Counters;
 import tickbus.simulator.text.Columns;
 import tickbus.simulator.text.Durations;
 
-/** The text that stays when the demo is over. */
+/** The report as text, written when the demo is over. */
 final class Report {
     private final StringBuilder text = new StringBuilder();
 
@@ -18,12 +18,12 @@ final class Report {
     /**
      * Writes a report.
      *
-     * @param options what was asked
+     * @param options the options of the demo
      * @param verdict the demo's last line
      * @param timeline what happened
-     * @param run what ran, null if it never came to that
-     * @param audit the comparison of edges, null if it never came to that
-     * @param operator who operated it, null if it never came to that
+     * @param run what ran, null if it did not start
+     * @param audit the comparison of edges, null if it did not start
+     * @param operator the operator, null if it did not start
      */
     static String write(DemoOptions options, String verdict, Timeline timeline, Watcher run, EdgeAudit audit,
             Operator operator) {
@@ -142,7 +142,7 @@ final class Report {
             statistics.forEach(table::row);
             text.append(statistics.isEmpty() ? "  none\n" : table.text("  "));
         } catch (RuntimeException e) {
-            // A driver that failed or is closed may have none; the rest of the report is worth having.
+            // A driver that has failed or is closed may have none; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

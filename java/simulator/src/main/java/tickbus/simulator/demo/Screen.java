@@ -43,7 +43,7 @@ public final class Screen {
             return false;
         }
         try {
-            // From JDK 22 on there is a console even where there is no terminal, and this method to ask it.
+            // Since JDK 22 there is a console even without a terminal, and this method to find out.
             return (Boolean) java.io.Console.class.getMethod("isTerminal").invoke(System.console());
         } catch (ReflectiveOperationException e) {
             return true;
@@ -63,7 +63,7 @@ public final class Screen {
     }
 
     /**
-     * Whether it is time to draw again; to be asked at every tick.
+     * Whether to draw again; to be called at every tick.
      *
      * @return true some times a second
      */
@@ -100,7 +100,7 @@ public final class Screen {
         out.flush();
     }
 
-    /** Nothing more will be drawn for now. */
+    /** Writes out what was drawn. */
     public void flush() {
         out.flush();
     }

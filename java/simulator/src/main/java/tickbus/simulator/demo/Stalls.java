@@ -3,12 +3,11 @@ package tickbus.simulator.demo;
 import tickbus.simulator.TimeSource;
 
 /**
- * Notices when this whole machine stands still, as a busy one does, or one that is the guest of another: a tick then
- * comes much too late, or the PLC's regular statistics do. Data that are stale for that reason say nothing about the
- * link.
+ * Detects that the whole computer has stalled, because it is busy or a virtual machine: a tick or the PLC's regular
+ * statistics are then much too late. Data that are stale for that reason say nothing about the link.
  */
 public final class Stalls {
-    /** Half of the least max_age: who stood still for so long may have made the other end's data stale. */
+    /** Half of the smallest max_age: a stall of this length may have made the other end's data stale. */
     private static final long LONG_NANOS = 125_000_000L;
 
     private final TimeSource time;
@@ -18,7 +17,7 @@ public final class Stalls {
     private long longest;
 
     /**
-     * Nothing has stood still yet.
+     * No stall yet.
      *
      * @param time the clock
      * @param stepNanos how often {@link #look} is called
@@ -28,7 +27,7 @@ public final class Stalls {
         this.stepNanos = stepNanos;
     }
 
-    /** Looks at the clock; once a tick, in real-time mode. */
+    /** Checks the clock; once per tick, in real-time mode. */
     public void look() {
         long now = time.nanoTime();
         if (counting) {
@@ -38,7 +37,7 @@ public final class Stalls {
         counting = true;
     }
 
-    /** The pause before the next tick is meant. */
+    /** The pause before the next tick is intended. */
     public void pause() {
         counting = false;
     }
@@ -46,16 +45,16 @@ public final class Stalls {
     /**
      * The other end was silent for longer than it should be.
      *
-     * @param nanos for how much longer
+     * @param nanos the excess in nanoseconds
      */
     public void silent(long nanos) {
         longest = Math.max(longest, nanos);
     }
 
     /**
-     * The longest one.
+     * The longest stall.
      *
-     * @return nanoseconds; 0 if none was long enough to matter
+     * @return nanoseconds; 0 if there was none long enough to matter
      */
     public long longestNanos() {
         return longest < LONG_NANOS ? 0 : longest;

@@ -14,7 +14,7 @@ import tickbus.simulator.text.Durations;
 /** A few lines on a terminal, redrawn in place some times a second. */
 final class TerminalDisplay implements Display {
 
-    /** What a step takes, roughly; only for the bar. */
+    /** The approximate duration of a step, for the progress bar. */
     private static final double STEP_NANOS = 0.8e9;
 
     private final Screen screen;

@@ -9,7 +9,7 @@ import tickbus.simulator.text.Durations;
 /** What happened, and when in simulation time. */
 public final class Timeline {
     /**
-     * One happening.
+     * One event.
      *
      * @param nanos simulation time
      * @param who the actor, such as operator, PLC, rig
@@ -30,9 +30,9 @@ public final class Timeline {
     private final Consumer<Event> listener;
 
     /**
-     * An empty one.
+     * An empty timeline.
      *
-     * @param listener told of each event at once
+     * @param listener called with each event at once
      */
     public Timeline(Consumer<Event> listener) {
         this.listener = listener;
@@ -52,9 +52,9 @@ public final class Timeline {
     }
 
     /**
-     * All that happened.
+     * All events.
      *
-     * @return in the order in which it was told
+     * @return in the order in which they were added
      */
     public List<Event> events() {
         return Collections.unmodifiableList(events);

@@ -9,7 +9,7 @@ import tickbus.simulator.Simulator;
 import tickbus.simulator.rig.Rig;
 import tickbus.simulator.text.Durations;
 
-/** Follows the operator panel, the rig and the link from tick to tick, and writes down what changes. */
+/** Follows the operator panel, the rig and the link from tick to tick, and records changes. */
 final class Watcher {
     private static final String[] PHASES = {
         "initialise", "home", "ready", "run", "abort", "recover", "finalise", "parked"
@@ -27,10 +27,10 @@ final class Watcher {
     private static final int STALE = 2;
     private static final long LONGEST_START_NANOS = 10_000_000_000L;
 
-    /** Statistics are slow, so they are asked for only now and then. */
+    /** Statistics are slow, so they are read only now and then. */
     private static final int TICKS_PER_LOOK_AT_LINK = 10;
 
-    /** How the driver says its link is doing; empty texts if it says nothing. */
+    /** The state of the link as the driver reports it; empty texts if it does not. */
     record Link(String state, String cause, String reason) {
         private static final Link UNKNOWN = new Link("", "", "");
 
@@ -69,10 +69,10 @@ final class Watcher {
     private boolean lastStale;
     private long stepSince;
     private Link link = Link.UNKNOWN;
-    /** Cycles of earlier lives of the PLC, and of the present one as it told last. */
+    /** Cycles of the PLC's earlier lives, and of the current one as last reported. */
     private int cyclesBefore;
     private int cyclesTold;
-    /** There was a PLC once. */
+    /** There has been a PLC. */
     private boolean begun;
     /** The PLC is dead: from the kill to the first data of the next life. */
     private boolean away;
@@ -95,7 +95,7 @@ final class Watcher {
         age = simulator.probe(driver.id() + ":bus.age");
     }
 
-    /** Looks at everything once, after a tick. Fails if data are stale that must not be. */
+    /** Checks everything once, after a tick. Fails if data are stale that must not be. */
     void look() {
         long now = simulator.simulationNanos();
         lookAtData(now);
@@ -161,7 +161,7 @@ final class Watcher {
         }
     }
 
-    /** Asks the driver how its link is doing. */
+    /** Asks the driver for the state of its link. */
     Link lookAtLink() {
         Link now = Link.of(driver.statistics());
         if (!now.state().equals(link.state()) || !now.cause().equals(link.cause())) {
@@ -171,7 +171,7 @@ final class Watcher {
         return now;
     }
 
-    /** The PLC is dead from here on, until data come again. */
+    /** The PLC is dead from now on, until new data arrive. */
     void plcKilled() {
         away = true;
         cyclesBefore += cyclesTold;
@@ -185,7 +185,7 @@ final class Watcher {
         return (int) status.getAsDouble() == STALE;
     }
 
-    /** Whether the PLC is dead, as far as the data tell. */
+    /** Whether the PLC is dead, according to the data. */
     boolean away() {
         return away;
     }
@@ -230,12 +230,12 @@ final class Watcher {
         return step() >= 0 && step() < STEPS.length ? STEPS[step()] : "unknown";
     }
 
-    /** Simulation time in the present step. */
+    /** Simulation time in the current step. */
     long stepNanos() {
         return simulator.simulationNanos() - stepSince;
     }
 
-    /** Cycles that the PLC has completed, in all its lives. */
+    /** Cycles completed by the PLC in all its lives. */
     int cycles() {
         return cyclesBefore + cyclesTold;
     }
@@ -249,7 +249,7 @@ final class Watcher {
         return age.getAsDouble();
     }
 
-    /** Stale ticks before the first data came. */
+    /** Stale ticks before the first data arrived. */
     long staleTicksAtStart() {
         return staleAtStart;
     }
@@ -259,7 +259,7 @@ final class Watcher {
         return staleInOutage;
     }
 
-    /** A line per time that Not OK rose, with its causes. */
+    /** A line for each time that Not OK rose, with the causes. */
     List<String> faults() {
         return List.copyOf(faults);
     }

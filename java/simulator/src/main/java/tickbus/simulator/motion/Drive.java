@@ -1,34 +1,34 @@
 package tickbus.simulator.motion;
 
 /**
- * Plans the motion of a drive from a command's speed, acceleration and deceleration: a trapezoid of speed over time,
- * or a triangle where the way is too short to reach the speed.
+ * Plans the motion of a drive from a command's speed, acceleration and deceleration: the speed over time is a
+ * trapezoid, or a triangle if the distance is too short to reach the speed.
  *
- * <p>From rest over a way d with speed v, acceleration a and deceleration b that takes v/a + (d − v²/2a − v²/2b)/v + v/b
- * where d is at least v²/2a + v²/2b, else w/a + w/b with the peak w = √(2dab/(a+b)).
+ * <p>From rest, a distance d with speed v, acceleration a and deceleration b takes v/a + (d − v²/2a − v²/2b)/v + v/b
+ * if d is at least v²/2a + v²/2b, else w/a + w/b with the peak w = √(2dab/(a+b)).
  *
- * <p>With a jerk above 0 each change of speed is an S: the acceleration rises and falls at that rate, so that it takes
- * longer, by acceleration / jerk where the acceleration is reached.
+ * <p>With a jerk above 0 each change of speed is an S-curve: the acceleration rises and falls at that rate, so that
+ * it takes longer, by acceleration / jerk if the acceleration is reached.
  */
 public final class Drive {
-    /** Halvings in the search for the peak of a short S; more would change nothing. */
+    /** Bisection steps in the search for the peak of a short S-curve; more would change nothing. */
     private static final int HALVINGS = 60;
 
     private final Legs legs;
-    /** Of the motion under way; 0 for none. */
+    /** Of the current motion; 0 for none. */
     private double jerk;
 
     /**
      * A drive at rest.
      *
-     * @param position where it stands
+     * @param position its position
      */
     public Drive(double position) {
         this.legs = new Legs(position);
     }
 
     /**
-     * Where the drive is.
+     * The position of the drive.
      *
      * @return in its unit
      */
@@ -37,7 +37,7 @@ public final class Drive {
     }
 
     /**
-     * How fast it is, with its direction as sign.
+     * The speed of the drive, with its direction as sign.
      *
      * @return units per second
      */
@@ -46,7 +46,7 @@ public final class Drive {
     }
 
     /**
-     * Whether a motion is under way.
+     * Whether it is moving.
      *
      * @return false at rest
      */
@@ -55,16 +55,16 @@ public final class Drive {
     }
 
     /**
-     * How long the present motion takes from its beginning to its end, as planned.
+     * The planned duration of the current motion, from beginning to end.
      *
-     * @return seconds; for one without end, the time until it has its speed
+     * @return seconds; for an endless motion, the time until it has its speed
      */
     public double plannedSeconds() {
         return legs.plannedTime();
     }
 
     /**
-     * How fast the acceleration may change in the motions that begin from now on.
+     * Sets the rate of change of the acceleration for the motions that start from now on.
      *
      * @param rate units per second cubed; 0 or less lets it jump
      */
@@ -73,10 +73,10 @@ public final class Drive {
     }
 
     /**
-     * Goes to a target and stops there. One that is under way goes on from its present speed if it can, else it brakes
-     * first.
+     * Moves to a target and stops there. A drive in motion continues from its current speed if it can, otherwise it
+     * brakes first.
      *
-     * @param target where to
+     * @param target the position
      * @param speed the greatest speed, above 0
      * @param acceleration above 0
      * @param deceleration above 0
@@ -103,7 +103,7 @@ public final class Drive {
         legs.endsAt(target);
     }
 
-    /** The greatest speed that a distance leaves room for. */
+    /** The highest speed that a distance permits. */
     private double top(double distance, double entry, double speed, double acceleration, double deceleration) {
         if (jerk == 0) {
             double peak = Math.sqrt((2 * distance * acceleration * deceleration + entry * entry * deceleration)
@@ -126,7 +126,7 @@ public final class Drive {
         return low;
     }
 
-    /** The way from one speed to a higher one, and from that to rest. */
+    /** The distance from one speed to a higher one, and from that to rest. */
     private double ramps(double entry, double top, double acceleration, double deceleration) {
         return (entry + top) / 2 * time(top - entry, acceleration) + top / 2 * time(top, deceleration);
     }
@@ -153,15 +153,15 @@ public final class Drive {
         }
     }
 
-    /** Stands still at once. */
+    /** Stops instantly. */
     public void halt() {
         legs.halt();
     }
 
     /**
-     * Stands still at once at a given place.
+     * Stops instantly at a given position.
      *
-     * @param place where
+     * @param place the position
      */
     public void haltAt(double place) {
         legs.haltAt(place);

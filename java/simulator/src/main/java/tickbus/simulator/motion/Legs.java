@@ -1,21 +1,21 @@
 package tickbus.simulator.motion;
 
 /**
- * Motion of one drive in legs: in each, the speed changes evenly or along an S, or not at all.
+ * Motion of one drive in legs: in each, the speed is constant, or changes linearly or along an S-curve.
  *
- * <p>The position is computed from the time since the motion began, never summed up from step to step: however that
- * time was cut into steps, the drive stands at the same place, and at the end exactly where it was to stop.
+ * <p>The position is computed from the time since the motion began, never accumulated from step to step: the result
+ * does not depend on the step size, and the drive ends exactly where it should.
  *
  * <p>Lengths are in any unit, speeds in that unit per second.
  */
 public final class Legs {
     private static final double SECONDS = 1e-9;
-    /** Braking first, then speeding up, slowing to the greatest speed, going on, and braking. */
+    /** Braking first, then accelerating, decelerating to the highest speed, constant speed, and braking. */
     private static final int MOST = 5;
 
     private final double[] duration = new double[MOST];
     private final double[] change = new double[MOST];
-    /** How long the acceleration of a leg takes to rise, and to fall; 0 where it jumps. */
+    /** How long the acceleration of a leg takes to rise, and to fall; 0 if it jumps. */
     private final double[] rise = new double[MOST];
     private int legs;
     private double startPosition;
@@ -32,14 +32,14 @@ public final class Legs {
     /**
      * A drive at rest.
      *
-     * @param position where it stands
+     * @param position its position
      */
     public Legs(double position) {
         this.position = position;
     }
 
     /**
-     * Where the drive is.
+     * The position of the drive.
      *
      * @return in the drive's unit
      */
@@ -48,7 +48,7 @@ public final class Legs {
     }
 
     /**
-     * How fast it is, with its direction as sign.
+     * The speed of the drive, with its direction as sign.
      *
      * @return units per second
      */
@@ -57,7 +57,7 @@ public final class Legs {
     }
 
     /**
-     * Whether a motion is under way.
+     * Whether it is moving.
      *
      * @return false at rest
      */
@@ -66,7 +66,7 @@ public final class Legs {
     }
 
     /**
-     * Where the legs that were added so far lead to.
+     * The position after the legs added so far.
      *
      * @return in the drive's unit
      */
@@ -75,7 +75,7 @@ public final class Legs {
     }
 
     /**
-     * How fast the drive will be at the end of the legs that were added so far.
+     * The speed of the drive after the legs added so far.
      *
      * @return units per second
      */
@@ -84,7 +84,7 @@ public final class Legs {
     }
 
     /**
-     * How long the legs that were added so far take.
+     * The duration of the legs added so far.
      *
      * @return seconds
      */
@@ -93,7 +93,7 @@ public final class Legs {
     }
 
     /**
-     * Shifts the scale under the drive; what turns uses it to stay within one turn.
+     * Shifts the scale of positions; rotating drives use it to stay within one turn.
      *
      * @param by what is added to every position
      */
@@ -103,7 +103,7 @@ public final class Legs {
         plannedPosition += by;
     }
 
-    /** Begins a new motion here and now, at the present speed; legs are to follow, and then one of the two ends. */
+    /** Starts a new motion at the current position and speed; legs have to follow, and then one of the two ends. */
     public void begin() {
         startPosition = position;
         startVelocity = velocity;
@@ -115,20 +115,21 @@ public final class Legs {
     }
 
     /**
-     * Adds a leg in which the speed changes evenly, or not at all.
+     * Adds a leg with a linear change of speed, or none.
      *
-     * @param time how long it lasts, in seconds, at least 0
-     * @param by how much the speed changes in it, in units per second
+     * @param time its duration in seconds, at least 0
+     * @param by the change of speed, in units per second
      */
     public void leg(double time, double by) {
         leg(time, by, 0);
     }
 
     /**
-     * Adds a leg in which the speed changes along an S: the acceleration rises evenly, stays, and falls evenly.
+     * Adds a leg in which the speed changes along an S-curve: the acceleration rises linearly, stays, and falls
+     * linearly.
      *
-     * @param time how long it lasts, in seconds, at least 0
-     * @param by how much the speed changes in it, in units per second
+     * @param time its duration in seconds, at least 0
+     * @param by the change of speed, in units per second
      * @param ramp how long the acceleration takes to rise, and likewise to fall, in seconds, at most half the time
      */
     public void leg(double time, double by, double ramp) {
@@ -142,9 +143,9 @@ public final class Legs {
     }
 
     /**
-     * After the legs the drive stands.
+     * After the legs the drive stops.
      *
-     * @param at exactly where: what the legs lead to, but for rounding
+     * @param at the exact position, equal to that of the legs except for rounding
      */
     public void endsAt(double at) {
         plannedPosition = at;
@@ -157,22 +158,22 @@ public final class Legs {
         }
     }
 
-    /** After the legs the drive goes on at the speed that it has then. */
+    /** After the legs the drive continues at its final speed. */
     public void goesOn() {
         endless = plannedVelocity != 0;
         moving = endless || velocity != 0;
     }
 
-    /** Stands still at once. */
+    /** Stops instantly. */
     public void halt() {
         moving = false;
         velocity = 0;
     }
 
     /**
-     * Stands still at once at a given place: something is in the way there.
+     * Stops instantly at a given position, where something is in the way.
      *
-     * @param place where
+     * @param place the position
      */
     public void haltAt(double place) {
         halt();
@@ -212,7 +213,7 @@ public final class Legs {
         velocity = speed + gained;
     }
 
-    /** By how much the speed has changed so far in a leg. */
+    /** The change of speed so far in a leg. */
     private double gained(int leg, double time) {
         double ramp = rise[leg];
         double left = duration[leg] - time;
@@ -226,7 +227,7 @@ public final class Legs {
         return steepest * (time - ramp / 2);
     }
 
-    /** How far this change has led so far. */
+    /** The distance covered so far in a leg. */
     private double way(int leg, double time) {
         double ramp = rise[leg];
         double left = duration[leg] - time;

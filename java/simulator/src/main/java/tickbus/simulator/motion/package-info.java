@@ -1,2 +1,2 @@
-/** Motion of drives that the machines share: where a drive stands, computed from the time since it set out. */
+/** Motion of drives, shared by the machines: the position of a drive as a function of the time since it started. */
 package tickbus.simulator.motion;

@@ -5,9 +5,9 @@ import java.util.List;
 import tickbus.simulator.peeler.AxisName;
 import tickbus.simulator.peeler.Peeler;
 
-/** How many commands each axis gets per second: over the whole run, and at the most in any one second. */
+/** How many commands each axis gets per second: over the whole run, and the maximum within any second. */
 final class CommandRate {
-    /** Holding Execute for 500 ms, as in 2018, allows no more commands per second and axis. */
+    /** Holding Execute for 500 ms, as in 2018, permits no more commands per second and axis. */
     static final double PAPER = 2;
 
     private static final long SECOND = 1_000_000_000L;
@@ -16,7 +16,7 @@ final class CommandRate {
     private final Peeler line;
     private final int[] seen = new int[AXES.size()];
     private final int[] most = new int[AXES.size()];
-    /** Times of the commands of the last second, per axis; more than these no link can carry. */
+    /** Times of the commands within the last second, per axis; no link carries more than fit here. */
     private final long[][] recent = new long[AXES.size()][1024];
     private final int[] first = new int[AXES.size()];
     private long begun = -1;
@@ -26,7 +26,7 @@ final class CommandRate {
         this.line = line;
     }
 
-    /** Looks at all axes; once a tick. */
+    /** Checks all axes; once per tick. */
     void look(long nanos) {
         now = nanos;
         for (int i = 0; i < seen.length; i++) {
@@ -57,17 +57,17 @@ final class CommandRate {
         return seconds() == 0 ? 0 : seen[axis.ordinal()] / seconds();
     }
 
-    /** The same of an axis in the mean of all. */
+    /** The mean over all axes. */
     double mean() {
         return seconds() == 0 ? 0 : commands() / seconds() / seen.length;
     }
 
-    /** The most commands that an axis got in any one second. */
+    /** The most commands that an axis got within any second. */
     int most(AxisName axis) {
         return most[axis.ordinal()];
     }
 
-    /** The axis with most commands. */
+    /** The axis with the most commands. */
     AxisName busiest() {
         AxisName busiest = AXES.get(0);
         for (AxisName axis : AXES) {

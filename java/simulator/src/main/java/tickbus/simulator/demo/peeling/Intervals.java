@@ -5,19 +5,21 @@ import java.util.Map;
 import tickbus.simulator.demo.DemoFailure;
 
 /**
- * The times from one record to the next, where the records arrive, in one direction of one link.
+ * The times between records at their destination, in one direction of one link.
  *
- * @param count how many there were
- * @param mean in milliseconds, as the others
+ * @param count the number of intervals
+ * @param mean in milliseconds, like the others
  * @param max the longest
  * @param min the shortest
  * @param variance in square milliseconds
  */
 record Intervals(long count, double mean, double max, double min, double variance) {
-    /** The paper's variances can only be thousandths of square seconds; as such they fit its other figures. */
+    /** To agree with its other figures, the paper's variances must be in thousandths of square seconds. */
     private static final double PAPER_VARIANCE = 1e3;
 
-    /** The four directions, with what S. Nyyssönen measured in 2018 (table 4 of his thesis, Wireshark at the PC). */
+    /**
+     * The four directions, and the measurements of S. Nyyssönen in 2018 (table 4 of his thesis, Wireshark at the PC).
+     */
     enum Direction {
         /** Commands to the charger. */
         CHARGER_TO_SIMULATION("charger -> simulation", 12298, 10.03, 31.11, 7.98, 0.00094),
@@ -46,7 +48,7 @@ record Intervals(long count, double mean, double max, double min, double varianc
     }
 
     /**
-     * Reads them from the statistics of the end that receives the records.
+     * Reads them from the statistics of the receiving end.
      *
      * @throws DemoFailure if there are none
      */

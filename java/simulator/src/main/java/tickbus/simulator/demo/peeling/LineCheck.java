@@ -5,15 +5,15 @@ import tickbus.simulator.demo.DemoFailure;
 import tickbus.simulator.peeler.Peeler;
 import tickbus.simulator.peeler.Wood;
 
-/** What must be so at the end of a good run. */
+/** What must hold at the end of a good run. */
 final class LineCheck {
-    /** Wood that may be lost in rounding, of one cubic metre. */
+    /** The rounding error permitted in the balance of wood, in cubic metres. */
     private static final double CRUMB = 1e-9;
 
     private LineCheck() {
     }
 
-    /** All wood that can be found, in cubic metres. */
+    /** All wood accounted for, in cubic metres. */
     static double found(Peeler line) {
         Wood wood = line.wood();
         return wood.veneer() + wood.torn() + wood.chipped() + wood.cores() + wood.unpeeled() + line.held();
@@ -22,7 +22,7 @@ final class LineCheck {
     /**
      * Checks a run.
      *
-     * @throws DemoFailure with what is not so
+     * @throws DemoFailure with what does not hold
      */
     static void check(LineWatcher watcher, int logs) {
         Peeler line = watcher.line();

@@ -13,7 +13,7 @@ import tickbus.simulator.peeler.Place;
 import tickbus.simulator.peeler.Wood;
 import tickbus.simulator.text.Durations;
 
-/** Shows the line while it runs: on a terminal a few lines that are redrawn, elsewhere one line per event. */
+/** Shows the line while it runs: on a terminal as a few lines that are redrawn, otherwise one line per event. */
 final class LineDisplay {
     /** Largest distance of knife and rolls, in millimetres. */
     private static final double FARTHEST = 300;

@@ -12,9 +12,9 @@ import tickbus.simulator.peeler.AxisName;
 import tickbus.simulator.peeler.Peeler;
 import tickbus.simulator.peeler.Place;
 
-/** Follows the blocks, the wood and the links from tick to tick, and writes down what changes. */
+/** Follows the blocks, the wood and the links from tick to tick, and records changes. */
 final class LineWatcher {
-    /** Statistics are slow, so they are asked for only now and then. */
+    /** Statistics are slow, so they are read only now and then. */
     private static final int TICKS_PER_LOOK_AT_LINKS = 50;
 
     private final Simulator simulator;
@@ -53,22 +53,22 @@ final class LineWatcher {
         return List.copyOf(shapes);
     }
 
-    /** What a driver's line does, as it told last. */
+    /** A driver's line state as last reported. */
     String link(int driver) {
         return links[driver] == null ? "not known yet" : links[driver];
     }
 
-    /** How a link broke that had been running; null as long as none has. */
+    /** The reason for which a running link broke; null if none has. */
     String broken() {
         return broken;
     }
 
-    /** For how long nothing had come over the link that broke. */
+    /** How long the broken link had been silent. */
     long silentNanos() {
         return silentNanos;
     }
 
-    /** Looks at everything once, after a tick. Fails if something happened on the line that must not. */
+    /** Checks everything once, after a tick. Fails if something happened on the line that must not happen. */
     void look() {
         long now = simulator.simulationNanos();
         if (simulator.ticks() % TICKS_PER_LOOK_AT_LINKS == 1) {

@@ -42,19 +42,19 @@ public final class PeelingDemo {
     private static final String OK_BEGINS = "demo-peeler: ok ";
     private static final String FAILED_BEGINS = "demo-peeler: failed reason=";
 
-    /** A demo that failed on a machine that stood still meanwhile says nothing, and is begun anew. */
+    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
     private static final int ATTEMPTS = 3;
 
-    /** Where the knife is when the picture of a block that is not round tells most. */
+    /** The position of the knife at which the picture of a block that is not round shows most. */
     private static final double PICTURE_MM = 138;
 
-    /** How long the news of a Ctrl-C may take to this process. */
+    /** How long it may take until this process is told of a Ctrl-C. */
     private static final long INTERRUPTION_MILLIS = 500;
 
-    /** Nothing needs to write these: the driver acknowledges by itself, and without a jerk there are no S-curves. */
+    /** Need not be written: the driver acknowledges by itself, and without a jerk there are no S-curves. */
     private static final List<String> LEFT_OUT = List.of(".Acknowledge", ".Jerk");
 
-    /** The PLCs are looked at so often. */
+    /** How often the PLCs are checked. */
     private static final int TICKS_PER_LOOK_AT_PLCS = 25;
 
     private final PeelingOptions options;
@@ -108,7 +108,7 @@ public final class PeelingDemo {
             out.println(failed(e.getMessage()));
             return USAGE;
         }
-        // The guard is closed last, so that after Ctrl-C the verdict is still printed.
+        // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
             PeelingDemo demo = new PeelingDemo(options, out, List.of());
             String verdict = demo.play(guard, err);
@@ -202,7 +202,10 @@ public final class PeelingDemo {
         }
     }
 
-    /** A link breaks because its PLC has died, which is told; or because this machine stood still, which does not count. */
+    /**
+     * If a link breaks because its PLC has died, that is reported; if because the computer stalled, it does not
+     * count.
+     */
     private void lookAtLinks(Plcs plcs, ShutdownGuard guard) {
         if (watcher.broken() == null) {
             return;
@@ -235,7 +238,7 @@ public final class PeelingDemo {
         try {
             plcs.check();
         } catch (DemoFailure e) {
-            // Ctrl-C in a terminal reaches every process of it, and a PLC may have been the faster one.
+            // Ctrl-C in a terminal reaches all of its processes, and a PLC may have been faster.
             if (guard.triggers(INTERRUPTION_MILLIS)) {
                 throw new DemoFailure("interrupted");
             }
@@ -293,7 +296,7 @@ public final class PeelingDemo {
         return options.report().resolveSibling(name);
     }
 
-    /** An HTML page for each driver's recording; says what went wrong, null if nothing did. */
+    /** An HTML page for each driver's recording; returns what went wrong, or null. */
     private String pages() {
         if (options.recordings() == null) {
             return null;

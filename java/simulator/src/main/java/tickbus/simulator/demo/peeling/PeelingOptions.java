@@ -5,7 +5,7 @@ import java.util.List;
 import tickbus.simulator.Arguments;
 
 /**
- * What the demo is asked to do.
+ * The options of the demo.
  *
  * @param drivers the DeviceDriver folder with charger.cfg and lathe.cfg
  * @param control the control table

@@ -9,14 +9,14 @@ import tickbus.simulator.peeler.Wood;
 import tickbus.simulator.text.Columns;
 import tickbus.simulator.text.Durations;
 
-/** The text that stays when the demo is over. */
+/** The report as text, written when the demo is over. */
 final class PeelingReport {
     private final StringBuilder text = new StringBuilder();
 
     private PeelingReport() {
     }
 
-    /** The tables about the links, which the demo prints in the end, too. */
+    /** The tables about the links, which the demo also prints at its end. */
     static String tables(Map<Intervals.Direction, Intervals> intervals, CommandRate rate) {
         PeelingReport report = new PeelingReport();
         report.intervals(intervals);
@@ -27,11 +27,11 @@ final class PeelingReport {
     /**
      * Writes a report.
      *
-     * @param options what was asked
+     * @param options the options of the demo
      * @param verdict the demo's last line
      * @param timeline what happened
-     * @param watcher what ran, null if it never came to that
-     * @param tables {@link #tables}, empty if it never came to that
+     * @param watcher what ran, null if it did not start
+     * @param tables {@link #tables}, empty if it did not start
      * @param rate commands of the axes
      */
     static String write(PeelingOptions options, String verdict, Timeline timeline, LineWatcher watcher, String tables,
@@ -144,7 +144,7 @@ final class PeelingReport {
             driver.statistics().forEach(table::row);
             text.append(table.text("  "));
         } catch (RuntimeException e) {
-            // A driver that failed or is closed may have none; the rest of the report is worth having.
+            // A driver that has failed or is closed may have none; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

@@ -14,7 +14,7 @@ import tickbus.simulator.demo.Timeline;
 
 /** The two PLCs, each a process that connects to its driver. */
 final class Plcs implements AutoCloseable {
-    /** The programs; the driver of each has its name. */
+    /** The programs; each one's driver has the same name. */
     static final List<String> PROGRAMS = List.of("charger", "lathe");
 
     private final Map<String, PlcProcess> processes = new LinkedHashMap<>();
@@ -38,7 +38,7 @@ final class Plcs implements AutoCloseable {
         }
     }
 
-    /** What they print: news for people. */
+    /** Collects their output for people. */
     void listen(long now, Timeline timeline) {
         processes.forEach((program, process) ->
                 process.news().forEach(line -> timeline.add(now, program, line.replaceFirst("^plc: ", ""))));
@@ -47,7 +47,7 @@ final class Plcs implements AutoCloseable {
     /**
      * Fails if one has ended.
      *
-     * @throws DemoFailure with its name and what it said last
+     * @throws DemoFailure with its name and last output
      */
     void check() {
         processes.forEach((program, process) -> {
@@ -59,7 +59,7 @@ final class Plcs implements AutoCloseable {
         });
     }
 
-    /** The statistics that one printed last. */
+    /** The statistics that a program printed last. */
     Map<String, String> statistics(String program) {
         return processes.get(program).statistics();
     }

@@ -1,8 +1,9 @@
 //! The lines of `[fieldbus.at]`: signals that lie where the device has them.
 
 use crate::fieldbus::At;
+use crate::fieldbus::at::both_ways;
 use crate::fieldbus::modbus::Spot;
-use crate::signal::SignalTable;
+use crate::signal::{Signal, SignalTable};
 
 use super::lie::nobody_writes;
 use super::{ClientOptions, Piece};
@@ -39,6 +40,32 @@ impl ClientOptions {
         for station in 0..table.stations.len() {
             self.check_claims(&placed, table, station);
         }
+    }
+
+    /// The signals that are written where another one is read, each with that one.
+    pub(in crate::fieldbus) fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        let (writes, _) = self.role.areas();
+        let is_placed = |signal: &Signal| self.at.contains_key(&signal.name);
+        both_ways(table, writes, is_placed, |signal| {
+            let pieces = if let Some(spot) = self.at.get(&signal.name) {
+                Piece::of_spot(signal, *spot).into_iter().collect()
+            } else {
+                let bytes = table.stations[signal.station].bytes(signal.area);
+                let blocks = self.blocks(signal.area, bytes).unwrap_or_default();
+                let parts = blocks.iter();
+                let parts = parts.filter_map(|block| Piece::of_block(signal, block));
+                parts.collect::<Vec<_>>()
+            };
+            let place = |piece: Piece| {
+                let bits = if signal.area == writes {
+                    piece.claim()
+                } else {
+                    piece.wire..piece.wire + piece.bits
+                };
+                ((signal.station, piece.table), bits)
+            };
+            pieces.into_iter().map(place).collect()
+        })
     }
 
     /// Reports lines of signals that would be written into bits that are another one's.

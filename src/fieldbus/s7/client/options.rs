@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Frames;
 use crate::config::{Collector, Table, Value};
+use crate::fieldbus::at::both_ways;
 use crate::fieldbus::s7::item::Object;
 use crate::fieldbus::s7::transport::PORT;
 use crate::fieldbus::s7::tsap::{RACK, SLOT};
@@ -111,6 +112,21 @@ impl ClientOptions {
             self.variables.insert(signal.name.clone(), variable);
         }
         self.report_overlaps(lines, table);
+    }
+
+    /// The signals that are written where another one is read, each with that one.
+    pub(in crate::fieldbus) fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        let (sends, _) = self.role.areas();
+        let is_placed = |signal: &Signal| self.variables.contains_key(&signal.name);
+        both_ways(table, sends, is_placed, |signal| {
+            let variable = self.variable(signal).into_iter();
+            variable
+                .map(|variable| {
+                    let (first, bits) = variable.bits();
+                    (variable.object, first..first + bits)
+                })
+                .collect()
+        })
     }
 
     /// Reports signals that would be written over one another. What is read may be read twice.

@@ -9,18 +9,14 @@
 mod foreign;
 
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::{SocketAddr, TcpListener};
+use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use foreign::Absent;
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
-use tickbus::signal::Slot;
-use tickbus::time::{Monotonic, Nanos};
+use foreign::machine::Machine;
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -67,75 +63,17 @@ address = "%ID4"
 type    = "REAL"
 "#;
 
-/// The machine: a driver on the system's clock.
-struct Machine {
-    driver: Driver,
-    slots: Vec<Slot>,
+fn open(fieldbus: &str) -> Machine {
+    Machine::open(&format!(
+        "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\n{fieldbus}\nmax_age = \"3s\"\nreconnect = [\"50ms\"]\n{SIGNALS}"
+    ))
 }
 
-impl Machine {
-    fn open(fieldbus: &str) -> Self {
-        let text = format!(
-            "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\n{fieldbus}\nmax_age = \"3s\"\nreconnect = [\"50ms\"]\n{SIGNALS}"
-        );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared();
-        let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
-        let slots = driver.initial_slots();
-        Self { driver, slots }
-    }
-
-    fn index(&self, name: &str) -> usize {
-        let found = self.driver.config().table.position(name);
-        found.unwrap_or_else(|| panic!("no signal {name}"))
-    }
-
-    fn get(&self, name: &str) -> f64 {
-        self.slots[self.index(name)].real()
-    }
-
-    fn set(&mut self, name: &str, value: f64) {
-        let index = self.index(name);
-        self.slots[index] = Slot::from_real(value);
-    }
-
-    fn tick(&mut self) {
-        self.driver.exchange(Nanos::ZERO, &mut self.slots);
-        std::thread::sleep(Duration::from_millis(1));
-    }
-
-    /// Ticks until `done` returns something.
-    #[track_caller]
-    fn until<T>(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> Option<T>) -> T {
-        let limit = Instant::now() + Duration::from_secs(60);
-        loop {
-            if let Some(found) = done(self) {
-                return found;
-            }
-            let reason = self.driver.link().reason;
-            assert!(
-                Instant::now() < limit,
-                "waited in vain until {what}: {reason}"
-            );
-            self.tick();
-        }
-    }
-
-    #[track_caller]
-    fn until_value(&mut self, name: &str, value: f64) {
-        self.until(&format!("{name} is {value}"), |machine| {
-            (machine.get(name) == value).then_some(())
-        });
-    }
-
-    /// Where it listens.
-    fn address(&mut self) -> SocketAddr {
-        self.until("it listens", |machine| {
-            let text = machine.driver.statistics();
-            let line = text.lines().find_map(|line| line.strip_prefix("address="));
-            line.map(|line| line.parse().expect("an address"))
-        })
-    }
+#[track_caller]
+fn until_value(machine: &mut Machine, name: &str, value: f64) {
+    machine.until(&format!("{name} is {value}"), |machine| {
+        machine.get(name) == value
+    });
 }
 
 /// A program from tests/peers/java, controlled by lines of text.
@@ -181,7 +119,7 @@ impl Peer {
             stdin,
             lines,
         };
-        let said = machine.until("the peer is ready", |_| peer.lines.try_recv().ok());
+        let said = machine.until_some("the peer is ready", |_| peer.lines.try_recv().ok());
         assert_eq!(said, "ready", "{class} {arguments:?}");
         Ok(peer)
     }
@@ -191,7 +129,7 @@ impl Peer {
     fn ask(&mut self, machine: &mut Machine, words: &[&str]) -> String {
         let stdin = self.stdin.as_mut().expect("it lives");
         writeln!(stdin, "{}", words.join("\t")).expect("it listens");
-        machine.until(&format!("{words:?} is answered"), |_| {
+        machine.until_some(&format!("{words:?} is answered"), |_| {
             self.lines.try_recv().ok()
         })
     }
@@ -243,7 +181,7 @@ fn plc4x(machine: &mut Machine, url: &str, tags: &Tags<'_>) -> Result<(), Absent
         (tags.torque, "torque", "0.25", 0.25),
     ] {
         assert_eq!(plc.ask(machine, &["write", tag, text]), "OK", "{tag}");
-        machine.until_value(name, value);
+        until_value(machine, name, value);
     }
     machine.set("sensor", 1.0);
     machine.set("position", -7.0);
@@ -253,9 +191,14 @@ fn plc4x(machine: &mut Machine, url: &str, tags: &Tags<'_>) -> Result<(), Absent
     Ok(())
 }
 
+fn plc4x_version() -> String {
+    let pinned = foreign::stated("tests/peers/java/pom.xml", "<plc4x.version>");
+    format!("Apache PLC4X {pinned}")
+}
+
 fn plc4x_over_modbus() -> Result<(), Absent> {
-    let mut machine = Machine::open("kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"");
-    let address = machine.address();
+    let mut machine = open("kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"");
+    let address = machine.address_for("plc4x-modbus", &plc4x_version());
     // PLC4X counts from 1: register 2 is bytes 2 and 3.
     let tags = Tags {
         run: "coil:1",
@@ -269,8 +212,8 @@ fn plc4x_over_modbus() -> Result<(), Absent> {
 }
 
 fn plc4x_over_s7() -> Result<(), Absent> {
-    let mut machine = Machine::open("kind = \"s7-server\"\naddress = \"127.0.0.1:0\"");
-    let address = machine.address();
+    let mut machine = open("kind = \"s7-server\"\naddress = \"127.0.0.1:0\"");
+    let address = machine.address_for("plc4x-s7", &plc4x_version());
     let tags = Tags {
         run: "%Q0.0:BOOL",
         speed: "%QW2:INT",
@@ -288,7 +231,7 @@ const OPCUA_SERVER: &str = "kind = \"opcua-server\"\naddress = \"127.0.0.1:0\"\n
 
 fn plc4x_over_opcua() -> Result<(), Absent> {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut machine = Machine::open(&format!(
+    let mut machine = open(&format!(
         "{OPCUA_SERVER}\npki = {:?}",
         folder.path().display().to_string()
     ));
@@ -307,7 +250,7 @@ fn plc4x_over_opcua() -> Result<(), Absent> {
 
 fn milo_as_client() -> Result<(), Absent> {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut machine = Machine::open(&format!(
+    let mut machine = open(&format!(
         "{OPCUA_SERVER}\npki = {:?}",
         folder.path().display().to_string()
     ));
@@ -317,8 +260,8 @@ fn milo_as_client() -> Result<(), Absent> {
     for (value, text) in [(-1234.0, "-1234"), (77.0, "77")] {
         let written = milo.ask(&mut machine, &["write", speed, "Int16", text]);
         assert_eq!(written, "good");
-        machine.until_value("speed", value);
-        // Write and verify: a value that was just accepted has good quality at once.
+        until_value(&mut machine, "speed", value);
+        // Write and verify: a value that was just accepted is good at once.
         assert_eq!(milo.ask(&mut machine, &["read", speed]), text);
     }
     let subscribed = milo.ask(&mut machine, &["subscribe", "ns=2;s=position"]);
@@ -328,9 +271,7 @@ fn milo_as_client() -> Result<(), Absent> {
         let mut seen = String::new();
         machine.until("the subscriber hears", |machine| {
             seen = milo.ask(machine, &["changes"]);
-            seen.split('\t')
-                .any(|one| one == position.to_string())
-                .then_some(())
+            seen.split('\t').any(|one| one == position.to_string())
         });
     }
     // The whole structure ServerStatus is read, and its clock runs.
@@ -345,7 +286,7 @@ fn milo_as_server() -> Result<(), Absent> {
         listener.local_addr().expect("it is bound").port()
     };
     let folder = tempfile::tempdir().expect("a folder");
-    let mut machine = Machine::open(&format!(
+    let mut machine = open(&format!(
         "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1:{port}\"\nsecurity = \"None\"\npki = {:?}\n\
          write_to = \"urn:test:milo\"",
         folder.path().display().to_string()
@@ -363,21 +304,21 @@ fn milo_as_server() -> Result<(), Absent> {
     let mut arguments = vec![port.as_str()];
     arguments.extend(nodes);
     let mut plc = Peer::start(&mut machine, "MiloServer", &arguments)?;
-    machine.until_value("speed", 7.0);
+    until_value(&mut machine, "speed", 7.0);
     assert_eq!(machine.get("torque"), 1.5);
     plc.ask(&mut machine, &["set", "speed", "-8"]);
     plc.ask(&mut machine, &["set", "run", "true"]);
-    machine.until_value("speed", -8.0);
-    machine.until_value("run", 1.0);
+    until_value(&mut machine, "speed", -8.0);
+    until_value(&mut machine, "run", 1.0);
     machine.set("position", 42.0);
     machine.set("pressure", 0.75);
     plc.ask_until(&mut machine, &["get", "position"], "42");
     plc.ask_until(&mut machine, &["get", "pressure"], "0.75");
     // It was killed and is started again.
     drop(plc);
-    machine.until_value("speed", -1.0);
+    until_value(&mut machine, "speed", -1.0);
     let mut plc = Peer::start(&mut machine, "MiloServer", &arguments)?;
-    machine.until_value("speed", 7.0);
+    until_value(&mut machine, "speed", 7.0);
     plc.ask_until(&mut machine, &["get", "position"], "42");
     let written = plc.ask(&mut machine, &["written"]);
     for node in ["speed", "run", "torque", "nobody"] {

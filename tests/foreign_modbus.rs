@@ -3,8 +3,6 @@
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 mod foreign;
-#[path = "peers/pcap.rs"]
-mod pcap;
 #[cfg(unix)]
 #[path = "peers/pty.rs"]
 mod pty;
@@ -13,16 +11,12 @@ use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Command, ExitCode, Stdio};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use foreign::Absent;
-use pcap::Tap;
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
+use foreign::machine::Machine;
+use foreign::pcap::{self, Tap};
 use tickbus::fieldbus::LinkState;
 use tickbus::signal::Slot;
-use tickbus::time::{Monotonic, Nanos};
 
 /// Bytes of %I and of %Q.
 const BYTES: usize = 64;
@@ -63,44 +57,20 @@ fn main() -> ExitCode {
     ])
 }
 
-/// A driver on the system's clock, which copies each byte of %Q to the byte of %I at the same offset.
-struct Machine {
-    driver: Driver,
-    slots: Vec<Slot>,
+fn open(fieldbus: &str, signals: &str) -> Machine {
+    Machine::open(&format!(
+        "[driver]\nid = 1\nname = \"Cell 4\"\n[fieldbus]\n{fieldbus}\nreconnect = [\"50ms\"]\n{signals}"
+    ))
 }
 
-impl Machine {
-    fn open(fieldbus: &str, signals: &str) -> Self {
-        let text = format!(
-            "[driver]\nid = 1\nname = \"Cell 4\"\n[fieldbus]\n{fieldbus}\nreconnect = [\"50ms\"]\n{signals}"
-        );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared();
-        let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
-        let slots = driver.initial_slots();
-        Self { driver, slots }
-    }
+/// A machine that mirrors each byte of %Q on the byte of %I at the same offset.
+trait Mirror {
+    /// A tick that brings the bytes `q N` back on `i N`.
+    fn mirror(&mut self);
+    fn mirror_until_the_end_of(&mut self, command: Command) -> String;
+}
 
-    fn index(&self, name: &str) -> usize {
-        let table = &self.driver.config().table;
-        let found = table.position(name);
-        found.unwrap_or_else(|| panic!("no signal {name}"))
-    }
-
-    fn get(&self, name: &str) -> f64 {
-        self.slots[self.index(name)].real()
-    }
-
-    fn set(&mut self, name: &str, value: f64) {
-        let index = self.index(name);
-        self.slots[index] = Slot::from_real(value);
-    }
-
-    fn tick(&mut self) {
-        self.driver.exchange(Nanos::ZERO, &mut self.slots);
-    }
-
-    /// A tick that copies the bytes `q N` to `i N`.
+impl Mirror for Machine {
     fn mirror(&mut self) {
         self.tick();
         for index in 0..self.slots.len() {
@@ -114,69 +84,15 @@ impl Machine {
     }
 
     #[track_caller]
-    fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
-        let limit = Instant::now() + Duration::from_secs(20);
-        while !done(self) {
-            let reason = self.driver.link().reason;
-            assert!(
-                Instant::now() < limit,
-                "waited in vain until {what}: {reason}"
-            );
-            self.tick();
-            std::thread::sleep(Duration::from_millis(1));
-        }
+    fn mirror_until_the_end_of(&mut self, command: Command) -> String {
+        self.until_the_end_of(command, Self::mirror)
     }
+}
 
-    fn statistic(&self, key: &str) -> Option<String> {
-        let text = self.driver.statistics();
-        let line = text
-            .lines()
-            .find_map(|line| line.strip_prefix(&format!("{key}=")));
-        line.map(str::to_owned)
-    }
-
-    /// Where it listens.
-    fn address(&mut self) -> SocketAddr {
-        self.until("it listens", |machine| {
-            machine.statistic("address").is_some()
-        });
-        let address = self.statistic("address").expect("it was waited for");
-        address.parse().expect("an address")
-    }
-
-    /// Ticks until the program at the other end exits; returns its output.
-    #[track_caller]
-    fn mirror_until_the_end_of(&mut self, mut command: Command) -> String {
-        let mut child = command
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("it starts");
-        let limit = Instant::now() + Duration::from_secs(60);
-        let status = loop {
-            if let Some(status) = child.try_wait().expect("it is ours") {
-                break status;
-            }
-            if Instant::now() > limit {
-                let _ = child.kill();
-            }
-            self.mirror();
-            std::thread::sleep(Duration::from_millis(1));
-        };
-        let mut told = String::new();
-        for pipe in [
-            child
-                .stdout
-                .take()
-                .map(|pipe| Box::new(pipe) as Box<dyn std::io::Read>),
-            child.stderr.take().map(|pipe| Box::new(pipe) as _),
-        ] {
-            let _ = pipe.expect("a pipe").read_to_string(&mut told);
-        }
-        assert!(status.success(), "{told}");
-        told
-    }
+/// The version of pymodbus that is installed for the tests.
+fn pymodbus_version() -> String {
+    let pinned = foreign::stated("tests/peers/requirements.txt", "pymodbus==");
+    format!("pymodbus {pinned}")
 }
 
 /// A byte in each direction at every offset, except for some of %Q with REALs in two byte orders.
@@ -215,8 +131,8 @@ fn pymodbus(script: &str) -> Result<Command, Absent> {
 fn pymodbus_drives_our_server() -> Result<(), Absent> {
     let mut client = pymodbus("modbus_client.py")?;
     let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
-    let mut machine = Machine::open(server, &signals());
-    let address = machine.address();
+    let mut machine = open(server, &signals());
+    let address = machine.address_for("pymodbus", &pymodbus_version());
     client.args([
         "tcp",
         &address.ip().to_string(),
@@ -250,8 +166,8 @@ fn pymodbus_meets_units() -> Result<(), Absent> {
         );
     }
     let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
-    let mut machine = Machine::open(server, &text);
-    let address = machine.address();
+    let mut machine = open(server, &text);
+    let address = machine.address_for("pymodbus-units", &pymodbus_version());
     python.args([
         "-c",
         "import sys\n\
@@ -326,7 +242,7 @@ fn words(count: usize) -> String {
 /// Sends values out and back, with %I and %Q at the same place.
 #[track_caller]
 fn loop_through(fieldbus: &str, count: usize) -> Machine {
-    let mut machine = Machine::open(fieldbus, &words(count));
+    let mut machine = open(fieldbus, &words(count));
     for round in 1..=3 {
         for word in 0..count {
             let value = (word * 7 + round * 1000) % 65536;
@@ -385,7 +301,7 @@ fn our_client_writes_only_where_it_may() -> Result<(), Absent> {
         let fieldbus = format!(
             "kind = \"modbus-client\"\naddress = \"{address}\"\ninputs = \"offset:0\"\n{write_to}"
         );
-        let mut machine = Machine::open(&fieldbus, &words(2));
+        let mut machine = open(&fieldbus, &words(2));
         machine.set("i 0", 5.0);
         machine.until("it runs", |machine| {
             machine
@@ -406,18 +322,18 @@ fn our_client_reads_inputs() -> Result<(), Absent> {
     let (_server, address) = Server::tcp()?;
     let client =
         format!("kind = \"modbus-client\"\nrole = \"controller\"\naddress = \"{address}\"\n");
-    let mut registers = Machine::open(&client, &words(300));
+    let mut registers = open(&client, &words(300));
     registers.until("input registers come", |machine| {
         machine.get("i 299") == 2093.0
     });
     let keys = format!("{client}inputs = \"discrete-input:1\"\n");
-    let mut bits = Machine::open(&keys, "[[signal]]\nname = \"i\"\naddress = \"%IW0\"\n");
-    // Every third bit, starting with bit 0 of byte 0.
+    let mut bits = open(&keys, "[[signal]]\nname = \"i\"\naddress = \"%IW0\"\n");
+    // Every third bit, from bit 0 of byte 0 on.
     bits.until("discrete inputs come", |machine| {
         machine.get("i") == f64::from(0b0100_1001_1001_0010_u16)
     });
     let keys = format!("{client}inputs = \"input-register:2047\"\n");
-    let mut beyond = Machine::open(&keys, &words(3));
+    let mut beyond = open(&keys, &words(3));
     beyond.until("it says what was refused", |machine| {
         machine.driver.link().cause.name() == "refused"
     });
@@ -435,10 +351,17 @@ fn mbpoll(machine: &mut Machine, arguments: &[&str]) -> Result<String, Absent> {
     Ok(machine.mirror_until_the_end_of(mbpoll))
 }
 
+fn mbpoll_version() -> Result<String, Absent> {
+    let told = foreign::command("mbpoll", "mbpoll")?.arg("-V").output();
+    let told = String::from_utf8(told.expect("it runs").stdout).expect("UTF-8");
+    Ok(told.lines().next().unwrap_or_default().trim().to_owned())
+}
+
 fn mbpoll_over_tcp() -> Result<(), Absent> {
     let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
-    let mut machine = Machine::open(server, &signals());
-    let port = machine.address().port().to_string();
+    let mut machine = open(server, &signals());
+    let port = machine.address_for("mbpoll", &mbpoll_version()?).port();
+    let port = port.to_string();
     let tcp = ["-m", "tcp", "-p", port.as_str()];
     mbpoll_everything(&mut machine, &tcp, "127.0.0.1")
 }
@@ -479,7 +402,7 @@ fn mbpoll_everything(machine: &mut Machine, mode: &[&str], host: &str) -> Result
 fn pymodbus_drives_our_server_on_a_line() -> Result<(), Absent> {
     let mut client = pymodbus("modbus_client.py")?;
     let line = pty::Line::new();
-    let mut machine = Machine::open(&serial("server", line.end(0)), &signals());
+    let mut machine = open(&serial("server", line.end(0)), &signals());
     machine.until("it listens", |machine| {
         machine.statistic("device").is_some()
     });
@@ -519,7 +442,7 @@ fn our_client_drives_pymodbus_on_a_line() -> Result<(), Absent> {
 #[cfg(unix)]
 fn mbpoll_on_a_line() -> Result<(), Absent> {
     let line = pty::Line::new();
-    let mut machine = Machine::open(&serial("server", line.end(0)), &signals());
+    let mut machine = open(&serial("server", line.end(0)), &signals());
     machine.until("it listens", |machine| {
         machine.statistic("device").is_some()
     });
@@ -553,7 +476,7 @@ const REQUESTS: [&[u8]; 19] = [
 
 fn tshark_finds_nothing() -> Result<(), Absent> {
     let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
-    let mut machine = Machine::open(server, &signals());
+    let mut machine = open(server, &signals());
     let tap = Tap::before(machine.address());
     let mut stream = TcpStream::connect(tap.address).expect("it listens");
     for (transaction, pdu) in (1_u16..).zip(REQUESTS) {

@@ -12,14 +12,12 @@ mod conformance;
 mod foreign;
 #[path = "peers/opcua.rs"]
 mod opcua;
-#[path = "peers/pcap.rs"]
-mod pcap;
 #[path = "peers/opcua_served.rs"]
 mod served;
 
 use std::path::{Path, PathBuf};
 
-use foreign::Absent;
+use foreign::{Absent, pcap};
 use opcua::{Device, IDENTITY, Peer, free_address, nodes, plc};
 use serde_json::{Value, json};
 use tickbus::driver::Code;

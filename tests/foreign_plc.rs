@@ -3,14 +3,11 @@
 
 mod foreign;
 
-use std::process::{Command, ExitCode, Stdio};
-use std::time::{Duration, Instant};
+use std::process::ExitCode;
 
 use foreign::Absent;
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
-use tickbus::signal::Slot;
-use tickbus::time::{Manual, Nanos};
+use foreign::machine::Machine;
+use tickbus::time::Manual;
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/plc.py");
 
@@ -64,68 +61,20 @@ fn main() -> ExitCode {
 }
 
 fn exchanges() -> Result<(), Absent> {
-    let python = foreign::python_with("main", &["socket"])?;
-    run(python).unwrap_or_else(|why| panic!("{why}"));
-    Ok(())
-}
-
-fn run(mut python: Command) -> Result<(), String> {
-    let config = Config::parse("driver.cfg", DRIVER_CFG).map_err(|why| why.to_string())?;
+    let mut python = foreign::python_with("main", &["socket"])?;
     // A device that replies needs no clock.
-    let mut device = Driver::open(config, Manual::new()).map_err(|why| why.to_string())?;
-    let mut slots = device.initial_slots();
-    let address = wait_for(|| {
-        let text = device.statistics();
-        let line = text.lines().find_map(|line| line.strip_prefix("address="));
-        line.map(str::to_owned)
-    })
-    .ok_or("the device does not listen")?;
-    let (host, port) = address.rsplit_once(':').ok_or("no port in the address")?;
-    let mut plc = python
-        .args([SCRIPT, host, port, &RECORDS.to_string()])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|why| why.to_string())?;
-    let ended = wait_for(|| {
-        device.exchange(Nanos::ZERO, &mut slots);
-        let [run, speed, _, sensor, position, copy] = &mut slots[..6] else {
-            panic!("six signals");
-        };
-        *sensor = *run;
-        *position = Slot::from_real(speed.real() * 2.0);
-        *copy = *speed;
-        std::thread::yield_now();
-        plc.try_wait().expect("it was started")
+    let mut device = Machine::open_on(Manual::new(), DRIVER_CFG);
+    let address = device.address();
+    let (host, port) = (address.ip().to_string(), address.port().to_string());
+    python.args([SCRIPT, &host, &port, &RECORDS.to_string()]);
+    let told = device.until_the_end_of(python, |device| {
+        device.tick();
+        let (run, speed) = (device.get("run"), device.get("speed"));
+        device.set("sensor", run);
+        device.set("position", speed * 2.0);
+        device.set("copy", speed);
     });
-    if ended.is_none() {
-        // Waited for below, whether or not it has just ended by itself.
-        let _ = plc.kill();
-    }
-    let output = plc.wait_with_output().map_err(|why| why.to_string())?;
-    let told =
-        [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
-    let statistics = device.statistics();
-    let received = statistics
-        .lines()
-        .find_map(|line| line.strip_prefix("bus_cycles="))
-        .unwrap_or_default();
-    if told[0].trim() == format!("plc.py: ok records={received}") {
-        Ok(())
-    } else {
-        Err(format!("{}\n{}\n{statistics}", told[0], told[1]))
-    }
-}
-
-/// Polls until there is something, for at most 20 s.
-fn wait_for<T>(mut look: impl FnMut() -> Option<T>) -> Option<T> {
-    let limit = Instant::now() + Duration::from_secs(20);
-    loop {
-        if let Some(found) = look() {
-            return Some(found);
-        }
-        if Instant::now() > limit {
-            return None;
-        }
-    }
+    let received = device.statistic("bus_cycles").expect("it is counted");
+    assert_eq!(told.trim(), format!("plc.py: ok records={received}"));
+    Ok(())
 }

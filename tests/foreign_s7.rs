@@ -8,20 +8,13 @@
 )]
 
 mod foreign;
-#[path = "peers/pcap.rs"]
-mod pcap;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
 use std::process::{Child, ChildStdout, Command, ExitCode, Stdio};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
 
-use foreign::Absent;
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
-use tickbus::signal::Slot;
-use tickbus::time::{Monotonic, Nanos};
+use foreign::machine::Machine;
+use foreign::{Absent, pcap};
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -84,106 +77,23 @@ address = "%ID4"
 type    = "REAL"
 "#;
 
-/// An open driver in real time.
-struct End {
-    driver: Driver,
-    slots: Vec<Slot>,
+fn open(fieldbus: &str) -> Machine {
+    open_with(fieldbus, "")
 }
 
-impl End {
-    fn open(fieldbus: &str) -> Self {
-        Self::open_with(fieldbus, "")
-    }
-
-    /// With further signals.
-    fn open_with(fieldbus: &str, further: &str) -> Self {
-        let text = format!(
-            "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\n{fieldbus}\n{SIGNALS}{further}"
-        );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-        let clock = Monotonic::shared();
-        let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
-        let slots = driver.initial_slots();
-        Self { driver, slots }
-    }
-
-    fn index(&self, name: &str) -> usize {
-        let signals = &self.driver.config().table.signals;
-        let found = signals.iter().position(|signal| signal.name == name);
-        found.unwrap_or_else(|| panic!("no signal {name}"))
-    }
-
-    fn set(&mut self, name: &str, value: f64) {
-        let index = self.index(name);
-        self.slots[index] = Slot::from_real(value);
-    }
-
-    fn get(&self, name: &str) -> f64 {
-        self.slots[self.index(name)].real()
-    }
-
-    fn tick(&mut self) {
-        self.driver.exchange(Nanos::ZERO, &mut self.slots);
-    }
-
-    fn statistic(&self, key: &str) -> Option<String> {
-        let text = self.driver.statistics();
-        let mut lines = text.lines();
-        lines.find_map(|line| line.strip_prefix(&format!("{key}=")).map(str::to_owned))
-    }
-
-    /// Ticks until `done` holds.
-    #[track_caller]
-    fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
-        let limit = Instant::now() + Duration::from_secs(20);
-        loop {
-            self.tick();
-            if done(self) {
-                return;
-            }
-            assert!(
-                Instant::now() < limit,
-                "waited 20 s in vain until {what}\n{}",
-                self.driver.statistics()
-            );
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-
-    /// The port that it listens on.
-    fn port(&mut self) -> u16 {
-        let mut port = 0;
-        self.until("it listens", |end| {
-            let address = end.statistic("address");
-            port = address.map_or(0, |address| {
-                let (_, port) = address.rsplit_once(':').expect("a port");
-                port.parse().expect("a number")
-            });
-            port != 0
-        });
-        port
-    }
+/// With further signals.
+fn open_with(fieldbus: &str, further: &str) -> Machine {
+    Machine::open(&format!(
+        "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\n{fieldbus}\n{SIGNALS}{further}"
+    ))
 }
 
 /// Runs a Python script with these arguments while `end` ticks; returns its output.
 #[track_caller]
-fn run(end: &mut End, mut python: Command, script: &str, arguments: &[String]) -> String {
+fn run(end: &mut Machine, mut python: Command, script: &str, arguments: &[String]) -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/");
-    let mut child = python
-        .arg(format!("{path}{script}"))
-        .args(arguments)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("python starts");
-    end.until("the script ends", |_| {
-        child.try_wait().expect("a child").is_some()
-    });
-    let output = child.wait_with_output().expect("a child");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let (out, errors) = (text(&output.stdout), text(&output.stderr));
-    assert!(output.status.success(), "{script}: {out}\n{errors}");
-    out
+    python.arg(format!("{path}{script}")).args(arguments);
+    end.until_the_end_of(python, Machine::tick)
 }
 
 /// The last values that a client wrote stay after it is gone.
@@ -192,13 +102,15 @@ const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age =
 
 fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
     let python = foreign::python_with("main", &["snap7"])?;
-    let mut end = End::open(SERVER);
+    let mut end = open(SERVER);
     end.set("sensor", 1.0);
     end.set("position", -2.0);
     end.set("pressure", 1.5);
-    let port = end.port().to_string();
+    let pinned = foreign::stated("tests/peers/requirements.txt", "python-snap7==");
+    let address = end.address_for("python-snap7", &format!("python-snap7 {pinned}"));
+    let port = address.port().to_string();
     let told = run(&mut end, python, "snap7_client.py", &[port]);
-    assert!(told.ends_with("snap7_client: ok\n"), "{told}");
+    assert!(told.contains("snap7_client: ok\n"), "{told}");
     end.tick();
     assert_eq!(
         (end.get("run"), end.get("speed"), end.get("setpoint")),
@@ -284,7 +196,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             .as_str();
     }
     let last = &*further;
-    let mut end = End::open_with(&fieldbus(""), last);
+    let mut end = open_with(&fieldbus(""), last);
     end.set("position", 70.0);
     end.until("it reads", |end| end.get("speed") == 1.0);
     assert_eq!(end.statistic("identity").as_deref(), Some(who));
@@ -294,7 +206,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
     assert_eq!(end.get("speed"), 1.0, "nothing was written");
     end.driver.close();
 
-    let mut end = End::open_with(&fieldbus(&format!("write_to = \"{who}\"")), last);
+    let mut end = open_with(&fieldbus(&format!("write_to = \"{who}\"")), last);
     for value in [70.0, 71.0, 72.0] {
         end.set("position", value);
         end.set("last", value + 100.0);
@@ -306,7 +218,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
     end.driver.close();
 
     let gone = fieldbus("").replace("\"DB1\"", "\"DB7\"");
-    let mut end = End::open_with(&gone, last);
+    let mut end = open_with(&gone, last);
     end.until("it is told", |end| {
         let reason = end.driver.link().reason;
         reason.contains("refuses reading DB7 bytes 0 to")
@@ -323,13 +235,16 @@ fn snap7_in_c() -> Result<Command, Absent> {
 
 fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
     let python = snap7_in_c()?;
-    let mut end = End::open(SERVER);
+    let mut end = open(SERVER);
     end.set("sensor", 1.0);
     end.set("position", -2.0);
     end.set("pressure", 1.5);
-    let port = end.port().to_string();
+    let pinned = foreign::stated("tests/peers/requirements-snap7.txt", "python-snap7==");
+    let client = format!("Snap7 in C, of python-snap7 {pinned}");
+    let address = end.address_for("snap7", &client);
+    let port = address.port().to_string();
     let told = run(&mut end, python, "snap7c_client.py", &[port]);
-    assert!(told.ends_with("snap7c_client: ok\n"), "{told}");
+    assert!(told.contains("snap7c_client: ok\n"), "{told}");
     end.tick();
     assert_eq!(
         (end.get("run"), end.get("speed"), end.get("setpoint")),
@@ -348,13 +263,13 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
             cpu.port
         )
     };
-    let mut end = End::open(&fieldbus(""));
-    // The initial content of its data block, plus 1.
+    let mut end = open(&fieldbus(""));
+    // What its data block holds before anybody has written, plus 1.
     end.until("it reads", |end| end.get("speed") == 28_399.0);
     let who = end.statistic("identity").expect("it was met");
     end.driver.close();
 
-    let mut end = End::open(&fieldbus(&format!("write_to = \"{who}\"")));
+    let mut end = open(&fieldbus(&format!("write_to = \"{who}\"")));
     for value in [70.0, 71.0] {
         end.set("position", value);
         end.set("pressure", 1.5);
@@ -376,9 +291,10 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
 }
 
 fn rust7_reads_and_writes_the_server() -> Result<(), Absent> {
-    let mut end = End::open(SERVER);
+    let mut end = open(SERVER);
     end.set("position", 258.0);
-    let port = end.port();
+    let stated = foreign::stated("Cargo.toml", "rust7 = \"");
+    let port = end.address_for("rust7", &format!("rust7 {stated}")).port();
     end.tick();
     let client = std::thread::spawn(move || {
         let mut client = rust7::client::S7Client::new();
@@ -413,12 +329,11 @@ fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
     let python = foreign::python_with("main", &["snap7"])?;
     let tshark = || foreign::command("tshark", "tshark");
     tshark()?;
-    let mut end = End::open(SERVER);
+    let mut end = open(SERVER);
     end.set("sensor", 1.0);
     end.set("position", -2.0);
     end.set("pressure", 1.5);
-    let port = end.port();
-    let tap = pcap::Tap::before((Ipv4Addr::LOCALHOST, port).into());
+    let tap = pcap::Tap::before(end.address());
     run(
         &mut end,
         python,
@@ -429,7 +344,7 @@ fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
         "kind = \"s7-client\"\naddress = \"{}\"\nrole = \"controller\"\nwrite_to = \"tickbus Test rig\"",
         tap.address
     );
-    let mut controller = End::open(&us);
+    let mut controller = open(&us);
     controller.until("our client reads", |controller| {
         end.tick();
         controller.get("position") == -2.0

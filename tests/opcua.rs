@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use conformance::rig::{Bus, Liar};
+use conformance::rig::{Bus, End, Liar, await_that, pass};
 use peers::{leave, own_address};
 use tickbus::time::Manual;
 
@@ -136,7 +136,58 @@ impl Bus for OpcUa {
     }
 }
 
-/// Sends bytes that are not OPC UA, and closes properly.
+/// A display that is only written to has nothing that could grow old but the server that has it.
+#[test]
+fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
+    const STATIONS: &str = "[[station]]\nname = \"drive\"\n[[station]]\nname = \"display\"\n\
+        [[signal]]\nname = \"speed\"\nstation = \"drive\"\naddress = \"%QW0\"\ntype = \"INT\"\n\
+        [[signal]]\nname = \"shown\"\nstation = \"display\"\naddress = \"%IW0\"\ntype = \"INT\"\n";
+    let clock = Manual::new();
+    let bus = OpcUa::new("controller");
+    let open = |role: &str| {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
+             max_age = \"300ms\"\nreconnect = [\"10ms\"]\n{STATIONS}",
+            bus.fieldbus(role)
+        );
+        End::open(&text, &clock)
+    };
+    let (mut device, mut controller) = (open("device"), open("controller"));
+    let stale = |device: &End| {
+        ["drive", "display"]
+            .map(|name| device.statistic(&format!("station.{name}.stale")) == "true")
+    };
+    let mut speed = 0.0;
+    // What comes all the time leaves the server no need to say that it is there.
+    let mut ticks = |device: &mut End| {
+        pass(&clock, 2);
+        speed = (speed + 1.0) % 1000.0;
+        controller.set("speed", speed);
+        controller.tick();
+        device.set("shown", 7.0);
+        device.tick();
+        controller.get("shown") == 7.0 && device.get("speed") > 0.0
+    };
+    await_that("both stations are fresh", || {
+        ticks(&mut device) && stale(&device) == [false, false]
+    });
+    // Longer than nothing may be heard of a server.
+    for _ in 0..1000 {
+        ticks(&mut device);
+    }
+    await_that("both stations are fresh still", || {
+        ticks(&mut device);
+        stale(&device) == [false, false]
+    });
+    controller.driver.close();
+    await_that("both are stale", || {
+        pass(&clock, 1);
+        device.tick();
+        stale(&device) == [true, true]
+    });
+}
+
+/// Says what is no OPC UA, and leaves in good order.
 fn lie(mut stream: TcpStream) {
     // The other end may have closed first.
     let _ = stream.set_nonblocking(false);

@@ -63,6 +63,19 @@ fn report(config: &Config) -> String {
     for request in config.bus.requests(&config.table) {
         line("request", &request);
     }
+    for (written, read) in config.bus.both_ways(&config.table) {
+        let [written, read] = [written, read].map(|index| {
+            let signal = &config.table.signals[index];
+            let place = config.bus.place(signal, &stations[signal.station]);
+            format!("\"{}\" at {place}", signal.name)
+        });
+        line(
+            "note",
+            &format!(
+                "{written} is written where {read} is read: what is read there may be what was just written"
+            ),
+        );
+    }
     line("timing", &timing(&config.timing));
     life_signs(config, &mut line);
     if let Some(record) = &config.record {

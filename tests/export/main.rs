@@ -273,6 +273,53 @@ fn the_tags_for_tia_portal_leave_out_signals_that_lie_elsewhere_in_the_plc() {
     }
 }
 
+/// `OpenPLC` keeps the registers of all its slave devices in one array, each way.
+#[test]
+fn more_registers_than_openplc_has_room_for_are_refused() {
+    let made = |inputs: usize, outputs: usize| {
+        let sizes = [inputs, outputs].map(|registers| 2 * registers);
+        let bus = "kind = \"modbus-server\"\naddress = \"192.168.0.20:502\"\nmax_age = \"1s\"\n";
+        let sections = format!(
+            "input_bytes = {}\noutput_bytes = {}\n[[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\n",
+            sizes[0], sizes[1]
+        );
+        export(&config(bus, &sections), Target::OpenPlc).map(drop)
+    };
+    made(100, 100).expect("there is room");
+    for (inputs, outputs, told) in [
+        (401, 100, "OpenPLC would read 401 registers"),
+        (100, 402, "OpenPLC would write 402 registers"),
+    ] {
+        let why = made(inputs, outputs).expect_err("refused").to_string();
+        assert!(
+            why.contains(told) && why.contains("it has room for 400"),
+            "{why}"
+        );
+    }
+}
+
+#[test]
+fn an_address_that_no_other_computer_reaches_is_noted() {
+    const NOTE: &str = "is reached from the simulation's computer alone";
+    for kind in ["socket", "modbus-server"] {
+        for (host, noted) in [
+            ("127.0.0.1", true),
+            ("localhost", true),
+            ("192.168.0.20", false),
+            ("0.0.0.0", false),
+        ] {
+            let bus = format!("kind = \"{kind}\"\naddress = \"{host}:1502\"");
+            let sections = "[[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\n";
+            let config = config(&bus, sections);
+            for target in [Target::Codesys, Target::TwinCat] {
+                let notes = export(&config, target).expect("sources").notes;
+                let found = notes.iter().any(|note| note.contains(NOTE));
+                assert_eq!(found, noted, "{bus} {notes:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_program_to_host_is_refused_where_it_would_not_compile_or_not_run() {
     let of = |fieldbus: &str, sections: &str| {

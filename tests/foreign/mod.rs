@@ -5,6 +5,12 @@
 //! `make test` installs the programs (`tools/peers`).
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
+pub mod machine;
+#[path = "../peers/pcap.rs"]
+pub mod pcap;
+pub mod recorder;
+pub mod session;
+
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -102,4 +108,14 @@ pub fn command(name: &str, package: &str) -> Result<Command, Absent> {
             "there is no {name} (apt-get install {package})"
         ))),
     }
+}
+
+/// What stands behind `before` in its line of a file of this repository: the version of a program at the other end.
+pub fn stated(file: &str, before: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(file);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|why| panic!("{file}: {why}"));
+    let found = text.lines().find_map(|line| line.split_once(before));
+    let (_, rest) = found.unwrap_or_else(|| panic!("no {before} in {file}"));
+    let end = rest.find(['"', '<']).unwrap_or(rest.len());
+    rest[..end].trim().to_owned()
 }

@@ -134,7 +134,50 @@ fn checksum(header: &[u8]) -> u16 {
     !u16::try_from((folded & 0xFFFF) + (folded >> 16)).expect("folded twice")
 }
 
-/// A proxy between clients and a server at `server` that records their data.
+/// What is heard of a connection between a client and a server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard<'a> {
+    /// One of them says something; it is passed on when the listener has heard it.
+    Said(From, &'a [u8]),
+    /// The client has said all.
+    Left,
+}
+
+/// Stands between clients and a server at `server`, and lets `hear` listen: to which connection, counted from 0, and
+/// what. Gives where clients find it.
+pub fn listen_before(
+    server: SocketAddr,
+    hear: impl Fn(usize, Heard<'_>) + Send + Sync + 'static,
+) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("it is bound");
+    let hear = Arc::new(hear);
+    // It ends with the process: nobody waits for it.
+    std::thread::spawn(move || {
+        for index in 0.. {
+            let Ok((client, _)) = listener.accept() else {
+                break;
+            };
+            let server = TcpStream::connect(server).expect("the server listens");
+            for (from, stream, to) in [
+                (From::Client, &client, &server),
+                (From::Server, &server, &client),
+            ] {
+                let ends = (stream.try_clone(), to.try_clone());
+                let (Ok(stream), Ok(to)) = ends else {
+                    panic!("more descriptors");
+                };
+                stream.set_nodelay(true).expect("a TCP option");
+                to.set_nodelay(true).expect("a TCP option");
+                let hear = Arc::clone(&hear);
+                std::thread::spawn(move || carry(from, stream, to, |heard| hear(index, heard)));
+            }
+        }
+    });
+    address
+}
+
+/// Stands between clients and a server, and takes down what they say.
 #[derive(Debug)]
 pub struct Tap {
     /// The address for clients.
@@ -144,32 +187,15 @@ pub struct Tap {
 
 impl Tap {
     pub fn before(server: SocketAddr) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let address = listener.local_addr().expect("it is bound");
         let conversations = Arc::<Mutex<Vec<Conversation>>>::default();
         let taken = Arc::clone(&conversations);
-        // Not joined: it ends with the process.
-        std::thread::spawn(move || {
-            while let Ok((client, _)) = listener.accept() {
-                let server = TcpStream::connect(server).expect("the server listens");
-                let index = {
-                    let mut all = taken.lock().expect("nobody panics");
-                    all.push(Conversation::default());
-                    all.len() - 1
-                };
-                for (from, stream, to) in [
-                    (From::Client, &client, &server),
-                    (From::Server, &server, &client),
-                ] {
-                    let ends = (stream.try_clone(), to.try_clone());
-                    let (Ok(stream), Ok(to)) = ends else {
-                        panic!("more descriptors");
-                    };
-                    stream.set_nodelay(true).expect("a TCP option");
-                    to.set_nodelay(true).expect("a TCP option");
-                    let taken = Arc::clone(&taken);
-                    std::thread::spawn(move || carry(from, stream, to, index, &taken));
-                }
+        let address = listen_before(server, move |index, heard| {
+            let mut all = taken.lock().expect("nobody panics");
+            if all.len() <= index {
+                all.resize_with(index + 1, Conversation::default);
+            }
+            if let Heard::Said(from, bytes) = heard {
+                all[index].0.push((from, bytes.to_vec()));
             }
         });
         Self {
@@ -184,23 +210,17 @@ impl Tap {
     }
 }
 
-fn carry(
-    from: From,
-    mut stream: TcpStream,
-    mut to: TcpStream,
-    index: usize,
-    taken: &Mutex<Vec<Conversation>>,
-) {
+fn carry(from: From, mut stream: TcpStream, mut to: TcpStream, hear: impl Fn(Heard<'_>)) {
     let mut buffer = [0; 4096];
     while let Ok(count @ 1..) = stream.read(&mut buffer) {
-        let bytes = buffer[..count].to_vec();
-        // Recorded before it is passed on, so that the answer comes after the request.
-        taken.lock().expect("nobody panics")[index]
-            .0
-            .push((from, bytes));
+        // Before it is passed on, so that the answer comes behind the question.
+        hear(Heard::Said(from, &buffer[..count]));
         if to.write_all(&buffer[..count]).is_err() {
             break;
         }
+    }
+    if from == From::Client {
+        hear(Heard::Left);
     }
     let _ = to.shutdown(std::net::Shutdown::Write);
 }

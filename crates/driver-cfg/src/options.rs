@@ -189,8 +189,19 @@ impl Options {
         }
     }
 
-    /// Takes the lines of `[fieldbus.at]`: the addresses of signals in the device. Reports invalid addresses,
-    /// or that the bus has no addresses of its own.
+    /// The signals that `[fieldbus.at]` lets be written where others are read, each with the one that is read, by their
+    /// places in the signal table.
+    pub fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        match self {
+            Self::ModbusClient(options) => options.both_ways(table),
+            Self::S7Client(options) => options.both_ways(table),
+            // Two signals of one node are refused.
+            _ => Vec::new(),
+        }
+    }
+
+    /// Takes the lines of `[fieldbus.at]`: where signals lie in the words of the device. Reports addresses that
+    /// are none, and that the bus has no addresses of its own.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let kind = self.kind();
         if let Self::S7Client(options) = self {

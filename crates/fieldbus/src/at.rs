@@ -1,7 +1,9 @@
 //! The table `[fieldbus.at]`: the address of each signal in the device, in the device's own notation.
 
+use std::ops::Range;
+
 use tickbus_base::toml_text::{Value, did_you_mean, shown};
-use tickbus_image::signal::SignalTable;
+use tickbus_image::signal::{Area, Signal, SignalTable};
 
 /// The longest address, in characters.
 const ADDRESS_LIMIT: usize = 500;
@@ -54,4 +56,34 @@ impl<'a> At<'a> {
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.value.wrong(what, right);
     }
+}
+
+/// The signals of area `writes` that are written where a signal of the other area is read, each with that one, where
+/// `[fieldbus.at]` has placed one of the two. `places` says what a signal lies in, and in which bits of it.
+///
+/// That is no mistake by itself: a handshake that the PLC takes back is written and read. But a simulation that
+/// reads its own value believes that it is the PLC's.
+pub fn both_ways<Object: PartialEq>(
+    table: &SignalTable,
+    writes: Area,
+    is_placed: impl Fn(&Signal) -> bool,
+    places: impl Fn(&Signal) -> Vec<(Object, Range<usize>)>,
+) -> Vec<(usize, usize)> {
+    let signals = table.signals.iter().enumerate();
+    let (written, read): (Vec<_>, Vec<_>) = signals
+        .map(|(index, signal)| (index, signal, is_placed(signal), places(signal)))
+        .partition(|(_, signal, ..)| signal.area == writes);
+    let mut found = Vec::new();
+    for (one, _, is_one_placed, its) in &written {
+        let others = read.iter().filter(|(.., is_placed, theirs)| {
+            (*is_placed || *is_one_placed)
+                && its.iter().any(|(object, bits)| {
+                    theirs.iter().any(|(other, others)| {
+                        object == other && bits.start < others.end && others.start < bits.end
+                    })
+                })
+        });
+        found.extend(others.map(|(other, ..)| (*one, *other)));
+    }
+    found
 }

@@ -19,7 +19,7 @@ pub mod loopback;
 pub mod tcp;
 
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
-pub use at::At;
+pub use at::{At, both_ways};
 pub use bus::{Bus, BusError, CYCLE, Free, Stepped};
 pub use changes::ChangeEvents;
 pub use dead_band::DeadBands;

@@ -2,7 +2,8 @@
 
 use crate::Spot;
 use tickbus_fieldbus::At;
-use tickbus_image::signal::SignalTable;
+use tickbus_fieldbus::both_ways;
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::lie::nobody_writes;
 use super::{ClientOptions, Piece};
@@ -41,7 +42,33 @@ impl ClientOptions {
         }
     }
 
-    /// Reports lines whose signals would be written to bits of another signal.
+    /// The signals that are written where another one is read, each with that one.
+    pub fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        let (writes, _) = self.role.areas();
+        let is_placed = |signal: &Signal| self.at.contains_key(&signal.name);
+        both_ways(table, writes, is_placed, |signal| {
+            let pieces = if let Some(spot) = self.at.get(&signal.name) {
+                Piece::of_spot(signal, *spot).into_iter().collect()
+            } else {
+                let bytes = table.stations[signal.station].bytes(signal.area);
+                let blocks = self.blocks(signal.area, bytes).unwrap_or_default();
+                let parts = blocks.iter();
+                let parts = parts.filter_map(|block| Piece::of_block(signal, block));
+                parts.collect::<Vec<_>>()
+            };
+            let place = |piece: Piece| {
+                let bits = if signal.area == writes {
+                    piece.claim()
+                } else {
+                    piece.wire..piece.wire + piece.bits
+                };
+                ((signal.station, piece.table), bits)
+            };
+            pieces.into_iter().map(place).collect()
+        })
+    }
+
+    /// Reports lines of signals that would be written into bits that are another one's.
     fn check_claims(&self, lines: &[&At<'_>], table: &SignalTable, station: usize) {
         let (writes, _) = self.role.areas();
         let blocks = self.blocks(writes, table.stations[station].bytes(writes));

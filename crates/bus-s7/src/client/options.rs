@@ -8,6 +8,7 @@ use crate::transport::PORT;
 use crate::tsap::{RACK, SLOT};
 use crate::{Start, Tsap, Variable, pdu, read_pdu};
 use tickbus_base::toml_text::{Collector, Table, Value};
+use tickbus_fieldbus::both_ways;
 use tickbus_fieldbus::tcp::{Address, AddressError};
 use tickbus_fieldbus::{At, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
@@ -113,7 +114,22 @@ impl ClientOptions {
         self.report_overlaps(lines, table);
     }
 
-    /// Reports signals that would be written to overlapping places. Overlapping reads are allowed.
+    /// The signals that are written where another one is read, each with that one.
+    pub fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        let (sends, _) = self.role.areas();
+        let is_placed = |signal: &Signal| self.variables.contains_key(&signal.name);
+        both_ways(table, sends, is_placed, |signal| {
+            let variable = self.variable(signal).into_iter();
+            variable
+                .map(|variable| {
+                    let (first, bits) = variable.bits();
+                    (variable.object, first..first + bits)
+                })
+                .collect()
+        })
+    }
+
+    /// Reports signals that would be written over one another. What is read may be read twice.
     fn report_overlaps(&self, lines: &[At<'_>], table: &SignalTable) {
         let (sends, _) = self.role.areas();
         let written = table.signals.iter().enumerate();

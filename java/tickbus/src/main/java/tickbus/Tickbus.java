@@ -407,14 +407,8 @@ public final class Tickbus implements AutoCloseable {
     public InjectedFault inject(String fault) {
         Objects.requireNonNull(fault, "fault");
         int id = whenIdle(() -> injectNative(handle, fault));
-        while (true) {
-            try {
-                return faults().stream().filter(one -> one.id() == id).findFirst().orElseThrow();
-            } catch (FieldbusException e) {
-                // The fault is injected: to throw BUSY now would say that it is not.
-                waitAfter(e);
-            }
-        }
+        // The fault is injected: to throw BUSY now would say that it is not.
+        return untilIdle(this::faults).stream().filter(one -> one.id() == id).findFirst().orElseThrow();
     }
 
     /**
@@ -480,6 +474,7 @@ public final class Tickbus implements AutoCloseable {
         if (events == null) {
             events = new long[EVENTS * EVENT_WORDS];
         }
+        // As untilIdle, which would allocate.
         while (true) {
             try {
                 endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
@@ -572,6 +567,17 @@ public final class Tickbus implements AutoCloseable {
                     throw e;
                 }
                 Thread.onSpinWait();
+            }
+        }
+    }
+
+    /** Makes a call again and again until no other thread is in its way. */
+    static <T> T untilIdle(Supplier<T> call) {
+        while (true) {
+            try {
+                return call.get();
+            } catch (FieldbusException e) {
+                waitAfter(e);
             }
         }
     }

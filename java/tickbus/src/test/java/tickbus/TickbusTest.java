@@ -52,6 +52,29 @@ class TickbusTest {
         }
     }
 
+    /** The times of a recording's rows. */
+    private List<String> times(Path recording) throws IOException {
+        return Files.readAllLines(recording).stream().filter(line -> line.startsWith("#")).toList();
+    }
+
+    @Test
+    void aTickThatWasReceivedAndNotAnsweredIsRecordedWhenTheDriverCloses() throws IOException {
+        List<List<String>> runs = new ArrayList<>();
+        for (boolean answered : new boolean[] {true, false}) {
+            DriverCfg cfg = DriverCfg.mirror(1).fieldbus("[record]\nfile = \"" + answered + ".vcd\"").signal("a", "%QX0.0");
+            try (Tickbus bus = cfg.open(directory)) {
+                assertTrue(bus.exchange(TICK) >= 0);
+                assertTrue(bus.receive(2 * TICK) >= 0);
+                if (answered) {
+                    bus.send();
+                }
+            }
+            runs.add(times(directory.resolve(answered + ".vcd")));
+        }
+        assertEquals(2, runs.get(0).size());
+        assertEquals(runs.get(0), runs.get(1));
+    }
+
     /** A name in Latin-1, on a system that names its files in UTF-8. */
     @Test
     @EnabledOnOs(OS.LINUX)

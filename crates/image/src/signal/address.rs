@@ -287,7 +287,9 @@ fn foreign_area(shown: &str, rest: &str, letter: Option<char>) -> AddressError {
 /// A decimal number without sign; one that does not fit becomes a number beyond every limit.
 fn number(text: &str) -> Option<usize> {
     let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    digits.then(|| text.parse().unwrap_or(usize::MAX / 16))
+    // Sixteen times it, and a few bytes more, still fit.
+    const BEYOND: usize = usize::MAX / 32;
+    digits.then(|| text.parse().map_or(BEYOND, |number: usize| number.min(BEYOND)))
 }
 
 /// The text as messages quote it.
@@ -389,6 +391,18 @@ mod tests {
             "bit 15 in the address \"%QX0.15\" does not exist; bits go from 0 to 7; bit 15 of %QW0 is \
              %QX0.7"
         );
+    }
+
+    #[test]
+    fn numbers_at_the_end_of_what_a_computer_counts_lie_beyond_the_area() {
+        for number in [u64::MAX, u64::MAX - 7, u64::MAX / 8, u64::MAX / 8 + 1] {
+            for text in [format!("%QX{number}.0"), format!("%IL0{number}")] {
+                for addressing in [Addressing::Bytes, Addressing::Elements] {
+                    let told = Address::parse(&text, addressing).unwrap_err().to_string();
+                    assert!(told.contains("lies beyond the 65536 bytes"), "{told}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod link;
 mod modbus;
+mod parts;
 mod socket;
 mod tcpip;
 
@@ -14,7 +15,7 @@ use crate::export::record::{Place, Record, block_prefix};
 use crate::export::{Export, File, head};
 use crate::fieldbus::Options;
 use crate::signal::DataType;
-use link::Link;
+use parts::Link;
 
 /// The editor that a file is for: both read the same XML, but have libraries of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! The editor's own Modbus client, which is set in the device tree (CODESYS), or called (TwinCAT's TF6250).
 
 use super::Editor;
-use super::link::{Link, dialled, loopback_note};
+use super::parts::{Link, dialled, loopback_note};
 use crate::driver::Config;
 use crate::export::st::telegrams::Telegrams;
 use crate::fieldbus::modbus::{Line, ServerOptions};

@@ -634,20 +634,27 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
         let mut request = Vec::new();
         rtu::append(1, &mut request, |pdu| pdu.extend([6, 0, 1, 0, speed]));
         master.write_all(&request).expect("a line");
+        let mut reader = master.try_clone().expect("a handle");
+        let (answered, answers) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut answer = [0; 8];
+            let _ = answered.send(reader.read_exact(&mut answer).map(|()| answer));
+        });
+        // The echo is expected for the duration of the answer on this line, 1.8 s. The test's clock runs no faster than
+        // the system's, so that the pseudo-terminal keeps up with it.
+        let (began, mut passes) = (std::time::Instant::now(), 0_u32);
         let mut answer = [0; 8];
-        std::thread::scope(|scope| {
-            let reading = scope.spawn(|| master.read_exact(&mut answer));
-            // The echo is expected for the duration of the answer on this line, 1.8 s: less time passes here,
-            // however slow the pseudo-terminal is.
-            let mut passes = 0;
-            await_that("it answers", || {
-                if passes < 500 {
-                    passes += 1;
-                    pass(&device.clock, 1);
-                }
-                device.end.tick();
-                reading.is_finished()
-            });
+        await_that("it answers", || {
+            if began.elapsed() >= Duration::from_millis(1) * passes {
+                passes += 1;
+                pass(&device.clock, 1);
+            }
+            device.end.tick();
+            let read = answers.try_recv();
+            read.is_ok_and(|read| {
+                answer = read.expect("the line is open");
+                true
+            })
         });
         assert_eq!(answer[..], request);
         // Everything that it sends is echoed.

@@ -11,16 +11,16 @@
     reason = "a test, which uses a part of the suite's fixtures"
 )]
 
-#[path = "conformance/resources.rs"]
-mod resources;
+#[path = "soak/common.rs"]
+mod common;
 
 use std::io::{Read as _, Write as _};
-use std::net::TcpStream;
+use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use resources::Resources;
+use common::{address, assert_all_explained, count, rest, statistic};
 use socket2::SockRef;
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
@@ -86,20 +86,8 @@ impl Death {
     }
 }
 
-fn statistic(driver: &Driver, key: &str) -> Option<String> {
-    let text = driver.statistics();
-    let found = text
-        .lines()
-        .find_map(|line| line.strip_prefix(&format!("{key}=")));
-    found.map(str::to_owned)
-}
-
-fn count(driver: &Driver, key: &str) -> u64 {
-    statistic(driver, key).map_or(0, |text| text.parse().expect("a count"))
-}
-
-/// One life of a peer: full load for `span`, then its death. Returns the number of answered records.
-fn live(address: &str, span: Duration, death: Death) -> u64 {
+/// One life of a peer: flat out for `span`, then its death. Gives how many records were answered.
+fn live(address: SocketAddr, span: Duration, death: Death) -> u64 {
     let mut stream = TcpStream::connect(address).expect("the device listens");
     stream.set_nodelay(true).expect("a socket option");
     let end = Instant::now() + span;
@@ -132,27 +120,14 @@ fn live(address: &str, span: Duration, death: Death) -> u64 {
     u64::from(answered)
 }
 
-/// What the process holds after the last peer is gone.
-fn rest() -> Resources {
-    Resources::settled(|| std::thread::sleep(Duration::from_millis(2)))
-}
-
 #[test]
 fn a_device_outlives_all_peers() {
-    let seconds = std::env::var("TICKBUS_SOAK_SECONDS").map_or(5, |text| {
-        text.parse().expect("TICKBUS_SOAK_SECONDS is a number")
-    });
-    let end = Instant::now() + Duration::from_secs(seconds);
+    let end = common::end();
     let clock = Monotonic::shared();
     let config = Config::parse("soak.cfg", CONFIG).unwrap_or_else(|why| panic!("{why}"));
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut slots = driver.initial_slots();
-    let address = loop {
-        match statistic(&driver, "address") {
-            Some(address) => break address,
-            None => std::thread::yield_now(),
-        }
-    };
+    let address = address(&driver);
 
     let over = AtomicBool::new(false);
     let (driver, lives, answered, before, after) = std::thread::scope(|scope| {
@@ -167,7 +142,7 @@ fn a_device_outlives_all_peers() {
         let mut lives = [0_u64; DEATHS.len()];
         let (mut answered, mut round) = (0, 0_u64);
         let mut before = None;
-        let mut told = Instant::now();
+        let mut told = common::Told::new();
         while Instant::now() < end {
             round += 1;
             for (death, lives) in DEATHS.into_iter().zip(&mut lives) {
@@ -175,20 +150,14 @@ fn a_device_outlives_all_peers() {
                 if death == Death::Silence && round % 10 != 1 {
                     continue;
                 }
-                answered += live(&address, Duration::from_millis(50), death);
+                answered += live(address, Duration::from_millis(50), death);
                 *lives += 1;
             }
             // The first rounds fill caches that are filled only once.
             if round == 5 {
                 before = Some(rest());
             }
-            if told.elapsed() > Duration::from_secs(30) {
-                told = Instant::now();
-                println!(
-                    "soak: {lives:?} lives, {answered} records, {:?}",
-                    Resources::now()
-                );
-            }
+            told.tell(|| format!("{lives:?} lives, {answered} records"));
         }
         let after = rest();
         over.store(true, Ordering::Relaxed);
@@ -222,15 +191,7 @@ fn a_device_outlives_all_peers() {
             driver.statistics()
         );
     }
-    for unexplained in [
-        "link.failed",
-        "cause.refused",
-        "cause.defect",
-        "cause.hung",
-        "failed",
-    ] {
-        assert_eq!(count(&driver, unexplained), 0, "{unexplained}");
-    }
+    assert_all_explained(&driver);
     assert_eq!(
         count(&driver, "bus_cycles"),
         answered,

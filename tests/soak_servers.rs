@@ -12,8 +12,8 @@
     reason = "a test, which uses a part of the suite's fixtures"
 )]
 
-#[path = "conformance/resources.rs"]
-mod resources;
+#[path = "soak/common.rs"]
+mod common;
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use resources::Resources;
+use common::{address, assert_all_explained, rest};
 use socket2::SockRef;
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
@@ -59,27 +59,7 @@ fn open(fieldbus: &str) -> (Driver, Vec<Slot>) {
     (driver, slots)
 }
 
-fn statistic(driver: &Driver, key: &str) -> Option<String> {
-    let text = driver.statistics();
-    let found = text
-        .lines()
-        .find_map(|line| line.strip_prefix(&format!("{key}=")));
-    found.map(str::to_owned)
-}
-
-/// The address of a server.
-fn address(driver: &Driver) -> SocketAddr {
-    let limit = Instant::now() + Duration::from_secs(20);
-    loop {
-        if let Some(address) = statistic(driver, "address") {
-            return address.parse().expect("an address");
-        }
-        assert!(Instant::now() < limit, "{}", driver.statistics());
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
-
-/// How a raw client ends.
+/// How a client ends that says only bytes.
 #[derive(Clone, Copy, Debug)]
 enum Death {
     Close,
@@ -180,17 +160,9 @@ fn opcua_clients(address: SocketAddr, pki: &std::path::Path) {
     client.close();
 }
 
-/// What the process holds after the last client is gone.
-fn rest() -> Resources {
-    Resources::settled(|| std::thread::sleep(Duration::from_millis(5)))
-}
-
 #[test]
 fn servers_outlive_all_clients() {
-    let seconds = std::env::var("TICKBUS_SOAK_SECONDS").map_or(5, |text| {
-        text.parse().expect("TICKBUS_SOAK_SECONDS is a number")
-    });
-    let end = Instant::now() + Duration::from_secs(seconds);
+    let end = common::end();
     let folder = tempfile::tempdir().expect("a folder");
     let local = "address = \"127.0.0.1:0\"\ncycle = \"2ms\"";
     let mut servers = vec![
@@ -216,7 +188,7 @@ fn servers_outlive_all_clients() {
             }
             servers
         });
-        let (mut round, mut before, mut told) = (0, None, Instant::now());
+        let (mut round, mut before, mut told) = (0, None, common::Told::new());
         while Instant::now() < end || round < 2 * FIRST_ROUNDS {
             round += 1;
             modbus_clients(addresses[0]);
@@ -226,10 +198,7 @@ fn servers_outlive_all_clients() {
             if round == FIRST_ROUNDS {
                 before = Some(rest());
             }
-            if told.elapsed() > Duration::from_secs(30) {
-                told = Instant::now();
-                println!("soak: {round} rounds, {:?}", Resources::now());
-            }
+            told.tell(|| format!("{round} rounds"));
         }
         let after = rest();
         over.store(true, Ordering::Relaxed);
@@ -239,20 +208,7 @@ fn servers_outlive_all_clients() {
     });
     for (driver, _) in servers {
         println!("{}", driver.statistics());
-        for unexplained in [
-            "link.failed",
-            "cause.refused",
-            "cause.defect",
-            "cause.hung",
-            "failed",
-        ] {
-            let count = statistic(&driver, unexplained).unwrap_or_default();
-            assert!(
-                matches!(&*count, "" | "0"),
-                "{unexplained}={count}: {}",
-                driver.statistics()
-            );
-        }
+        assert_all_explained(&driver);
         driver.close();
     }
 }

@@ -3,6 +3,7 @@
 
 mod link;
 mod modbus;
+mod parts;
 mod socket;
 mod tcpip;
 
@@ -12,7 +13,7 @@ use super::{comment, copies, records, remark, taken, temporaries};
 use crate::plcopen::{Kind, Project, Unit, Variable, variable};
 use crate::record::{Place, Record, block_prefix};
 use crate::{Export, File, head};
-use link::Link;
+use parts::Link;
 use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::Options;
 use tickbus_image::signal::DataType;

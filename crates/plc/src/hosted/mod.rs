@@ -314,6 +314,18 @@ impl Drop for PrivateCopy {
 mod tests {
     use super::*;
 
+    #[cfg(unix)]
+    #[test]
+    fn the_copy_of_a_program_is_for_nobody_else() {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let copy = PrivateCopy::new(b"secret", Path::new("plc.so")).expect("a copy");
+        let rights = std::fs::metadata(copy.path())
+            .expect("it is there")
+            .permissions();
+        assert_eq!(rights.mode() & 0o077, 0);
+    }
+
     fn refusal(path: &str, options: &[(&str, &str)]) -> String {
         let options: Vec<_> = options
             .iter()

@@ -1,55 +1,15 @@
 //! How the registers are received and sent, per bus.
 
+use super::parts::{Link, Stream, dialled, loopback_note};
 use super::{Editor, modbus, socket, tcpip};
-use crate::plcopen::{Kind, Variable, variable};
-use crate::st::life::{ALIVE, time};
 use tickbus_base::time::Nanos;
 use tickbus_bus_socket::{Message, TcpRole};
 use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::Options;
-use tickbus_fieldbus::tcp::{Address, Host};
 use tickbus_image::signal::Area;
 
 /// The default cycle of the socket bus.
 const CYCLE: Nanos = Nanos::from_millis(10);
-
-/// Statements, and the variables that they use.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Part {
-    pub(super) locals: Vec<Variable>,
-    pub(super) lines: Vec<String>,
-}
-
-/// How the registers are received and sent.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Link {
-    /// Global variables in addition to those of signals.
-    pub(super) globals: Vec<Variable>,
-    /// Before the inputs are copied.
-    pub(super) before: Part,
-    /// After the outputs are copied.
-    pub(super) after: Part,
-    /// The settings to be made in the editor.
-    pub(super) steps: Vec<String>,
-    /// What the user should know.
-    pub(super) notes: Vec<String>,
-    /// The editor transfers the variables of signals itself: there are no registers to copy.
-    pub(super) is_by_name: bool,
-}
-
-/// The parameters of the texts for records over TCP.
-#[derive(Clone, Debug)]
-pub(super) struct Stream<'a> {
-    /// The list of global variables.
-    pub(super) list: &'a str,
-    /// The simulation's host and port.
-    pub(super) host: String,
-    pub(super) port: u16,
-    /// Size in bytes of a record from the simulation, and of one to it.
-    pub(super) bytes: [usize; 2],
-    pub(super) cycle: Nanos,
-    pub(super) max_age: Nanos,
-}
 
 impl Link {
     pub(super) fn of(config: &Config, editor: Editor, list: &str) -> Self {
@@ -107,84 +67,4 @@ impl Link {
             }
         }
     }
-
-    pub(super) fn of_steps(steps: impl Into<Vec<String>>) -> Self {
-        Self {
-            steps: steps.into(),
-            ..Self::default()
-        }
-    }
-
-    /// The counters and the life sign, for links that can tell what is received and sent.
-    pub(super) fn counters() -> Vec<Variable> {
-        [
-            (ALIVE, "BOOL", "the simulation was heard of lately"),
-            ("Received", "UDINT", "images that came"),
-            ("Sent", "UDINT", "images that went"),
-            (
-                "Errors",
-                "UDINT",
-                "requests that failed, and connections that were lost",
-            ),
-        ]
-        .map(|(name, kind, comment)| Variable {
-            comment: comment.to_owned(),
-            ..variable(name, Kind::Basic(kind))
-        })
-        .into()
-    }
-}
-
-/// The simulation's host as the PLC connects to it; a wildcard address does not tell where it is.
-pub(super) fn dialled(address: &Address) -> String {
-    match &address.host {
-        Host::Ip(ip) if !ip.is_unspecified() => ip.to_string(),
-        Host::Ip(_) => "192.168.0.20".to_owned(),
-        Host::Name(name) => name.clone(),
-    }
-}
-
-/// The note for an address that the PLC can only reach on the simulation's own computer.
-pub(super) fn loopback_note(address: &Address) -> Option<String> {
-    let is_loopback = match &address.host {
-        Host::Ip(ip) => ip.is_loopback(),
-        Host::Name(name) => name.eq_ignore_ascii_case("localhost"),
-    };
-    is_loopback.then(|| {
-        format!(
-            "the address {address} is reached from the simulation's computer alone: a PLC elsewhere needs that computer's own, \
-             in driver.cfg and here"
-        )
-    })
-}
-
-/// The statements that detect that nothing has been received for too long.
-pub(super) fn silence(list: &str, max_age: Nanos) -> [String; 2] {
-    [
-        format!(
-            "Silence(IN := {list}.Simulated AND NOT Is_new, PT := {});",
-            time(max_age)
-        ),
-        format!("{list}.Alive := {list}.Simulated AND {list}.Received > 0 AND NOT Silence.Q;"),
-    ]
-}
-
-/// Converts the bytes of a record to registers, or back.
-pub(super) fn registers(list: &str, count: usize, incoming: bool) -> [String; 3] {
-    let last = count.saturating_sub(1);
-    let body = if incoming {
-        format!(
-            "    {list}.In[Number] := SHL(BYTE_TO_WORD(Incoming[2 * Number]), 8) OR BYTE_TO_WORD(Incoming[2 * Number + 1]);"
-        )
-    } else {
-        format!(
-            "    Outgoing[2 * Number] := WORD_TO_BYTE(SHR({list}.Out[Number], 8)); Outgoing[2 * Number + 1] := \
-             WORD_TO_BYTE({list}.Out[Number] AND WORD#16#00FF);"
-        )
-    };
-    [
-        format!("FOR Number := 0 TO {last} DO"),
-        body,
-        "END_FOR;".to_owned(),
-    ]
 }

@@ -2,7 +2,7 @@
 //! TF6250).
 
 use super::Editor;
-use super::link::{Link, dialled, loopback_note};
+use super::parts::{Link, dialled, loopback_note};
 use crate::st::telegrams::Telegrams;
 use tickbus_bus_modbus::{Line, ServerOptions};
 use tickbus_driver_cfg::Config;

@@ -1,45 +1,25 @@
 //! Records over TCP in TwinCAT, by the library `Tc2_TcpIp` of TF6310.
 
-use super::link::{Link, Part, Stream, registers, silence};
+use super::parts::{Link, Part, Stream, assembly, incoming, outgoing, sending, silence, taken};
 use crate::plcopen::{Kind, variable};
-use crate::st::life::time;
 
 pub(super) fn link(stream: &Stream<'_>) -> Link {
-    let Stream {
-        host,
-        port,
-        bytes: [received, sent],
-        ..
-    } = stream;
-    let mut globals = Link::counters();
-    globals.extend([
+    let globals = [
         variable("Is_connected", Kind::Basic("BOOL")),
         variable("Is_lost", Kind::Basic("BOOL")),
         variable("Socket", Kind::Block("T_HSOCKET")),
-    ]);
-    Link {
+    ];
+    let last = "Each call of TF6310 is answered by a service of Windows or TwinCAT/BSD after some cycles of the task: expect \
+                tens of milliseconds.";
+    Link::of_records(
+        stream,
         globals,
-        before: before(stream),
-        after: after(stream),
-        steps: vec![
-            "Install TF6310 (TCP/IP) with its licence on the target; References > Add library: Tc2_TcpIp.".to_owned(),
-            format!(
-                "In the first program check the address of the simulation's computer, '{host}', port {port}; let its \
-                 firewall pass the port. Records have {received} bytes from the simulation, {sent} bytes to it."
-            ),
-            "Each call of TF6310 is answered by a service of Windows or TwinCAT/BSD after some cycles of the task: expect \
-             tens of milliseconds."
-                .to_owned(),
-        ],
-        notes: Vec::new(),
-        is_by_name: false,
-    }
+        [before(stream), after(stream)],
+        "Install TF6310 (TCP/IP) with its licence on the target; References > Add library: Tc2_TcpIp.",
+        last.to_owned(),
+    )
 }
 
-#[expect(
-    clippy::too_many_lines,
-    reason = "one program of the PLC, from its head to its end"
-)]
 fn before(stream: &Stream<'_>) -> Part {
     let Stream {
         list,
@@ -48,7 +28,6 @@ fn before(stream: &Stream<'_>) -> Part {
         bytes: [bytes, _],
         ..
     } = stream;
-    let count = bytes.div_ceil(2);
     let mut part = Part {
         locals: vec![
             variable("State", Kind::Basic("UINT")),
@@ -101,15 +80,10 @@ fn before(stream: &Stream<'_>) -> Part {
     part.locals.extend([
         variable("Receive", Kind::Block("FB_SocketReceive")),
         variable("Is_receiving", Kind::Basic("BOOL")),
-        variable("Incoming", Kind::Array(2 * count, "BYTE")),
-        variable("Filled", Kind::Basic("UDINT")),
-        variable("Number", Kind::Basic("UINT")),
-        variable("Is_new", Kind::Basic("BOOL")),
-        variable("Silence", Kind::Block("TON")),
     ]);
-    let mut lines = vec![
-        format!("(* A record is complete with {bytes} bytes, however TCP cuts the stream. *)"),
-        "Is_new := FALSE;".to_owned(),
+    part.locals.extend(incoming(stream, "UDINT"));
+    let mut lines = assembly(stream).to_vec();
+    lines.extend([
         "IF Is_receiving THEN".to_owned(),
         "    Receive(bExecute := TRUE);".to_owned(),
         "    IF NOT Receive.bBusy THEN".to_owned(),
@@ -121,14 +95,9 @@ fn before(stream: &Stream<'_>) -> Part {
         "        ELSE".to_owned(),
         "            Filled := Filled + Receive.nRecBytes;".to_owned(),
         "        END_IF;".to_owned(),
-        format!("        IF Filled >= {bytes} THEN"),
-        "            Filled := 0;".to_owned(),
-        "            Is_new := TRUE;".to_owned(),
-    ];
-    lines.extend(registers(list, count, true).map(|line| format!("            {line}")));
+    ]);
+    lines.extend(taken(stream, 8));
     lines.extend([
-        format!("            {list}.Received := {list}.Received + 1;"),
-        "        END_IF;".to_owned(),
         "    END_IF;".to_owned(),
         "END_IF;".to_owned(),
         format!("IF NOT {list}.Is_connected THEN"),
@@ -154,8 +123,6 @@ fn after(stream: &Stream<'_>) -> Part {
     if *bytes == 0 {
         return Part::default();
     }
-    let count = bytes.div_ceil(2);
-    let cycle = time(stream.cycle);
     let mut lines = vec![
         "IF Is_sending THEN".to_owned(),
         "    Send(bExecute := TRUE);".to_owned(),
@@ -170,12 +137,8 @@ fn after(stream: &Stream<'_>) -> Part {
         "        END_IF;".to_owned(),
         "    END_IF;".to_owned(),
         "END_IF;".to_owned(),
-        "(* A record goes out in each cycle; none is made up for. *)".to_owned(),
-        format!("IF {list}.Is_connected AND NOT Is_sending AND TIME() - Sent_at >= {cycle} THEN"),
-        format!("    Sent_at := Sent_at + {cycle};"),
-        format!("    IF TIME() - Sent_at >= {cycle} THEN Sent_at := TIME(); END_IF;"),
     ];
-    lines.extend(registers(list, count, false).map(|line| format!("    {line}")));
+    lines.extend(sending(stream, &format!("{list}.Is_connected")));
     lines.extend([
         format!(
             "    Send(sSrvNetId := '', hSocket := {list}.Socket, cbLen := {bytes}, pSrc := ADR(Outgoing), bExecute := TRUE, tTimeout := T#5S);"
@@ -184,13 +147,7 @@ fn after(stream: &Stream<'_>) -> Part {
         "END_IF;".to_owned(),
     ]);
     Part {
-        locals: vec![
-            variable("Send", Kind::Block("FB_SocketSend")),
-            variable("Outgoing", Kind::Array(2 * count, "BYTE")),
-            variable("Number", Kind::Basic("UINT")),
-            variable("Is_sending", Kind::Basic("BOOL")),
-            variable("Sent_at", Kind::Basic("TIME")),
-        ],
+        locals: outgoing(stream, variable("Send", Kind::Block("FB_SocketSend"))),
         lines,
     }
 }

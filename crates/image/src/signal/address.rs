@@ -289,7 +289,10 @@ fn number(text: &str) -> Option<usize> {
     let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     // Sixteen times it, and a few bytes more, still fit.
     const BEYOND: usize = usize::MAX / 32;
-    digits.then(|| text.parse().map_or(BEYOND, |number: usize| number.min(BEYOND)))
+    digits.then(|| {
+        text.parse()
+            .map_or(BEYOND, |number: usize| number.min(BEYOND))
+    })
 }
 
 /// The text as messages quote it.

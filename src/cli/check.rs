@@ -9,13 +9,9 @@ use std::path::PathBuf;
 
 use super::Outcome;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{short_number, shown};
-use tickbus_bus_plugin as plugin;
-use tickbus_bus_s7 as s7;
-use tickbus_bus_socket as socket;
-use tickbus_bus_socket::{Sending, TcpRole};
+use tickbus_base::toml_text::short_number;
 use tickbus_driver_cfg::Options;
-use tickbus_driver_cfg::{Config, Timing, loopback};
+use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{
     Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width,
@@ -153,113 +149,11 @@ fn role(config: &Config) -> &'static str {
 
 fn bus(options: &Options, role: Role, table: &SignalTable) -> String {
     let mut parts = vec![options.kind().to_owned()];
-    match options {
-        Options::Loopback(options) => parts.extend(loopback(options)),
-        Options::Socket(options) => parts.extend(socket(options)),
-        Options::Plugin(options) => parts.extend(plugin(options)),
-        Options::ModbusServer(options) => parts.extend(options.shown(table)),
-        Options::ModbusClient(options) => parts.extend(options.shown(role, table)),
-        Options::S7Server(options) => parts.extend(s7_server(options)),
-        Options::S7Client(options) => parts.extend(s7_client(options)),
-        Options::OpcuaClient(options) => parts.extend(options.summary()),
-        Options::OpcuaServer(options) => parts.extend(options.summary()),
-    }
+    parts.extend(options.summary(role, table));
     if options.events() {
         parts.push("with events".to_owned());
     }
     parts.join(", ")
-}
-
-fn socket(options: &socket::Options) -> Vec<String> {
-    let address = &options.address;
-    let each: Vec<String> = options.stations.iter().map(ToString::to_string).collect();
-    let mut parts = vec![
-        match options.tcp {
-            TcpRole::Listen if !each.is_empty() => {
-                format!("listens on {}, one station each", each.join(" and "))
-            }
-            TcpRole::Listen => format!("listens on {address}"),
-            TcpRole::Connect => format!("connects to {address}"),
-        },
-        match options.sending {
-            Sending::Cyclic => "sends every cycle".to_owned(),
-            Sending::OnChange => "sends on change".to_owned(),
-            Sending::Reply => "replies to each record".to_owned(),
-        },
-    ];
-    if options.min_interval > Nanos::ZERO {
-        parts.push(format!("at most every {}", options.min_interval));
-    }
-    if let socket::Message::Axis { .. } = options.message {
-        parts.push("one axis in each message".to_owned());
-    }
-    parts
-}
-
-fn s7_server(options: &s7::ServerOptions) -> Vec<String> {
-    let mut parts = vec![format!("listens on {}", options.address)];
-    for block in &options.blocks {
-        let of = match &block.station {
-            Some(station) => format!(" of \"{}\"", shown(station)),
-            None => String::new(),
-        };
-        parts.push(format!(
-            "DB{} is {}{of} from byte {}",
-            block.number, block.area, block.offset
-        ));
-    }
-    parts
-}
-
-fn s7_client(options: &s7::ClientOptions) -> Vec<String> {
-    let mut parts = vec![
-        format!("connects to {}", options.address),
-        format!("TSAP {}", options.called),
-    ];
-    for places in &options.places {
-        for (area, place) in ["%I", "%Q"].iter().zip(places) {
-            parts.extend(place.map(|place| format!("{area} at {place}")));
-        }
-    }
-    parts.push(match &options.write_to {
-        // Always one line; shown completely, because every character matters.
-        Some(identity) => format!("writes into \"{identity}\" alone"),
-        None => "writes nothing".to_owned(),
-    });
-    parts
-}
-
-fn loopback(options: &loopback::Options) -> Vec<String> {
-    let mode = match options.mode {
-        loopback::Mode::Free => "free-running",
-        loopback::Mode::Stepped => "stepped by the simulation",
-    };
-    let mut parts = vec![mode.to_owned()];
-    match &options.peer {
-        loopback::Peer::Link(name) => parts.push(format!("link \"{name}\"")),
-        loopback::Peer::Replay(file) => parts.push(format!("replays \"{}\"", file.display())),
-        loopback::Peer::Program {
-            name,
-            options,
-            scan,
-        } => {
-            parts.push(format!("hosts the PLC program \"{name}\""));
-            parts.push(scan.map_or("scan as compiled".to_owned(), |scan| format!("scan {scan}")));
-            parts.extend(options.iter().map(|(key, value)| format!("{key} {value}")));
-        }
-    }
-    parts
-}
-
-fn plugin(options: &plugin::Options) -> Vec<String> {
-    let mut parts = vec![format!("library {}", options.library.display())];
-    if options.isolated {
-        parts.push("in a helper process".to_owned());
-    }
-    parts.extend(options.timeout.map(|timeout| format!("timeout {timeout}")));
-    let given = options.options.iter();
-    parts.extend(given.map(|(key, value)| format!("{} {}", shown(key), shown(value))));
-    parts
 }
 
 fn timing(timing: &Timing) -> String {

@@ -8,6 +8,7 @@ mod answer;
 mod client;
 mod function;
 mod identification;
+mod kind;
 mod line;
 pub mod mbap;
 mod place;

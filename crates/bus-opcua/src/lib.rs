@@ -12,8 +12,8 @@ mod url;
 mod application;
 #[cfg(feature = "opcua")]
 mod client;
+mod kind;
 #[cfg(feature = "opcua")]
-mod line;
 #[cfg(feature = "opcua")]
 mod pki;
 #[cfg(feature = "opcua")]
@@ -28,7 +28,6 @@ mod values;
 #[cfg(feature = "opcua")]
 pub use client::Client;
 #[cfg(feature = "opcua")]
-pub use line::Line;
 pub use node::{Identifier, Namespace, NodeName, NodeNameError, Pattern};
 pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};

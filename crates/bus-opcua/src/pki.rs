@@ -18,9 +18,9 @@ use opcua::crypto::{CertificateStore, SecurityPolicy, X509, X509Data};
 use opcua::types::{ByteString, DateTime, DateTimeUtc, StatusCode};
 
 use tickbus_base::time::{WallClock, system_time};
-use tickbus_fieldbus::BusError;
+use tickbus_fieldbus::{BusError, BusSetup};
 
-use super::{Credentials, Line, Login, Policy, Secret, Trust, application};
+use super::{Credentials, Login, Policy, Secret, Trust, application};
 
 /// The product name of all programs of this project.
 pub(super) const PRODUCT: &str = "tickbus";
@@ -56,18 +56,18 @@ pub(super) struct Pki {
 
 impl Pki {
     /// The certificates and names of the driver of `line`.
-    pub(super) fn new(credentials: &Credentials, line: Line<'_>) -> Self {
-        let folder = line.directory.join(&credentials.pki);
+    pub(super) fn new(credentials: &Credentials, setup: &BusSetup<'_>) -> Self {
+        let folder = setup.folder.join(&credentials.pki);
         Self {
             folder: std::path::absolute(&folder).unwrap_or(folder),
-            certificate: format!("own/tickbus-{}.der", line.id).into(),
-            key: format!("private/tickbus-{}.pem", line.id).into(),
-            application: format!("{PRODUCT} {}", line.name),
-            uri: application_uri(line.name),
+            certificate: format!("own/tickbus-{}.der", setup.id).into(),
+            key: format!("private/tickbus-{}.pem", setup.id).into(),
+            application: format!("{PRODUCT} {}", setup.name),
+            uri: application_uri(setup.name),
             trust: credentials.trust,
             host: None,
             wall: system_time,
-            directory: line.directory.to_owned(),
+            directory: setup.folder.to_owned(),
             login: credentials.login.clone(),
         }
     }

@@ -13,6 +13,7 @@ mod direct;
 mod helper;
 #[cfg(unix)]
 mod isolated;
+mod kind;
 mod library;
 #[cfg(unix)]
 mod locate;
@@ -32,12 +33,12 @@ pub use answer::Answer;
 pub use helper::serve as serve_host;
 pub use options::Options;
 pub use outcome::Outcome;
-pub use setup::{Line, Setup, Station};
+pub use setup::{Setup, Station};
 #[cfg(unix)]
 pub use wire::{Fields, Inbox, Message, WireError};
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::Free;
+use tickbus_fieldbus::{BusSetup, Free, OpenError};
 
 /// The version that host and helper must share.
 #[cfg(unix)]
@@ -54,24 +55,15 @@ struct Limits {
     close: Nanos,
 }
 
-/// Why there is no such bus.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Refusal {
-    /// The driver.cfg must be changed: what was searched for, and what to do.
-    Config(String),
-    /// This system does not support what the driver.cfg asks for.
-    Unsupported(String),
-}
-
 /// Makes the bus that `options` describe, for `line`.
 ///
 /// # Errors
 ///
 /// The library's file does not exist, or there is no helper for it: what was searched for, and what to do.
-pub fn open(options: &Options, line: Line<'_>) -> Result<Box<dyn Free>, Refusal> {
-    let library = absolute(line.directory, &options.library);
+pub fn open(options: &Options, line: &BusSetup<'_>) -> Result<Box<dyn Free>, OpenError> {
+    let library = absolute(line.folder, &options.library);
     if !library.is_file() {
-        return Err(Refusal::Config(format!(
+        return Err(OpenError::Config(format!(
             "there is no library {}; check `library`, which begins at the folder of the driver.cfg",
             library.display()
         )));
@@ -83,7 +75,7 @@ pub fn open(options: &Options, line: Line<'_>) -> Result<Box<dyn Free>, Refusal>
     };
     let setup = Setup::new(options, library, line);
     if options.isolated {
-        return isolated(options, line.directory, setup, limits);
+        return isolated(options, line.folder, setup, limits);
     }
     Ok(Box::new(direct::Direct::new(setup, limits)))
 }
@@ -94,17 +86,17 @@ fn isolated(
     directory: &Path,
     setup: Setup,
     limits: Limits,
-) -> Result<Box<dyn Free>, Refusal> {
+) -> Result<Box<dyn Free>, OpenError> {
     let named = options.helper.as_ref();
     let named = named.map(|path| absolute(directory, path));
     let program =
-        locate::helper(named, &absolute(directory, Path::new(""))).map_err(Refusal::Config)?;
+        locate::helper(named, &absolute(directory, Path::new(""))).map_err(OpenError::Config)?;
     Ok(Box::new(isolated::Isolated::new(setup, limits, program)))
 }
 
 #[cfg(not(unix))]
-fn isolated(_: &Options, _: &Path, _: Setup, _: Limits) -> Result<Box<dyn Free>, Refusal> {
-    Err(Refusal::Unsupported(
+fn isolated(_: &Options, _: &Path, _: Setup, _: Limits) -> Result<Box<dyn Free>, OpenError> {
+    Err(OpenError::Unsupported(
         "isolated = true is not available on this system; remove it".to_owned(),
     ))
 }

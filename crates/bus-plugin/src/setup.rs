@@ -1,31 +1,14 @@
 //! What a library needs to open its bus.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::Options;
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::{CYCLE, Role};
-use tickbus_image::signal::{Area, SignalTable};
+use tickbus_fieldbus::{BusSetup, CYCLE, Role};
+use tickbus_image::signal::Area;
 
 /// The smallest default time-out of an exchange.
 const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);
-
-/// What a bus needs to know about its driver.
-#[derive(Clone, Copy, Debug)]
-pub struct Line<'a> {
-    /// The driver's name.
-    pub name: &'a str,
-    /// The folder of its driver.cfg.
-    pub directory: &'a Path,
-    /// Which end of the bus it is.
-    pub role: Role,
-    /// Its stations.
-    pub table: &'a SignalTable,
-    /// The bus cycle, if stated.
-    pub cycle: Option<Nanos>,
-    /// Data older than this are stale.
-    pub max_age: Nanos,
-}
 
 /// One station's frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -62,7 +45,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    pub(super) fn new(options: &Options, library: PathBuf, line: Line<'_>) -> Self {
+    pub(super) fn new(options: &Options, library: PathBuf, line: &BusSetup<'_>) -> Self {
         let (tx, rx) = match line.role {
             Role::Device => (Area::Input, Area::Output),
             Role::Controller => (Area::Output, Area::Input),
@@ -81,7 +64,7 @@ impl Setup {
         Self {
             library,
             name: line.name.to_owned(),
-            directory: line.directory.to_string_lossy().into_owned(),
+            directory: line.folder.to_string_lossy().into_owned(),
             role: line.role,
             options: options.options.clone(),
             stations: stations.collect(),

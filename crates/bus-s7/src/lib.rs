@@ -8,6 +8,7 @@ mod client;
 mod conversation;
 mod fault;
 pub mod item;
+mod kind;
 pub mod pdu;
 mod place;
 mod server;

@@ -24,7 +24,7 @@ impl Identity {
     pub fn of_driver(name: &str) -> Self {
         let number = |text: &str| text.parse().unwrap_or(0);
         Self {
-            order: env!("CARGO_PKG_NAME").to_owned(),
+            order: "tickbus".to_owned(),
             firmware: [
                 number(env!("CARGO_PKG_VERSION_MAJOR")),
                 number(env!("CARGO_PKG_VERSION_MINOR")),

@@ -11,6 +11,7 @@ mod connect;
 mod connection;
 mod fault;
 mod frames;
+mod kind;
 mod lines;
 mod listen;
 mod options;

@@ -312,7 +312,7 @@ struct FieldbusTable<'a> {
 
 impl FieldbusTable<'_> {
     fn read_life_signs(&self, table: &SignalTable) -> LifeSigns {
-        let of_bus = self.bus.as_ref().and_then(Options::cycle);
+        let of_bus = self.bus.as_ref().and_then(|bus| bus.cycle());
         let cycle = self.timing.as_ref().and_then(|timing| timing.cycle);
         let mut signs = LifeSigns::default();
         self.life_signs
@@ -366,7 +366,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_
         is_for_both: stated.is_none(),
         own_role: stated.unwrap_or_default(),
         life_signs,
-        timing: spans.read(bus.as_ref().and_then(Options::cycle)),
+        timing: spans.read(bus.as_ref().and_then(|bus| bus.cycle())),
         sizes,
         at,
         bus,

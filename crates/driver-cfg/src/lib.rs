@@ -3,12 +3,12 @@
 //! [`Config`] is what a file says, checked; [`Options`] lists the bus kinds.
 
 mod config;
+mod kinds;
 mod layout;
 pub mod loopback;
-mod options;
 mod overlay;
 mod timing;
 
 pub use config::{Asked, Config};
-pub use options::{KINDS, Options};
+pub use kinds::{BUILT, Exported, Options};
 pub use timing::Timing;

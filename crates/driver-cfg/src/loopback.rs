@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::Role;
+use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
+use tickbus_image::signal::SignalTable;
 use tickbus_plc::{Hosted, INTERVAL};
 use tickbus_programs::{self as programs, PROGRAMS};
 use tickbus_record as record;
@@ -130,6 +132,68 @@ impl Options {
             peer: peer?,
             events: events?,
         })
+    }
+}
+
+impl BusKind for Options {
+    const NAME: &'static str = "loopback";
+
+    fn read(role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(role, table)
+    }
+}
+
+impl BusOptions for Options {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        let mode = match self.mode {
+            Mode::Free => "free-running",
+            Mode::Stepped => "stepped by the simulation",
+        };
+        let mut parts = vec![mode.to_owned()];
+        match &self.peer {
+            Peer::Link(name) => parts.push(format!("link \"{name}\"")),
+            Peer::Replay(file) => parts.push(format!("replays \"{}\"", file.display())),
+            Peer::Program {
+                name,
+                options,
+                scan,
+            } => {
+                parts.push(format!("hosts the PLC program \"{name}\""));
+                parts.push(
+                    scan.map_or("scan as compiled".to_owned(), |scan| format!("scan {scan}")),
+                );
+                parts.extend(options.iter().map(|(key, value)| format!("{key} {value}")));
+            }
+        }
+        parts
+    }
+
+    /// Opens one end of a named link. A hosted program and a replayed recording are the driver's to start.
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        match (&self.peer, self.mode) {
+            (Peer::Link(name), Mode::Free) => {
+                let cycle = setup.cycle.unwrap_or(CYCLE);
+                Ok(Bus::Free(Box::new(FreeLoopback::named(name, cycle))))
+            }
+            (Peer::Link(name), Mode::Stepped) => {
+                Ok(Bus::Stepped(Box::new(SteppedLoopback::named(name))))
+            }
+            _ => Err(OpenError::Unsupported(
+                "nobody hosts the other end of this loopback; open it as a driver".to_owned(),
+            )),
+        }
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn is_in_process(&self) -> bool {
+        true
     }
 }
 

@@ -3,15 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use tickbus_base::time::Clock;
-use tickbus_bus_modbus::{ModbusClient, ModbusServer};
-use tickbus_bus_plugin as plugin;
-use tickbus_bus_s7::{S7Client, S7Server};
-use tickbus_bus_socket::Socket;
+use tickbus_base::time::{Clock, Nanos};
 use tickbus_driver_cfg::Options;
-use tickbus_driver_cfg::loopback::{Mode, Options as LoopbackOptions, Peer};
-use tickbus_fieldbus::loopback::{self, FreeLoopback, SteppedLoopback, private_link};
-use tickbus_fieldbus::{Bus, Free, Role};
+use tickbus_driver_cfg::loopback::{Mode, Peer};
+use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
+use tickbus_fieldbus::{Bus, BusSetup, OpenError, Role};
 use tickbus_image::signal::Area;
 use tickbus_plc as plc;
 
@@ -63,121 +59,54 @@ pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
 ) -> Result<(Bus, Option<Program>), DriverError> {
-    match &config.bus {
-        Options::Loopback(options) => open_loopback(config, options, clock),
-        Options::Socket(options) => {
-            let cycle = config.timing.cycle;
-            let socket = Socket::new(options, &config.table, config.role, cycle, &config.axes);
-            Ok((Bus::Free(Box::new(socket)), None))
-        }
-        Options::S7Server(options) => {
-            let server = S7Server::new(options, &config.table, config.role, &config.name);
-            Ok((Bus::Free(Box::new(server)), None))
-        }
-        Options::S7Client(options) => {
-            let cycle = config.timing.cycle;
-            let client = S7Client::new(options, &config.table, config.role, cycle);
-            Ok((Bus::Free(Box::new(client)), None))
-        }
-        Options::Plugin(options) => Ok((Bus::Free(open_plugin(config, options)?), None)),
-        Options::ModbusServer(options) => {
-            let server = ModbusServer::new(options, &config.table, config.role, &config.name);
-            Ok((Bus::Free(Box::new(server)), None))
-        }
-        Options::ModbusClient(options) => {
-            let cycle = config.timing.cycle;
-            let client = ModbusClient::new(options, &config.table, config.role, cycle);
-            Ok((Bus::Free(Box::new(client)), None))
-        }
-        Options::OpcuaClient(_) | Options::OpcuaServer(_) => {
-            Ok((Bus::Free(open_opcua(config)?), None))
+    if let Options::Loopback(options) = &config.bus {
+        match &options.peer {
+            Peer::Link(_) => {}
+            Peer::Replay(file) => {
+                let (replay, tally) = Replay::open(config, &config.folder().join(file))?;
+                return Ok((Bus::Stepped(Box::new(replay)), Some(Program::Replay(tally))));
+            }
+            Peer::Program {
+                name,
+                options: given,
+                scan,
+            } => return open_hosted(config, options.mode, (name, given, *scan), clock),
         }
     }
-}
-
-fn open_plugin(config: &Config, options: &plugin::Options) -> Result<Box<dyn Free>, DriverError> {
-    let line = plugin::Line {
+    let setup = BusSetup {
         name: &config.name,
-        directory: config.folder(),
+        id: config.id,
+        folder: config.folder(),
         role: config.role,
         table: &config.table,
+        axes: &config.axes,
         cycle: config.timing.cycle,
         max_age: config.timing.max_age,
     };
-    plugin::open(options, line).map_err(|refusal| {
+    let bus = config.bus.open(&setup).map_err(|error| {
         let named = |what| format!("{}: {what}", config.path.display());
-        match refusal {
-            plugin::Refusal::Config(what) => DriverError::Config(named(what)),
-            plugin::Refusal::Unsupported(what) => DriverError::Unsupported(named(what)),
+        match error {
+            OpenError::Config(what) => DriverError::Config(named(what)),
+            OpenError::Unsupported(what) => DriverError::Unsupported(named(what)),
         }
-    })
+    })?;
+    Ok((bus, None))
 }
 
-#[cfg(feature = "opcua")]
-fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
-    use tickbus_bus_opcua as opcua;
-
-    let line = opcua::Line {
-        name: &config.name,
-        id: config.id,
-        directory: config.folder(),
-        role: config.role,
-        table: &config.table,
-        cycle: config.timing.cycle,
-    };
-    let refused = |what| DriverError::Config(format!("{}: {what}", config.path.display()));
-    match &config.bus {
-        Options::OpcuaClient(options) => {
-            let client = opcua::Client::new(options, line).map_err(refused)?;
-            Ok(Box::new(client))
-        }
-        Options::OpcuaServer(options) => Ok(Box::new(opcua::Server::new(options, line))),
-        other => unreachable!("{} is another room's", other.kind()),
-    }
-}
-
-#[cfg(not(feature = "opcua"))]
-fn open_opcua(config: &Config) -> Result<Box<dyn Free>, DriverError> {
-    Err(DriverError::Unsupported(format!(
-        "{}: bus kind \"{}\" is not in this build of tickbus; use the library of a `make dist`, which has it, \
-         or build with `cargo build --release --features opcua`",
-        config.path.display(),
-        config.bus.kind()
-    )))
-}
-
-fn open_loopback(
+/// The loopback with a PLC program at its other end, by its name, options and scan interval.
+fn open_hosted(
     config: &Config,
-    options: &LoopbackOptions,
+    mode: Mode,
+    (name, options, scan): (&str, &[(String, String)], Option<Nanos>),
     clock: &Arc<dyn Clock>,
 ) -> Result<(Bus, Option<Program>), DriverError> {
     let cycle = config.timing.cycle.unwrap_or(loopback::CYCLE);
-    let (name, program_options, scan) = match (&options.peer, options.mode) {
-        (Peer::Link(name), Mode::Free) => {
-            return Ok((Bus::Free(Box::new(FreeLoopback::named(name, cycle))), None));
-        }
-        (Peer::Link(name), Mode::Stepped) => {
-            return Ok((Bus::Stepped(Box::new(SteppedLoopback::named(name))), None));
-        }
-        (Peer::Replay(file), _) => {
-            let (replay, tally) = Replay::open(config, &config.folder().join(file))?;
-            return Ok((Bus::Stepped(Box::new(replay)), Some(Program::Replay(tally))));
-        }
-        (
-            Peer::Program {
-                name,
-                options,
-                scan,
-            },
-            _,
-        ) => (name, options, *scan),
-    };
     let folder = config.path.parent().unwrap_or(Path::new(""));
-    let mut program = tickbus_programs::program_beside(folder, name, program_options)
+    let mut program = tickbus_programs::program_beside(folder, name, options)
         .map_err(|source| program_error(config, source))?;
     check_fit(config, &mut *program, Role::Controller)?;
     let scan = plc::interval(&*program, scan);
-    if options.mode == Mode::Stepped {
+    if mode == Mode::Stepped {
         let (host, tally) = SteppedHost::new(program, config, scan);
         return Ok((Bus::Stepped(Box::new(host)), Some(Program::Stepped(tally))));
     }

@@ -16,12 +16,12 @@ use opcua::types::EndpointDescription;
 use tickbus_base::os::Poller;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{self, no_wait};
-use tickbus_fieldbus::{BusError, Free, Guard, Port, Role};
+use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Guard, Port, Role};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
 use super::pki::Pki;
 use super::reactor::{Driven, Reactor};
-use super::{ClientOptions, Line, NodeName, Policy};
+use super::{ClientOptions, NodeName, Policy};
 use dial::Dial;
 use feed::Rhythm;
 use readings::Readings;
@@ -66,14 +66,14 @@ impl Client {
     /// # Errors
     ///
     /// Node ids and signals do not match.
-    pub fn new(options: &ClientOptions, line: Line<'_>) -> Result<Self, String> {
+    pub fn new(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Self, String> {
         Ok(Self {
             options: options.clone(),
-            pki: Pki::new(&options.credentials, line),
-            fields: fields(options, line)?,
-            table: line.table.clone(),
-            role: line.role,
-            cycle: line.cycle(),
+            pki: Pki::new(&options.credentials, setup),
+            fields: fields(options, setup)?,
+            table: setup.table.clone(),
+            role: setup.role,
+            cycle: setup.cycle.unwrap_or(CYCLE),
             guard: Guard::new(options.write_to.as_deref()),
         })
     }
@@ -216,10 +216,10 @@ impl Free for Client {
 }
 
 /// The node of each signal.
-fn fields(options: &ClientOptions, line: Line<'_>) -> Result<Vec<Field>, String> {
-    let read: Area = line.role.areas().1;
+fn fields(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Vec<Field>, String> {
+    let read: Area = setup.role.areas().1;
     let field = |signal: &Signal| {
-        let node = options.node(signal, &line.table.stations[signal.station]);
+        let node = options.node(signal, &setup.table.stations[signal.station]);
         Ok(Field {
             name: signal.name.clone(),
             data_type: signal.data_type,
@@ -228,5 +228,5 @@ fn fields(options: &ClientOptions, line: Line<'_>) -> Result<Vec<Field>, String>
             node: node.map_err(|error| format!("signal \"{}\": {error}", signal.name))?,
         })
     };
-    line.table.signals.iter().map(field).collect()
+    setup.table.signals.iter().map(field).collect()
 }

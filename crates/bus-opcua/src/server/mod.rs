@@ -19,14 +19,13 @@ use socket2::SockRef;
 use tokio::sync::Notify;
 
 use tickbus_base::time::{Nanos, Pace, Stop};
-use tickbus_fieldbus::Rarely;
-use tickbus_fieldbus::{BusError, Free, Port, Role, tcp};
+use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Port, Rarely, Role, tcp};
 use tickbus_image::signal::SignalTable;
 
 use super::pki::Pki;
 use super::reactor::{Inbox, Reactor};
 use super::rejects::Rejects;
-use super::{Line, Policy, ServerOptions, Trust};
+use super::{Policy, ServerOptions, Trust};
 use image::{Image, Show};
 use manager::{News, Own, Visitor};
 use peers::{Peers, Seen};
@@ -59,16 +58,16 @@ pub struct Server {
 
 impl Server {
     /// The bus that `options` describe, for `line`.
-    pub fn new(options: &ServerOptions, line: Line<'_>) -> Self {
-        let mut pki = Pki::new(&options.credentials, line);
+    pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
+        let mut pki = Pki::new(&options.credentials, setup);
         pki.host.clone_from(&options.host);
         Self {
             options: options.clone(),
             pki,
-            name: line.name.to_owned(),
-            table: Arc::new(line.table.clone()),
-            role: line.role,
-            cycle: line.cycle(),
+            name: setup.name.to_owned(),
+            table: Arc::new(setup.table.clone()),
+            role: setup.role,
+            cycle: setup.cycle.unwrap_or(CYCLE),
         }
     }
 

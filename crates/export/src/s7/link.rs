@@ -7,7 +7,7 @@ use crate::siemens::spelling;
 use tickbus_bus_s7::Variable;
 use tickbus_bus_socket::Message;
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Options;
+use tickbus_driver_cfg::Exported;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{DataType, Width};
 
@@ -68,18 +68,18 @@ impl Body {
 
 /// The body for the bus of the driver.cfg.
 pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
-    let mut body = match &plan.config.bus {
-        Options::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
+    let mut body = match plan.config.bus.exported() {
+        Exported::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
             by_hand("socket with message = \"axis\"", notes)
         }
-        Options::Socket(options) => socket::body(plan, options, notes),
-        Options::ModbusServer(options) => modbus::client(plan, options, notes),
-        Options::ModbusClient(options) => modbus::server(plan, options, notes),
-        Options::S7Server(options) => s7comm::puts_and_gets(plan, options, notes),
-        Options::S7Client(options) => s7comm::nothing(plan, options),
-        Options::OpcuaClient(_) => opcua_server(plan),
-        Options::OpcuaServer(options) => opcua_client(plan, &options.address.to_string()),
-        bus @ (Options::Loopback(_) | Options::Plugin(_)) => by_hand(bus.kind(), notes),
+        Exported::Socket(options) => socket::body(plan, options, notes),
+        Exported::ModbusServer(options) => modbus::client(plan, options, notes),
+        Exported::ModbusClient(options) => modbus::server(plan, options, notes),
+        Exported::S7Server(options) => s7comm::puts_and_gets(plan, options, notes),
+        Exported::S7Client(options) => s7comm::nothing(plan, options),
+        Exported::OpcuaClient(_) => opcua_server(plan),
+        Exported::OpcuaServer(options) => opcua_client(plan, &options.address.to_string()),
+        Exported::Loopback(_) | Exported::ByHand(_) => by_hand(plan.config.bus.kind(), notes),
     };
     watch(plan, &mut body);
     body
@@ -222,16 +222,20 @@ pub(super) fn text(plan: &Plan<'_>, body: &Body) -> String {
 
 /// The settings to be made in the project in addition to the sources.
 pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
-    match &plan.config.bus {
-        Options::Socket(options) => socket::steps(plan, options),
-        Options::S7Server(_) => s7comm::steps_for_puts_and_gets(),
-        Options::S7Client(options) => s7comm::steps_for_nothing(plan, options),
-        Options::OpcuaClient(_) => vec![format!(
+    match plan.config.bus.exported() {
+        Exported::Socket(options) => socket::steps(plan, options),
+        Exported::S7Server(_) => s7comm::steps_for_puts_and_gets(),
+        Exported::S7Client(options) => s7comm::steps_for_nothing(plan, options),
+        Exported::OpcuaClient(_) => vec![format!(
             "In the CPU's properties activate the OPC UA server and its licence. Share \"{}\" and \"{}\": accessible from OPC UA, \
              and the inputs writable. In driver.cfg let node_pattern name their members.",
             plan.outputs.block, plan.inputs.block
         )],
-        _ => Vec::new(),
+        Exported::Loopback(_)
+        | Exported::ModbusServer(_)
+        | Exported::ModbusClient(_)
+        | Exported::OpcuaServer(_)
+        | Exported::ByHand(_) => Vec::new(),
     }
 }
 

@@ -10,15 +10,21 @@ use crate::File;
 use crate::record::Place;
 use crate::siemens::{address, spelling};
 use crate::symbols::comment;
-use tickbus_driver_cfg::Options;
+use tickbus_driver_cfg::Exported;
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 
 /// Whether a signal is at a place from `[fieldbus.at]`, rather than at its address.
 pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
-    match &plan.config.bus {
-        Options::S7Client(options) => options.variables.contains_key(&signal.name),
-        Options::ModbusClient(options) => options.at.contains_key(&signal.name),
-        _ => false,
+    match plan.config.bus.exported() {
+        Exported::S7Client(options) => options.variables.contains_key(&signal.name),
+        Exported::ModbusClient(options) => options.at.contains_key(&signal.name),
+        Exported::Loopback(_)
+        | Exported::Socket(_)
+        | Exported::ModbusServer(_)
+        | Exported::S7Server(_)
+        | Exported::OpcuaClient(_)
+        | Exported::OpcuaServer(_)
+        | Exported::ByHand(_) => false,
     }
 }
 

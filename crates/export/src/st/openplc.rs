@@ -12,7 +12,7 @@ use crate::record::block_prefix;
 use crate::{Export, File};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Options;
+use tickbus_driver_cfg::Exported;
 
 const EDITOR: &str = "OpenPLC, or another editor that compiles with iec2c";
 
@@ -32,26 +32,26 @@ const TASK: &str = "every_scan";
 /// On a bus that `OpenPLC` does not support at this end, or with an image that is too large for it.
 pub(crate) fn export(config: &Config) -> Result<Export, Mistakes> {
     let mut notes = Vec::new();
-    let text = match &config.bus {
-        Options::ModbusServer(options) => polled::text(config, options, &mut notes)?,
-        Options::ModbusClient(options) => served::text(config, options)?,
-        Options::Loopback(_) | Options::Socket(_) => hosted::text(config, &mut notes)?,
-        Options::S7Client(_) => {
+    let text = match config.bus.exported() {
+        Exported::ModbusServer(options) => polled::text(config, options, &mut notes)?,
+        Exported::ModbusClient(options) => served::text(config, options)?,
+        Exported::Loopback(_) | Exported::Socket(_) => hosted::text(config, &mut notes)?,
+        Exported::S7Client(_) => {
             return Err(refusal(
                 config,
                 "OpenPLC's S7 server has words alone, and drops a byte that is written by itself",
             ));
         }
-        Options::S7Server(_) => {
+        Exported::S7Server(_) => {
             return Err(refusal(config, "OpenPLC makes no S7 connections by itself"));
         }
-        Options::OpcuaClient(_) | Options::OpcuaServer(_) => {
+        Exported::OpcuaClient(_) | Exported::OpcuaServer(_) => {
             return Err(refusal(
                 config,
                 "OpenPLC's OPC UA, where a version has it, names variables in a way of its own",
             ));
         }
-        Options::Plugin(_) => {
+        Exported::ByHand(_) => {
             return Err(refusal(
                 config,
                 "OpenPLC does not know the bus of a vendor's library",

@@ -5,7 +5,7 @@ use super::{Editor, modbus, socket, tcpip};
 use tickbus_base::time::Nanos;
 use tickbus_bus_socket::{Message, TcpRole};
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Options;
+use tickbus_driver_cfg::Exported;
 use tickbus_image::signal::Area;
 
 /// The default cycle of the socket bus.
@@ -13,8 +13,8 @@ const CYCLE: Nanos = Nanos::from_millis(10);
 
 impl Link {
     pub(super) fn of(config: &Config, editor: Editor, list: &str) -> Self {
-        match &config.bus {
-            Options::Socket(options)
+        match config.bus.exported() {
+            Exported::Socket(options)
                 if options.tcp == TcpRole::Listen
                     && !matches!(options.message, Message::Axis { .. }) =>
             {
@@ -36,8 +36,8 @@ impl Link {
                 link.notes.extend(loopback_note(&options.address));
                 link
             }
-            Options::ModbusServer(options) => modbus::link(config, options, editor, list),
-            Options::ModbusClient(options) if editor == Editor::Codesys && options.at.is_empty() => Self::of_steps([
+            Exported::ModbusServer(options) => modbus::link(config, options, editor, list),
+            Exported::ModbusClient(options) if editor == Editor::Codesys && options.at.is_empty() => Self::of_steps([
                 format!(
                     "Device tree: Ethernet > ModbusTCP Server Device. Its holding registers are what the simulation writes: map \
                      them to {list}.In. Its input registers are what the simulation reads: map them to {list}.Out."
@@ -46,15 +46,20 @@ impl Link {
                     .to_owned(),
             ]),
             // Copying registers that are never received would overwrite what OPC UA has written.
-            Options::OpcuaClient(_) | Options::OpcuaServer(_) => Self {
+            Exported::OpcuaClient(_) | Exported::OpcuaServer(_) => Self {
                 is_by_name: true,
                 ..Self::of_steps([format!(
                     "OPC UA carries the variables themselves: share {list} with its server (in CODESYS the symbol \
                      configuration, in TwinCAT the attribute OPC.UA.DA). The registers In and Out of other buses are not there."
                 )])
             },
-            bus => {
-                let kind = bus.kind();
+            Exported::Loopback(_)
+            | Exported::Socket(_)
+            | Exported::ModbusClient(_)
+            | Exported::S7Server(_)
+            | Exported::S7Client(_)
+            | Exported::ByHand(_) => {
+                let kind = config.bus.kind();
                 let mut link = Self::of_steps([format!(
                     "What brings {list}.In and takes {list}.Out is to be written by hand: the bus \"{kind}\" of this file has \
                      no block of its own here."

@@ -1,0 +1,108 @@
+//! The kinds `modbus-server` and `modbus-client`, for the list of bus kinds.
+
+use tickbus_axis::Axis;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::{Signal, SignalTable, Station};
+
+use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions};
+
+impl BusKind for ServerOptions {
+    const NAME: &'static str = "modbus-server";
+
+    fn read(role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(role, table)
+    }
+}
+
+impl BusOptions for ServerOptions {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, table: &SignalTable) -> Vec<String> {
+        self.shown(table)
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let server = ModbusServer::new(self, setup.table, setup.role, setup.name);
+        Ok(Bus::Free(Box::new(server)))
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.line.set_address(address, |_| Ok(())))
+    }
+
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        self.stations.read_station(count, false, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, _station: &Station) -> String {
+        self.place(signal)
+    }
+}
+
+impl BusKind for ClientOptions {
+    const NAME: &'static str = "modbus-client";
+
+    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(role, moved, table)
+    }
+}
+
+impl BusOptions for ClientOptions {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
+        self.shown(role, table)
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let client = ModbusClient::new(self, setup.table, setup.role, setup.cycle);
+        Ok(Bus::Free(Box::new(client)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.line.set_address(address, Address::check_dialled))
+    }
+
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        self.stations.read_station(count, true, table);
+    }
+
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, station: &Station) -> String {
+        self.place(signal, station.bytes(signal.area))
+    }
+
+    fn requests(&self, table: &SignalTable) -> Vec<String> {
+        self.shown_requests(table)
+    }
+
+    fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        self.both_ways(table)
+    }
+}

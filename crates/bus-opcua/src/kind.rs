@@ -1,0 +1,97 @@
+//! The kinds `opcua-client` and `opcua-server`, for the list of bus kinds.
+
+use tickbus_axis::Axis;
+use tickbus_base::toml_text::{Collector, Table};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
+use tickbus_image::signal::{Signal, SignalTable, Station};
+
+use super::{ClientOptions, ServerOptions};
+
+impl BusKind for ClientOptions {
+    const NAME: &'static str = "opcua-client";
+
+    fn read(_role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(moved, table)
+    }
+}
+
+impl BusOptions for ClientOptions {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        self.summary()
+    }
+
+    #[cfg(feature = "opcua")]
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let client = super::Client::new(self, setup).map_err(OpenError::Config)?;
+        Ok(Bus::Free(Box::new(client)))
+    }
+
+    #[cfg(not(feature = "opcua"))]
+    fn open(&self, _setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        Err(not_in_this_build(Self::NAME))
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.set_address(address))
+    }
+
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, station: &Station) -> String {
+        self.place(signal, station)
+    }
+}
+
+impl BusKind for ServerOptions {
+    const NAME: &'static str = "opcua-server";
+
+    fn read(_role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(table)
+    }
+}
+
+impl BusOptions for ServerOptions {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        self.summary()
+    }
+
+    #[cfg(feature = "opcua")]
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        Ok(Bus::Free(Box::new(super::Server::new(self, setup))))
+    }
+
+    #[cfg(not(feature = "opcua"))]
+    fn open(&self, _setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        Err(not_in_this_build(Self::NAME))
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.set_address(address))
+    }
+}
+
+#[cfg(not(feature = "opcua"))]
+fn not_in_this_build(kind: &str) -> OpenError {
+    OpenError::Unsupported(format!(
+        "bus kind \"{kind}\" is not in this build of tickbus; use the library of a `make dist`, which has it, or build \
+         with `cargo build --release --features opcua`"
+    ))
+}

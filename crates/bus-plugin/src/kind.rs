@@ -1,0 +1,41 @@
+//! The kind `plugin`, for the list of bus kinds.
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, shown};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::SignalTable;
+
+use super::Options;
+
+impl BusKind for Options {
+    const NAME: &'static str = "plugin";
+
+    fn read(_role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(table)
+    }
+}
+
+impl BusOptions for Options {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        let mut parts = vec![format!("library {}", self.library.display())];
+        if self.isolated {
+            parts.push("in a helper process".to_owned());
+        }
+        parts.extend(self.timeout.map(|timeout| format!("timeout {timeout}")));
+        let given = self.options.iter();
+        parts.extend(given.map(|(key, value)| format!("{} {}", shown(key), shown(value))));
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        super::open(self, setup).map(Bus::Free)
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+}

@@ -1,0 +1,129 @@
+//! The kinds `s7-server` and `s7-client`, for the list of bus kinds.
+
+use tickbus_axis::Axis;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table, shown};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::{Signal, SignalTable, Station};
+
+use super::{ClientOptions, S7Client, S7Server, ServerOptions};
+
+impl BusKind for ServerOptions {
+    const NAME: &'static str = "s7-server";
+
+    fn read(_role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(table)
+    }
+}
+
+impl BusOptions for ServerOptions {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        let mut parts = vec![format!("listens on {}", self.address)];
+        for block in &self.blocks {
+            let of = match &block.station {
+                Some(station) => format!(" of \"{}\"", shown(station)),
+                None => String::new(),
+            };
+            parts.push(format!(
+                "DB{} is {}{of} from byte {}",
+                block.number, block.area, block.offset
+            ));
+        }
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let server = S7Server::new(self, setup.table, setup.role, setup.name);
+        Ok(Bus::Free(Box::new(server)))
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.set_address(address))
+    }
+
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        self.read_station(count, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+}
+
+impl BusKind for ClientOptions {
+    const NAME: &'static str = "s7-client";
+
+    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(role, moved, table)
+    }
+}
+
+impl BusOptions for ClientOptions {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        let mut parts = vec![
+            format!("connects to {}", self.address),
+            format!("TSAP {}", self.called),
+        ];
+        for places in &self.places {
+            for (area, place) in ["%I", "%Q"].iter().zip(places) {
+                parts.extend(place.map(|place| format!("{area} at {place}")));
+            }
+        }
+        parts.push(match &self.write_to {
+            // Always one line; shown completely, because every character matters.
+            Some(identity) => format!("writes into \"{identity}\" alone"),
+            None => "writes nothing".to_owned(),
+        });
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let client = S7Client::new(self, setup.table, setup.role, setup.cycle);
+        Ok(Bus::Free(Box::new(client)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.set_address(address))
+    }
+
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        self.read_station(count, table);
+    }
+
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, _station: &Station) -> String {
+        let variable = self.variable(signal);
+        variable.map_or_else(String::new, |variable| variable.to_string())
+    }
+
+    fn requests(&self, table: &SignalTable) -> Vec<String> {
+        self.shown_requests(table)
+    }
+
+    fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        self.both_ways(table)
+    }
+}

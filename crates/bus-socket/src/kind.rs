@@ -1,0 +1,70 @@
+//! The kind `socket`, for the list of bus kinds.
+
+use tickbus_axis::Axis;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::SignalTable;
+
+use super::{Message, Options, Sending, Socket, TcpRole};
+
+impl BusKind for Options {
+    const NAME: &'static str = "socket";
+
+    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+        Self::read(role, moved, table)
+    }
+}
+
+impl BusOptions for Options {
+    fn events(&self) -> bool {
+        self.events
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        let address = &self.address;
+        let each: Vec<String> = self.stations.iter().map(ToString::to_string).collect();
+        let mut parts = vec![
+            match self.tcp {
+                TcpRole::Listen if !each.is_empty() => {
+                    format!("listens on {}, one station each", each.join(" and "))
+                }
+                TcpRole::Listen => format!("listens on {address}"),
+                TcpRole::Connect => format!("connects to {address}"),
+            },
+            match self.sending {
+                Sending::Cyclic => "sends every cycle".to_owned(),
+                Sending::OnChange => "sends on change".to_owned(),
+                Sending::Reply => "replies to each record".to_owned(),
+            },
+        ];
+        if self.min_interval > Nanos::ZERO {
+            parts.push(format!("at most every {}", self.min_interval));
+        }
+        if let Message::Axis { .. } = self.message {
+            parts.push("one axis in each message".to_owned());
+        }
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let socket = Socket::new(self, setup.table, setup.role, setup.cycle, setup.axes);
+        Ok(Bus::Free(Box::new(socket)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        Some(self.set_address(address))
+    }
+
+    fn read_station(&mut self, _count: usize, table: &mut Table<'_>) {
+        self.read_station(table);
+    }
+
+    fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, axes, collector);
+    }
+}

@@ -1,0 +1,127 @@
+//! A kind of bus, as the list of kinds in `driver-cfg` knows it: the options that a driver.cfg gives it, and all that
+//! others ask of a bus before it runs.
+
+use std::path::Path;
+
+use tickbus_axis::Axis;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table};
+use tickbus_image::signal::{Signal, SignalTable, Station};
+
+use super::{At, Bus, Role};
+
+/// What a bus is told about its driver when it opens.
+#[derive(Clone, Copy, Debug)]
+pub struct BusSetup<'a> {
+    /// The driver's name.
+    pub name: &'a str,
+    /// The driver's id, unique in its folder.
+    pub id: i32,
+    /// The folder of its driver.cfg, to which paths are relative.
+    pub folder: &'a Path,
+    /// Which end of the bus it is.
+    pub role: Role,
+    /// Its stations and signals.
+    pub table: &'a SignalTable,
+    /// Its axes, whose signals are in the table.
+    pub axes: &'a [Axis],
+    /// The bus cycle, if stated.
+    pub cycle: Option<Nanos>,
+    /// Data older than this are stale.
+    pub max_age: Nanos,
+}
+
+/// Why a bus does not open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum OpenError {
+    /// The driver.cfg must be changed: what is wrong, and what to do.
+    Config(String),
+    /// This system, or this build, does not have what the driver.cfg asks for.
+    Unsupported(String),
+}
+
+/// The options of one bus: what is asked of it while a driver.cfg is read, checked, exported and opened.
+///
+/// Methods with a body are for buses that have something to say there.
+pub trait BusOptions {
+    /// Whether every change by the peer is reported as an event, in addition to the image.
+    fn events(&self) -> bool;
+
+    /// What the line is and does, for `tickbus check`: parts of a sentence, to be joined with commas.
+    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String>;
+
+    /// Makes the bus. It connects to nothing yet.
+    ///
+    /// # Errors
+    ///
+    /// The driver.cfg asks for what is not there, or not in this build.
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError>;
+
+    /// The default bus cycle; `None` for a bus whose peer sets the cycle.
+    fn cycle(&self) -> Option<Nanos> {
+        None
+    }
+
+    /// Whether both ends of the bus are in one process.
+    fn is_in_process(&self) -> bool {
+        false
+    }
+
+    /// Replaces the address from the driver.cfg by one from a command line; `None` if the bus has no address.
+    /// An error says what is wrong with the text.
+    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+        let _ = address;
+        None
+    }
+
+    /// Reads the keys that the bus has in the next of `count` `[[station]]` tables.
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        let _ = (count, table);
+    }
+
+    /// Whether signals can have addresses of the device's own, in `[fieldbus.at]`.
+    fn has_addresses(&self) -> bool {
+        false
+    }
+
+    /// Takes the lines of `[fieldbus.at]`, and reports invalid addresses; for buses that [have
+    /// them](Self::has_addresses).
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        let _ = (lines, table);
+    }
+
+    /// Reports what does not fit the driver's stations, signals and axes.
+    fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
+        let _ = (table, axes, collector);
+    }
+
+    /// The place of a signal of `station` in the bus's own notation; empty where it is its address.
+    fn place(&self, signal: &Signal, station: &Station) -> String {
+        let _ = (signal, station);
+        String::new()
+    }
+
+    /// What a polling bus requests in each cycle, one line per request; empty for others.
+    fn requests(&self, table: &SignalTable) -> Vec<String> {
+        let _ = table;
+        Vec::new()
+    }
+
+    /// The signals that are written where another one is read, each with that one, by their positions in the table.
+    fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
+        let _ = table;
+        Vec::new()
+    }
+}
+
+/// A kind of bus that a driver.cfg can name.
+pub trait BusKind: BusOptions + Sized {
+    /// Its name, as in `kind = "modbus-server"`.
+    const NAME: &'static str;
+
+    /// Reads its keys in `[fieldbus]`, for the end with `role`, and reports their mistakes. `moved` says that
+    /// [another address](BusOptions::set_address) will follow.
+    ///
+    /// The table is finished: keys that are left in it are unknown.
+    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self>;
+}

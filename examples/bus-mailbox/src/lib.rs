@@ -1,0 +1,118 @@
+//! An example of a bus: `kind = "mailbox"` carries the image in two files of a folder, one for each end.
+//!
+//! It shows what a bus needs, and how little: a [frame](frame), free of I/O; the [options](Options) that a driver.cfg
+//! gives it; and the thread that carries frames between the port and the line. `CONTRIBUTING.md` tells how a bus is
+//! added; this one is added with the feature `example-bus` of `tickbus-driver-cfg`, which its tests switch on.
+
+mod frame;
+mod options;
+
+use std::path::PathBuf;
+use std::{fs, io};
+
+use tickbus_base::time::{Nanos, Pace, Stop};
+use tickbus_fieldbus::{BusError, Free, Port, Role};
+
+pub use frame::{Frame, NoFrame};
+pub use options::Options;
+
+/// The bus: one end of the pair of files.
+#[derive(Debug)]
+pub struct Mailbox {
+    own: PathBuf,
+    peers: PathBuf,
+    cycle: Nanos,
+}
+
+impl Mailbox {
+    fn new(folder: PathBuf, role: Role, cycle: Nanos) -> Self {
+        let (writes, reads) = match role {
+            Role::Device => ("inputs", "outputs"),
+            Role::Controller => ("outputs", "inputs"),
+        };
+        Self {
+            own: folder.join(writes),
+            peers: folder.join(reads),
+            cycle,
+        }
+    }
+
+    /// Replaces the own file at once, so that the peer never reads half of one.
+    fn write(&self, frame: &Frame) -> Result<(), BusError> {
+        let beside = self.own.with_extension("new");
+        fs::write(&beside, frame.bytes())
+            .and_then(|()| fs::rename(&beside, &self.own))
+            .map_err(|error| failed("write", &self.own, &error))
+    }
+
+    fn read(&self) -> Result<Option<Vec<u8>>, BusError> {
+        match fs::read(&self.peers) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(failed("read", &self.peers, &error)),
+        }
+    }
+
+    fn serve(&self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        port.opening("waiting for the peer's file");
+        let sizes: Vec<(usize, usize)> = (0..port.stations()).map(|n| port.sizes(n)).collect();
+        let receives = sizes.iter().map(|(_, rx)| rx).sum();
+        let mut own = Frame::default();
+        let mut pace = Pace::new(port.clock().now(), self.cycle);
+        while !stop.is_stopped() {
+            let now = port.clock().now();
+            if !pace.take(now) {
+                port.observe(now);
+            } else if !port.is_down(now) {
+                if let Some(bytes) = self.read()? {
+                    let peers = Frame::parse(&bytes, receives)
+                        .map_err(|error| BusError::Protocol(error.to_string()))?;
+                    take(port, now, &peers, &mut own, &sizes);
+                }
+                if own.confirmed && port.sends(now) {
+                    own.image.clear();
+                    for station in 0..sizes.len() {
+                        own.image.extend_from_slice(port.outgoing(station, now));
+                    }
+                    own.sequence += 1;
+                    own.confirmed = false;
+                }
+                self.write(&own)?;
+            }
+            port.clock().wait_until(pace.due().min(port.due()), stop);
+        }
+        Ok(())
+    }
+}
+
+/// Takes over the peer's frame, if it is another one than the last, and what it says of ours.
+fn take(port: &mut Port, now: Nanos, peers: &Frame, own: &mut Frame, sizes: &[(usize, usize)]) {
+    if peers.seen == own.sequence && !own.confirmed {
+        own.confirmed = true;
+        (0..sizes.len()).for_each(|station| port.sent(station));
+    }
+    if peers.sequence == own.seen || peers.image.is_empty() {
+        return;
+    }
+    own.seen = peers.sequence;
+    port.running("the peer writes its file");
+    let mut rest = &peers.image[..];
+    for (station, (_, rx)) in sizes.iter().enumerate() {
+        let (bytes, behind) = rest.split_at(*rx);
+        port.received(station, now, bytes);
+        rest = behind;
+    }
+}
+
+impl Free for Mailbox {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let ended = self.serve(port, stop);
+        // A file that is left behind would look like a peer that stands still.
+        let _ = fs::remove_file(&self.own);
+        ended
+    }
+}
+
+fn failed(what: &str, file: &std::path::Path, error: &io::Error) -> BusError {
+    BusError::Link(format!("could not {what} {}: {error}", file.display()))
+}

@@ -1,0 +1,58 @@
+//! What a driver.cfg says to the bus, and its place in the list of kinds.
+
+use std::path::PathBuf;
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::Table;
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::SignalTable;
+
+use super::Mailbox;
+
+/// The longest path of a folder, in characters.
+const PATH_LIMIT: usize = 1000;
+
+/// The keys of `[fieldbus]` that are the bus's own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// The folder with the two files, which begins at that of the driver.cfg.
+    pub folder: PathBuf,
+}
+
+impl BusKind for Options {
+    const NAME: &'static str = "mailbox";
+
+    fn read(_role: Role, _moved: bool, mut table: Table<'_>) -> Option<Self> {
+        let hint = "name the folder of the two files, such as folder = \"mailbox\"";
+        let folder = table.require("folder", hint);
+        table.finish();
+        let folder = folder?.label(PATH_LIMIT, hint)?.into();
+        Some(Self { folder })
+    }
+}
+
+impl BusOptions for Options {
+    fn events(&self) -> bool {
+        false
+    }
+
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        vec![format!("files in {}", self.folder.display())]
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let folder = setup.folder.join(&self.folder);
+        if !folder.is_dir() {
+            return Err(OpenError::Config(format!(
+                "there is no folder {}; make it, or name another one in `folder`",
+                folder.display()
+            )));
+        }
+        let mailbox = Mailbox::new(folder, setup.role, setup.cycle.unwrap_or(CYCLE));
+        Ok(Bus::Free(Box::new(mailbox)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+}

@@ -1,4 +1,4 @@
-//! The project's only room that calls the operating system directly, behind safe functions; one file per
+//! Thin, safe wrappers around the operating system; one file per topic.
 //! topic.
 
 mod library;

@@ -1,5 +1,4 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
-//! topic.
 
 mod library;
 mod log;

@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What the scripts of this folder share; they source it.
+# Shared by the scripts in this folder, which source it.
 
 set -euo pipefail
 
@@ -16,8 +16,7 @@ have() {
     command -v "$1" >/dev/null 2>&1
 }
 
-# Whether packages of the system may be installed: on Debian or Ubuntu, as root or with a sudo that asks for no
-# password.
+# Whether system packages can be installed: on Debian or Ubuntu, as root or with a sudo that asks for no password.
 can_install() {
     have apt-get && { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; }
 }
@@ -26,12 +25,12 @@ as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
-# at_least 1.88 1.95.0: whether the second version is no older than the first.
+# at_least 1.88 1.95.0: whether the second version is at least the first.
 at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
-# The project's version, as Cargo.toml has it.
+# The project's version, from Cargo.toml.
 version() {
     sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1
 }
@@ -74,8 +73,8 @@ tickbus_command() {
 STRIPPED=target/stripped
 DEBUG_TABLES=target/debug-tables
 
-# without_debug_tables FILE COPY: a copy without debug tables, which are half of it and more; where the system has the
-# tools, the tables go to a file of their own, under the copy's name with .debug, and debuggers find them by that.
+# without_debug_tables FILE COPY: a copy without debug tables, which take up more than half of it. If the tools are
+# installed, the tables go to a separate file, named after the copy with .debug, where debuggers find them.
 without_debug_tables() {
     mkdir -p "$(dirname "$2")" "$DEBUG_TABLES"
     local tables
@@ -90,8 +89,7 @@ without_debug_tables() {
     fi
 }
 
-# Whether there is an iec2c: the one that IEC2C names, that is on the PATH, or that lies in shared/peers beside the
-# checkout. IEC2C names it from there on.
+# Whether there is an iec2c: named by IEC2C, on the PATH, or in shared/peers beside the checkout. Sets IEC2C to it.
 has_iec2c() {
     if [ -z "${IEC2C:-}" ] && ! have iec2c && [ -x "$ROOT/../shared/peers/iec2c/iec2c" ]; then
         IEC2C=$ROOT/../shared/peers/iec2c/iec2c
@@ -100,12 +98,12 @@ has_iec2c() {
     have "$IEC2C"
 }
 
-# Maven, without its chatter and its colours, on the Java reactor.
+# Runs Maven on the Java reactor, quietly and without colours.
 maven() {
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
 }
 
-# Lays out in a folder what a user gets: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
+# Lays out the distribution in a folder: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
 # command) and simulator/ (the simulator, the control tables, and in peeler/ the driver.cfg of the
 # peeling line). Needs what tools/build makes.
 assemble() {
@@ -114,7 +112,7 @@ assemble() {
     rm -rf "$folder/DeviceDriver" "$folder/simulator"
     mkdir -p "$folder/DeviceDriver" "$folder/simulator/peeler"
     cp plc/peeler/*.cfg "$folder/simulator/peeler/"
-    # The command is there for plug-ins in helper processes.
+    # The command is needed for plug-ins in helper processes.
     cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$STRIPPED/$(tickbus_command)" \
         "$folder/DeviceDriver/"
     cp java/simulator/rig.table java/simulator/peeler.table "java/simulator/target/simulator-$release.jar" \

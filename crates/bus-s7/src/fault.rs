@@ -38,7 +38,7 @@ pub enum Fault {
     /// Another protocol within ISO on TCP.
     #[error("a message of it begins with 0x{0:02X}, where S7 has 0x32")]
     NoS7(u8),
-    /// S7CommPlus, the newer protocol of the same maker.
+    /// `S7CommPlus`, the newer protocol of the same maker.
     #[error(
         "it speaks S7CommPlus, the protocol of TIA Portal and of symbolic access; here is PUT and GET \
          (S7 communication) with absolute addresses"

@@ -12,7 +12,7 @@ pub const LEAST: u16 = 240;
 pub const SHORTEST: u16 = 64;
 
 const PROTOCOL: u8 = 0x32;
-/// S7CommPlus, the protocol of TIA Portal and newer panels.
+/// `S7CommPlus`, the protocol of TIA Portal and newer panels.
 const PLUS: u8 = 0x72;
 
 /// Bytes of the header of a job.

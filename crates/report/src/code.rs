@@ -22,7 +22,7 @@ pub(super) enum Coding {
     /// A varint with the number of distinct values; these values, ascending, as f64; then for each change the
     /// index of its value, as the zigzag varint of the difference from the previous index, starting from 0.
     Table,
-    /// Each change as f32, XORed with the previous one; all low bytes first, the high bytes last.
+    /// Each change as f32, combined with the previous one by exclusive or; all low bytes first, the high bytes last.
     Single,
     /// As `Single`, with f64.
     Double,

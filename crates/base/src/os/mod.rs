@@ -1,5 +1,4 @@
-//! The project's only room that calls the operating system directly, behind safe functions; one file per
-//! topic.
+//! Thin, safe wrappers around the operating system; one file per topic.
 
 mod library;
 mod log;

@@ -1,11 +1,11 @@
 package tickbus;
 
 /**
- * Turns doubles into the 64-bit integers that some slots hold, and counts those that did not fit, as the native library
- * does for all other types.
+ * Converts doubles to the 64-bit integers that some slots hold, and counts those that did not fit, as the native
+ * library does for all other types.
  */
 final class Conversions {
-    // Written by the ticking thread alone, read by whoever asks for statistics.
+    // Only written by the ticking thread; read by any thread that asks for statistics.
     private volatile long saturated;
     private volatile long notANumber;
 

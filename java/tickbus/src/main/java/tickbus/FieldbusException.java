@@ -1,7 +1,7 @@
 package tickbus;
 
 /**
- * The one exception of tickbus: a status code, and a message that says what happened and what to do.
+ * The only exception of tickbus: a status code, and a message that says what happened and what to do.
  */
 public final class FieldbusException extends RuntimeException {
     private static final long serialVersionUID = 1L;
@@ -20,7 +20,7 @@ public final class FieldbusException extends RuntimeException {
         this.code = code;
     }
 
-    /** With what happened, and the remedy of the status table. */
+    /** For what happened, with the remedy of the status table. */
     FieldbusException(Status status, String what) {
         this(status.code(), status + " (" + status.code() + "): " + what + "\n  " + status.remedy());
     }

@@ -1,7 +1,7 @@
 package tickbus;
 
 /**
- * A fault that was injected into a driver: a signal that is stuck, a cable that is pulled. It came from a
+ * A fault injected into a driver, such as a stuck signal or a broken line. It comes from a
  * {@code [[fault]]} section of driver.cfg or from {@link Tickbus#inject}.
  *
  * <pre>{@code
@@ -14,14 +14,14 @@ package tickbus;
  * stuck.end();
  * }</pre>
  *
- * <p>It can be used by any thread, as {@link Tickbus#statistics} can.
+ * <p>It can be used by any thread, like {@link Tickbus#statistics}.
  */
 public final class InjectedFault implements AutoCloseable {
-    /** Where a fault stands in its life. */
+    /** The state of a fault. */
     public enum State {
         /** It has not begun, or may begin again. */
         WAITING,
-        /** It does its harm. */
+        /** It has its effect. */
         ACTIVE,
         /** It is over for good. */
         OVER
@@ -44,7 +44,7 @@ public final class InjectedFault implements AutoCloseable {
     /**
      * Its number.
      *
-     * @return counts from 1, in the order of injection
+     * @return numbers from 1, in order of injection
      */
     public int id() {
         return id;
@@ -53,7 +53,7 @@ public final class InjectedFault implements AutoCloseable {
     /**
      * Its name.
      *
-     * @return as its section says, or made from what it does
+     * @return as in its section, or derived from what it does
      */
     public String name() {
         return name;
@@ -62,14 +62,14 @@ public final class InjectedFault implements AutoCloseable {
     /**
      * Its kind.
      *
-     * @return as its section says, such as {@code link-down}
+     * @return as in its section, such as {@code link-down}
      */
     public String kind() {
         return kind;
     }
 
     /**
-     * Where it stands.
+     * Its state.
      *
      * @return as of the last exchange
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
@@ -79,7 +79,7 @@ public final class InjectedFault implements AutoCloseable {
     }
 
     /**
-     * Whether it does its harm.
+     * Whether it has its effect.
      *
      * @return as of the last exchange
      * @throws FieldbusException as {@link #state}
@@ -99,8 +99,7 @@ public final class InjectedFault implements AutoCloseable {
     }
 
     /**
-     * Ends it at the next exchange, which has the true values again. A fault that is over, or has not begun, is
-     * over then.
+     * Ends it at the next exchange, which has the true values again. A fault that has not begun yet never will.
      *
      * @throws FieldbusException as {@link #state}
      */
@@ -108,7 +107,7 @@ public final class InjectedFault implements AutoCloseable {
         bus.endFault(id);
     }
 
-    /** The same as {@link #end}, for a fault that lasts as long as a block; nothing if the driver is closed. */
+    /** The same as {@link #end}, for try-with-resources; does nothing if the driver is closed. */
     @Override
     public void close() {
         try {

@@ -7,7 +7,7 @@ enum IntegerKind {
     /** LWORD and ULINT. */
     UNSIGNED;
 
-    /** From here on every double is a whole number. */
+    /** From here on every double is an integer. */
     private static final double ALL_WHOLE = 0x1p52;
 
     /** The number in the slot, rounded to the nearest double. */
@@ -15,11 +15,11 @@ enum IntegerKind {
         if (this == SIGNED || slot >= 0) {
             return slot;
         }
-        // Halved to fit, with the lost bit kept so that the rounding comes out as if it had not been.
+        // Halved to fit; the lost bit is kept, so that rounding gives the right result.
         return (slot >>> 1 | slot & 1) * 2.0;
     }
 
-    /** Whether the number that the value is rounded to, halves away from zero, fits. */
+    /** Whether the value, rounded with halves away from zero, fits. */
     boolean holds(double value) {
         return this == SIGNED ? value >= -0x1p63 && value < 0x1p63 : value > -0.5 && value < 0x1p64;
     }

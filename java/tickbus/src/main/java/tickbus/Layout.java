@@ -8,14 +8,14 @@ import java.util.ArrayList;
 import java.util.List;
 
 /**
- * The shared buffer, and the driver's own description of it: filled by the native library, once, while a
- * driver is being opened. The native library calls the methods by name.
+ * The shared buffer, and the driver's description of it: filled once by the native library while a driver is being
+ * opened. The native library calls the methods by name.
  *
- * <p>The buffer is a header of 8-byte words in native byte order, then the slots: one per signal, then one
- * for the edges of each latched signal that the simulation reads.
+ * <p>The buffer is a header of 8-byte words in native byte order, followed by the slots: one per signal, then one for
+ * the edges of each latched signal that the simulation reads.
  */
 final class Layout {
-    /** Version of the buffer's layout that this class knows. */
+    /** The version of the buffer's layout that this class implements. */
     static final long VERSION = 1;
     static final int WORD_VERSION = 0;
     static final int WORD_SEQUENCE = 2;
@@ -62,12 +62,12 @@ final class Layout {
         return words;
     }
 
-    /** The slots as the bits that they are. */
+    /** The slots as raw bits. */
     LongBuffer slots() {
         return words.slice(SLOTS, slotCount());
     }
 
-    /** The same slots as doubles, which they are but for unscaled 64-bit integers. */
+    /** The slots as doubles, which all of them are except unscaled 64-bit integers. */
     DoubleBuffer doubles() {
         return doubles.slice(SLOTS, slotCount());
     }
@@ -88,7 +88,7 @@ final class Layout {
         return signals;
     }
 
-    /** Says what is wrong if the native library is of another version than these classes. */
+    /** Throws if the native library is of another version than these classes. */
     void check() {
         long version = words.get(WORD_VERSION);
         if (version != VERSION) {

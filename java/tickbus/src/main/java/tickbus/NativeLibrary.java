@@ -14,8 +14,8 @@ import java.util.Locale;
 /**
  * Finds and loads the native library, once per class loader.
  *
- * <p>It looks, in this order, at the file that the system property {@code tickbus.library} names (and then
- * nowhere else); in the directory that {@code tickbus.native.dir} names; beside the jar; inside the jar.
+ * <p>It looks for the file named by the system property {@code tickbus.library} (and then nowhere else); in the
+ * directory named by {@code tickbus.native.dir}; beside the jar; inside the jar; in this order.
  */
 final class NativeLibrary {
     static final String LIBRARY = "tickbus.library";
@@ -31,7 +31,7 @@ final class NativeLibrary {
     private NativeLibrary() {
     }
 
-    /** Loads the library unless it is loaded; a failure can be tried again. */
+    /** Loads the library unless it is loaded; after a failure it may be tried again. */
     static synchronized void load() {
         if (!loaded) {
             new NativeLibrary().search();
@@ -39,7 +39,7 @@ final class NativeLibrary {
         }
     }
 
-    /** Names of operating system and processor as the jar's folders have them, such as linux-x86_64. */
+    /** Operating system and processor as named by the jar's folders, such as linux-x86_64. */
     static String platform(String osName, String osArch) {
         String os = osName.toLowerCase(Locale.ROOT);
         String system = os.startsWith("windows") ? "windows" : os.startsWith("mac") ? "macos" : os.replace(' ', '-');
@@ -83,7 +83,7 @@ final class NativeLibrary {
             Path directory = Files.isDirectory(classes) ? classes : classes.getParent();
             return fromFile(place, directory.resolve(file).toString());
         } catch (URISyntaxException | RuntimeException e) {
-            // A class loader may give its classes no place, or none that is a file.
+            // A class loader may give its classes no location, or one that is not a file.
             tried.add(place + ": the classes do not come from a file (" + e + ")");
             return false;
         }
@@ -143,8 +143,8 @@ final class NativeLibrary {
         Path copy = Files.createTempFile("tickbus-", "-" + file);
         // Where a loaded library cannot be deleted (Windows), the file stays until the JVM ends, or longer.
         copy.toFile().deleteOnExit();
-        // Into the file that is there, which nobody else may write: a copy that replaces it would have the rights of the
-        // umask.
+        // Into the existing file, which only this user can write: a file that replaces it would have the umask's
+        // permissions.
         try (OutputStream into = Files.newOutputStream(copy)) {
             content.transferTo(into);
         }
@@ -163,7 +163,7 @@ final class NativeLibrary {
         try {
             Files.deleteIfExists(copy);
         } catch (IOException e) {
-            // In use; deleteOnExit has it.
+            // In use; deleteOnExit takes care of it.
             return;
         }
     }

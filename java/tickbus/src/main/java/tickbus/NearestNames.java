@@ -5,14 +5,14 @@ import java.util.List;
 import java.util.Locale;
 import java.util.stream.Collectors;
 
-/** Finds what somebody may have meant by a name that is not there. */
+/** Finds existing names that may have been meant by an unknown one. */
 final class NearestNames {
     private static final int SHOWN = 3;
 
     private NearestNames() {
     }
 
-    /** Text for a message: the names that are spelt most alike, or nothing if none is. */
+    /** Text for a message: the most similar names, or nothing if there are none. */
     static String hint(String wrong, List<String> names) {
         int tolerated = Math.max(2, wrong.length() / 3);
         List<String> near = names.stream()
@@ -26,7 +26,7 @@ final class NearestNames {
         return near.stream().map(name -> "'" + name + "'").collect(Collectors.joining(", ", "; did you mean ", "?"));
     }
 
-    /** Insertions, deletions and replacements of letters that lead from one to the other, case aside. */
+    /** The number of insertions, deletions and replacements that turn one into the other, ignoring case. */
     static int distance(String one, String other) {
         String a = one.toLowerCase(Locale.ROOT);
         String b = other.toLowerCase(Locale.ROOT);

@@ -5,14 +5,14 @@ import java.nio.LongBuffer;
 /**
  * A handle on one signal of an open driver.
  *
- * <p>Get it once by {@link Tickbus#signal(String)} and keep it; getters and setters neither allocate nor
- * look anything up. They work on the memory shared with the driver: what is set goes to the PLC with the
- * next {@link Tickbus#send()} or {@link Tickbus#exchange()}, what is got came with the last {@link Tickbus#receive()} or
- * {@code exchange()}. They belong to the thread that ticks
- * the driver, and throw {@link FieldbusException} with {@link Status#CLOSED} once it is closed.
+ * <p>Get it once by {@link Tickbus#signal(String)} and keep it; getters and setters neither allocate nor look
+ * anything up. They work on the memory shared with the driver: a value that is set is sent to the PLC with the next
+ * {@link Tickbus#send()} or {@link Tickbus#exchange()}, a value that is read came with the last {@link
+ * Tickbus#receive()} or {@code exchange()}. They belong to the ticking thread, and throw {@link FieldbusException}
+ * with {@link Status#CLOSED} once the driver is closed.
  */
 public final class Signal {
-    /** Beyond this, not every whole number is a double. */
+    /** Beyond this, not every integer is a double. */
     private static final long EXACT = 1L << 53;
     /** The double 1.0. */
     private static final long ONE = 0x3FF0_0000_0000_0000L;
@@ -20,15 +20,15 @@ public final class Signal {
     private final Tickbus bus;
     private final LongBuffer slots;
     private final Layout.Entry entry;
-    /** Null where the slot holds a double. */
+    /** Null if the slot holds a double. */
     private final IntegerKind integer;
     /**
-     * The signal's slot while it can be got, or set, as a double without further ado; else -1. One comparison
-     * thus stands for all checks of the common case.
+     * The signal's slot if it can be read, or written, as a double without further checks; else -1. A single
+     * comparison thus covers all checks of the common case.
      */
     private int getAt;
     private int setAt;
-    /** The slot of the edges while they can be got; else -1. */
+    /** The slot of the edges if they can be read; else -1. */
     private int edgesAt;
 
     Signal(Tickbus bus, LongBuffer slots, Layout.Entry entry) {
@@ -64,9 +64,9 @@ public final class Signal {
     /**
      * Sets the signal, to be sent with the next exchange or {@link Tickbus#send()}.
      *
-     * <p>The native library scales, rounds half away from zero, and saturates at the ends of the type's range.
+     * <p>The native library scales, rounds half away from zero, and saturates at the limits of the type's range.
      *
-     * @param value the value in the signal's unit; for a BOOL all but 0 is true
+     * @param value the value in the signal's unit; for a BOOL everything except 0 is true
      * @throws IllegalStateException if the PLC writes this signal
      * @throws IllegalArgumentException if the value is not a finite number
      */
@@ -85,7 +85,7 @@ public final class Signal {
             throw new IllegalArgumentException(
                 "signal '" + name() + "' cannot be set to " + value + "; a finite number is needed");
         }
-        // No infinity and no NaN comes here, and for those alone a fail-safe value is needed.
+        // The value is finite here, so that the fail-safe value is not needed.
         slots.put(entry.slot(), bus.conversions().slot(integer, value, 0));
     }
 
@@ -96,7 +96,7 @@ public final class Signal {
      */
     public boolean getBoolean() {
         int at = getAt;
-        // The shift drops the sign, which is all that a negative zero has.
+        // The shift drops the sign bit, the only one set in a negative zero.
         return at >= 0 ? slots.get(at) << 1 != 0 : getOtherBoolean();
     }
 
@@ -123,8 +123,8 @@ public final class Signal {
     /**
      * The signal's value as an integer.
      *
-     * @return exact for every unscaled integer type; an LWORD or ULINT is to be read as unsigned. Of other
-     *     values the nearest integer, halves away from zero.
+     * @return exact for every unscaled integer type; an LWORD or ULINT is to be read as unsigned. For other values
+     * the nearest integer, halves away from zero.
      */
     public long getLong() {
         bus.mustBeOpen();
@@ -135,7 +135,7 @@ public final class Signal {
     /**
      * Sets the signal to an integer, exactly.
      *
-     * @param value the value in the signal's unit; an LWORD or ULINT reads it as unsigned
+     * @param value the value in the signal's unit; unsigned for an LWORD or ULINT
      * @throws IllegalStateException if the PLC writes this signal
      * @throws IllegalArgumentException if the value is beyond ±2<sup>53</sup> and the signal is not an
      *     unscaled 64-bit integer
@@ -154,9 +154,10 @@ public final class Signal {
     }
 
     /**
-     * How many edges came with the last exchange or {@link Tickbus#receive()}, of the kind that {@code latch} in driver.cfg names.
+     * How many edges, of the kind that {@code latch} in driver.cfg names, came with the last exchange or {@link
+     * Tickbus#receive()}.
      *
-     * @return zero and above
+     * @return 0 or more
      * @throws IllegalStateException if the signal is not latched, or the simulation writes it
      */
     public long edges() {
@@ -213,7 +214,7 @@ public final class Signal {
     /**
      * The station that the signal belongs to.
      *
-     * @return empty where driver.cfg names no stations
+     * @return empty if driver.cfg names no stations
      */
     public String station() {
         return entry.station();
@@ -243,12 +244,12 @@ public final class Signal {
         return name() + " (" + address() + " " + type() + ")";
     }
 
-    /** What a slot of this signal means. */
+    /** The value that this signal's slot represents. */
     double value(long bits) {
         return integer == null ? Double.longBitsToDouble(bits) : integer.toDouble(bits);
     }
 
-    /** Null where the slot holds a double. */
+    /** Null if the slot holds a double. */
     IntegerKind integer() {
         return integer;
     }
@@ -257,7 +258,7 @@ public final class Signal {
         return entry.slot();
     }
 
-    /** Makes all getters and setters refuse. */
+    /** Makes all getters and setters throw. */
     void close() {
         getAt = -1;
         setAt = -1;

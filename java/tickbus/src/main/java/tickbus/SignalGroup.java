@@ -4,22 +4,22 @@ import java.nio.DoubleBuffer;
 import java.nio.LongBuffer;
 import java.util.List;
 
-/** The signals that one end writes, or those that it reads: all at once, as an array of doubles. */
+/** The signals that one end writes, or those that it reads, all at once as an array of doubles. */
 final class SignalGroup {
     private final LongBuffer slots;
     private final DoubleBuffer doubles;
     /** The slot of each signal. */
     private final int[] at;
-    /** Whether the slots follow each other without a gap, so that one bulk copy moves them. */
+    /** Whether the slots are consecutive, so that one bulk copy moves them. */
     private final boolean dense;
-    /** Which of the signals hold an integer; mostly none. */
+    /** Which of the signals hold an integer; usually none. */
     private final int[] integers;
     private final IntegerKind[] kinds;
-    /** What each integer is where NaN is set. */
+    /** The value of each integer if NaN is set. */
     private final long[] failSafe;
     private final Conversions conversions;
 
-    /** The slots still have the values of an open driver that has not ticked: the fail-safe ones. */
+    /** To be created when the slots hold the values of a driver that has not ticked: the fail-safe ones. */
     SignalGroup(Layout layout, List<Signal> signals, Conversions conversions) {
         this.slots = layout.slots();
         this.doubles = layout.doubles();

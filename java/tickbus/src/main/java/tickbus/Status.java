@@ -1,16 +1,16 @@
 package tickbus;
 
 /**
- * What an exchange, or another call on a driver, came to.
+ * The result of an exchange, or of another call on a driver.
  *
- * <p>{@link #FRESH}, {@link #UNCHANGED} and {@link #STALE} are answers of {@link Tickbus#exchange()}; all
- * others have negative codes and come as {@link FieldbusException}.
+ * <p>{@link #FRESH}, {@link #UNCHANGED} and {@link #STALE} are returned by {@link Tickbus#exchange()}; all others
+ * have negative codes and are thrown as {@link FieldbusException}.
  */
 public enum Status {
     /** 0: a new bus cycle has arrived since the last exchange, even if nothing changed in it. */
     FRESH(0, "a new bus cycle has arrived since the last exchange",
         "nothing to do"),
-    /** 1: the link lives, and no new bus cycle has arrived since the last exchange. */
+    /** 1: the link is alive, but no new bus cycle has arrived since the last exchange. */
     UNCHANGED(1, "the link lives, no new bus cycle since the last exchange",
         "nothing to do; the simulation ticks faster than the bus"),
     /** 2: the PLC has been silent for longer than {@code max_age}; fail-safe values are delivered. */
@@ -37,7 +37,7 @@ public enum Status {
     /** -7: all places for drivers in this process are taken. */
     TOO_MANY_DRIVERS(-7, "all places for drivers in this process are taken",
         "close drivers that are no longer used, or spread them over several processes"),
-    /** -8: the driver met a defect of its own; it answers so until closed. */
+    /** -8: a defect in the driver itself; it stays in this state until closed. */
     INTERNAL(-8, "the driver met a defect of its own and has stopped",
         "close and open it again; report the message and your driver.cfg"),
     /** -9: the native library cannot be loaded. */
@@ -60,9 +60,9 @@ public enum Status {
     }
 
     /**
-     * The number that crosses the border to the native library.
+     * The number by which the native library knows it.
      *
-     * @return zero and above: the exchange was done; below zero: it was not
+     * @return 0 or more: the exchange was done; below 0: it was not
      */
     public int code() {
         return code;
@@ -90,7 +90,7 @@ public enum Status {
      * The status with this code.
      *
      * @param code a status code
-     * @return the status; {@link #INTERNAL} for a number that is none
+     * @return the status; {@link #INTERNAL} for an unknown number
      */
     public static Status of(int code) {
         for (Status status : ALL) {

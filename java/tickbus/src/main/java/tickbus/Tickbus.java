@@ -34,36 +34,37 @@ import java.util.stream.Stream;
  * }
  * }</pre>
  *
- * <p><b>A tick</b> is either {@link #receive()}, the model, {@link #send()}, or one {@link #exchange()}. The first answers
- * within the tick: what the PLC sent is in the model at once, and the model's answer on the line at the end of the same tick.
- * {@code exchange()} sends first and receives then, so that an answer goes out with the next tick. It suits simulators that hand
- * over all values at one place. Edges, age and status are the same with both. {@link #receive()}, {@link #send()} and
- * {@link #exchange()} take no lock, make no system call, and allocate nothing, in either language; they never wait for the bus
- * unless driver.cfg says {@code mode = "stepped"}.
+ * <p><b>A tick</b> is either {@link #receive()}, the model, {@link #send()}, or one {@link #exchange()}. The first
+ * way answers within the tick: what the PLC sent is in the model at once, and the model's answer is sent at the end
+ * of the same tick. {@code exchange()} sends first and then receives, so that an answer is sent with the next tick.
+ * It suits simulators that pass all values in one place. Edges, age and status are the same in both. {@link
+ * #receive()}, {@link #send()} and {@link #exchange()} take no lock, make no system call, and allocate nothing, in
+ * either language; they never wait for the bus unless driver.cfg says {@code mode = "stepped"}.
  *
- * <p><b>Time.</b> {@link #exchange(long)} and {@link #receive(long)} are given the simulation's time. Stepped buses run the PLC by
- * it, recordings and faults are timed by it. Without it a tick has the computer's time since the first tick, which is right where the
- * simulation keeps pace with that. A simulation that runs as fast as it can, or stands still, outruns a PLC that has a clock of its
- * own: between two of the PLC's scans thousands of ticks pass, and the machine has long gone where the PLC would have stopped it.
- * Let such a simulation keep pace with the clock, or run the PLC by simulation time, with {@code mode = "stepped"}.
+ * <p><b>Time.</b> {@link #exchange(long)} and {@link #receive(long)} take the simulation's time. Stepped buses run
+ * the PLC by it, and recordings and faults use it. Without it a tick has the computer's time since the first tick,
+ * which is right if the simulation keeps pace with that. A simulation that runs as fast as it can outruns a PLC with
+ * its own clock: thousands of ticks pass between two of the PLC's scans, and the machine has long moved past the
+ * point at which the PLC would have stopped it. Let such a simulation keep pace with the clock, or run the PLC in
+ * simulation time, with {@code mode = "stepped"}.
  *
- * <p><b>Threads.</b> The first thread that ticks becomes the driver's ticking thread: ticks, events and the
- * getters and setters of the signals belong to it. Another thread's tick throws {@link Status#BUSY} and does
- * nothing, until the ticking thread has ended or has called {@link #releaseThread}. A simulation engine whose events run on changing
- * threads calls that at the end of each of its events that ticks. {@link #statistics}, {@link #inject},
- * {@link #faults} and {@link #close} can be called by any thread; while a tick's call is running they throw {@link Status#BUSY}, and a
- * tick that meets one of them waits for its end. Different drivers are independent of each other.
+ * <p><b>Threads.</b> The first thread that ticks becomes the driver's ticking thread: ticks, events and the getters
+ * and setters of the signals belong to it. Another thread's tick throws {@link Status#BUSY} and does nothing, until
+ * the ticking thread has ended or has called {@link #releaseThread}. A simulation engine whose events run on changing
+ * threads calls that at the end of each event that ticks. {@link #statistics}, {@link #inject}, {@link #faults} and
+ * {@link #close} can be called by any thread; during a call of a tick they throw {@link Status#BUSY}, and a tick that
+ * meets one of them waits until it is done. Different drivers are independent of each other.
  *
  * <p>After {@link #close} every method but {@link #close}, {@link #id}, {@link #name} and {@link #toString}
  * throws {@link FieldbusException} with {@link Status#CLOSED}.
  */
 public final class Tickbus implements AutoCloseable {
     private static final VarHandle TICKER;
-    /** Events that one native call can bring. */
+    /** The most events fetched by one native call. */
     private static final int EVENTS = 64;
-    /** Events that one call hands over at most: as many as the driver's ring holds. */
+    /** The most events handed over by one call: as many as the driver's ring holds. */
     private static final int MOST_EVENTS = 4096;
-    /** How often a call that meets a running exchange is tried. */
+    /** How often a call that meets a running exchange is retried. */
     private static final int PATIENCE = 100;
     /** Longs per event: signal, slot, time. */
     private static final int EVENT_WORDS = 3;
@@ -95,13 +96,13 @@ public final class Tickbus implements AutoCloseable {
     private final Conversions conversions = new Conversions();
     private final SignalGroup written;
     private final SignalGroup read;
-    /** Events that were fetched; those from {@code nextEvent} to {@code endOfEvents} are yet to be handed over. */
+    /** Fetched events; those from {@code nextEvent} to {@code endOfEvents} have not been handed over yet. */
     private long[] events;
     private int nextEvent;
     private int endOfEvents;
     /**
-     * The thread that the slots belong to; null when there is none. A thread that reads its own name here put it
-     * there itself, so that a plain comparison is enough on every tick but a thread's first.
+     * The thread that the slots belong to; null if there is none. If a thread reads its own name here it has put it
+     * there itself, so that a plain comparison suffices on every tick except a thread's first.
      */
     private Thread ticker;
     private volatile boolean closed;
@@ -120,8 +121,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Opens the driver that a configuration file describes, and starts its fieldbus. Returns at once, whether
-     * or not the PLC is there: until it is, {@link #exchange()} answers {@link Status#STALE}.
+     * Opens the driver that a configuration file describes, and starts its fieldbus. Returns at once, whether or not
+     * the PLC is there: until it is, {@link #exchange()} returns {@link Status#STALE}.
      *
      * @param driverCfg the driver.cfg
      * @return the open driver, to be closed
@@ -135,18 +136,18 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Opens the driver that a configuration file describes, with some tables other than its own: so a test can
-     * have the plant's own signal table, and a PLC program in this process at the other end.
+     * Opens the driver that a configuration file describes, with some of its tables replaced: for example, a test
+     * uses the plant's own signal table, with a PLC program in this process at the other end.
      *
-     * <p>A {@code [fieldbus]} with a {@code kind} stands instead of the file's; one without sets the {@code mode} of
-     * the file's own loopback. Times, sizes and signs of life of the file stay. {@code [[station]]} tables say by name
-     * what another bus has to know of the file's stations. A bus that replays a recording takes the file's own
-     * {@code [record]} away.
+     * <p>A {@code [fieldbus]} with a {@code kind} replaces the file's; one without sets the {@code mode} of the
+     * file's own loopback. Times, sizes and life signs of the file stay. {@code [[station]]} tables give, by name,
+     * what another bus needs to know about the file's stations. A bus that replays a recording removes the file's own
+     * {@code [record]}.
      *
-     * @param driverCfg the driver.cfg, which must be right as it stands
+     * @param driverCfg the driver.cfg, which must be valid on its own
      * @param tables TOML as in a driver.cfg; empty changes nothing
      * @return the open driver, to be closed
-     * @throws FieldbusException as {@link #open(Path)}; mistakes in the tables have their lines and columns, too
+     * @throws FieldbusException as {@link #open(Path)}; mistakes in the tables also have their lines and columns
      */
     public static Tickbus open(Path driverCfg, String tables) {
         Objects.requireNonNull(driverCfg, "driverCfg");
@@ -163,17 +164,17 @@ public final class Tickbus implements AutoCloseable {
         }
     }
 
-    /** The file's name for native code: its URI, where the JVM's file encoding cannot hold the path as text. */
+    /** The file's name for native code: its URI if the JVM's file encoding cannot represent the path as text. */
     private static String nameOf(Path file) {
         String name = file.toString();
         return name.indexOf('\uFFFD') < 0 ? name : "file://" + file.toUri().getRawPath();
     }
 
     /**
-     * One tick: sends the signals that this end writes, and takes those that it reads.
+     * One tick: sends the signals that this end writes, and receives those that it reads.
      *
-     * <p>The simulation time given last stands. Where none was ever given, the tick has the computer's time since the
-     * first one; a stepped fieldbus then goes on by one step, to what it granted last.
+     * <p>The last given simulation time is kept. If none was ever given, the tick has the computer's time since the
+     * first tick; a stepped fieldbus then advances by one step, to the time that it granted last.
      *
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
      * @throws FieldbusException {@link Status#BUS_FAILED}, {@link Status#BUSY}, {@link Status#CLOSED} or
@@ -188,7 +189,8 @@ public final class Tickbus implements AutoCloseable {
     /**
      * One tick at a given simulation time, which stepped fieldbuses and recordings need.
      *
-     * @param simulationNanos nanoseconds since the simulation began, not falling; a stepped fieldbus refuses a time before the last
+     * @param simulationNanos nanoseconds since the simulation began, never decreasing; a stepped fieldbus refuses an
+     * earlier time than the last
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
      * @throws FieldbusException as {@link #exchange()}
      */
@@ -199,10 +201,10 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Begins a tick: takes the signals that this end reads. The model computes, and {@link #send()} ends the tick.
+     * Begins a tick: receives the signals that this end reads. The model computes, and {@link #send()} ends the tick.
      *
-     * <p>Time is as in {@link #exchange()}. On a stepped fieldbus the PLC runs up to it, with what was sent in the tick
-     * before. To receive again without having sent begins another tick; the one before has no answer then.
+     * <p>Time is as in {@link #exchange()}. On a stepped fieldbus the PLC runs up to it, with what was sent in the
+     * previous tick. Receiving again without having sent begins another tick; the previous one then has no answer.
      *
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
      * @throws FieldbusException as {@link #exchange()}
@@ -216,7 +218,8 @@ public final class Tickbus implements AutoCloseable {
     /**
      * Begins a tick at a given simulation time, which stepped fieldbuses and recordings need.
      *
-     * @param simulationNanos nanoseconds since the simulation began, not falling; a stepped fieldbus refuses a time before the last
+     * @param simulationNanos nanoseconds since the simulation began, never decreasing; a stepped fieldbus refuses an
+     * earlier time than the last
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
      * @throws FieldbusException as {@link #exchange()}
      */
@@ -229,10 +232,10 @@ public final class Tickbus implements AutoCloseable {
     /**
      * Ends the tick that {@link #receive()} began: sends the signals that this end writes.
      *
-     * <p>To send again in the same tick hands over the newer values; that is no tick of its own.
+     * <p>Sending again in the same tick publishes the newer values, but is not a tick.
      *
-     * @throws FieldbusException as {@link #exchange()}; also if the {@code receive()} of this tick failed, and
-     *     nothing is sent then
+     * @throws FieldbusException as {@link #exchange()}; also if the {@code receive()} of this tick failed: then
+     * nothing is sent
      */
     public void send() {
         mustBeTicker();
@@ -243,9 +246,9 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Goes on where {@link #statistics}, {@link #inject} or {@link #close} of another thread was in the way. They have the
-     * driver for as long as it takes to copy what they need, or to take it over; after {@code close} it is
-     * {@link Status#CLOSED}.
+     * Retries a call that was refused because {@link #statistics}, {@link #inject} or {@link #close} of another
+     * thread was using the driver. They use it only as long as it takes to copy what they need, or to take it over;
+     * after {@code close} it is {@link Status#CLOSED}.
      */
     private int after(int refusal, LongToIntFunction call) {
         int code = refusal;
@@ -260,8 +263,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Sets all signals that this end writes. Unlike {@link Signal#set} it lets NaN and infinities pass: the
-     * native library sends the signal's fail-safe value for NaN, and counts it.
+     * Sets all signals that this end writes. Unlike {@link Signal#set} it accepts NaN and infinities: for NaN the
+     * native library sends the signal's fail-safe value, and counts it.
      *
      * @param values one value per signal for which {@link Signal#isWritten}, in the order of {@link #signals}
      * @throws IllegalArgumentException if there are more or fewer values than such signals
@@ -276,7 +279,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Gets all signals that this end reads.
+     * Reads all signals that this end reads.
      *
      * @param into gets one value per signal that is not {@link Signal#isWritten}, in the order of
      *     {@link #signals}; may be longer
@@ -321,7 +324,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Age of the data at the last exchange; of the worst station where there are several.
+     * Age of the data at the last exchange; if there are several stations, of the oldest.
      *
      * @return nanoseconds; {@link Long#MAX_VALUE} if nothing has arrived yet
      */
@@ -330,7 +333,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * How many bus cycles had arrived at the last exchange.
+     * How many bus cycles had arrived by the last exchange.
      *
      * @return counts from 0
      */
@@ -339,9 +342,9 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Up to which simulation time the last exchange lets the simulation go on.
+     * The simulation time up to which the simulation may run after the last exchange.
      *
-     * @return nanoseconds; the time handed in, on buses that do not keep time
+     * @return nanoseconds; on buses that are not stepped, the time that was passed
      */
     public long grantedNanos() {
         return header(Layout.WORD_GRANTED);
@@ -366,8 +369,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * What the driver has counted so far: {@code ticks}, {@code fresh}, {@code stale}, {@code state} and more.
-     * Not for every tick.
+     * The driver's counters and state: {@code ticks}, {@code fresh}, {@code stale}, {@code state} and more. Not to be
+     * called on every tick.
      *
      * @return unmodifiable, in an order fit for printing
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
@@ -376,7 +379,7 @@ public final class Tickbus implements AutoCloseable {
         String text = whenIdle(() -> statisticsNative(handle));
         Map<String, String> statistics = new LinkedHashMap<>();
         text.lines().forEach(line -> {
-            // A count has the name of its signal in its key, and that may have a '=' of its own.
+            // The key of such a count contains a signal's name, which may contain a '='.
             int equals = line.startsWith("plc.rises.") ? line.lastIndexOf('=') : line.indexOf('=');
             statistics.put(line.substring(0, equals), line.substring(equals + 1));
         });
@@ -395,12 +398,12 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Injects a fault: a wrong value of a signal, or a trouble of the line. It can begin at the next exchange.
+     * Injects a fault: a wrong value of a signal, or trouble on the line. It can begin at the next exchange.
      *
      * <p>Times and ticks count from this driver's first exchange: {@code at = "2s"} is two seconds after that.
      *
-     * @param fault the keys of a {@code [[fault]]} section of driver.cfg, one a line, with or without its header
-     * @return the fault, to be ended
+     * @param fault the keys of a {@code [[fault]]} section of driver.cfg, one per line, with or without its header
+     * @return the fault, for ending it
      * @throws FieldbusException {@link Status#BAD_ARGUMENT} with every mistake at its line and column;
      *     {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
@@ -412,9 +415,9 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * The faults that were injected, by driver.cfg or by {@link #inject}.
+     * The faults that were injected by driver.cfg or by {@link #inject}.
      *
-     * @return in the order of injection; where there were more than 64, those that are long over may be missing
+     * @return in order of injection; if there were more than 64, those that ended long ago may be missing
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public List<InjectedFault> faults() {
@@ -444,11 +447,11 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Hands over the waiting events, oldest first: the writes of the PLC one by one, on buses that have them.
+     * Hands over the pending events, oldest first: the writes of the PLC one by one, on buses that have them.
      *
-     * <p>One call hands over 4096 at most, as many as the driver keeps, so that a PLC which writes faster than the handler
-     * works does not hold the tick up for ever. Should the handler throw, the event that it threw at counts as handed over,
-     * and the next call goes on behind it.
+     * <p>One call hands over at most 4096, the capacity of the driver's ring, so that a PLC which writes faster than
+     * the handler works does not hold up the tick forever. If the handler throws, the event counts as handed over,
+     * and the next call continues after it.
      *
      * @param handler called on this thread, for each event
      * @return how many events there were
@@ -487,7 +490,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Ends the connection. Closing twice is no mistake.
+     * Closes the connection. Closing twice is allowed.
      *
      * @throws FieldbusException {@link Status#BUSY} if another thread is in an exchange; the driver stays open
      */
@@ -502,7 +505,7 @@ public final class Tickbus implements AutoCloseable {
                 return null;
             });
         } catch (FieldbusException e) {
-            // The native side has given the driver up, unless it was in use.
+            // The native side has closed the driver, unless it was in use.
             if (e.status() != Status.BUSY) {
                 closed();
             }
@@ -512,8 +515,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Lets another thread become the ticking thread. To be called by the ticking thread; by any other, it does
-     * nothing. Whoever lets the next thread go on must also order its memory, as every executor, lock and queue does.
+     * Lets another thread become the ticking thread. Called by the ticking thread; does nothing on any other. The
+     * hand-over to the next thread must also order memory, as every executor, lock and queue does.
      */
     public void releaseThread() {
         TICKER.compareAndSet(this, Thread.currentThread(), null);
@@ -557,7 +560,7 @@ public final class Tickbus implements AutoCloseable {
         }
     }
 
-    /** Makes a native call that a running exchange of the ticking thread keeps out, most often for less than 1 us. */
+    /** Makes a native call that a running exchange of the ticking thread blocks, usually for less than 1 us. */
     private static <T> T whenIdle(Supplier<T> call) {
         for (int attempt = 1;; attempt++) {
             try {
@@ -590,7 +593,7 @@ public final class Tickbus implements AutoCloseable {
         Thread.onSpinWait();
     }
 
-    /** What a negative code means, with the driver's own reason where it has one. */
+    /** The exception for a negative code, with the driver's own reason if it has one. */
     private FieldbusException failure(int code) {
         Status status = Status.of(code);
         String what = "'" + name + "': " + status.text();
@@ -603,14 +606,14 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Makes an HTML page from a recording: a chart of the signals, faults, states of the line. It lies beside the
-     * recording, loads nothing, and any browser shows it.
+     * Makes an HTML page from a recording: a chart of the signals, faults, states of the line. It is written beside
+     * the recording, is self-contained, and any browser shows it.
      *
      * @param recording the VCD or CSV file that a {@code [record]} table named; its driver must be closed
      * @param title the page's heading
-     * @param statistics what {@link #statistics} gave last; may be empty
-     * @param heading what the text is
-     * @param text shown as it is; empty for none
+     * @param statistics the last result of {@link #statistics}; may be empty
+     * @param heading the heading of the text
+     * @param text shown verbatim; empty for none
      * @return the page
      * @throws FieldbusException {@link Status#BAD_ARGUMENT} with the reason if it cannot be made
      */
@@ -624,13 +627,13 @@ public final class Tickbus implements AutoCloseable {
     /** Opens a driver and describes it to {@code layout}; throws {@link FieldbusException}. */
     static native long initializeNative(String driverCfg, String tables, Layout layout);
 
-    /** The tick; gives a status code and never throws, whatever the handle. */
+    /** The tick; returns a status code and never throws, for any handle. */
     static native int xChangeData(long handle);
 
-    /** The half of the tick that receives; as {@link #xChangeData}. */
+    /** The receiving half of the tick; as {@link #xChangeData}. */
     static native int receiveNative(long handle);
 
-    /** The half of the tick that sends; as {@link #xChangeData}. */
+    /** The sending half of the tick; as {@link #xChangeData}. */
     static native int sendNative(long handle);
 
     /** Closes a driver; throws {@link FieldbusException}. */
@@ -639,13 +642,15 @@ public final class Tickbus implements AutoCloseable {
     /** Lines of {@code key=value}; throws {@link FieldbusException}. */
     static native String statisticsNative(long handle);
 
-    /** Moves events into {@code into}, three longs each, and says how many; throws {@link FieldbusException}. */
+    /**
+     * Moves events into {@code into}, three longs each, and returns their number; throws {@link FieldbusException}.
+     */
     static native int eventsNative(long handle, long[] into);
 
-    /** Injects the fault that a section describes, and gives its number; throws {@link FieldbusException}. */
+    /** Injects the fault that a section describes, and returns its number; throws {@link FieldbusException}. */
     static native int injectNative(long handle, String fault);
 
-    /** Ends a fault at the next exchange; false if there is none. Throws {@link FieldbusException}. */
+    /** Ends a fault at the next exchange; false if it does not exist. Throws {@link FieldbusException}. */
     static native boolean endFaultNative(long handle, int id);
 
     /** A line per fault, with tabs between its fields; throws {@link FieldbusException}. */
@@ -654,6 +659,6 @@ public final class Tickbus implements AutoCloseable {
     /** Makes the page of a recording; the text's first line is its heading. Throws {@link FieldbusException}. */
     static native String reportNative(String recording, String title, String statistics, String text);
 
-    /** Does nothing: what a native call costs, the baseline of the benchmarks. */
+    /** Does nothing: the cost of a native call, the baseline of the benchmarks. */
     static native int emptyNative();
 }

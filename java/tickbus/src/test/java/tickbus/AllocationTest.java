@@ -37,8 +37,8 @@ class AllocationTest {
             double sum = 0;
             long allocated = Long.MAX_VALUE;
             long now = 0;
-            // The JVM itself allocates a little now and then, as classes are initialised and code is
-            // compiled; a tick that did would do so in every round.
+            // The JVM itself allocates a little now and then, as classes are initialised and code is compiled; a tick
+            // that allocates would do so in every round.
             for (int round = 0; round < 4; round++) {
                 long before = threads.getCurrentThreadAllocatedBytes();
                 for (int i = 0; i < TICKS; i++) {

@@ -17,7 +17,7 @@ import java.util.stream.Stream;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.ValueSource;
 
-/** Runs the native tests in a JVM that checks every JNI call, on each JDK we promise to run on. */
+/** Runs the native tests in a JVM that checks every JNI call, on each supported JDK. */
 class CheckJniTest {
     @ParameterizedTest(name = "JDK {0}")
     @ValueSource(ints = {17, 25})
@@ -54,7 +54,7 @@ class CheckJniTest {
         }
     }
 
-    /** The version that a JDK's folder says it has; 0 if it is no JDK. */
+    /** The version of the JDK in a folder; 0 if it is not a JDK. */
     private static int feature(Path home) {
         if (!Files.isExecutable(home.resolve("bin").resolve("java"))) {
             return 0;

@@ -7,9 +7,9 @@ import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 
-/** A JVM of its own, for what would disturb the one that runs the tests. */
+/** A separate JVM, for tests that would disturb the current one. */
 final class ChildJvm {
-    /** How it ended, and all it said. */
+    /** Its exit code, and its output. */
     record Outcome(int exit, String output) {
     }
 
@@ -38,7 +38,7 @@ final class ChildJvm {
 
     /** The class path of the tests. */
     static String classPath() {
-        // Surefire hands over a jar that only names the class path; here it says what that is.
+        // Surefire passes a jar that only names the class path; the class path is in this property.
         return System.getProperty("surefire.test.class.path", System.getProperty("java.class.path"));
     }
 

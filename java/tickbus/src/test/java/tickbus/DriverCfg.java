@@ -17,7 +17,7 @@ final class DriverCfg {
             .append("\"\n\n[fieldbus]\nkind = \"loopback\"\n").append(fieldbus).append('\n');
     }
 
-    /** A device whose PLC brings every byte of %I back on %Q, within the same exchange. */
+    /** A device whose PLC copies every byte of %I to %Q, within the same exchange. */
     static DriverCfg mirror(int id) {
         return new DriverCfg(id, "program = \"mirror\"\nmode = \"stepped\"\nscan = \"1ms\"");
     }

@@ -26,7 +26,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.function.Executable;
 import org.junit.jupiter.api.io.TempDir;
 
-/** Calls that nobody should make: each gets an answer, and the JVM lives on. */
+/** Misuse of the API: each call gets an answer, and the JVM survives. */
 @Tag("native")
 class MisuseTest {
     @TempDir
@@ -127,7 +127,7 @@ class MisuseTest {
         assertEquals("Driver 1", bus.name());
     }
 
-    /** Runs a call on a thread of its own, to that thread's end. */
+    /** Runs a call on another thread, and waits for it. */
     private static void elsewhere(Executable call) throws Exception {
         AtomicReference<Throwable> thrown = new AtomicReference<>();
         Thread thread = new Thread(() -> {
@@ -169,7 +169,7 @@ class MisuseTest {
         }
     }
 
-    /** Runs both on a thread each, from one moment on, and waits for their ends. */
+    /** Runs both on a thread each, starting simultaneously, and waits for them. */
     private static <T> List<T> atOnce(Callable<T> one, Callable<T> other) throws Exception {
         CyclicBarrier start = new CyclicBarrier(2);
         ExecutorService threads = Executors.newFixedThreadPool(2);
@@ -210,7 +210,7 @@ class MisuseTest {
         Tickbus.finalizeNative(handle);
     }
 
-    /** Makes a call that another thread may get in the way of; false if it did. */
+    /** Makes a call that another thread may block; false if it did. */
     private static boolean served(Runnable call) {
         try {
             call.run();
@@ -313,7 +313,7 @@ class MisuseTest {
             Tickbus bus = Tickbus.open(mirror());
             Callable<Integer> ticking = () -> {
                 int ticks = 0;
-                // Nobody promises that close wins against a thread that never pauses.
+                // Nothing guarantees that close wins against a thread that never pauses.
                 for (int i = 0; i < 2000; i++) {
                     try {
                         bus.exchange();

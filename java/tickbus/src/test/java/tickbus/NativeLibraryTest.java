@@ -14,7 +14,7 @@ import java.util.stream.Stream;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 
-/** Loading happens once per process, so that each case gets a JVM of its own. */
+/** The library is loaded once per process, so that each case gets its own JVM. */
 class NativeLibraryTest {
     private static final String FILE = System.mapLibraryName("tickbus");
     private static final Path BUILT = Path.of(System.getProperty("tickbus.native.dir"), FILE).toAbsolutePath();
@@ -24,7 +24,7 @@ class NativeLibraryTest {
     @TempDir
     Path directory;
 
-    /** Loads the library in a JVM of its own, which says "loaded" or why it could not. */
+    /** Loads the library in a separate JVM, which prints "loaded" or why it could not. */
     private static ChildJvm.Outcome load(Path classes, String... arguments) throws IOException, InterruptedException {
         return new ChildJvm().with("--enable-native-access=ALL-UNNAMED").with(arguments)
             .with("-cp", classes + java.io.File.pathSeparator + ChildJvm.classes(NativeLibraryTest.class),

@@ -32,7 +32,7 @@ class TickbusTest {
 
     private long now;
 
-    /** In stepped mode the mirror's answer is there within a few scans at the most. */
+    /** In stepped mode the mirror's answer arrives within at most a few scans. */
     private void tick(Tickbus bus) {
         for (int i = 0; i < 4; i++) {
             now += TICK;
@@ -40,7 +40,7 @@ class TickbusTest {
         }
     }
 
-    /** Exchanges until something is so; fails when it never becomes so. */
+    /** Exchanges until this is true; fails if it never is. */
     private static void exchangeUntil(BooleanSupplier reached, Tickbus... buses) {
         long deadline = System.nanoTime() + 20_000_000_000L;
         while (!reached.getAsBoolean()) {
@@ -304,7 +304,7 @@ class TickbusTest {
                 machine.send();
                 return true;
             }, plc);
-            // The machine does not tick any more: its answer is on the line.
+            // The machine no longer ticks: its answer is on the line.
             exchangeUntil(() -> plc.signal("sensor").getBoolean(), plc);
             assertEquals(1, plc.signal("sensor").edges());
         }
@@ -382,7 +382,7 @@ class TickbusTest {
         }
     }
 
-    /** A bus with events that counts up and down again, a write of the PLC in each tick. */
+    /** A bus with events whose signal counts up and down, a write by the PLC in each tick. */
     private Tickbus withEvents() {
         return DriverCfg.mirror(1).fieldbus("events = true").signal("in", "%IW0", "type = \"INT\"")
             .signal("out", "%QW0", "type = \"INT\"").open(directory);
@@ -420,7 +420,7 @@ class TickbusTest {
         try (Tickbus bus = withEvents()) {
             writes(bus, 1, 1);
             int[] value = {1};
-            // Each event brings the next one.
+            // Each event causes the next one.
             int count = bus.pollEvents((signal, seen, time) -> {
                 value[0]++;
                 writes(bus, value[0] % 1000, value[0] % 1000);

@@ -10,12 +10,15 @@ import java.util.jar.Attributes;
 import java.util.jar.JarOutputStream;
 import java.util.jar.Manifest;
 
-/** A DeviceDriver folder for tests that meet the real driver. */
+/** A DeviceDriver folder for tests with the real driver. */
 public final class DriverFolder {
     private DriverFolder() {
     }
 
-    /** Makes one without a .cfg. The driver's classes are on the test's class path; the folder's jar only names them. */
+    /**
+     * Creates one without a .cfg. The driver's classes are on the test's class path; the folder's jar only names
+     * them.
+     */
     public static Path make(Path folder) throws IOException {
         Manifest manifest = new Manifest();
         manifest.getMainAttributes().put(Attributes.Name.MANIFEST_VERSION, "1.0");
@@ -28,7 +31,7 @@ public final class DriverFolder {
         return folder;
     }
 
-    /** The same with the two drivers of the peeling line, their {@code [fieldbus]} replaced by these lines. */
+    /** The same with the two drivers of the peeling line; these lines replace their {@code [fieldbus]}. */
     public static Path ofPeelingLine(Path folder, UnaryOperator<String> fieldbus) throws IOException {
         make(folder);
         for (String name : List.of("charger", "lathe")) {
@@ -41,7 +44,7 @@ public final class DriverFolder {
         return folder;
     }
 
-    /** As they are, but on ports that the system chooses. */
+    /** Unchanged, except for ports chosen by the system. */
     public static Path ofPeelingLine(Path folder) throws IOException {
         return ofPeelingLine(folder, name -> "kind = \"socket\"\naddress = \"127.0.0.1:0\"\ncycle = \"10ms\"");
     }

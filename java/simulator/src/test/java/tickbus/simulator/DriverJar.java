@@ -13,7 +13,7 @@ import java.util.jar.JarOutputStream;
 import java.util.jar.Manifest;
 import javax.tools.ToolProvider;
 
-/** Compiles drivers into jars that a test puts into a folder. They write what they do into a system property. */
+/** Compiles drivers into jars that a test puts into a folder. They log what they do in a system property. */
 final class DriverJar {
     /** The property. */
     static final String LOG = "tickbus.test.log";

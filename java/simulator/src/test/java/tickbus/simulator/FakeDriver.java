@@ -6,19 +6,19 @@ import controlinterface.HardwareComponent;
 import java.util.ArrayList;
 import java.util.List;
 
-/** A driver with chosen components that remembers what it got and answers with what it is told. */
+/** A driver with chosen components that records what it gets and delivers what it is told. */
 public final class FakeDriver extends ControlInterfaceDeviceDriver {
     private final int id;
     private final List<HardwareComponent> components = new ArrayList<>();
     /** Next answer, one value per component read. */
     public double[] answer;
-    /** What came last. */
+    /** The values received last. */
     public final double[] got;
-    /** Simulation time as last told. */
+    /** The last simulation time. */
     public long time = -1;
     /** Calls of {@link #exit}. */
     public int exits;
-    /** Whether it delivers before the machine's step, rather than when it has sent. */
+    /** Whether it delivers before the machine's step, rather than after sending. */
     public boolean deliversFirst;
     /** Thrown by the next tick, if any. */
     public RuntimeException failTick;

@@ -1,6 +1,6 @@
 package tickbus.simulator;
 
-/** A clock that moves only when it is waited for or pushed. */
+/** A clock that only moves when it is waited for or advanced. */
 final class ManualTime implements TimeSource {
     private long now;
     int waits;

@@ -9,8 +9,8 @@ interface TransferFunction {
     /**
      * Computes one tick's result.
      *
+     * @param values all values of the table
      * @param from indices of the function's sources in {@code values}
-     * @param from where in {@code values} the function's sources stand
      * @return the result
      */
     double apply(double[] values, int[] from);

@@ -6,7 +6,7 @@ import java.util.Map;
 
 /** All axes of the line, and the variables through which their PLCs command them and see them. */
 final class Axes {
-    /** What an axis shows, behind its name and a dot. */
+    /** The names of an axis's outputs, after its name and a dot. */
     private static final List<String> SHOWN =
             List.of("Healthy", "InPosition", "ActualPosition", "ActualSpeed", "Status", "Error");
 

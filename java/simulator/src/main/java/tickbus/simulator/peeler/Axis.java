@@ -3,11 +3,11 @@ package tickbus.simulator.peeler;
 import tickbus.simulator.motion.Drive;
 
 /**
- * One axis: what it does with the commands of its PLC, and what it tells back.
+ * One axis: carries out the commands of its PLC, and gives feedback.
  *
- * <p>A command begins with the rising edge of Execute while Enable is on, and takes bits and values as they are then;
- * the next one can only begin after Execute has fallen. It clears InPosition. Without Enable nothing moves, and what was
- * under way is forgotten.
+ * <p>A command starts with the rising edge of Execute while Enable is on, with the bits and values at that time; the
+ * next one can only start after Execute has fallen. It clears InPosition. Without Enable nothing moves, and the
+ * current command is discarded.
  *
  * <ul>
  *   <li><b>Position</b>, no other bit: to the target, in a trapezoid or triangle of speed. A target beyond an end
@@ -22,15 +22,15 @@ import tickbus.simulator.motion.Drive;
 final class Axis {
     private enum Mode { IDLE, POSITION, SPEED, STOPPING, TORQUE, TRACKING }
 
-    /** Of what opens and closes, in millimetres per second. */
+    /** The speed of axes that open and close, in millimetres per second. */
     private static final double CLAMP_SPEED = 400;
 
     private static final double GATE_SPEED = 200;
 
-    /** From here on, what opens and closes is a gate, in millimetres of stroke. */
+    /** Axes that open and close with at most this stroke, in millimetres, are gates. */
     private static final double LONGEST_GATE = 100;
 
-    /** How near a tracking axis is to where it should be, in its unit, when it is in position. */
+    /** How close a tracking axis must be to its required position, in its unit, to be in position. */
     private static final double TOLERANCE = 0.05;
 
     private final AxisName name;
@@ -42,16 +42,16 @@ final class Axis {
     private boolean healthy = true;
     private AxisError error = AxisError.NONE;
     private int commands;
-    /** Values of the command that is carried out, where they are needed later. */
+    /** Values of the active command that are needed later. */
     private double offset;
     private double limit;
     private double torque;
     private double deceleration = 1;
     private int direction;
-    /** Something that stands in the way downwards; the lower end if nothing does. */
+    /** The position of an obstacle below; the lower end if there is none. */
     private double obstacle;
     private boolean met;
-    /** Speed of a motion that is not the drive's own. */
+    /** The speed of a motion that is not the drive's own. */
     private double pushed;
 
     Axis(AxisName name) {
@@ -81,7 +81,7 @@ final class Axis {
         return healthy;
     }
 
-    /** What it does, as a word: see {@link AxisStatus}. */
+    /** The status word: see {@link AxisStatus}. */
     int status() {
         return AxisStatus.READY.when(command.enable() && healthy) | AxisStatus.MOVING.when(velocity() != 0)
                 | AxisStatus.IN_POSITION.when(inPosition) | AxisStatus.LOW_END.when(position() <= name.low())
@@ -95,22 +95,22 @@ final class Axis {
         return mode == Mode.TORQUE && direction != 0 && torque > 0;
     }
 
-    /** What is wrong with it or with its last command, as a number. */
+    /** The error word: what is wrong with the axis or with its last command. */
     int error() {
         return (healthy ? error : AxisError.FAILED).ordinal();
     }
 
-    /** Something went wrong with what it does; known until its next command. */
+    /** An error in what the axis does; cleared by its next command. */
     void blame(AxisError what) {
         error = what;
     }
 
-    /** Commands begun so far. */
+    /** The number of commands started so far. */
     int commands() {
         return commands;
     }
 
-    /** Whether it presses against what is in its way. */
+    /** Whether it presses against an obstacle. */
     boolean presses() {
         return met && (name.kind() != AxisKind.TORQUE || mode == Mode.TORQUE && direction < 0 && torque > 0);
     }
@@ -138,12 +138,12 @@ final class Axis {
         return Math.abs(position() - place) <= 1;
     }
 
-    /** A fault of the axis begins or ends; while there is one it does not move. */
+    /** Sets or clears a fault of the axis; with a fault it does not move. */
     void fail(boolean failed) {
         healthy = !failed;
     }
 
-    /** Until further notice it cannot go below this; the lower end if there is nothing. */
+    /** Sets the position below which it cannot go, until further notice; the lower end for none. */
     void meets(double place) {
         obstacle = Math.max(place, name.low());
         if (position() > obstacle + TOLERANCE) {
@@ -248,7 +248,7 @@ final class Axis {
         }
     }
 
-    /** InPosition is shown off for one step at least, even by a command to where the axis stands already. */
+    /** InPosition is off for at least one step, even if the axis is at its target already. */
     private void move(long nanos, boolean begun) {
         drive.advance(nanos);
         if (drive.position() <= obstacle && drive.velocity() <= 0 && obstacle > name.low()) {
@@ -274,7 +274,7 @@ final class Axis {
         met = place == obstacle && obstacle > name.low();
     }
 
-    /** A tracking axis goes where it should be, no faster than its command says; 0 sets no limit. */
+    /** Moves a tracking axis to its required position, at most at the speed of its command; 0 is no limit. */
     void trackTo(double place, long nanos) {
         double seconds = nanos * 1e-9;
         double before = position();
@@ -286,7 +286,7 @@ final class Axis {
         inPosition = Math.abs(position() - target) <= TOLERANCE;
     }
 
-    /** A tracking axis turns at a speed for a time. */
+    /** Turns a tracking axis at a speed for a time. */
     void trackAt(double velocity, long nanos) {
         drive.haltAt(position() + velocity * nanos * 1e-9);
         pushed = velocity;

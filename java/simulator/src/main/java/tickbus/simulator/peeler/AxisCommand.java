@@ -4,16 +4,16 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * The command of one axis as the PLC shows it at one moment: five bits and six values.
+ * The command of one axis as the PLC currently sends it: five bits and six values.
  *
  * <p>Nothing happens before Execute rises. Values are in the axis's unit, per second and per second squared.
  */
 final class AxisCommand {
-    /** What the variables are called, behind the axis's name and a dot, in their order. */
+    /** The names of its variables, after the axis's name and a dot, in order. */
     static final List<String> NAMES = List.of("Execute", "Tracking", "TorqueControl", "SpeedControl", "Enable",
             "TargetPosition", "Speed", "Acceleration", "Deceleration", "Torque", "Jerk");
 
-    /** What bits of the same place are called on an axis that opens and closes. */
+    /** The names of the same bits on an axis that opens and closes. */
     static final Map<String, String> NAMES_OF_TORQUE = Map.of("Tracking", "Close", "TorqueControl", "Open");
 
     private final double[] values = new double[NAMES.size()];
@@ -40,7 +40,7 @@ final class AxisCommand {
         return bit(2);
     }
 
-    /** Move as long as this is on. */
+    /** Move while this is on. */
     boolean speedControl() {
         return bit(3);
     }
@@ -49,12 +49,12 @@ final class AxisCommand {
         return bit(4);
     }
 
-    /** Where to; tracking, an offset. */
+    /** The target; with tracking, an offset. */
     double target() {
         return values[5];
     }
 
-    /** The greatest speed, without direction. */
+    /** The highest speed, without direction. */
     double speed() {
         return values[6];
     }
@@ -67,17 +67,17 @@ final class AxisCommand {
         return values[8];
     }
 
-    /** Pressure in percent; of the knife carriage, the thickness of the veneer in millimetres. */
+    /** Pressure in percent; for the knife carriage, the thickness of the veneer in millimetres. */
     double torque() {
         return values[9];
     }
 
-    /** For an S-curve: how fast the acceleration may change; 0 lets it jump. */
+    /** For an S-curve: the rate of change of the acceleration; 0 lets it jump. */
     double jerk() {
         return values[10];
     }
 
-    /** Whether speed, acceleration and deceleration can be moved with; a NaN cannot. */
+    /** Whether speed, acceleration and deceleration permit a motion; NaN does not. */
     boolean movable() {
         return speed() > 0 && acceleration() > 0 && deceleration() > 0 && Double.isFinite(target());
     }

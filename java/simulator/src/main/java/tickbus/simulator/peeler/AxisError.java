@@ -1,8 +1,8 @@
 package tickbus.simulator.peeler;
 
-/** The values of an axis's error word, from 0 on; docs/axis-link.md has them for the PLC's programmer. */
+/** The values of an axis's error word, from 0 on; docs/axis-link.md documents them for the PLC's programmer. */
 enum AxisError {
-    /** All is well. */
+    /** No error. */
     NONE,
     /** The target lies beyond an end position: the axis stopped there. */
     BEYOND_END,

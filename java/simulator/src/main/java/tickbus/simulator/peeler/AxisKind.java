@@ -1,6 +1,6 @@
 package tickbus.simulator.peeler;
 
-/** Which commands an axis takes. */
+/** Which commands an axis accepts. */
 public enum AxisKind {
     /** To a position; by joystick. */
     POSITION,

@@ -5,7 +5,7 @@ import java.util.List;
 /**
  * The axes of the line: the charger's twelve, then the lathe's thirteen, in the order of their records.
  *
- * <p>Positions count from the lathe's centre line, from the middle of the block or from the ground, outwards.
+ * <p>Positions count outwards from the lathe's centre line, from the middle of the block, or from the ground.
  */
 public enum AxisName {
     /** One stroke up and down takes every block one step on. */
@@ -20,9 +20,9 @@ public enum AxisName {
     CENTRING_X_LEFT("centring x left", AxisKind.POSITION, 0, 300, 300),
     /** Height of the left spindle above the V of the linear feeder. */
     CENTRING_Y_LEFT("centring y left", AxisKind.POSITION, 0, 300, 0),
-    /** As its left one. */
+    /** As for the left one. */
     CENTRING_X_RIGHT("centring x right", AxisKind.POSITION, 0, 300, 300),
-    /** As its left one. */
+    /** As for the left one. */
     CENTRING_Y_RIGHT("centring y right", AxisKind.POSITION, 0, 300, 0),
     /** 900: at the centring spindles; 0: between the lathe's spindles. */
     TRANSFER_ARM("transfer arm", AxisKind.POSITION, 0, 900, 900),
@@ -39,28 +39,31 @@ public enum AxisName {
     SPINDLE_RIGHT("spindle right", AxisKind.TORQUE, 0, 800, 800),
     /** In revolutions. */
     SPINDLE_ROTATION("spindle rotation", AxisKind.SPEED, Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, 0),
-    /** Edge to the axis of the block; tracking, it advances one thickness of veneer, its torque, per revolution. */
+    /**
+     * Edge to the axis of the block; tracking, it advances per revolution by one thickness of veneer, which is its
+     * torque.
+     */
     KNIFE_CARRIAGE("knife carriage", AxisKind.TRACKING, 0, 400, 300),
-    /** In degrees; tracking, a curve over the distance of the knife, and an offset. */
+    /** In degrees; tracking, a function of the knife's distance, plus an offset. */
     PITCH_ANGLE("pitch angle", AxisKind.TRACKING, -5, 10, 0),
     /** Its gap to the knife. */
     NOSEBAR("nosebar", AxisKind.POSITION, 0, 20, 20),
-    /** Tracking, it keeps the distance of the knife, and an offset. */
+    /** Tracking, it keeps the knife's distance, plus an offset. */
     TOP_ROLL("top roll", AxisKind.TRACKING, 0, 400, 300),
-    /** As the top one. */
+    /** As for the top roll. */
     BOTTOM_ROLL_LEFT("bottom roll left", AxisKind.TRACKING, 0, 400, 300),
-    /** As the top one. */
+    /** As for the top roll. */
     BOTTOM_ROLL_RIGHT("bottom roll right", AxisKind.TRACKING, 0, 400, 300),
-    /** In revolutions; tracking, as fast as the surface of the block, and its torque in percent more. */
+    /** In revolutions; tracking, the speed of the block's surface, increased by its torque in percent. */
     ROLL_ROTATION("roll rotation", AxisKind.TRACKING, Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, 0),
-    /** Open, it lets what is peeled onto the veneer belt. */
+    /** When open, veneer falls onto the veneer belt. */
     VENEER_GATE("veneer gate", AxisKind.TORQUE, 0, 100, 0),
-    /** Open, it lets what is peeled into the chipper. */
+    /** When open, veneer falls into the chipper. */
     ROUND_UP_GATE("round-up gate", AxisKind.TORQUE, 0, 100, 0),
-    /** Open, it lets the core fall out. */
+    /** When open, the core falls out. */
     CORE_DROP("core drop", AxisKind.TORQUE, 0, 100, 0);
 
-    /** What backs the block up. */
+    /** The rolls that support the block. */
     static final List<AxisName> ROLLS = List.of(TOP_ROLL, BOTTOM_ROLL_LEFT, BOTTOM_ROLL_RIGHT);
 
     private final String label;
@@ -78,7 +81,7 @@ public enum AxisName {
     }
 
     /**
-     * What the axis is called in driver.cfg.
+     * The axis's name in driver.cfg.
      *
      * @return such as {@code step feeder}
      */
@@ -87,7 +90,7 @@ public enum AxisName {
     }
 
     /**
-     * Which commands it takes.
+     * Which commands it accepts.
      *
      * @return its kind
      */
@@ -114,7 +117,7 @@ public enum AxisName {
     }
 
     /**
-     * Where it stands when the simulation begins.
+     * Its position when the simulation starts.
      *
      * @return in the axis's unit
      */

@@ -6,7 +6,7 @@ enum AxisStatus {
     READY,
     /** Its speed is not 0. */
     MOVING,
-    /** As the bit of that name. */
+    /** The same as the bit of that name. */
     IN_POSITION,
     /** At its lower end position. */
     LOW_END,
@@ -18,9 +18,9 @@ enum AxisStatus {
     TRACKING,
     /** There is pressure for closing or opening. */
     PRESSURE,
-    /** Something is in its way. */
+    /** There is an obstacle in its way. */
     MET,
-    /** The last command was not carried out, or not to its end: the error word says why. */
+    /** The last command was not carried out, or not completely: the error word says why. */
     REFUSED;
 
     int when(boolean so) {

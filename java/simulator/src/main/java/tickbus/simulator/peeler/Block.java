@@ -4,11 +4,11 @@ import java.util.List;
 import java.util.stream.IntStream;
 
 /**
- * A block of wood, as a log is called once it is cut to the length of the lathe: a profile at each end, and straight
- * lines between them.
+ * A block of wood, which is a log cut to the length of the lathe: a profile at each end, and straight lines between
+ * them.
  */
 final class Block {
-    /** Length in millimetres; its middle is the line's middle. */
+    /** Length in millimetres; its middle is the middle of the line. */
     static final double LENGTH = 1300;
 
     static final double HALF = LENGTH / 2;
@@ -22,7 +22,7 @@ final class Block {
     private final String shape;
     private final Profile left;
     private final Profile right;
-    /** Where the spindles hold it, as seen from its own axis at each end; all 0 before it was ever held. */
+    /** Where the spindles hold it, relative to its own axis at each end; all 0 before it was ever held. */
     private double leftX;
     private double leftY;
     private double rightX;
@@ -35,12 +35,12 @@ final class Block {
         this.right = right;
     }
 
-    /** Counts from 1. */
+    /** Its number, from 1. */
     int number() {
         return number;
     }
 
-    /** What it looks like, for people. */
+    /** Its shape, for people. */
     String shape() {
         return shape;
     }
@@ -49,12 +49,12 @@ final class Block {
         return ofLeft ? left : right;
     }
 
-    /** Height of an end's axis when the block lies in a V of 90 degrees, above the bottom of that. */
+    /** Height of an end's axis above the bottom of a V-block of 90 degrees. */
     double lyingHeight(boolean ofLeft) {
         return (end(ofLeft).reach(DOWN_RIGHT) + end(ofLeft).reach(DOWN_LEFT)) / ROOT;
     }
 
-    /** How far an end's axis then lies to the right of the middle of the V. */
+    /** How far an end's axis then is to the right of the middle of the V. */
     double lyingAside(boolean ofLeft) {
         return (end(ofLeft).reach(DOWN_LEFT) - end(ofLeft).reach(DOWN_RIGHT)) / ROOT;
     }
@@ -64,7 +64,7 @@ final class Block {
         return lyingHeight(ofLeft) + end(ofLeft).reach(UP);
     }
 
-    /** The tips hold it here, as seen from each end's axis, in millimetres to the right and upwards. */
+    /** Sets where the tips hold it, relative to each end's axis, in millimetres to the right and upwards. */
     void holdAt(boolean ofLeft, double x, double y) {
         if (ofLeft) {
             leftX = x;
@@ -75,7 +75,7 @@ final class Block {
         }
     }
 
-    /** Who holds it now holds it off from where it was held before. */
+    /** Shifts the place where it is held. */
     void shift(boolean ofLeft, double x, double y) {
         holdAt(ofLeft, (ofLeft ? leftX : rightX) + x, (ofLeft ? leftY : rightY) + y);
     }
@@ -85,7 +85,7 @@ final class Block {
         return ofLeft ? Math.hypot(leftX, leftY) : Math.hypot(rightX, rightY);
     }
 
-    /** Whether a tip at this place, as seen from an end's axis, meets wood. */
+    /** Whether a tip at this place, relative to an end's axis, meets wood. */
     boolean isHitAt(boolean ofLeft, double x, double y) {
         double half = Math.hypot(x, y);
         int sector = (int) Math.floorMod(Math.round(Math.toDegrees(Math.atan2(y, x)) * Profile.SECTORS / 360),
@@ -102,7 +102,7 @@ final class Block {
         }).toList();
     }
 
-    /** Cubic millimetres, in so many slices, around its own axis. */
+    /** Its volume in cubic millimetres, computed with this many slices around its own axis. */
     double volume(int count) {
         double sum = 0;
         for (int i = 0; i < count; i++) {

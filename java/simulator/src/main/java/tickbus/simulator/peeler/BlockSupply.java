@@ -1,11 +1,11 @@
 package tickbus.simulator.peeler;
 
-/** Blocks as they come from the cross-cut saw: of four shapes, in turns. */
+/** Blocks as they come from the cross-cut saw: four shapes in rotation. */
 final class BlockSupply {
     private int made;
     private final int most;
 
-    /** At most so many blocks. */
+    /** A supply of at most this many blocks. */
     BlockSupply(int most) {
         this.most = most;
     }

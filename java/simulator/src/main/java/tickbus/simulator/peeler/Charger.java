@@ -1,10 +1,10 @@
 package tickbus.simulator.peeler;
 
 /**
- * The charger: a step feeder with four steps, a linear feeder with a V, centring spindles that move across and up, and
- * the transfer arm with its clamps.
+ * The charger: a step feeder with four steps, a linear feeder with a V, centring spindles that move sideways and up,
+ * and the transfer arm with its clamps.
  *
- * <p>It follows its axes; what they do is the PLC's affair. Who lets a block fall makes a mishap.
+ * <p>It follows its axes, which the PLC controls. Letting a block fall is a mishap.
  */
 final class Charger {
     /** Steps of the step feeder. */
@@ -16,7 +16,7 @@ final class Charger {
     /** Height of the pre-centring sensors above the bottom of the V, in millimetres. */
     static final double SENSOR_HEIGHT = 800;
 
-    /** Where the clamps take a block over, and how near to that it must be. */
+    /** The height at which the clamps take a block over, and the tolerance. */
     private static final double TRANSFER_HEIGHT = 280;
 
     private static final double NEAR = 5;
@@ -87,7 +87,7 @@ final class Charger {
         return steps[step];
     }
 
-    /** Whether a sensor, counted from 0, sees a block. */
+    /** Whether a sensor, counted from 0, detects a block. */
     boolean sensor(int index) {
         return switch (index) {
             case 0, 1, 2, 3 -> steps[index] != null;
@@ -99,13 +99,13 @@ final class Charger {
         };
     }
 
-    /** What the sensor over an end measures down to the block, in millimetres. */
+    /** The distance that the sensor above an end measures down to the block, in millimetres. */
     double distance(boolean left) {
         boolean below = fed != null && axis(AxisName.LINEAR_FEEDER).standsAt(0);
         return SENSOR_HEIGHT - (below ? fed.lyingTop(left) : 0);
     }
 
-    /** Puts into the axes' way what is there; before they move. */
+    /** Sets obstacles for the axes; before they move. */
     void obstruct() {
         boolean offered = fed != null && axis(AxisName.LINEAR_FEEDER).standsAt(0);
         axis(AxisName.CENTRING_SPINDLE_LEFT).meets(centred != null || offered && tipHits(true) ? Block.HALF : 0);
@@ -156,13 +156,13 @@ final class Charger {
         }
     }
 
-    /** Where a tip is, as seen from the axis of the block on the linear feeder: across. */
+    /** The horizontal position of a tip, relative to the axis of the block on the linear feeder. */
     private double tipX(boolean left) {
         Axis x = axis(left ? AxisName.CENTRING_X_LEFT : AxisName.CENTRING_X_RIGHT);
         return x.position() - OVER_FEEDER - fed.lyingAside(left);
     }
 
-    /** The same upwards. */
+    /** The vertical position of a tip, likewise. */
     private double tipY(boolean left) {
         Axis y = axis(left ? AxisName.CENTRING_Y_LEFT : AxisName.CENTRING_Y_RIGHT);
         return y.position() - fed.lyingHeight(left);
@@ -188,7 +188,7 @@ final class Charger {
         }
     }
 
-    /** Whether at least one of a pair has let go. */
+    /** Whether at least one of a pair has released. */
     static boolean away(Axis left, Axis right) {
         return Math.max(left.position(), right.position()) > Block.HALF + BITE;
     }

@@ -1,31 +1,31 @@
 package tickbus.simulator.peeler;
 
 /**
- * The lathe: spindles that hold a block and turn it, a knife that goes one thickness of veneer nearer with each
- * revolution, rolls that back the block up, gates for what comes off, and a flap through which the core falls.
+ * The lathe: spindles that hold a block and turn it, a knife that advances by one thickness of veneer with each
+ * revolution, rolls that support the block, gates for the veneer, and a flap through which the core falls.
  */
 final class Lathe {
-    /** Force that a cut takes, in newtons per square millimetre of wood that is cut at once. */
+    /** Cutting force, in newtons per square millimetre of wood cut at once. */
     private static final double CUTTING_FORCE = 3;
 
-    /** Torque that the spindles can bear without slipping, in newton metres per percent of pressure. */
+    /** Torque that the spindles transmit without slipping, in newton metres per percent of pressure. */
     private static final double GRIP = 60;
 
     private static final double MM_PER_M = 1000;
 
-    /** No veneer is as thick, in millimetres: the knife was driven into the wood. */
+    /** A thicker cut, in millimetres, means that the knife was driven into the wood. */
     private static final double THICKEST = 10;
 
-    /** What is left of a block that was peeled to its end reaches no farther than this, in millimetres. */
+    /** The largest radius of a core, in millimetres. */
     private static final double CORE = 45;
 
     private static final double FLAP_OPEN = 50;
     private static final double GATE_CLOSED = 10;
 
-    /** Of the rolls, in millimetres. */
+    /** Diameter of the rolls, in millimetres. */
     private static final double ROLL_DIAMETER = 120;
 
-    /** The knife's pitch angle in degrees, where it is at the axis; it rises with the distance, per millimetre. */
+    /** The knife's pitch angle in degrees at the axis; it rises with the distance, per millimetre. */
     private static final double PITCH_AT_AXIS = -1;
 
     private static final double PITCH_SLOPE = 0.02;
@@ -49,7 +49,7 @@ final class Lathe {
         return axes.get(name);
     }
 
-    /** What the spindles hold, or null. */
+    /** The block that the spindles hold, or null. */
     Peeling held() {
         return held;
     }
@@ -63,12 +63,12 @@ final class Lathe {
         return wood;
     }
 
-    /** How fast the surface of the block moves in front of the knife, in millimetres per second. */
+    /** The speed of the block's surface in front of the knife, in millimetres per second. */
     double surfaceSpeed() {
         return surfaceSpeed;
     }
 
-    /** Puts into the axes' way what is there; before they move. */
+    /** Sets obstacles for the axes; before they move. */
     void obstruct(Block presented) {
         double tip = held != null || presented != null ? Block.HALF : 0;
         axis(AxisName.SPINDLE_LEFT).meets(tip);
@@ -176,7 +176,7 @@ final class Lathe {
         }
     }
 
-    /** One mishap per block is enough; the others follow from it. */
+    /** One mishap per block is reported; the others follow from it. */
     private void scold(String what) {
         if (!scolded) {
             scolded = true;

@@ -7,8 +7,8 @@ import java.util.Locale;
 import tickbus.simulator.text.Svg;
 
 /**
- * Draws the lathe as it stands as a self-contained SVG, seen from its right end: the block's cross-section in its middle,
- * the knife and what comes off, the rolls, and a caption.
+ * Draws the current state of the lathe as a self-contained SVG, seen from its right end: the cross-section of the
+ * block at its middle, the knife and the veneer, the rolls, and a caption.
  */
 public final class LathePicture {
     private static final int WIDTH = 960;
@@ -48,10 +48,10 @@ public final class LathePicture {
     }
 
     /**
-     * Draws it into a file.
+     * Draws it to a file.
      *
      * @param line the line, between two steps
-     * @param file where to; a file already there is replaced
+     * @param file the file; replaced if it exists
      * @throws IOException if the file cannot be written
      */
     public static void write(Peeler line, Path file) throws IOException {
@@ -70,7 +70,7 @@ public final class LathePicture {
         }
         StringBuilder path = new StringBuilder();
         for (int i = 0; i < Profile.SECTORS; i++) {
-            // The knife is at the right; what comes to it next lies above it.
+            // The knife is at the right; what it cuts next is above it.
             double angle = i * SECTOR;
             double radius = held.radius(i) * SCALE;
             path.append(String.format(Locale.ROOT, "%s%.1f %.1f", i == 0 ? "M" : "L", X + radius * Math.cos(angle),

@@ -4,9 +4,9 @@ import java.util.ArrayList;
 import java.util.Collections;
 import java.util.List;
 
-/** What must not happen on the line, and did: each at its time. */
+/** Things that happened on the line and must not, each with its time. */
 final class Mishaps {
-    /** More than these say nothing new. */
+    /** Further ones say nothing new. */
     private static final int MOST = 100;
 
     private final List<String> texts = new ArrayList<>();

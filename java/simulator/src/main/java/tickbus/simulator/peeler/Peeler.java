@@ -7,11 +7,12 @@ import tickbus.simulator.Machine;
 /**
  * The peeling line as a machine: charger and lathe, with 25 axes.
  *
- * <p>Inputs are {@code <axis>.Execute} and the other parts of each axis's command, where an axis that opens and
- * closes has {@code .Close} and {@code .Open} instead of {@code .Tracking} and {@code .TorqueControl}; outputs are {@code <axis>.Healthy},
- * {@code .InPosition}, {@code .ActualPosition}, {@code .ActualSpeed}, {@code .Status} and {@code .Error} of each axis,
- * then the sensors of the charger and the simulation time. The same inputs at the same steps give the same motion, bit
- * for bit. A step allocates nothing but when a block changes hands or something goes wrong.
+ * <p>Inputs are {@code <axis>.Execute} and the other parts of each axis's command; an axis that opens and closes has
+ * {@code .Close} and {@code .Open} instead of {@code .Tracking} and {@code .TorqueControl}. Outputs are {@code
+ * <axis>.Healthy}, {@code .InPosition}, {@code .ActualPosition}, {@code .ActualSpeed}, {@code .Status} and {@code
+ * .Error} of each axis, then the sensors of the charger and the simulation time. The same inputs at the same steps
+ * give the same motion, bit for bit. A step allocates nothing except when a block changes hands or something goes
+ * wrong.
  */
 public final class Peeler implements Machine {
     private static final double SECONDS = 1e-9;
@@ -24,7 +25,7 @@ public final class Peeler implements Machine {
     private final Lathe lathe;
     private long now;
 
-    /** A line with as many blocks as it takes, and blocks on all steps of its feeder. */
+    /** A line with an unlimited supply of blocks, and blocks on all steps of its feeder. */
     public Peeler() {
         this(Integer.MAX_VALUE, Charger.STEPS);
     }
@@ -33,7 +34,7 @@ public final class Peeler implements Machine {
      * A line.
      *
      * @param blocks how many blocks there are; after the last one the charger runs empty
-     * @param onSteps how many of them lie on the step feeder in the beginning, at most 4
+     * @param onSteps how many of them are on the step feeder at the beginning, at most 4
      */
     public Peeler(int blocks, int onSteps) {
         axes = new Axes();
@@ -102,17 +103,17 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * Makes an axis fail, or mends it: a failed one is not healthy, and does not move.
+     * Sets or clears a fault of an axis: with a fault it is not healthy, and does not move.
      *
      * @param name which one
-     * @param failed whether it fails
+     * @param failed whether it has a fault
      */
     public void fail(AxisName name, boolean failed) {
         axes.get(name).fail(failed);
     }
 
     /**
-     * What must not happen and did.
+     * Things that happened and must not.
      *
      * @return texts in the order in which it happened; empty in a good run
      */
@@ -121,7 +122,7 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * Where an axis stands.
+     * The position of an axis.
      *
      * @param name which one
      * @return in the axis's unit
@@ -131,7 +132,7 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * How fast an axis is, with its direction as sign.
+     * The speed of an axis, with its direction as sign.
      *
      * @param name which one
      * @return in the axis's unit per second
@@ -151,7 +152,7 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * How many commands an axis has begun.
+     * The number of commands that an axis has started.
      *
      * @param name which one
      * @return counts from 0
@@ -163,7 +164,7 @@ public final class Peeler implements Machine {
     /**
      * The block in a place.
      *
-     * @param place where
+     * @param place the place
      * @return its number from 1 on, 0 if there is none
      */
     public int blockAt(Place place) {
@@ -172,9 +173,9 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * What the block in a place looks like.
+     * The shape of the block in a place.
      *
-     * @param place where
+     * @param place the place
      * @return such as {@code cylinder}; empty if there is none
      */
     public String shapeAt(Place place) {
@@ -193,9 +194,9 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * How far the block in the lathe is held off its axis.
+     * How far off its axis the block in the lathe is held.
      *
-     * @return millimetres, of the end where it is more; 0 if there is none
+     * @return millimetres, at the end where it is more; 0 if there is no block
      */
     public double eccentricity() {
         Block block = lathe.block();
@@ -203,16 +204,16 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * Whether what comes off the block in the lathe is a whole ribbon.
+     * Whether the veneer from the block in the lathe is a continuous ribbon.
      *
-     * @return false too if there is no block
+     * @return false if there is no block
      */
     public boolean round() {
         return lathe.held() != null && lathe.held().round();
     }
 
     /**
-     * What is left of the block in the lathe.
+     * The remaining volume of the block in the lathe.
      *
      * @return cubic metres; 0 if there is none
      */
@@ -221,7 +222,7 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * How fast the surface of the block in the lathe passes the knife.
+     * The speed of the block's surface at the knife.
      *
      * @return metres per second
      */
@@ -230,7 +231,7 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * Where the wood went.
+     * The balance of wood.
      *
      * @return live counts
      */

@@ -3,11 +3,11 @@ package tickbus.simulator.peeler;
 import java.util.List;
 
 /**
- * A block between the lathe's spindles, and what the knife takes off it as it turns.
+ * A block between the lathe's spindles, and what the knife cuts off it as it turns.
  *
- * <p>In slices along its length and sectors around it: as a sector passes the knife, all wood that reaches beyond the
- * knife's edge is cut off. What comes is a whole ribbon only after the knife has been in the wood over the full length for
- * a whole turn; before that it is torn, or comes in short pieces.
+ * <p>It consists of slices along its length and sectors around it: as a sector passes the knife, all wood beyond the
+ * knife's edge is cut off. The veneer is a continuous ribbon only after the knife has been in the wood over the full
+ * length for a full turn; before that it is torn, or comes in short pieces.
  */
 final class Peeling {
     /** Slices along the block. */
@@ -16,7 +16,7 @@ final class Peeling {
     private static final double SLICE = Block.LENGTH / SLICES;
     private static final double SECTOR = 2 * Math.PI / Profile.SECTORS;
 
-    /** A cut of less than this share of the thickness leaves a hole in the ribbon. */
+    /** A cut of less than this fraction of the thickness leaves a hole in the ribbon. */
     private static final double HOLE = 0.5;
 
     private final Block block;
@@ -24,7 +24,7 @@ final class Peeling {
     private final double[][] radius = new double[SLICES][];
     /** Sectors that have passed the knife. */
     private double turned;
-    /** Sectors in a row in which the knife was in the wood over the full length. */
+    /** Consecutive sectors in which the knife was in the wood over the full length. */
     private int contact;
     private double thickest;
     private double load;
@@ -43,7 +43,7 @@ final class Peeling {
         return block;
     }
 
-    /** Cubic millimetres that are left. */
+    /** The remaining volume in cubic millimetres. */
     double volume() {
         double sum = 0;
         for (double[] slice : radius) {
@@ -54,7 +54,7 @@ final class Peeling {
         return sum;
     }
 
-    /** The farthest point of what is left. */
+    /** The largest remaining radius. */
     double reach() {
         double most = 0;
         for (double[] slice : radius) {
@@ -65,17 +65,17 @@ final class Peeling {
         return most;
     }
 
-    /** The surface in front of the knife, in the middle of the block. */
+    /** The radius in front of the knife, in the middle of the block. */
     double surface() {
         return radius[SLICES / 2][sector((long) turned)];
     }
 
-    /** The surface in the middle of the block, so many sectors behind the one in front of the knife. */
+    /** The radius in the middle of the block, this many sectors behind the one in front of the knife. */
     double radius(int sectors) {
         return radius[SLICES / 2][sector((long) turned + sectors)];
     }
 
-    /** The farthest point in front of the knife, over the length of the block. */
+    /** The largest radius in front of the knife, over the length of the block. */
     double front() {
         double most = 0;
         for (double[] slice : radius) {
@@ -84,7 +84,7 @@ final class Peeling {
         return most;
     }
 
-    /** Whether what comes off is a whole ribbon. */
+    /** Whether the veneer is a continuous ribbon. */
     boolean round() {
         return contact >= Profile.SECTORS;
     }
@@ -103,10 +103,10 @@ final class Peeling {
      * Turns the block.
      *
      * @param revolutions how far, towards the knife; the other way nothing is cut
-     * @param before the knife's distance from the axis in the beginning, in millimetres
-     * @param after likewise in the end
-     * @param thickness what the veneer should be
-     * @param belt whether what comes off falls on the veneer belt; else it goes into the chipper
+     * @param before the knife's distance from the axis at the beginning, in millimetres
+     * @param after the distance at the end
+     * @param thickness the nominal thickness of the veneer
+     * @param belt whether the veneer falls onto the veneer belt, rather than into the chipper
      */
     void turn(double revolutions, double before, double after, double thickness, boolean belt) {
         thickest = 0;
@@ -145,7 +145,7 @@ final class Peeling {
         if (!belt) {
             wood.chip(volume);
         } else if (round()) {
-            // A ribbon is as long as its middle between its two faces.
+            // The length of a ribbon is that of its middle, between its two faces.
             wood.veneer(volume, volume / across);
         } else {
             wood.torn(volume);

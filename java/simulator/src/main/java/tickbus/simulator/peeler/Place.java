@@ -1,6 +1,6 @@
 package tickbus.simulator.peeler;
 
-/** Where a block can be, in the order of its way. */
+/** Where a block can be, in the order in which it gets there. */
 public enum Place {
     /** The first step of the step feeder. */
     STEP_1,

@@ -5,8 +5,8 @@ import java.util.Arrays;
 /**
  * A cross-section of a block: its radius in millimetres around an axis, by angle.
  *
- * <p>Angles count from the horizontal, anticlockwise as seen from the right end, in {@link #SECTORS} steps. Seen from the
- * axis, every point of the surface is visible.
+ * <p>Angles count from the horizontal, anticlockwise as seen from the right end, in {@link #SECTORS} steps. Every
+ * point of the surface is visible from the axis.
  */
 final class Profile {
     /** Sectors in a turn. */
@@ -36,7 +36,7 @@ final class Profile {
         return new Profile(all);
     }
 
-    /** The same with a bump, or with a dent if its height is below 0; angle and width in degrees. */
+    /** This profile with a bump, or with a dent if its height is below 0; angle and width in degrees. */
     Profile bump(double angle, double width, double height) {
         double[] all = radius.clone();
         for (int i = 0; i < SECTORS; i++) {
@@ -46,7 +46,7 @@ final class Profile {
         return new Profile(all);
     }
 
-    /** A section between two others: the first one at part 0, the second at part 1. */
+    /** A profile interpolated between two others: the first one at part 0, the second at part 1. */
     static Profile between(Profile first, Profile second, double part) {
         double[] all = new double[SECTORS];
         for (int i = 0; i < SECTORS; i++) {
@@ -55,7 +55,7 @@ final class Profile {
         return new Profile(all);
     }
 
-    /** The same, larger or smaller by a factor. */
+    /** This profile scaled by a factor. */
     Profile scale(double by) {
         return new Profile(Arrays.stream(radius).map(r -> r * by).toArray());
     }
@@ -68,12 +68,14 @@ final class Profile {
         return radius.clone();
     }
 
-    /** Square millimetres. */
+    /** The area in square millimetres. */
     double area() {
         return Arrays.stream(radius).map(r -> r * r / 2 * SECTOR).sum();
     }
 
-    /** How far the section reaches in a direction, in degrees: where a straight edge across that would touch it. */
+    /**
+     * The extent of the profile in a direction, in degrees: where a straight edge perpendicular to it would touch.
+     */
     double reach(double direction) {
         double towards = Math.toRadians(direction);
         double farthest = 0;
@@ -84,9 +86,9 @@ final class Profile {
     }
 
     /**
-     * The same section around another axis, which lies inside it.
+     * The same cross-section around another axis, which must be inside it.
      *
-     * @param x of the new axis as seen from the present one, in millimetres
+     * @param x of the new axis relative to the current one, in millimetres
      * @param y likewise, upwards
      */
     Profile around(double x, double y) {
@@ -109,7 +111,7 @@ final class Profile {
         return new Profile(all);
     }
 
-    /** Where a ray meets the polygon through points given by rising angles and distances. */
+    /** The intersection of a ray with the polygon through points given by ascending angles and distances. */
     private static double onEdge(double[] angle, double[] distance, double ray) {
         double at = ray + TURN * Math.ceil((angle[0] - ray) / TURN);
         int found = Arrays.binarySearch(angle, at);

@@ -1,7 +1,7 @@
 package tickbus.simulator.peeler;
 
 /**
- * Where the wood went, in cubic millimetres: nothing is lost on the way from the block to veneer, waste and core.
+ * The balance of wood, in cubic millimetres: nothing is lost between the block and veneer, waste and core.
  */
 public final class Wood {
     private static final double MM3_PER_M3 = 1e9;
@@ -23,13 +23,13 @@ public final class Wood {
         chucked += volume;
     }
 
-    /** A piece of a whole ribbon goes to the belt. */
+    /** A piece of a continuous ribbon goes to the belt. */
     void veneer(double volume, double length) {
         veneer += volume;
         ribbon += length;
     }
 
-    /** A piece that is no ribbon goes to the belt. */
+    /** A piece that is not a ribbon goes to the belt. */
     void torn(double volume) {
         torn += volume;
     }
@@ -49,7 +49,7 @@ public final class Wood {
     }
 
     /**
-     * Blocks that the lathe took.
+     * The number of blocks that the lathe took.
      *
      * @return a count
      */
@@ -58,7 +58,7 @@ public final class Wood {
     }
 
     /**
-     * Blocks that were peeled down to their cores.
+     * The number of blocks that were peeled down to their cores.
      *
      * @return a count
      */
@@ -67,7 +67,7 @@ public final class Wood {
     }
 
     /**
-     * Blocks that fell before that.
+     * The number of blocks that fell before that.
      *
      * @return a count
      */
@@ -76,7 +76,7 @@ public final class Wood {
     }
 
     /**
-     * Whole ribbon on the veneer belt.
+     * Continuous ribbon on the veneer belt.
      *
      * @return metres
      */
@@ -85,7 +85,7 @@ public final class Wood {
     }
 
     /**
-     * All that was ever between the lathe's spindles.
+     * Everything that was ever between the lathe's spindles.
      *
      * @return cubic metres
      */
@@ -94,7 +94,7 @@ public final class Wood {
     }
 
     /**
-     * Of that, whole ribbon on the veneer belt.
+     * The part of it that is continuous ribbon on the veneer belt.
      *
      * @return cubic metres
      */
@@ -103,7 +103,7 @@ public final class Wood {
     }
 
     /**
-     * Of that, torn or short pieces on the veneer belt.
+     * The part of it that is torn or short pieces on the veneer belt.
      *
      * @return cubic metres
      */
@@ -112,7 +112,7 @@ public final class Wood {
     }
 
     /**
-     * Of that, what went into the chipper.
+     * The part of it that went into the chipper.
      *
      * @return cubic metres
      */
@@ -121,7 +121,7 @@ public final class Wood {
     }
 
     /**
-     * Of that, cores.
+     * The part of it that is cores.
      *
      * @return cubic metres
      */
@@ -130,7 +130,7 @@ public final class Wood {
     }
 
     /**
-     * Of that, blocks that fell before they were peeled.
+     * The part of it that is blocks that fell before they were peeled.
      *
      * @return cubic metres
      */

@@ -3,7 +3,7 @@ package tickbus.simulator.rig;
 /**
  * A package sensor: a light beam across a lift's path, which a passing bottle blocks.
  *
- * <p>It also times how long it has been blocked while the lift is commanded to run; a bottle that passes takes a small
+ * <p>It also measures how long it has been blocked while the lift is commanded to run; a passing bottle takes a small
  * part of the time that means a jam.
  */
 final class Beam {
@@ -32,11 +32,11 @@ final class Beam {
     }
 
     /**
-     * Looks at the bottle on the path.
+     * Checks for a bottle on the path.
      *
      * @param bottle the bottle, or null
      * @param running the lift is commanded to run
-     * @param nanos time since the last look
+     * @param nanos time since the last check
      */
     void look(Bottle bottle, boolean running, long nanos) {
         blocked = bottle != null

@@ -3,8 +3,8 @@ package tickbus.simulator.rig;
 /**
  * A bottle in the rig.
  *
- * <p>The rig keeps a fixed set of these and uses them again, so that motion allocates nothing: read a bottle between
- * two steps and do not keep it.
+ * <p>The rig reuses a fixed set of these, so that motion allocates nothing: read a bottle between two steps and do
+ * not keep it.
  */
 public final class Bottle {
     /** What carries a bottle. */
@@ -19,9 +19,9 @@ public final class Bottle {
         SLEEVE,
         /** The suction cup of lift 2. */
         CUP2,
-        /** Wedged in the guide of lift 1, its cup let go. */
+        /** Wedged in the guide of lift 1, released by its cup. */
         STUCK1,
-        /** Wedged in the guide of lift 2, its cup let go. */
+        /** Wedged in the guide of lift 2, released by its cup. */
         STUCK2
     }
 
@@ -73,13 +73,13 @@ public final class Bottle {
     /**
      * Whether it has been at the lamp.
      *
-     * @return true from the moment that it was
+     * @return true once it has
      */
     public boolean treated() {
         return treated;
     }
 
-    /** A new bottle gets its number. */
+    /** Numbers a new bottle. */
     void number(int newId) {
         id = newId;
         treated = false;
@@ -100,7 +100,7 @@ public final class Bottle {
         treated = true;
     }
 
-    /** Back in a pocket; true the first time that it is, and was treated. */
+    /** It is in a pocket again; returns whether it was treated, the first time only. */
     boolean comesBack() {
         boolean first = treated && !back;
         back |= first;

@@ -6,7 +6,7 @@ package tickbus.simulator.rig;
  * <p>{@link Rig} puts the panel, the step bits and the variables around it.
  */
 final class Cell {
-    /** Longest stretch of motion between two looks for collisions. */
+    /** The longest motion between two collision checks. */
     private static final long SLICE_NANOS = 10_000_000L;
 
     private final Faults faults = new Faults();
@@ -47,7 +47,7 @@ final class Cell {
                 faults);
     }
 
-    /** Acts on the commands of this step and moves on. */
+    /** Applies the commands of this step and moves. */
     void step(Inputs in, long nanos) {
         if (in.rising(Inputs.ACKNOWLEDGE)) {
             acknowledge();
@@ -68,7 +68,7 @@ final class Cell {
         }
     }
 
-    /** The operator's hand: every bottle on a lift's path or in a sleeve goes. */
+    /** The operator removes every bottle on a lift's path or in a sleeve. */
     void clear() {
         remove(path1.takeAway());
         remove(path2.takeAway());
@@ -85,7 +85,7 @@ final class Cell {
         return wheel1.moving() || wheel2.moving() || path1.drive().moving() || path2.drive().moving();
     }
 
-    /** A run bit is high that has no effect, because a fault came after it rose. */
+    /** Whether a run bit is on that has no effect, because a fault came after it rose. */
     boolean ignores(Inputs in) {
         return in.high(Inputs.LA1_RUN) && !run1 || in.high(Inputs.LA2_RUN) && !run2;
     }

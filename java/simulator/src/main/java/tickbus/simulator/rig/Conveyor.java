@@ -9,10 +9,10 @@ import java.util.List;
  * outfeed's rail takes treated bottles off the wheel as they reach it.
  */
 final class Conveyor {
-    /** As many as pockets, sleeves and cups together can carry. */
+    /** The total capacity of pockets, sleeves and cups. */
     private static final int MOST = 8;
 
-    /** The rail begins here, and ends where no pocket can slip past it within one step. */
+    /** The rail begins here, and ends where no pocket can pass it within one step. */
     private static final double RAIL_BEGIN = Geometry.OUTFEED - Geometry.ALIGNED;
     private static final double RAIL_END = Geometry.OUTFEED + 30.0;
 

@@ -5,7 +5,7 @@ import java.util.List;
 
 /** Why Not OK is on, latched until acknowledged. */
 final class Faults {
-    /** The kinds of fault, as far as the counters tell them apart. */
+    /** The kinds of fault that the counters distinguish. */
     enum Kind {
         JAM(false),
         COLLISION(true),

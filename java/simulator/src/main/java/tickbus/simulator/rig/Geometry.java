@@ -19,7 +19,7 @@ public final class Geometry {
     /** The big move of either lift. */
     public static final double BIG = 180.0;
 
-    /** The small move of lift 1, by which its cup gets clear of the chamber wheel. */
+    /** The small move of lift 1, which brings its cup clear of the chamber wheel. */
     public static final double SMALL = 20.0;
 
     /** Base of a bottle that hangs in a sleeve: lift 1 after a big move, lift 2 at its bottom. */
@@ -58,13 +58,15 @@ public final class Geometry {
     /** Half the range of a bottom switch, in millimetres. */
     public static final double BOTTOM_WINDOW = 0.5;
 
-    /** How near a cup must be to a bottle to grip it, and a bottle to a pocket or sleeve to be held, in millimetres. */
+    /**
+     * How close a cup must be to a bottle to grip it, and a bottle to a pocket or sleeve to be held, in millimetres.
+     */
     static final double REACH = 1.0;
 
     /** How far a wheel may be off an index position for a lift to pass through it, in degrees. */
     static final double ALIGNED = 2.0;
 
-    /** Underside of the chamber wheel: what stands higher at lift 1 is in the wheel's way. */
+    /** Underside of the chamber wheel: anything higher at lift 1 obstructs the wheel. */
     static final double CHAMBER_UNDERSIDE = SLEEVE_FLOOR - 5.0;
 
     private Geometry() {}

@@ -42,7 +42,7 @@ final class Inputs {
         written[index] = value;
     }
 
-    /** Takes what was written as the levels of this step. */
+    /** Takes the written values as the levels of this step. */
     void sample() {
         for (int i = 0; i < level.length; i++) {
             before[i] = level[i];

@@ -5,8 +5,8 @@ import java.util.Locale;
 /**
  * The drive of a lift: a linear motor with taught moves, a bottom switch and two end stops.
  *
- * <p>At power-up and after a fault it does not trust its position unless it stands at the bottom. Then only a downward
- * move is allowed, which becomes a reference run: slowly down to the mechanical stop, which is position 0.
+ * <p>At power-up and after a fault its position is only valid if it is at the bottom. Otherwise the only permitted
+ * move is downwards, which becomes a reference run: slowly down to the mechanical stop, which is position 0.
  */
 final class LiftDrive {
     /** Speed in millimetres per second and acceleration in millimetres per second squared of a move. */
@@ -58,18 +58,18 @@ final class LiftDrive {
         return referenced;
     }
 
-    /** A move or its end ramp is under way, or a wedged bottle holds it up. */
+    /** A move or its final ramp is in progress, or a wedged bottle blocks it. */
     boolean moving() {
         return underWay;
     }
 
-    /** A big downward move: to the bottom, from wherever the lift stands; without a reference, a reference run. */
+    /** A big downward move: to the bottom, from any position; without a reference, a reference run. */
     void toBottom() {
         referencing = !referenced;
         go(0, referencing ? Pace.REFERENCE : Pace.BIG);
     }
 
-    /** A move by a distance, which needs a reference and room. */
+    /** A move by a distance, which requires a reference and enough room. */
     void by(double distance, Pace newPace, Faults faults) {
         double end = position() + distance;
         if (!referenced) {
@@ -85,8 +85,8 @@ final class LiftDrive {
     }
 
     /**
-     * The run command fell: ramps down where it is. A lift that the bottom switch already sees sinks the last half
-     * millimetre onto its stop, because a control drops the run command as soon as it sees the switch.
+     * The run command fell: brakes where it is. A lift already at the bottom switch sinks the last half millimetre
+     * onto its stop, because a control drops the run command as soon as it sees the switch.
      */
     void stop() {
         if (target == 0 && atBottom()) {
@@ -101,25 +101,25 @@ final class LiftDrive {
         }
     }
 
-    /** A fault: stands still at once. */
+    /** A fault: stops instantly. */
     void halt() {
         ramp.halt();
         underWay = false;
         referencing = false;
     }
 
-    /** The fault is over; the position is only trusted at the bottom. */
+    /** The fault is over; the position is only valid at the bottom. */
     void acknowledge() {
         referenced = atBottom();
     }
 
-    /** A bottle stuck: the motor pulls in vain. */
+    /** A bottle is stuck: the motor runs against it. */
     void wedge(double place) {
         ramp.haltAt(place);
         wedged = true;
     }
 
-    /** The stuck bottle is gone: a move still commanded goes on. */
+    /** The stuck bottle is gone: a move that is still commanded continues. */
     void unwedge() {
         wedged = false;
         if (underWay) {

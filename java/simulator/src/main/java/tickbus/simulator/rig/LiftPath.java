@@ -3,10 +3,10 @@ package tickbus.simulator.rig;
 import java.util.Locale;
 
 /**
- * A lift with its cup, its beam, and the wheels that its path passes: what it grips, carries, meets and drops.
+ * A lift with its cup, its beam, and the wheels that its path passes: what it grips, carries, hits and drops.
  *
- * <p>Everything that can go wrong between a lift and a bottle is found by comparing where the cup was with where it is,
- * so that no step is too long to notice it.
+ * <p>Everything that can go wrong between a lift and a bottle is detected by comparing the cup's previous and current
+ * position, so that it is not missed however long the step is.
  */
 final class LiftPath {
     private final Lift lift;
@@ -61,12 +61,12 @@ final class LiftPath {
         return jams;
     }
 
-    /** The next bottle that passes the beam will stick in it. */
+    /** Makes the next bottle that passes the beam stick in it. */
     void jamNext() {
         jamArmed = true;
     }
 
-    /** The operator's hand: takes the bottle off the cup or out of the guide; null if there is none. */
+    /** The operator takes the bottle off the cup or out of the guide; null if there is none. */
     Bottle takeAway() {
         if (stuck != null) {
             Bottle bottle = stuck;
@@ -99,7 +99,7 @@ final class LiftPath {
         return bottle;
     }
 
-    /** Moves on, and takes care of everything on the way. */
+    /** Moves, and handles everything on the way. */
     void advance(long nanos) {
         double from = cupHeight();
         drive.advance(nanos);
@@ -116,7 +116,7 @@ final class LiftPath {
         }
     }
 
-    /** Looks along the beam. */
+    /** Checks the beam. */
     void watch(boolean running, long nanos) {
         beam.look(stuck != null ? stuck : cup.held(), running, nanos);
         if (beam.blockedTooLong()) {
@@ -126,12 +126,12 @@ final class LiftPath {
         }
     }
 
-    /** Nothing of this lift is in the way of the wheel at the foot of its path. */
+    /** No part of this lift obstructs the wheel at the bottom of its path. */
     boolean clearOfLower() {
         return drive.position() <= Geometry.REACH && cup.held() == null;
     }
 
-    /** Nothing of this lift is in the way of the wheel at the top of its path. */
+    /** No part of this lift obstructs the wheel at the top of its path. */
     boolean clearOfUpper() {
         return upper == null || top(cupHeight()) <= Geometry.CHAMBER_UNDERSIDE;
     }
@@ -193,7 +193,7 @@ final class LiftPath {
         }
     }
 
-    /** The empty cup comes from below to a bottle: with vacuum it grips it, without it pushes it. */
+    /** The empty cup reaches a bottle from below: with vacuum it grips it, without it pushes it. */
     private void meetBase(Seat seat, double from, double to) {
         Bottle bottle = seat.bottle();
         if (bottle == null || cup.held() != null) {

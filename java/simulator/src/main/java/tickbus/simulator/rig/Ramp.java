@@ -22,12 +22,13 @@ final class Ramp {
         return legs.moving();
     }
 
-    /** Shifts the scale under a resting or endlessly turning drive; a wheel uses it to stay within one turn. */
+    /** Shifts the scale of a resting or endlessly turning drive; a wheel uses it to stay within one turn. */
     void shift(double by) {
         legs.shift(by);
     }
 
     /**
+     * Moves to a target and stops there. A moving drive first brakes to rest.
      * Goes to a target and stops there. A drive under way first brakes to rest.
      *
      * @param target where to stop
@@ -65,12 +66,12 @@ final class Ramp {
         }
     }
 
-    /** Stands still at once. */
+    /** Stops instantly. */
     void halt() {
         legs.halt();
     }
 
-    /** Stands still at once at a given place: something is in the way there. */
+    /** Stops instantly at a given position, where something is in the way. */
     void haltAt(double place) {
         legs.haltAt(place);
     }

@@ -6,13 +6,13 @@ import tickbus.simulator.Machine;
 /**
  * The bottle treatment cell of the test rig.
  *
- * <p>Index wheel 1 brings bottles in its four pockets from the infeed to lift 1. Lift 1 raises a bottle into a sleeve of
- * the chamber wheel, which turns it over to lift 2, which raises it to the lamp and lowers it again. The chamber wheel
- * turns it back, lift 1 lowers it into a pocket, and index wheel 1 takes it on to the outfeed. One bottle is on its way up
- * while another is on its way down. {@link Geometry} has the layout.
+ * <p>Index wheel 1 brings bottles in its four pockets from the infeed to lift 1. Lift 1 raises a bottle into a sleeve
+ * of the chamber wheel, which turns it over to lift 2, which raises it to the lamp and lowers it again. The chamber
+ * wheel turns it back, lift 1 lowers it into a pocket, and index wheel 1 takes it on to the outfeed. One bottle moves
+ * up while another moves down. {@link Geometry} has the layout.
  *
- * <p>Motion is a pure function of the inputs at each step: no clock, no chance, and in normal motion no allocation. Not
- * safe for use by several threads; call everything between two steps.
+ * <p>Motion is a pure function of the inputs at each step: no clock, no randomness, and in normal motion no
+ * allocation. Not thread-safe; call everything between two steps.
  */
 public final class Rig implements Machine {
     private final Inputs in = new Inputs();
@@ -23,7 +23,7 @@ public final class Rig implements Machine {
     private long time;
 
     /**
-     * A rig as it is found at power-up: somebody left lift 1 raised and the chamber wheel between two index positions.
+     * A rig as found at power-up: lift 1 was left raised, and the chamber wheel between two index positions.
      */
     public Rig() {
         this(0, 300, 40, 0);
@@ -103,8 +103,8 @@ public final class Rig implements Machine {
     }
 
     /**
-     * The operator's hand: takes away the stuck bottle and every bottle in a sleeve or on a cup. Bottles in pockets stay.
-     * Not OK then goes off at the next rising Acknowledge.
+     * The operator takes away the stuck bottle and every bottle in a sleeve or on a cup. Bottles in pockets stay. Not
+     * OK then goes off at the next rising Acknowledge.
      */
     public void clearJam() {
         cell.clear();
@@ -122,7 +122,7 @@ public final class Rig implements Machine {
     /**
      * The bottles in the rig, by number.
      *
-     * @return a new list; its bottles are true until the next step
+     * @return a new list; its bottles are valid until the next step
      */
     public List<Bottle> bottles() {
         return cell.conveyor().present();
@@ -131,7 +131,7 @@ public final class Rig implements Machine {
     /**
      * Why Not OK is on.
      *
-     * @return one sentence per cause, empty when all is well
+     * @return one sentence per cause, empty if there is none
      */
     public List<String> faults() {
         return cell.faults().texts();
@@ -167,7 +167,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * The angle of index wheel 1: where its pocket 0 stands; pocket n stands n × 90 further.
+     * The angle of index wheel 1: the position of its pocket 0; pocket n is n × 90 further.
      *
      * @return degrees, from 0 up to 360
      */
@@ -176,7 +176,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * The angle of the chamber wheel: where its sleeve 0 stands; sleeve 1 stands opposite.
+     * The angle of the chamber wheel: the position of its sleeve 0; sleeve 1 is opposite.
      *
      * @return degrees, from 0 up to 360
      */
@@ -215,10 +215,10 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a lift trusts its position.
+     * Whether a lift has a valid position.
      *
      * @param lift which lift
-     * @return false until a reference run, unless it stood at the bottom
+     * @return false until a reference run, unless it was at the bottom
      */
     public boolean referenced(Lift lift) {
         return cell.path(lift).drive().referenced();
@@ -228,14 +228,14 @@ public final class Rig implements Machine {
      * Whether a bottle blocks a lift's package sensor.
      *
      * @param lift which lift
-     * @return true while the beam is dark
+     * @return true while the beam is interrupted
      */
     public boolean beamBlocked(Lift lift) {
         return cell.path(lift).beam().blocked();
     }
 
     /**
-     * Whether a wheel's homing sensor shows.
+     * Whether a wheel's homing sensor is on.
      *
      * @param wheel 1 or 2
      * @return true near every index position
@@ -254,9 +254,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether any drive is under way.
+     * Whether any drive is moving.
      *
-     * @return true also while a wedged bottle holds a lift up
+     * @return true also while a wedged bottle blocks a lift
      */
     public boolean moving() {
         return cell.moving();
@@ -272,9 +272,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * The step of the cycle whose command word stands.
+     * The step of the cycle that the current command word belongs to.
      *
-     * @return 1 to 6, or 0 if the word is none of theirs
+     * @return 1 to 6, or 0 if it belongs to none
      */
     public int step() {
         return monitor.step();

@@ -15,7 +15,7 @@ public final class RigPanel {
      * The name of a phase of the control.
      *
      * @param number as the control shows it on its panel
-     * @return the name, or the number itself if it is none of the eight
+     * @return the name, or the number itself if it is unknown
      */
     public static String phase(int number) {
         return number >= 0 && number < PHASES.length ? PHASES[number] : Integer.toString(number);
@@ -43,7 +43,8 @@ public final class RigPanel {
     }
 
     /**
-     * Shows a rig in several lines: what {@link #line(Rig)} has, the sensors, the bottles, and the causes of a fault.
+     * Shows a rig in several lines: the contents of {@link #line(Rig)}, the sensors, the bottles, and the causes of a
+     * fault.
      *
      * @param rig the rig, between two steps
      * @return lines, each with its end
@@ -74,7 +75,7 @@ public final class RigPanel {
         return text.toString();
     }
 
-    /** A lift's stroke as a bar: the cup's place on it, filled up to there. */
+    /** A lift's stroke as a bar, filled up to the cup's position. */
     private static String bar(Rig rig, Lift lift) {
         int filled = (int) Math.round(rig.position(lift) / Geometry.STROKE * BAR);
         boolean carries = rig.bottles().stream().anyMatch(b -> carriedBy(b, lift));

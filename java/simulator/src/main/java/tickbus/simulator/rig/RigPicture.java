@@ -7,8 +7,8 @@ import java.util.Locale;
 import tickbus.simulator.text.Svg;
 
 /**
- * Draws a rig as it stands as a self-contained SVG: both wheels seen from a little above, both lifts with their cups,
- * every bottle with its number, the lamp, the sensors, and a caption with phase, step and cycle.
+ * Draws the current state of a rig as a self-contained SVG: both wheels seen from a little above, both lifts with
+ * their cups, every bottle with its number, the lamp, the sensors, and a caption with phase, step and cycle.
  */
 public final class RigPicture {
     private static final int WIDTH = 960;
@@ -40,10 +40,10 @@ public final class RigPicture {
     }
 
     /**
-     * Draws a rig into a file.
+     * Draws a rig to a file.
      *
      * @param rig the rig, between two steps
-     * @param file where to; a file already there is replaced
+     * @param file the file; replaced if it exists
      * @throws IOException if the file cannot be written
      */
     public static void write(Rig rig, Path file) throws IOException {

@@ -7,10 +7,10 @@ import java.util.Locale;
 import tickbus.simulator.text.Svg;
 
 /**
- * The machine itself in a picture.
+ * The machine in a picture.
  *
- * <p>Points are given in the rig's millimetres: across to the right, near towards the viewer, and height. Index wheel 1
- * has its infeed in front, lift 1 at its right, the outfeed behind; the chamber wheel reaches from lift 1 to lift 2.
+ * <p>Points are given in the rig's millimetres: to the right, towards the viewer, and height. Index wheel 1 has its
+ * infeed in front, lift 1 at its right, the outfeed behind; the chamber wheel reaches from lift 1 to lift 2.
  */
 final class RigScene {
     private static final double ORIGIN_X = 262;
@@ -60,7 +60,7 @@ final class RigScene {
         signs();
     }
 
-    /** The motors and shafts, which stand on the ground behind and below the wheels. */
+    /** The motors and shafts on the ground, behind and below the wheels. */
     private void undercarriage() {
         shadow(0, 62);
         shadow(LIFT1, 34);
@@ -90,7 +90,7 @@ final class RigScene {
         belt(RADIUS1 + RIM + 4, RADIUS1 + RIM + 106);
     }
 
-    /** A roller conveyor between the wheel and the world, at the infeed in front or the outfeed behind. */
+    /** A roller conveyor at the wheel: the infeed in front or the outfeed behind. */
     private void belt(double from, double to) {
         double half = 24;
         svg.path(String.format(Locale.ROOT, "M%.1f %.1fH%.1fV%.1fH%.1fZ",
@@ -134,7 +134,7 @@ final class RigScene {
         things.forEach(thing -> thing.paint().run());
     }
 
-    /** What of a lift stands between two heights: rod, cup, and the bottle that it carries. */
+    /** The part of a lift between two heights: rod, cup, and the bottle that it carries. */
     private void column(Lift lift, double across, double from, double to) {
         double cup = rig.cupHeight(lift);
         rod(across, from, Math.min(cup - 5, to));

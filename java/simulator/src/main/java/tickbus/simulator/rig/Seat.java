@@ -1,6 +1,6 @@
 package tickbus.simulator.rig;
 
-/** Where a lift's path meets a wheel: the slot of that wheel that stands at the lift. */
+/** Where a lift's path meets a wheel: the slot of that wheel at the lift. */
 final class Seat {
     private final Slots slots;
     private final double station;

@@ -26,7 +26,7 @@ final class Slots {
         return wheel;
     }
 
-    /** Base of a bottle in one of them. */
+    /** Base of a bottle in a slot. */
     double floor() {
         return floor;
     }
@@ -39,12 +39,12 @@ final class Slots {
         return bottles[slot];
     }
 
-    /** Where a slot stands, in degrees from 0 up to 360. */
+    /** The position of a slot, in degrees from 0 up to 360. */
     double station(int slot) {
         return (wheel.angle() + slot * TURN / bottles.length) % TURN;
     }
 
-    /** The slot at a station; -1 if the wheel stands between two. */
+    /** The slot at a station; -1 if the wheel is between two. */
     int at(double station) {
         if (!wheel.aligned()) {
             return -1;

@@ -1,14 +1,15 @@
 package tickbus.simulator.rig;
 
 /**
- * Tells the control when a step is done: complete(n) rises when all motion that belongs to command word n has ended.
+ * Reports completed steps to the control: complete(n) rises when all motion of command word n has ended.
  *
- * <p>It stays on until the command pattern changes or an Acknowledge rises. A fault voids the step: its bit never comes.
+ * <p>It stays on until the command pattern changes or Acknowledge rises. A fault cancels the step: its bit never
+ * comes.
  */
 final class StepMonitor {
     static final int STEPS = 6;
 
-    /** The command words of the six steps without the lamp, which is no motion. */
+    /** The command words of the six steps without the lamp, which is not a motion. */
     private static final int[] WORDS = {0x0001, 0x0024, 0x000C, 0x0080, 0x1C34, 0x143C};
 
     private enum State {
@@ -21,7 +22,7 @@ final class StepMonitor {
     private int pattern;
     private int step;
 
-    /** The step completed last; 0 when no cycle is under way: after a fault, or after a word that is no step's. */
+    /** The last completed step; 0 outside a cycle: after a fault, or after a word that is not a step's. */
     private int previous;
 
     private long cycles;
@@ -29,12 +30,12 @@ final class StepMonitor {
     private long lampErrors;
 
     /**
-     * Looks at the command pattern and the drives at the end of a step.
+     * Checks the command pattern and the drives at the end of a step.
      *
      * @param newPattern motion and suction bits of the command word
      * @param acknowledge Acknowledge rose
      * @param fault Not OK is on
-     * @param busy some drive is under way, or deaf to a run bit
+     * @param busy some drive is moving, or ignores a run bit
      */
     void look(int newPattern, boolean acknowledge, boolean fault, boolean busy) {
         if (newPattern != pattern) {
@@ -60,14 +61,14 @@ final class StepMonitor {
     }
 
     /**
-     * Whether the present step belongs to a cycle. The word of a homing with both cups on is that of step 6, so a
-     * step counts only where its turn has come.
+     * Whether the current step belongs to a cycle. The word of a homing with both cups on equals that of step 6, so a
+     * step only counts after its predecessor.
      */
     private boolean inTurn() {
         return step > 0 && (step == previous || step == previous % STEPS + 1);
     }
 
-    /** Compares the lamp with the commanded motion of lift 2, which it must mirror within a cycle. */
+    /** Compares the lamp with the commanded motion of lift 2, which it must follow within a cycle. */
     void lamp(boolean lamp, boolean lift2Runs) {
         boolean wrong = inTurn() && lamp != lift2Runs;
         if (wrong && !lampWrong) {
@@ -76,7 +77,7 @@ final class StepMonitor {
         lampWrong = wrong;
     }
 
-    /** The step whose word stands, 1 to 6, or 0. */
+    /** The step of the current word, 1 to 6, or 0. */
     int step() {
         return step;
     }

@@ -36,7 +36,7 @@ final class Wheel {
      * @param pitch degrees between index positions
      * @param speed degrees per second while indexing
      * @param steepness degrees per second squared while indexing
-     * @param angle where it stands
+     * @param angle its position
      */
     Wheel(double pitch, double speed, double steepness, double angle) {
         this.pitch = pitch;
@@ -70,7 +70,7 @@ final class Wheel {
         return retriggers;
     }
 
-    /** Takes the control's commands of this step. */
+    /** Applies the control's commands of this step. */
     void command(boolean indexRising, boolean jogRising, boolean jogHigh) {
         if (indexRising) {
             index();
@@ -85,7 +85,7 @@ final class Wheel {
         }
     }
 
-    /** Stands still at once and forgets every command. */
+    /** Stops instantly and discards all commands. */
     void halt() {
         ramp.halt();
         state = State.REST;
@@ -94,10 +94,10 @@ final class Wheel {
     }
 
     /**
-     * Turns on.
+     * Turns for a time.
      *
-     * @param nanos for how long
-     * @param free nothing stands in the wheel's way, so that it may creep onto the index position
+     * @param nanos the time
+     * @param free nothing obstructs the wheel, so that it may creep to the index position
      */
     void advance(long nanos, boolean free) {
         ramp.advance(nanos);
@@ -120,7 +120,7 @@ final class Wheel {
         } else if (state == State.REST && !settling) {
             startIndex();
         } else if (settling) {
-            // The end of homing is the wheel's own affair: a command that comes meanwhile is not lost.
+            // Creeping is not the control's motion: a command that arrives meanwhile is executed afterwards.
             pending = true;
         } else {
             retriggers++;

@@ -4,7 +4,7 @@ import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 
-/** A table of text whose columns line up. */
+/** A text table with aligned columns. */
 public final class Columns {
     private final List<String[]> rows = new ArrayList<>();
     private final boolean[] right;

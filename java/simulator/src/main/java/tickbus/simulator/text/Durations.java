@@ -17,7 +17,7 @@ public final class Durations {
      *
      * @param text a number and one of the units ns, us, ms, s, min: {@code 2ms}, {@code 0.5s}
      * @return nanoseconds, 0 or more
-     * @throws IllegalArgumentException if the text is no duration, is finer than a nanosecond, or is longer
+     * @throws IllegalArgumentException if the text is not a duration, is finer than a nanosecond, or is longer
      *     than about 292 years
      */
     public static long parse(String text) {
@@ -46,7 +46,7 @@ public final class Durations {
     }
 
     /**
-     * Writes a duration with the unit that suits it.
+     * Formats a duration with a suitable unit.
      *
      * @param nanos nanoseconds
      * @return such as {@code 2ms} or {@code 1.5s}; reads back as the same value
@@ -62,7 +62,7 @@ public final class Durations {
     }
 
     /**
-     * Writes a point of simulation time for a column of such points.
+     * Formats a point in simulation time for a column of such points.
      *
      * @param nanos nanoseconds since the simulation began
      * @return seconds with three decimals, right aligned to nine characters: {@code "   12.345"}

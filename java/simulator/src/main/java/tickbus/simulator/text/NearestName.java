@@ -3,15 +3,15 @@ package tickbus.simulator.text;
 import java.util.Collection;
 import java.util.Locale;
 
-/** Finds the name that somebody probably meant. */
+/** Finds the name that was probably meant. */
 public final class NearestName {
     private NearestName() {
     }
 
     /**
-     * The hint to put behind a complaint about an unknown name.
+     * The hint to append to an error about an unknown name.
      *
-     * @param wrong the name that nobody knows
+     * @param wrong the unknown name
      * @param known the names that exist
      * @return {@code "; did you mean \"…\"?"}, or an empty text when nothing is near enough
      */
@@ -28,7 +28,7 @@ public final class NearestName {
         return best == null ? "" : "; did you mean \"" + best + "\"?";
     }
 
-    /** Levenshtein distance: the fewest insertions, deletions and replacements that lead from a to b. */
+    /** Levenshtein distance: the smallest number of insertions, deletions and replacements that turn a into b. */
     private static int distance(String a, String b) {
         int[] row = new int[b.length() + 1];
         for (int j = 0; j <= b.length(); j++) {

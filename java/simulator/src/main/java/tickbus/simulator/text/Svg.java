@@ -93,7 +93,7 @@ public final class Svg {
      * @param x left
      * @param y base line
      * @param look attributes
-     * @param words what they are
+     * @param words the text
      * @return this
      */
     public Svg text(double x, double y, String look, String words) {

@@ -1,2 +1,2 @@
-/** Small readers and writers of text that the rooms of the simulator share. */
+/** Small text utilities shared by the packages of the simulator. */
 package tickbus.simulator.text;

@@ -19,9 +19,9 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.simulator.DriverFolder;
 
 /**
- * The whole way: simulator, drop-in driver, native library, loopback, the built-in PLC program. First as it
- * should be, then with the PLC, the rig and the link broken in turn. Stepped, so that no clock plays a part; but
- * the PLC as a process of its own, killed and started again, is a matter of real time.
+ * The whole chain: simulator, drop-in driver, native library, loopback, the built-in PLC program. First undisturbed,
+ * then with faults of the PLC, the rig and the link in turn. Stepped, so that no clock is involved; only the test
+ * with the PLC as a separate process, killed and restarted, runs in real time.
  */
 @Tag("native")
 class DemoTest {
@@ -43,7 +43,7 @@ class DemoTest {
         Cfg.write(folder.resolve("drivers"), lines);
     }
 
-    /** The project's driver.cfg as it is, but for the port, and the PLC as a process. */
+    /** The project's driver.cfg unchanged except for the port, and the PLC as a process. */
     private int demoOfTwoProcesses() throws IOException {
         String cfg = Files.readString(Path.of("../../driver.cfg"));
         String anyPort = cfg.replace("\"127.0.0.1:20030\"", "\"127.0.0.1:0\"");

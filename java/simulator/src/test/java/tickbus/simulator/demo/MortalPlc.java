@@ -9,7 +9,7 @@ import java.util.function.Supplier;
 
 /**
  * A driver whose PLC can be switched off and on in simulation time: while it is off, the simulation gets the last
- * values until they are stale, and fail-safe values from then on, as from a bus whose peer has died.
+ * values until they are stale, and then fail-safe values, as from a bus whose peer has died.
  */
 final class MortalPlc extends ControlInterfaceDeviceDriver {
     static final long MAX_AGE = 250_000_000L;
@@ -32,7 +32,7 @@ final class MortalPlc extends ControlInterfaceDeviceDriver {
         last = failSafe.clone();
     }
 
-    /** A PLC that remembers nothing of an earlier one. */
+    /** Switches on a PLC without any memory of an earlier one. */
     void on() {
         driver = maker.get();
         driver.connect(inputs -> {

@@ -17,7 +17,7 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.simulator.DriverSet;
 import tickbus.simulator.TickMode;
 
-/** The demo's script against a PLC in the same class loader: what it does, and everything that it must not let pass. */
+/** The demo's script with a PLC in the same class loader: what it does, and all the failures that it must detect. */
 class OperatorTest {
     private static final Path TABLE = Path.of("rig.table");
 
@@ -33,7 +33,7 @@ class OperatorTest {
         return play(cycles, TABLE, HostedPlc::new);
     }
 
-    /** The same, with a PLC that is killed and started again. */
+    /** The same with a PLC that is killed and restarted. */
     private int playWithOutage(int cycles, Consumer<PlcDriver> sabotage) throws IOException {
         plc = new PlcDriver(TABLE);
         sabotage.accept(plc);

@@ -57,21 +57,21 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
     private final Set<String> pulses = new HashSet<>();
     int exits;
 
-    /** What is broken: after how much simulation time the link goes stale, a step that never ends, and so on. */
+    /** What is broken: the simulation time at which the link goes stale, a step that never ends, and so on. */
     long staleFrom = Long.MAX_VALUE;
     long throwFrom = Long.MAX_VALUE;
     int deafStep;
     boolean countless;
     boolean lampDark;
-    /** Without a PLC: the cups let go; lift 2 goes on; the driver goes on saying that all is fresh. */
+    /** Without a PLC: the cups release; lift 2 continues; the driver keeps reporting fresh data. */
     boolean dropsInOutage;
     boolean creepsInOutage;
     boolean neverStale;
-    /** The PLC makes an edge after the last counts that it gave. */
+    /** The PLC makes an edge after its last report. */
     boolean edgeAfterDeath;
-    /** An edge of this signal is lost at the PLC's end just when it comes back. */
+    /** An edge of this signal is lost at the PLC's end just as it returns. */
     String lostAtReturn;
-    /** The PLC counts an edge of this signal that there never was. */
+    /** The PLC counts an edge of this signal that did not happen. */
     String miscounted;
 
     PlcDriver(Path controlTable) throws IOException {
@@ -195,7 +195,8 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
             resume = false;
             stopping = false;
             inAtScan.clear();
-            // A pulse of the time without it comes late. Its image begins with all bits off, so what is on counts once.
+            // A pulse from the time without a PLC arrives late. Its image starts with all bits off, so what is on
+            // counts once.
             pulses.forEach(name -> rises.merge(name, in.get(name) == 0 ? 1L : 0L, Long::sum));
             pulses.clear();
             in.replaceAll((name, value) -> 0.0);
@@ -238,12 +239,12 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
 
         @Override
         public void check() {
-            // It cannot end.
+            // This PLC cannot end.
         }
 
         @Override
         public void close() {
-            // Nor need it.
+            // Nothing to close.
         }
     }
 

@@ -5,7 +5,7 @@ import java.util.List;
 import tickbus.simulator.DriverSet;
 import tickbus.simulator.TickMode;
 
-/** The demo with {@link PlcDriver} in a JVM of its own, so that a test can interrupt it. */
+/** The demo with {@link PlcDriver} in a separate JVM, so that a test can interrupt it. */
 final class PlcMain {
     private PlcMain() {
     }

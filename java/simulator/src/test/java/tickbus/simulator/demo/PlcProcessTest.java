@@ -21,7 +21,7 @@ import org.junit.jupiter.api.condition.DisabledOnOs;
 import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
 
-/** The PLC's process, with shell scripts in its place. */
+/** The PLC's process, replaced by shell scripts. */
 @DisabledOnOs(value = OS.WINDOWS, disabledReason = "the processes of this test are shell scripts")
 @Timeout(60)
 class PlcProcessTest {

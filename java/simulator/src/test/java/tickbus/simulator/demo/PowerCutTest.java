@@ -26,8 +26,8 @@ import tickbus.simulator.rig.Lift;
 import tickbus.simulator.rig.Rig;
 
 /**
- * The built-in PLC program loses its power at one moment after the other of a cycle, and comes back without a memory:
- * the rig must stop safe, drop nothing, and go on. Stepped, in simulation time.
+ * The power of the built-in PLC program is cut at one moment after another of a cycle, and it restarts without
+ * memory: the rig must stop safely, drop nothing, and continue. Stepped, in simulation time.
  */
 @Tag("native")
 class PowerCutTest {
@@ -80,7 +80,7 @@ class PowerCutTest {
                     () -> assertTrue(!rig.moving(), () -> moment + ": something moves without a PLC"),
                     () -> assertArrayEquals(stood, where(), moment));
         }
-        // By the last word, before it is stale, step 6 may end.
+        // With the last word, step 6 may end before the data are stale.
         endedWithoutPlc += rig.counters().cycles() - cycles;
         plc.on();
     }
@@ -117,7 +117,7 @@ class PowerCutTest {
         }
     }
 
-    /** However the rig was left, and however late the PLC is: a scan of 10 ms is not always one. */
+    /** However the rig was left, and however late the PLC is: the delay need not be a multiple of the 10 ms scan. */
     @ParameterizedTest
     @ValueSource(strings = {"10ms", "37ms"})
     void homingEndsWellFromAnyPosition(String scan) throws IOException {

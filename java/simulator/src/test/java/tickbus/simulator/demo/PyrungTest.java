@@ -28,8 +28,8 @@ import tickbus.simulator.rig.Button;
 import tickbus.simulator.rig.Rig;
 
 /**
- * The rig under a PLC that nobody here wrote: the soft PLC pyrung runs the rig's program in ladder, {@code
- * tests/peers/rig_ladder.py}, and reaches the machine as a Modbus client. In real time, as pyrung keeps it.
+ * The rig with a third-party PLC: the soft PLC pyrung runs the rig's program in ladder logic, {@code
+ * tests/peers/rig_ladder.py}, and connects to the machine as a Modbus client. In real time, as pyrung requires.
  */
 @Tag("native")
 @DisabledOnOs(value = OS.WINDOWS, disabledReason = "the environments of the tests are those of Unix")
@@ -42,7 +42,7 @@ class PyrungTest {
     private static final long STEP = 2_000_000L;
     private static final long SECOND = 1_000_000_000L;
 
-    /** For a machine that is busy with other tests as well. */
+    /** Long enough for a machine that is busy with other tests. */
     private static final long PATIENCE = 60 * SECOND;
 
     @TempDir
@@ -115,7 +115,7 @@ class PyrungTest {
                 assertTrue(plc.waitFor(20, TimeUnit.SECONDS), "the PLC ends when it is told to");
             }
         }
-        // Initialise, home, ready, run, finalise, parked; before the PLC speaks the phase is that of nobody.
+        // Initialise, home, ready, run, finalise, parked; before the PLC has sent anything there is no phase.
         assertEquals(List.of(0, 1, 2, 3, 6, 7), phases, this::ladder);
         assertEquals(0, rig.counters().faults(), () -> rig.faults().toString());
         assertEquals(0, rig.counters().fallen());

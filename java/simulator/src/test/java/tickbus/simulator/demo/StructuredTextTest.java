@@ -25,8 +25,8 @@ import tickbus.simulator.rig.Lift;
 import tickbus.simulator.rig.Rig;
 
 /**
- * The rig's program in Structured Text, compiled, runs the rig beside the built-in one: all that either gives the
- * machine is equal in every tick. Stepped, in simulation time.
+ * The rig's program in Structured Text, compiled, runs in parallel with the built-in one: their outputs must be equal
+ * in every tick. Stepped, in simulation time.
  */
 @Tag("native")
 @EnabledIfEnvironmentVariable(named = StructuredTextTest.PROGRAM, matches = ".+",
@@ -43,7 +43,7 @@ class StructuredTextTest {
     private final Rig rig = new Rig();
     private Simulator simulator;
 
-    /** Two PLCs that see the same machine; the machine gets what both give it. */
+    /** Two PLCs with the same inputs; their outputs must agree. */
     private static final class Twins extends ControlInterfaceDeviceDriver {
         private final List<FieldbusDriver> drivers;
         private final List<double[]> given = new ArrayList<>();

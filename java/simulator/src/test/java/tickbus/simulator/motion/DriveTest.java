@@ -8,11 +8,11 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 
-/** Times and ways of planned motions. */
+/** Durations and distances of planned motions. */
 class DriveTest {
     private static final long MILLI = 1_000_000L;
 
-    /** The command that was captured in 2018: speed 8000, acceleration and deceleration 15000. */
+    /** The command documented in 2018: speed 8000, acceleration and deceleration 15000. */
     private static Drive captured(double distance, double jerk) {
         Drive drive = new Drive(100);
         drive.jerk(jerk);
@@ -57,7 +57,9 @@ class DriveTest {
         assertEquals(coarse.velocity(), fine.velocity());
     }
 
-    /** A jerk adds acceleration / jerk to each of the two changes of speed, whose ways grow with them. */
+    /**
+     * A jerk adds acceleration / jerk to each of the two changes of speed, and lengthens their distances accordingly.
+     */
     @Test
     void anSTakesLongerAndKeepsToAccelerationAndJerk() {
         Drive drive = captured(13950, 150000);

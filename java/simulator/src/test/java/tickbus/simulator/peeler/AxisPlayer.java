@@ -34,7 +34,7 @@ final class AxisPlayer {
         }
     }
 
-    /** Lets Execute fall, and rise again; the tick of the rise is done on return. */
+    /** Clears Execute and sets it again; the tick with the rising edge is done on return. */
     void execute() {
         release();
         set("Execute", 1);
@@ -54,7 +54,7 @@ final class AxisPlayer {
         execute();
     }
 
-    /** How many ticks it takes. */
+    /** The number of ticks until this is true. */
     long until(BooleanSupplier so) {
         for (long ticks = 0; ticks < PATIENCE; ticks++) {
             if (so.getAsBoolean()) {

@@ -66,7 +66,7 @@ final class LinePlayer {
         }
     }
 
-    /** Gives commands to axes at once: Execute falls, and rises. */
+    /** Gives commands to axes at once: Execute falls and rises. */
     private void execute(AxisName... axes) {
         for (AxisName axis : axes) {
             set(axis, "Execute", 0);
@@ -153,14 +153,14 @@ final class LinePlayer {
         move(0, AxisName.TRANSFER_ARM);
     }
 
-    /** Takes the block that is presented. */
+    /** Takes the presented block. */
     void take() {
         press(true, 80, AxisName.SPINDLE_LEFT, AxisName.SPINDLE_RIGHT);
         press(false, 60, AxisName.TRANSFER_CLAMP_LEFT, AxisName.TRANSFER_CLAMP_RIGHT);
         move(900, AxisName.TRANSFER_ARM);
     }
 
-    /** Peels what the spindles hold, as the lathe's PLC does, and lets the core fall. */
+    /** Peels the block that the spindles hold, as the lathe's PLC does, and lets the core fall. */
     void peel() {
         press(true, 40, AxisName.SPINDLE_LEFT, AxisName.SPINDLE_RIGHT);
         press(false, 50, AxisName.ROUND_UP_GATE);

@@ -22,8 +22,8 @@ import tickbus.simulator.TickMode;
 import tickbus.simulator.TimeSource;
 
 /**
- * The line behind its two links, byte by byte as in 2018: a client with nothing but a socket sends 360 bytes, of which
- * thirty command an axis, and gets 134.
+ * The line behind its two links, byte by byte as in 2018: a plain socket client sends 360 bytes, 30 of them
+ * commanding one axis, and gets 134.
  */
 @Tag("native")
 @Timeout(60)
@@ -53,7 +53,7 @@ class LinkTest {
                 Integer.parseInt(address.substring(address.lastIndexOf(':') + 1)));
     }
 
-    /** Sends and receives until the linear feeder is as it should be. */
+    /** Sends and receives until the linear feeder is in the expected state. */
     private static ByteBuffer talk(Socket plc, byte bits, boolean inPosition, int sizeIn) throws IOException {
         ByteBuffer out = ByteBuffer.allocate(360);
         out.put(LINEAR_FEEDER * COMMAND, bits);

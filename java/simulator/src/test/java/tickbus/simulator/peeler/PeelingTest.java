@@ -8,13 +8,13 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 
-/** What the knife takes off a block, and that no wood is lost. */
+/** What the knife cuts off a block; no wood may be lost. */
 class PeelingTest {
     private static final double MM3 = 1e9;
 
     private final Wood wood = new Wood();
 
-    /** Peels to an end radius, so many revolutions per step. */
+    /** Peels to a final radius, a number of revolutions per step. */
     private Peeling peel(Block block, double from, double to, double thickness, double step, boolean belt) {
         Peeling peeling = new Peeling(block, wood);
         on(peeling, from, to, thickness, step, belt);
@@ -89,7 +89,7 @@ class PeelingTest {
         assertTrue(peeling.reach() <= 41.5, "it reaches to " + peeling.reach());
     }
 
-    /** A knot that springs out of the round makes a hole in the ribbon, and so does a dent deeper than the last cut. */
+    /** A knot that protrudes makes a hole in the ribbon, and so does a dent deeper than the last cut. */
     @Test
     void aDentEndsTheRibbon() {
         Profile dented = Profile.circle(140).bump(90, 5, -12);

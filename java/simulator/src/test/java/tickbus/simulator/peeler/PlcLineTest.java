@@ -18,7 +18,7 @@ import tickbus.simulator.DriverFolder;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.TimeSource;
 
-/** The whole line with its two PLC programs, stepped: on simulation time, so that no clock plays a part. */
+/** The whole line with its two PLC programs, stepped: in simulation time, so that no clock is involved. */
 @Tag("native")
 class PlcLineTest {
     private static final long TICK = 2_000_000L;
@@ -69,7 +69,9 @@ class PlcLineTest {
         assertTrue(wood.torn() < 0.05 * wood.veneer(), "torn: " + wood.torn());
     }
 
-    /** Its PLC stops all axes, and begins anew from what the sensors show; a block that is half peeled is given up. */
+    /**
+     * Its PLC stops all axes, and starts over with the state that the sensors show; a half-peeled block is discarded.
+     */
     @ParameterizedTest
     @CsvSource({"TRANSFER_CLAMP_RIGHT, 37.47, 0", "CENTRING_X_LEFT, 18.2, 0", "LINEAR_FEEDER, 43.22, 0",
         "TRANSFER_ARM, 11.5, 0", "SPINDLE_ROTATION, 18.47, 1", "KNIFE_CARRIAGE, 24, 1"})

@@ -18,7 +18,7 @@ import tickbus.junit.Plc;
 import tickbus.junit.PlcTest;
 import tickbus.simulator.rig.Lift;
 
-/** What the rig's PLC program does when something goes wrong, and how an operator gets it to run again. */
+/** How the rig's PLC program reacts to faults, and how an operator restarts it. */
 @RigTest
 @DisplayName("The rig, when something fails,")
 class RigFailsTest {
@@ -28,7 +28,7 @@ class RigFailsTest {
         plc.expect(on("Running lamp"));
     }
 
-    /** The fault lamp is on, and no drive is told to move. */
+    /** The fault lamp is on, and no drive is commanded to move. */
     private static void expectAborted(Plc plc) {
         plc.expect(on("Fault lamp").and(is("Phase", 4)).and(off("Running lamp")));
         plc.expect(off("LA1 run").and(off("LA2 run")).and(off("IM1 index")).and(off("IM2 index")).and(off("IM1 jog"))
@@ -171,7 +171,7 @@ class RigFailsTest {
                 kind = "link-down"
                 for  = "2s"
                 """);
-        // The machine's driver shows fail-safe values: nothing moves, and the cups hold on.
+        // The machine's driver delivers fail-safe values: nothing moves, and the cups keep holding.
         plc.await(off("LA1 run")).within("1s");
         plc.expect(on("SC1").and(on("SC2")).and(off("Running lamp"))).during("500ms");
         plc.await(is("Phase", 1)).within("3s");

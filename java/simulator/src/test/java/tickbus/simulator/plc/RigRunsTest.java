@@ -15,7 +15,7 @@ import org.junit.jupiter.api.Nested;
 import org.junit.jupiter.api.Test;
 import tickbus.junit.Plc;
 
-/** What the rig's PLC program does when all is well. To be read from top to bottom. */
+/** The rig's PLC program without faults. To be read from top to bottom. */
 @RigTest
 @DisplayName("The rig")
 class RigRunsTest {
@@ -30,7 +30,7 @@ class RigRunsTest {
         plc.await(on("Homing sensor 2")).within("10s");
         plc.expect(off("Ready lamp"));
 
-        // Lift 1 fetches down what may hang in the sleeve over it, from before the power was cut.
+        // Lift 1 brings down whatever may be in the sleeve above it since before the power cut.
         plc.await(on("LA1 run").and(on("SC1"))).within("3s");
         plc.await(on("Step 2 complete")).within("1s");
         plc.await(on("LA1 bottom")).within("2s");
@@ -162,7 +162,7 @@ class RigRunsTest {
         plc.await(on("Ready lamp")).within("25s");
         plc.press("Start button");
         plc.await(is("Cycles", 2)).within("20s");
-        // The number belongs to this program, this machine and this step: any change of theirs shows here.
+        // The number is specific to this program, machine and step: any change to them shows here.
         assertEquals(7_256, plc.ticks());
     }
 }

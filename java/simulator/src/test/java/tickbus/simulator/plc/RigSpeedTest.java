@@ -15,16 +15,16 @@ import tickbus.junit.PlcTest;
 import tickbus.junit.Recording;
 
 /**
- * How many ticks a second a test gets: the rig behind its control table, its PLC program, and all that the kit does.
+ * Ticks per second that a test can reach: the rig behind its control table, its PLC program, and the test kit.
  *
- * <p>Under {@code make bench}, which names a file for the figures in {@code tickbus.bench.out}, it runs for seconds; else
- * it only shows that it could.
+ * <p>With {@code make bench}, which names a file for the results in {@code tickbus.bench.out}, it runs for seconds;
+ * otherwise it only checks that it works.
  */
 @RigTest
 class RigSpeedTest {
     private static final String OUT = System.getProperty("tickbus.bench.out", "");
     private static final long TICKS = OUT.isEmpty() ? 20_000 : 1_000_000;
-    /** The first rounds are the compiler's; the figure is the median of the others. */
+    /** The first rounds let the JIT compile; the result is the median of the others. */
     private static final int WARM_UP = OUT.isEmpty() ? 0 : 2;
     private static final int ROUNDS = OUT.isEmpty() ? 1 : 5;
 

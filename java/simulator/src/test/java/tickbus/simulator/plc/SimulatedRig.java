@@ -16,9 +16,8 @@ import tickbus.simulator.rig.Rig;
 /**
  * The rig behind its control table, as the simulator runs it, stepped by a {@link Plc} of the test kit.
  *
- * <p>A machine of your own needs none of this: implement {@link Machine} and set its sensors there. This one is a model
- * that exists already and has a simulator of its own, so the simulator is stepped whole, with the {@link Plc} in the
- * place of its driver.
+ * <p>For a machine of your own, just implement {@link Machine} and set its sensors there. This model exists already
+ * with its own simulator, so the whole simulator is stepped, with the {@link Plc} in place of its driver.
  */
 public final class SimulatedRig implements Machine {
     private static final Path CONTROL_TABLE = Path.of("rig.table");
@@ -27,7 +26,7 @@ public final class SimulatedRig implements Machine {
     private Line line;
     private Simulator simulator;
 
-    /** A rig as it is found at power-up. */
+    /** A rig as found at power-up. */
     public SimulatedRig() {
         this(new Rig());
     }
@@ -36,7 +35,7 @@ public final class SimulatedRig implements Machine {
         this.rig = rig;
     }
 
-    /** The model, for what no signal tells: bottles, jams. */
+    /** The model, for what signals do not show: bottles, jams. */
     Rig rig() {
         return rig;
     }
@@ -54,7 +53,7 @@ public final class SimulatedRig implements Machine {
         simulator.tick();
     }
 
-    /** The simulator's driver: its components are the signals of the PLC. The exchange is made by the kit. */
+    /** The simulator's driver: its components are the signals of the PLC. The test kit makes the exchange. */
     private static final class Line extends ControlInterfaceDeviceDriver {
         private final Plc plc;
         private final Signal[] written;
@@ -68,7 +67,7 @@ public final class SimulatedRig implements Machine {
             inputs = new double[read.length];
         }
 
-        /** What the PLC commanded at the end of the last tick. */
+        /** The PLC's commands at the end of the last tick. */
         void deliver() {
             for (int i = 0; i < read.length; i++) {
                 inputs[i] = read[i].get();
@@ -102,7 +101,7 @@ public final class SimulatedRig implements Machine {
 
         @Override
         public void exit() {
-            // The kit closes the line.
+            // The test kit closes the line.
         }
     }
 }

@@ -7,7 +7,7 @@ import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import org.junit.jupiter.api.Test;
 
-/** Bottles on one lift's path, also in places that no command word can bring them to. */
+/** Bottles on one lift's path, including places that no command word can bring them to. */
 class LiftPathTest {
     private static final long MILLI = 1_000_000L;
 

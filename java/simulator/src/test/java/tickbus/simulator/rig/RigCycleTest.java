@@ -110,7 +110,7 @@ class RigCycleTest {
     @Test
     void completeNeverComesInTheTickInWhichTheWordChanged() {
         WordPlayer player = WordPlayer.homed(50 * WordPlayer.MILLI);
-        // Lift 2 is at its bottom and the cup is empty: nothing of this word moves anything but lift 1.
+        // Lift 2 is at its bottom and the cup is empty: this word only moves lift 1.
         player.cycles(1).steps(1, 4);
         for (int n = 1; n <= 6; n++) {
             player.play(WordPlayer.STEPS[n - 1], 1);
@@ -124,7 +124,7 @@ class RigCycleTest {
     @Test
     void aWordWithoutMotionIsCompleteInTheNextTick() {
         WordPlayer player = WordPlayer.homed().cycles(1);
-        // Both lifts stand at the bottom: step 6 asks for nothing.
+        // Both lifts are at the bottom: step 6 has nothing to do.
         player.play(0, 5).play(WordPlayer.STEPS[5], 1);
         assertFalse(player.on("step6.complete"));
         player.play(WordPlayer.STEPS[5], 1);
@@ -213,7 +213,7 @@ class RigCycleTest {
             }
             grown += threads.getThreadAllocatedBytes(id) - before;
         }
-        // The measurement itself may allocate a little, once; a step that did would show 6,000 times.
+        // The measurement itself may allocate a little, once; a step that allocates would show 6,000 times.
         assertTrue(grown < 6_000, grown + " bytes in 6,000 steps");
         player.assertWell();
     }

@@ -69,7 +69,7 @@ class RigDriveTest {
         player.playFor(WordPlayer.SC1, 1_000);
         assertEquals(stopped, player.value("la1.position"));
         assertFalse(player.on("step2.complete"));
-        // A big downward move goes to the bottom from wherever the lift stands.
+        // A big downward move goes to the bottom from any position.
         player.playFor(WordPlayer.LA1_BIG_DOWN | WordPlayer.SC1, 700).play(0, 1).assertWell();
         assertEquals(0, player.value("la1.position"));
         player.steps(1, 6).assertWell();

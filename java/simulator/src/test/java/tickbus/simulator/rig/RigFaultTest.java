@@ -12,7 +12,7 @@ import org.junit.jupiter.params.provider.CsvSource;
 import org.junit.jupiter.params.provider.EnumSource;
 import org.junit.jupiter.params.provider.ValueSource;
 
-/** Everything that raises Not OK, and the ways back. */
+/** Everything that raises Not OK, and how to recover. */
 class RigFaultTest {
     private static final int UP_WITH_BOTTLE = WordPlayer.LA1_BIG_UP | WordPlayer.SC1;
 
@@ -37,7 +37,7 @@ class RigFaultTest {
         player.playFor(WordPlayer.STEPS[step - 1], 100).assertFault("jam: package sensor " + (lift.ordinal() + 1));
         assertFalse(player.on("step" + step + ".complete"));
 
-        // The control lets go of everything but the suction. Acknowledging does not help while the bottle sticks.
+        // The control drops everything except the suction. Acknowledging has no effect while the bottle is stuck.
         int suction = WordPlayer.STEPS[step - 1] & (WordPlayer.SC1 | WordPlayer.SC2);
         player.play(suction, 10).play(suction | WordPlayer.ACKNOWLEDGE, 2).play(suction, 2);
         player.assertFault("jam");
@@ -147,7 +147,7 @@ class RigFaultTest {
 
     @Test
     void aSecondBottleDoesNotFitIntoASleeve() {
-        // Down again without the chamber wheel having turned: its sleeve still holds the first bottle.
+        // Down again, but the chamber wheel has not turned: its sleeve still holds the first bottle.
         WordPlayer player = WordPlayer.homed().steps(1, 3);
         player.playFor(WordPlayer.LA1_BIG_DOWN, 700).steps(1, 1).playFor(UP_WITH_BOTTLE, 700);
         player.assertFault("lift 1 brought bottle 2 to the chamber wheel, where bottle 1 already was");
@@ -168,7 +168,7 @@ class RigFaultTest {
 
     @Test
     void codesReadLeastSignificantDigitFirstEndAtTheEndStop() {
-        // A control that swaps the digits of the code asks for + small where the rig wants - small.
+        // A control that swaps the digits of the code commands + small where the rig expects - small.
         WordPlayer.homed().steps(1, 2).play(WordPlayer.LA1_SMALL_UP, 1)
                 .assertFault("lift 1 was told to move +20 mm from 180.0 mm, past its end stop at 190 mm");
     }
@@ -194,7 +194,7 @@ class RigFaultTest {
     void aFaultStopsEveryDriveAndVoidsTheStep() {
         WordPlayer player = WordPlayer.homed().cycles(1).steps(1, 4).playFor(WordPlayer.STEPS[4], 200);
         double lift1 = player.value("la1.position");
-        // SC2 lets go in mid-air: lift 1 must stop as well.
+        // SC2 releases in mid-air: lift 1 must stop as well.
         player.play(WordPlayer.STEPS[4] & ~WordPlayer.SC2, 1).assertFault("SC2 let go");
         player.playFor(WordPlayer.STEPS[4] & ~WordPlayer.SC2, 1_000);
         assertEquals(lift1, player.value("la1.position"), 0.1);

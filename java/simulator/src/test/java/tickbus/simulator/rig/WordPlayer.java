@@ -5,7 +5,7 @@ import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.util.List;
 
-/** Plays command words to a rig, as a control does, and looks at what the rig answers. */
+/** Sends command words to a rig, as a control does, and checks its outputs. */
 final class WordPlayer {
     static final long MILLI = 1_000_000L;
 
@@ -145,7 +145,7 @@ final class WordPlayer {
         return assertAccounted();
     }
 
-    /** Not OK is on for one cause, whose text holds the given words. */
+    /** Not OK is on for one cause, whose text contains the given words. */
     WordPlayer assertFault(String words) {
         assertTrue(on("not.ok"), "Not OK is off, expected: " + words);
         assertTrue(rig.faults().get(0).contains(words), () -> rig.faults() + " does not say: " + words);

@@ -14,7 +14,7 @@ class CommandRateTest {
     private final CommandRate rate = new CommandRate(line);
     private long now;
 
-    /** A command to an axis, and a pause. */
+    /** A command to an axis, followed by a pause. */
     private void command(AxisName axis, int millis) {
         int execute = line.inputs().indexOf(axis.label() + ".Execute");
         line.input(line.inputs().indexOf(axis.label() + ".Enable"), 1);

@@ -19,7 +19,7 @@ import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.simulator.DriverFolder;
 
-/** The whole way: simulator, two drivers, native library, two sockets, two PLC processes. */
+/** The whole chain: simulator, two drivers, native library, two sockets, two PLC processes. */
 @Tag("native")
 class PeelingDemoTest {
     @TempDir

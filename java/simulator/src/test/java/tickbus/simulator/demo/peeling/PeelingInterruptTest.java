@@ -37,7 +37,7 @@ class PeelingInterruptTest {
             }
             List<ProcessHandle> plcs = demo.toHandle().descendants().toList();
             assertEquals(2, plcs.size());
-            // Process.destroy() would close the stream that the verdict comes through.
+            // Process.destroy() would close the stream from which the verdict is read.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();
             assertEquals("demo-peeler: failed reason=interrupted", rest.get(rest.size() - 1));

@@ -3,6 +3,7 @@
 mod bus;
 mod config;
 mod exchange;
+mod extras;
 mod faults;
 mod frames;
 mod heartbeat;

@@ -3,16 +3,17 @@
 use std::sync::Arc;
 
 use crate::axis::Reflexes;
-use crate::faults::{Board, Faults};
+use crate::faults::Board;
 use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
 use crate::plc;
 use crate::record::{Columns, Recorder, RecorderError, When};
 use crate::signal::Slot;
-use crate::time::{Clock, Manual, Nanos};
+use crate::time::{Clock, Glance, Manual, Nanos};
 
 use super::bus::{self, Program};
 use super::exchange::{Exchange, Tick};
+use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::station::Station;
@@ -28,6 +29,8 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
     pub(super) clock: Arc<dyn Clock>,
+    /// The same clock, for the tick.
+    pub(super) glance: Glance,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
@@ -41,13 +44,9 @@ pub struct Driver {
     pub(super) tick: Option<Tick>,
     /// What the last tick found.
     pub(super) last: Exchange,
-    /// Faults to inject; none for most drivers.
-    pub(super) faults: Option<Box<Faults>>,
+    /// What is done around every exchange; nothing in most drivers.
+    pub(super) extras: Option<Box<Extras>>,
     pub(super) board: Arc<Board>,
-    /// What the axes need done on every tick; none for most drivers.
-    pub(super) reflexes: Option<Reflexes>,
-    /// The heartbeats of this end; none for most drivers.
-    pub(super) beats: Box<[Beat]>,
     events: Consumer,
     program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
@@ -185,12 +184,18 @@ impl Driver {
         let stations = stations
             .map(|(index, tick)| Station::new(tick, &config.table, index, (tx, rx)))
             .collect();
+        // They are the machine's: a PLC has its own.
+        let reflexes = match config.role {
+            Role::Device => Reflexes::new(&config.axes),
+            Role::Controller => None,
+        };
         let list = config.faults.clone();
         let mut driver = Self {
             slots,
             recorder,
             stations,
             line,
+            glance: Glance::at(Arc::clone(&clock)),
             clock,
             max_age: config.timing.max_age,
             status,
@@ -201,13 +206,8 @@ impl Driver {
             given: None,
             tick: None,
             last: Exchange::NONE,
-            faults: None,
+            extras: Extras::new(reflexes, Beat::all(&config, config.role)),
             board,
-            // They are the machine's: a PLC has its own.
-            reflexes: (config.role == Role::Device)
-                .then(|| Reflexes::new(&config.axes))
-                .flatten(),
-            beats: Beat::all(&config, config.role),
             events: tick.events,
             program,
             config: Arc::new(config),

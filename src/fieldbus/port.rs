@@ -388,6 +388,10 @@ impl Port {
     /// The peer is there. Whether it also says anything is looked after by the port: a line that is silent
     /// for too long becomes stale by itself.
     pub fn running(&mut self, reason: &str) {
+        // Said in every cycle of some buses.
+        if !self.troubles.are_there() && self.status.is_up() {
+            return;
+        }
         self.enter(LinkState::Running, Cause::Running, reason);
     }
 

@@ -71,7 +71,7 @@ impl Driver {
     }
 
     fn exchange_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
-        let found = match self.begin(time, slots) {
+        let (found, done) = match self.begin(time, slots) {
             Ok(now) => {
                 if let Some(extras) = &mut self.extras {
                     extras.handed_over(slots);
@@ -80,10 +80,15 @@ impl Driver {
                 let sent = self.put(now, slots);
                 let (found, done) = self.take(now, slots);
                 self.lap(now);
-                self.judged(found, sent.and(done))
+                (found, sent.and(done))
             }
-            Err(error) => self.judged(self.last, Err(error)),
+            Err(error) => (self.last, Err(error)),
         };
+        if let Err(error) = done {
+            self.last = self.failed(found, &error);
+            self.end(self.last, slots);
+            return self.last;
+        }
         self.last = found;
         self.end(found, slots);
         found
@@ -104,15 +109,19 @@ impl Driver {
     }
 
     fn receive_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
-        let found = match self.begin(time, slots) {
+        let (found, done) = match self.begin(time, slots) {
             Ok(now) => {
                 self.begin_extras(slots);
                 let (found, done) = self.take(now, slots);
                 self.lap(now);
-                self.judged(found, done)
+                (found, done)
             }
-            Err(error) => self.judged(self.last, Err(error)),
+            Err(error) => (self.last, Err(error)),
         };
+        if let Err(error) = done {
+            self.last = self.failed(found, &error);
+            return self.last;
+        }
         self.last = found;
         found
     }
@@ -138,7 +147,10 @@ impl Driver {
         }
         let sent = self.put(now, slots);
         self.lap(now);
-        let done = self.judged(self.last, sent);
+        let done = match sent {
+            Ok(()) => self.last,
+            Err(error) => self.failed(self.last, &error),
+        };
         self.end(done, slots);
         done
     }
@@ -238,8 +250,6 @@ impl Driver {
     }
 
     /// The half that receives: what it found, and whether it could.
-    ///
-    /// What is found is handed on in registers: reading back at once what was just written takes as long as all else.
     #[inline(always)]
     fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
         let (granted, done) = match &mut self.line {
@@ -273,26 +283,17 @@ impl Driver {
         (found, done)
     }
 
-    /// What there is to say after a half: what was found, or that the bus failed.
-    #[inline]
-    fn judged(&mut self, found: Exchange, done: Result<(), BusError>) -> Exchange {
-        match done {
-            Ok(()) => found,
-            Err(error) => Exchange {
-                code: Code::BusFailed,
-                granted: self.failed(&error),
-                ..found
-            },
-        }
-    }
-
-    /// Says that the bus failed, and gives the time of that.
+    /// What there is to say when the bus failed and this was found.
     #[cold]
-    fn failed(&mut self, error: &BusError) -> Nanos {
+    fn failed(&mut self, found: Exchange, error: &BusError) -> Exchange {
         let now = self.now();
         let (state, cause, reason) = (LinkState::Failed, error.into(), error.to_string());
         self.status.enter(now, state, cause, &reason);
-        now
+        Exchange {
+            code: Code::BusFailed,
+            granted: now,
+            ..found
+        }
     }
 
     /// Adds what a call that began at `begun` has taken to its tick, if that is one of the sample.

@@ -6,10 +6,11 @@ use crate::axis::Reflexes;
 use crate::faults::Board;
 use crate::fieldbus::{Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped};
 use crate::image::{Consumer, Event, image};
+use crate::os::Glance;
 use crate::plc;
 use crate::record::{Columns, Recorder, RecorderError, When};
 use crate::signal::Slot;
-use crate::time::{Clock, Glance, Manual, Nanos};
+use crate::time::{Clock, Manual, Nanos};
 
 use super::bus::{self, Program};
 use super::exchange::{Exchange, Tick};

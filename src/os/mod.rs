@@ -1,5 +1,6 @@
 //! What only the operating system can do, behind safe functions; one file per thing.
 
+mod glance;
 mod library;
 mod log;
 #[cfg(unix)]
@@ -10,6 +11,7 @@ mod serial;
 #[cfg(unix)]
 mod shared_memory;
 
+pub use glance::Glance;
 pub use library::{Library, one_line};
 #[cfg(test)]
 pub(crate) use log::logged;

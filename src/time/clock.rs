@@ -36,9 +36,9 @@ pub trait Clock: Send + Sync + fmt::Debug {
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick reads it, too, at a [`Glance`](super::Glance): on the systems that tickbus runs on that is no system call (on
-/// Linux some 25 ns in the vDSO). A time that a thread keeps in memory would cost less and lag by as much as that thread is kept waiting, tens
-/// of milliseconds on a busy machine.
+/// The tick reads it, too, at a glance (see `os`): on the systems that tickbus runs on that is no system call (on
+/// Linux some 25 ns in the vDSO). A time that a thread keeps in memory would cost less and lag by as much as that
+/// thread is kept waiting, tens of milliseconds on a busy machine.
 ///
 /// It stands still while the computer sleeps.
 #[derive(Debug)]

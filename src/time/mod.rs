@@ -5,7 +5,6 @@
 //! [`Manual`] in tests and wherever simulation time rules.
 
 mod clock;
-mod glance;
 mod nanos;
 mod pace;
 mod spans;
@@ -13,7 +12,6 @@ mod stop;
 mod wall;
 
 pub use clock::{Clock, Manual, Monotonic};
-pub use glance::Glance;
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
 pub use spans::Spans;

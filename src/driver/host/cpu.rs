@@ -75,13 +75,13 @@ impl Other {
             outputs_before,
             beats,
         } = self;
-        inputs.before.copy_from_slice(&inputs.bytes);
+        tally.keep((*station, reads), &mut inputs.before, &inputs.bytes);
         let valid = image.is_valid();
         let arrival = image.read(now, &mut Taking { inputs, tape: None });
         tally.count((*station, reads), &inputs.before, &inputs.bytes);
         // A frame that was written after the peer stopped may have been read: asked once more.
         let alive = valid && image.is_valid() && arrival.age <= max_age;
-        outputs_before.copy_from_slice(outputs);
+        tally.keep((*station, writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
             alive,
@@ -152,7 +152,7 @@ impl Cpu {
             others,
         } = self;
         let (station, further) = tick.stations.split_first_mut().expect("at least one");
-        inputs.before.copy_from_slice(&inputs.bytes);
+        tally.keep((0, *reads), &mut inputs.before, &inputs.bytes);
         if let Some(faults) = faults {
             faults.begin_scan(now, &mut inputs.bytes, outputs);
         }
@@ -170,7 +170,7 @@ impl Cpu {
         tally.count((0, *reads), &inputs.before, &inputs.bytes);
         // As of the other stations, whose scan says why.
         let alive = in_time && valid && station.is_valid() && arrival.age <= *max_age;
-        outputs_before.copy_from_slice(outputs);
+        tally.keep((0, *writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
             alive,

@@ -95,10 +95,21 @@ impl Tally {
         }
     }
 
-    /// Counts the rising edges from `before` to `now` in an area of a station.
-    pub(super) fn count(&self, (station, area): (usize, Area), before: &[u8], now: &[u8]) {
+    fn frame(&self, (station, area): (usize, Area)) -> Option<&Frame> {
         let here = |frame: &&Frame| (frame.station, frame.area) == (station, area);
-        let Some(frame) = self.frames.iter().find(here) else {
+        self.frames.iter().find(here)
+    }
+
+    /// Keeps in `before` what [`count`](Self::count) will compare with, where there is anything to count.
+    pub(super) fn keep(&self, of: (usize, Area), before: &mut [u8], now: &[u8]) {
+        if self.frame(of).is_some() {
+            before.copy_from_slice(now);
+        }
+    }
+
+    /// Counts the rising edges from `before` to `now` in an area of a station.
+    pub(super) fn count(&self, of: (usize, Area), before: &[u8], now: &[u8]) {
+        let Some(frame) = self.frame(of) else {
             return;
         };
         // Most scans change nothing.

@@ -7,13 +7,13 @@
 
 use std::sync::Arc;
 
-use super::{Clock, Nanos};
+use crate::time::{Clock, Nanos};
 
 /// The clock of one thread that looks at it again and again, within microseconds: the tick.
 ///
 /// The operating system's clock costs half as much as a small exchange. For a [millisecond](TRUST) after a look at it, the
 /// processor's counter tells how much time has passed since; by the pace at which it counted between two looks. So the
-/// time is right to a microsecond, and whatever becomes of the counter (a virtual machine that moves to another computer),
+/// time is right to two microseconds, and whatever becomes of the counter (a virtual machine that moves to another computer),
 /// it is never off by more than that millisecond for longer than that. Where the processor has no such counter, or the
 /// clock is not the operating system's, each look is one at the clock.
 #[derive(Debug)]
@@ -106,11 +106,15 @@ impl Glance {
         let pace = (u128::from(passed) << 32) / u128::from(counted.max(1));
         let pace = u64::try_from(pace).unwrap_or(u64::MAX);
         if !(FASTEST..=SLOWEST).contains(&pace) {
-            self.trusted = 0;
+            self.pace = 0;
         } else if is_sharp {
             self.pace = pace;
-            self.trusted = (TRUST.0.unsigned_abs() << 32) / pace;
         }
+        let trusted = (TRUST.0.unsigned_abs() << 32).checked_div(self.pace);
+        // Whoever was kept from the processor between counter and clock looks again next time.
+        self.trusted = trusted
+            .filter(|trusted| self.base.blur <= trusted >> SHARPNESS)
+            .unwrap_or_default();
         time
     }
 }

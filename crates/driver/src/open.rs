@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
+use tickbus_base::os::Glance;
 use tickbus_base::time::{Clock, Manual, Nanos};
-use tickbus_fieldbus::faults::{Board, Faults};
+use tickbus_fieldbus::faults::Board;
 use tickbus_fieldbus::{
     Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped,
 };
@@ -15,6 +16,7 @@ use tickbus_record::{Columns, Recorder, RecorderError, When};
 
 use super::bus::{self, Program};
 use super::exchange::{Exchange, Tick};
+use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::station::Station;
@@ -31,6 +33,8 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
     pub(super) clock: Arc<dyn Clock>,
+    /// The same clock, for the tick.
+    pub(super) glance: Glance,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
@@ -44,13 +48,9 @@ pub struct Driver {
     pub(super) tick: Option<Tick>,
     /// The result of the last tick.
     pub(super) last: Exchange,
-    /// Injected faults; `None` for most drivers.
-    pub(super) faults: Option<Box<Faults>>,
+    /// What is done around every exchange; nothing in most drivers.
+    pub(super) extras: Option<Box<Extras>>,
     pub(super) board: Arc<Board>,
-    /// What the axes need done on every tick; `None` for most drivers.
-    pub(super) reflexes: Option<Reflexes>,
-    /// The heartbeats of this end; empty for most drivers.
-    pub(super) beats: Box<[Beat]>,
     events: Consumer,
     program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
@@ -188,12 +188,18 @@ impl Driver {
         let stations = stations
             .map(|(index, tick)| Station::new(tick, &config.table, index, (tx, rx)))
             .collect();
+        // They are the machine's: a PLC has its own.
+        let reflexes = match config.role {
+            Role::Device => Reflexes::new(&config.axes),
+            Role::Controller => None,
+        };
         let list = config.faults.clone();
         let mut driver = Self {
             slots,
             recorder,
             stations,
             line,
+            glance: Glance::at(Arc::clone(&clock)),
             clock,
             max_age: config.timing.max_age,
             status,
@@ -204,13 +210,8 @@ impl Driver {
             given: None,
             tick: None,
             last: Exchange::NONE,
-            faults: None,
+            extras: Extras::new(reflexes, Beat::all(&config, config.role)),
             board,
-            // Only a machine has reflexes; a PLC program handles its axes itself.
-            reflexes: (config.role == Role::Device)
-                .then(|| Reflexes::new(&config.axes))
-                .flatten(),
-            beats: Beat::all(&config, config.role),
             events: tick.events,
             program,
             config: Arc::new(config),

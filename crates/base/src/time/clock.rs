@@ -1,7 +1,7 @@
 //! Injected clocks.
 
 use std::fmt;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -28,13 +28,18 @@ pub trait Clock: Send + Sync + fmt::Debug {
     fn epoch(&self) -> Option<Nanos> {
         None
     }
+
+    /// Whether it is the operating system's clock, so that time passes on it as it does for the processor.
+    fn is_of_the_system(&self) -> bool {
+        false
+    }
 }
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick reads it as well: on the systems that tickbus runs on that is not a system call (on Linux some 25
-/// ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy machine it would
-/// lag by the tens of milliseconds for which that thread is not scheduled.
+/// The tick reads it, too, at a glance (see `os`): on the systems that tickbus runs on that is no system call (on
+/// Linux some 25 ns in the vDSO). A time that a thread keeps in memory would cost less and lag by as much as that
+/// thread is kept waiting, tens of milliseconds on a busy machine.
 ///
 /// It stands still while the computer sleeps.
 #[derive(Debug)]
@@ -79,6 +84,10 @@ impl Clock for Monotonic {
         let date = i64::try_from(date.as_nanos()).ok()?;
         Some(Nanos(date) - monotonic_now())
     }
+
+    fn is_of_the_system(&self) -> bool {
+        true
+    }
 }
 
 /// A clock that stands still until it is told to advance: for tests, and for simulation time.
@@ -86,6 +95,8 @@ impl Clock for Monotonic {
 pub struct Manual {
     now: AtomicI64,
     waiters: Mutex<Vec<Waiter>>,
+    /// How many there are: mostly none where simulation time is the clock, and then the tick takes no lock.
+    waiting: AtomicUsize,
 }
 
 /// A thread that waits on a manual clock.
@@ -108,9 +119,17 @@ impl Manual {
 
     /// Sets the clock to `now`; a clock never runs backwards, so an earlier time changes nothing.
     pub fn set(&self, now: Nanos) {
-        self.now.fetch_max(now.0, Ordering::SeqCst);
-        let now = self.now();
-        // Collected first: a waker may take its time, and threads may be added or removed meanwhile.
+        let now = Nanos(now.0.max(self.now.fetch_max(now.0, Ordering::SeqCst)));
+        // Whoever waits is counted before it looks at the time: it sees this one, or is seen here.
+        if self.waiting.load(Ordering::SeqCst) > 0 {
+            self.wake(now);
+        }
+    }
+
+    /// Wakes every wait whose deadline has come.
+    #[cold]
+    fn wake(&self, now: Nanos) {
+        // Collected first: a waker may take its time, and threads come and go meanwhile.
         let due: Vec<_> = self
             .lock()
             .iter()
@@ -159,12 +178,14 @@ impl Manual {
     /// advance.
     fn wait_listed(&self, deadline: Nanos, stop: &Stop, wait: impl FnOnce()) {
         let me = stop.downgrade();
+        self.waiting.fetch_add(1, Ordering::SeqCst);
         self.lock().push(Waiter {
             deadline,
             stop: me.clone(),
         });
         wait();
         self.lock().retain(|waiter| !waiter.stop.ptr_eq(&me));
+        self.waiting.fetch_sub(1, Ordering::SeqCst);
     }
 }
 

@@ -180,7 +180,7 @@ impl Driver {
     #[inline]
     fn now(&mut self) -> Nanos {
         match &self.line {
-            Line::Free(_) => self.glance.now(),
+            Line::Free(_) => self.clock.now(),
             // Simulation time stands still during an exchange.
             Line::Stepped { time, .. } => time.now(),
         }
@@ -301,7 +301,7 @@ impl Driver {
     #[inline]
     fn lap(&mut self, begun: Nanos) {
         if let (true, Some(tick)) = (Samples::takes(self.counters.ticks), &mut self.tick) {
-            tick.taken += self.glance.now() - begun;
+            tick.taken += self.clock.now() - begun;
         }
     }
 

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
-use tickbus_base::os::Glance;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::Board;
 use tickbus_fieldbus::{
@@ -33,8 +32,6 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: Line,
     pub(super) clock: Arc<dyn Clock>,
-    /// The same clock, for the tick.
-    pub(super) glance: Glance,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: Counters,
@@ -199,7 +196,6 @@ impl Driver {
             recorder,
             stations,
             line,
-            glance: Glance::at(Arc::clone(&clock)),
             clock,
             max_age: config.timing.max_age,
             status,

@@ -1,6 +1,5 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
-mod glance;
 mod library;
 mod log;
 #[cfg(unix)]
@@ -11,7 +10,6 @@ mod serial;
 #[cfg(unix)]
 mod shared_memory;
 
-pub use glance::Glance;
 pub use library::{Library, one_line};
 pub use log::{dropped_log_lines, flush_log, is_told, is_told_rarely, log_to_stderr};
 #[cfg(unix)]

@@ -28,18 +28,13 @@ pub trait Clock: Send + Sync + fmt::Debug {
     fn epoch(&self) -> Option<Nanos> {
         None
     }
-
-    /// Whether it is the operating system's clock, so that time passes on it as it does for the processor.
-    fn is_of_the_system(&self) -> bool {
-        false
-    }
 }
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick reads it, too, at a glance (see `os`): on the systems that tickbus runs on that is no system call (on
-/// Linux some 25 ns in the vDSO). A time that a thread keeps in memory would cost less and lag by as much as that
-/// thread is kept waiting, tens of milliseconds on a busy machine.
+/// The tick reads it as well: on the systems that tickbus runs on that is not a system call (on Linux some 25
+/// ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy machine it would
+/// lag by the tens of milliseconds for which that thread is not scheduled.
 ///
 /// It stands still while the computer sleeps.
 #[derive(Debug)]
@@ -83,10 +78,6 @@ impl Clock for Monotonic {
         let date = SystemTime::now().duration_since(UNIX_EPOCH).ok()?;
         let date = i64::try_from(date.as_nanos()).ok()?;
         Some(Nanos(date) - monotonic_now())
-    }
-
-    fn is_of_the_system(&self) -> bool {
-        true
     }
 }
 

@@ -11,11 +11,11 @@ use crate::time::{Clock, Nanos};
 
 /// The clock of one thread that looks at it again and again, within microseconds: the tick.
 ///
-/// The operating system's clock costs half as much as a small exchange. For a [millisecond](TRUST) after a look at it, the
-/// processor's counter tells how much time has passed since; by the pace at which it counted between two looks. So the
-/// time is right to two microseconds, and whatever becomes of the counter (a virtual machine that moves to another computer),
-/// it is never off by more than that millisecond for longer than that. Where the processor has no such counter, or the
-/// clock is not the operating system's, each look is one at the clock.
+/// The operating system's clock costs half as much as a small exchange. For a millisecond after a look at it, the
+/// processor's counter tells how much time has passed since, by the pace at which it counted between two looks: so the
+/// time is right to two microseconds. Whatever becomes of the counter, as where a virtual machine moves to another
+/// computer, the clock itself is looked at again after a millisecond of counting. Where the processor has no such
+/// counter, or the clock is not the operating system's, each look is one at the clock.
 #[derive(Debug)]
 pub struct Glance {
     clock: Arc<dyn Clock>,
@@ -84,7 +84,7 @@ impl Glance {
             return self.look(counter);
         }
         // Neither overflows: a millisecond has at most 2^25 counts of at most 2^35.
-        self.base.time + Nanos((counted * self.pace >> 32).cast_signed())
+        self.base.time + Nanos(((counted * self.pace) >> 32).cast_signed())
     }
 
     /// Looks at the clock itself, and learns the counter's pace from that.

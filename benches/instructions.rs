@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
 
-use tickbus::driver_cfg::Config;
 use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
 

@@ -166,7 +166,10 @@ fn a_killed_plc_is_stale_and_its_successor_is_served() {
         assert_eq!(slots[2], Slot::from_real(255.0), "fail-safe when stale");
         drop(plc);
     }
-    assert_eq!(statistic(&driver, "link.running"), Some(KILLS.to_string()));
+    // At least: on a busy machine a PLC that lives may be silent for longer than max_age.
+    let running = statistic(&driver, "link.running").map(|count| count.parse::<u64>());
+    let is_served = matches!(running, Some(Ok(count)) if count >= u64::from(KILLS));
+    assert!(is_served, "each PLC is served: {running:?}");
     assert_eq!(statistic(&driver, "link.failed"), Some("0".to_owned()));
     driver.close();
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use tickbus::report::{self, Contents, Kind, Run};
+use tickbus::report::{self, Contents, Run, SignalKind};
 use tickbus::time::Nanos;
 
 const RECORDING: &str = "bus.tick,bus.time_ns,bus.status,bus.dropped,Lamp,Height,Step,Lamp.edges\n\
@@ -183,7 +183,7 @@ fn page(run: &Run) -> String {
 #[test]
 fn a_page_has_no_address_to_load_anything_from() {
     let mut run = Run::new(100);
-    let signal = run.add_signal("x", Kind::Real, "");
+    let signal = run.add_signal("x", SignalKind::Real, "");
     run.change(signal, Nanos(1), 2.0);
     let page = page(&run);
     for word in [
@@ -204,8 +204,8 @@ fn a_page_has_no_address_to_load_anything_from() {
 #[test]
 fn a_million_changes_that_follow_a_rule_take_little_room() {
     let mut run = Run::new(2_000_000);
-    let ramp = run.add_signal("ramp", Kind::Real, "mm");
-    let pulse = run.add_signal("pulse", Kind::Bool, "");
+    let ramp = run.add_signal("ramp", SignalKind::Real, "mm");
+    let pulse = run.add_signal("pulse", SignalKind::Bool, "");
     for tick in 0..500_000_i32 {
         let now = Nanos::from_millis(i64::from(tick));
         run.tick(now);

@@ -41,7 +41,7 @@ const fn word(generation: u64, state: u64) -> u64 {
 
 /// One place, on its own cache lines: drivers that tick on different cores share nothing.
 #[repr(align(128))]
-struct Place<T> {
+struct HandleEntry<T> {
     word: AtomicU64,
     /// Only accessed by the thread that has moved the word to [`CLAIMED`], until it moves it on.
     content: UnsafeCell<Content<T>>,
@@ -55,7 +55,7 @@ struct Content<T> {
 
 /// A table of tenants of type `T`.
 pub(super) struct Handles<T, const N: usize = PLACES> {
-    places: [Place<T>; N],
+    places: [HandleEntry<T>; N],
 }
 
 // SAFETY: the one part that is not Sync by itself is `content`. It is reached through `Claim` alone,
@@ -67,7 +67,7 @@ unsafe impl<T: Send, const N: usize> Sync for Handles<T, N> {}
 impl<T, const N: usize> Handles<T, N> {
     pub(super) const fn new() -> Self {
         let places = [const {
-            Place {
+            HandleEntry {
                 word: AtomicU64::new(word(0, FREE)),
                 content: UnsafeCell::new(Content {
                     tenant: None,
@@ -143,7 +143,7 @@ impl<T, const N: usize> Handles<T, N> {
     }
 }
 
-impl<T> Place<T> {
+impl<T> HandleEntry<T> {
     /// Why a claim with this generation failed.
     #[cold]
     fn refusal(&self, generation: u64) -> Code {
@@ -164,7 +164,7 @@ impl<T> Place<T> {
 
 /// Exclusive use of a place; ends when dropped.
 struct Claim<'a, T> {
-    place: &'a Place<T>,
+    place: &'a HandleEntry<T>,
     generation: u64,
     /// The state in which the place is left.
     end: u64,
@@ -172,7 +172,7 @@ struct Claim<'a, T> {
 
 impl<'a, T> Claim<'a, T> {
     #[inline]
-    fn take(place: &'a Place<T>, found: u64, generation: u64, end: u64) -> Option<Self> {
+    fn take(place: &'a HandleEntry<T>, found: u64, generation: u64, end: u64) -> Option<Self> {
         let claimed = generation << STATE_BITS | CLAIMED;
         place
             .word

@@ -12,7 +12,7 @@ mod messages;
 use std::path::Path;
 
 use proptest::prelude::*;
-use tickbus::axis::{COMMAND_BYTES, Field, Kind};
+use tickbus::axis::{AxisKind, COMMAND_BYTES, Field};
 use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Plan, Slot};
 
@@ -141,7 +141,7 @@ fn the_charger_s_fourteen_bytes_lie_behind_its_axes() {
 /// An axis made up by a test.
 #[derive(Clone, Debug)]
 struct Made {
-    kind: Kind,
+    kind: AxisKind,
     inverted: bool,
     gain: f64,
     flags: [bool; 4],
@@ -149,7 +149,7 @@ struct Made {
 }
 
 fn made() -> impl Strategy<Value = Made> {
-    let kinds = prop::sample::select(Kind::ALL.map(|(_, kind)| kind).to_vec());
+    let kinds = prop::sample::select(AxisKind::ALL.map(|(_, kind)| kind).to_vec());
     let gains = prop::sample::select(vec![1.0, 10.0, 50.0, 100.0]);
     let gaps = (0_usize..5, 0_usize..5);
     (kinds, any::<bool>(), gains, any::<[bool; 4]>(), gaps).prop_map(
@@ -213,7 +213,7 @@ proptest! {
         prop_assert_eq!(station.input_bytes, feedback + size);
         for (number, (axis, (command, feedback, _))) in axes.iter().zip(&places).enumerate() {
             let (bits, torque) = match axis.kind {
-                Kind::Torque => (["Execute", "Close", "Open", "SpeedControl", "Enable"], "Torque"),
+                AxisKind::Torque => (["Execute", "Close", "Open", "SpeedControl", "Enable"], "Torque"),
                 _ => (["Execute", "Tracking", "TorqueControl", "SpeedControl", "Enable"], "Torque"),
             };
             let name = |field: &str| format!("axis {number}.{field}");

@@ -11,7 +11,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use tickbus::report::{self, Contents, Kind, MarkKind, Run, Statistics};
+use tickbus::report::{self, Contents, MarkKind, Run, SignalKind, Statistics};
 use tickbus::time::Nanos;
 use webdriver::Browser;
 
@@ -117,7 +117,7 @@ fn bits(value: f64) -> u64 {
 fn what_the_page_has_is_what_was_recorded_whatever_the_values() {
     let mut run = samples::machine(3_000, 1_000_000);
     let mut random = samples::Random(7);
-    let odd = run.add_signal("odd values", Kind::Real, "");
+    let odd = run.add_signal("odd values", SignalKind::Real, "");
     for (at, value) in [
         0.0,
         -0.0,
@@ -133,13 +133,13 @@ fn what_the_page_has_is_what_was_recorded_whatever_the_values() {
     {
         run.change(odd, Nanos(i64::try_from(at).expect("few") * 17), value);
     }
-    let late = run.add_signal("first known late", Kind::Bool, "");
+    let late = run.add_signal("first known late", SignalKind::Bool, "");
     run.change(late, Nanos::from_millis(1_500), 1.0);
     run.change(late, Nanos::from_millis(1_600), f64::NAN);
     run.change(late, Nanos::from_millis(1_700), 1.0);
-    run.add_signal("never known", Kind::Real, "V");
-    let real = run.add_signal("REAL, every value another", Kind::Real, "");
-    let long = run.add_signal("LREAL, every value another", Kind::Real, "");
+    run.add_signal("never known", SignalKind::Real, "V");
+    let real = run.add_signal("REAL, every value another", SignalKind::Real, "");
+    let long = run.add_signal("LREAL, every value another", SignalKind::Real, "");
     for at in 0..3_000 {
         let raw = u32::try_from(random.below(1 << 30)).expect("it is below");
         run.change(real, Nanos::from_millis(at), f64::from(f32::from_bits(raw)));
@@ -158,7 +158,7 @@ fn a_run_that_begins_before_zero_or_late_and_lasts_long_keeps_its_times() {
     let day = 86_400_000_000_000;
     for begin in [-1_500_000_001, 90 * day + 1] {
         let mut run = Run::new(1000);
-        let signal = run.add_signal("x", Kind::Bool, "");
+        let signal = run.add_signal("x", SignalKind::Bool, "");
         for (place, at) in [0, 1, 999, 3 * day].into_iter().enumerate() {
             run.tick(Nanos(begin + at));
             run.change(
@@ -187,7 +187,7 @@ fn names_and_texts_are_shown_and_never_run() {
     ];
     let mut run = Run::new(1000);
     for name in &names {
-        let signal = run.add_signal(name, Kind::Bool, attack);
+        let signal = run.add_signal(name, SignalKind::Bool, attack);
         run.change(signal, Nanos(0), 0.0);
         run.change(signal, Nanos(9), 1.0);
     }
@@ -249,7 +249,7 @@ fn an_empty_recording_and_a_single_tick_open() {
     );
     assert_quiet(&browser);
     let mut single = Run::new(10);
-    let signal = single.add_signal("x", Kind::Bool, "");
+    let signal = single.add_signal("x", SignalKind::Bool, "");
     single.tick(Nanos::from_millis(5));
     single.change(signal, Nanos::from_millis(5), 1.0);
     open(&browser, &Page::of(&contents(&single)));
@@ -263,7 +263,7 @@ fn an_empty_recording_and_a_single_tick_open() {
 fn thousands_of_signals_are_scrolled_and_filtered() {
     let mut run = Run::new(1_000_000);
     for number in 0..5_000 {
-        let signal = run.add_signal(&format!("Sensor {number}"), Kind::Bool, "");
+        let signal = run.add_signal(&format!("Sensor {number}"), SignalKind::Bool, "");
         run.change(signal, Nanos(0), 0.0);
         if number % 2 == 1 {
             run.change(signal, Nanos(number), 1.0);
@@ -360,7 +360,7 @@ fn two_fingers_zoom() {
 #[test]
 fn edges_are_drawn_where_they_happened() {
     let mut run = Run::new(1000);
-    let signal = run.add_signal("pulse", Kind::Bool, "");
+    let signal = run.add_signal("pulse", SignalKind::Bool, "");
     for (at, value) in [(0, 0.0), (500, 1.0), (600, 0.0)] {
         run.change(signal, Nanos::from_millis(at), value);
     }

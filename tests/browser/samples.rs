@@ -1,6 +1,6 @@
 //! Sample runs.
 
-use tickbus::report::{Kind, Mark, MarkKind, Run};
+use tickbus::report::{Mark, MarkKind, Run, SignalKind};
 use tickbus::time::Nanos;
 
 /// Pseudo-random numbers, the same in every run.
@@ -32,12 +32,12 @@ pub(crate) fn machine(ticks: i64, budget: usize) -> Run {
     let mut run = Run::new(budget);
     let mut random = Random(1);
     for number in 0..24 {
-        run.add_signal(&format!("Valve {number} open"), Kind::Bool, "");
+        run.add_signal(&format!("Valve {number} open"), SignalKind::Bool, "");
     }
     for number in 0..7 {
-        run.add_signal(&format!("Axis {number} position"), Kind::Real, "mm");
+        run.add_signal(&format!("Axis {number} position"), SignalKind::Real, "mm");
     }
-    let step = run.add_signal("Step", Kind::Real, "");
+    let step = run.add_signal("Step", SignalKind::Real, "");
     let mut valves = [false; 24];
     for tick in 0..ticks {
         let now = Nanos::from_millis(tick);

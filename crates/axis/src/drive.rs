@@ -1,6 +1,6 @@
 //! What a command means to an axis: one simulated drive, stepped through time.
 
-use super::{Kind, Limits, Motion, Profile};
+use super::{AxisKind, Limits, Motion, Profile};
 
 /// The tolerance within which a target counts as reached, in the unit of the axis.
 const THERE: f64 = 1e-9;
@@ -65,7 +65,7 @@ impl Feedback {
 /// without a limit of jerk.
 #[derive(Clone, Debug)]
 pub struct Drive {
-    kind: Kind,
+    kind: AxisKind,
     limits: Option<[f64; 2]>,
     /// Tests clear it to simulate a fault.
     pub healthy: bool,
@@ -108,7 +108,7 @@ const SQUEEZE: f64 = 400.0;
 
 impl Drive {
     /// An axis of a kind, at rest.
-    pub fn new(kind: Kind, position: f64, limits: Option<[f64; 2]>) -> Self {
+    pub fn new(kind: AxisKind, position: f64, limits: Option<[f64; 2]>) -> Self {
         Self {
             kind,
             limits,
@@ -168,7 +168,7 @@ impl Drive {
             deceleration: motion.deceleration.abs(),
             jerk: (demand.jerk > 0.0).then_some(demand.jerk),
         };
-        let is_torque = self.kind == Kind::Torque;
+        let is_torque = self.kind == AxisKind::Torque;
         let impossible = demand.torque_control && (!is_torque || demand.tracking);
         let moves = !demand.torque_control && !demand.tracking;
         // A REAL from the wire may be NaN or infinite: the position would never be valid again.
@@ -357,7 +357,7 @@ mod tests {
 
     #[test]
     fn a_position_command_takes_the_time_of_its_profile_and_ends_in_position() {
-        let mut drive = Drive::new(Kind::Position, 50.0, Some([0.0, 400.0]));
+        let mut drive = Drive::new(AxisKind::Position, 50.0, Some([0.0, 400.0]));
         let seconds = arrives(&mut drive, &demand(250.0));
         assert!(
             (2.1 - SCAN..=2.1 + 2.0 * SCAN).contains(&seconds),
@@ -372,7 +372,7 @@ mod tests {
 
     #[test]
     fn nothing_moves_without_enable_and_a_command_is_gone_with_it() {
-        let mut drive = Drive::new(Kind::Position, 0.0, None);
+        let mut drive = Drive::new(AxisKind::Position, 0.0, None);
         let off = Demand {
             enable: false,
             ..demand(10.0)
@@ -392,7 +392,7 @@ mod tests {
 
     #[test]
     fn a_command_in_mid_move_brakes_turns_and_arrives() {
-        let mut drive = Drive::new(Kind::Position, 0.0, Some([0.0, 400.0]));
+        let mut drive = Drive::new(AxisKind::Position, 0.0, Some([0.0, 400.0]));
         for _ in 0..50 {
             drive.step(SCAN, &demand(300.0), 0.0, 0.0);
         }
@@ -414,7 +414,7 @@ mod tests {
 
     #[test]
     fn a_jog_runs_for_as_long_as_its_bit_and_ends_at_the_limit() {
-        let mut drive = Drive::new(Kind::Position, 0.0, Some([0.0, 100.0]));
+        let mut drive = Drive::new(AxisKind::Position, 0.0, Some([0.0, 100.0]));
         let jog = Demand {
             speed_control: true,
             ..demand(1e9)
@@ -435,7 +435,7 @@ mod tests {
 
     #[test]
     fn a_clamp_closes_on_what_is_there_and_opens_to_its_end() {
-        let mut drive = Drive::new(Kind::Torque, 800.0, Some([0.0, 800.0]));
+        let mut drive = Drive::new(AxisKind::Torque, 800.0, Some([0.0, 800.0]));
         let close = Demand {
             execute: true,
             enable: true,
@@ -476,9 +476,9 @@ mod tests {
             for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                 for field in 0..5 {
                     let kind = if torque_control {
-                        Kind::Torque
+                        AxisKind::Torque
                     } else {
-                        Kind::Position
+                        AxisKind::Position
                     };
                     let mut drive = Drive::new(kind, 20.0, Some([0.0, 100.0]));
                     let mut numbers = [50.0, 10.0, 10.0, 10.0, 1.0];
@@ -518,7 +518,7 @@ mod tests {
 
     #[test]
     fn an_axis_that_tracked_without_a_deceleration_stops_when_it_tracks_no_more() {
-        let mut drive = Drive::new(Kind::Tracking, 0.0, None);
+        let mut drive = Drive::new(AxisKind::Tracking, 0.0, None);
         let track = Demand {
             tracking: true,
             motion: Motion {
@@ -538,7 +538,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_command_is_told() {
-        let mut drive = Drive::new(Kind::Position, 0.0, Some([0.0, 100.0]));
+        let mut drive = Drive::new(AxisKind::Position, 0.0, Some([0.0, 100.0]));
         let none = Demand {
             motion: Motion {
                 position: 10.0,
@@ -559,7 +559,7 @@ mod tests {
     #[test]
     fn a_clamp_closes_whatever_the_numbers_of_its_command_say() {
         for speed in [-1.0, 0.0, 100.0] {
-            let mut drive = Drive::new(Kind::Torque, 800.0, Some([0.0, 800.0]));
+            let mut drive = Drive::new(AxisKind::Torque, 800.0, Some([0.0, 800.0]));
             let mut close = demand(500.0);
             (close.tracking, close.motion.speed) = (true, speed);
             let mut told = Feedback::default();
@@ -580,9 +580,9 @@ mod tests {
             tracking: true,
             ..open
         };
-        let kinds = [Kind::Position, Kind::Speed, Kind::Tracking];
+        let kinds = [AxisKind::Position, AxisKind::Speed, AxisKind::Tracking];
         let wrong = kinds.map(|kind| (kind, open));
-        for (kind, command) in wrong.into_iter().chain([(Kind::Torque, both)]) {
+        for (kind, command) in wrong.into_iter().chain([(AxisKind::Torque, both)]) {
             let mut drive = Drive::new(kind, 20.0, Some([0.0, 100.0]));
             for _ in 0..5 {
                 let told = drive.step(SCAN, &command, 20.0, 0.0);
@@ -597,7 +597,7 @@ mod tests {
 
     #[test]
     fn what_tracks_at_speed_0_stays_where_it_is() {
-        let mut drive = Drive::new(Kind::Tracking, 20.0, Some([0.0, 100.0]));
+        let mut drive = Drive::new(AxisKind::Tracking, 20.0, Some([0.0, 100.0]));
         let mut track = demand(0.0);
         (track.tracking, track.motion.speed) = (true, 0.0);
         for _ in 0..5 {

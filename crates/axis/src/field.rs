@@ -2,7 +2,7 @@
 
 use tickbus_image::signal::{Area, DataType};
 
-use super::Kind;
+use super::AxisKind;
 
 /// Size of a command structure, in `%Q`.
 pub const COMMAND_BYTES: usize = 30;
@@ -111,10 +111,10 @@ impl Field {
     }
 
     /// The part of its signal's name after the axis' name and a dot.
-    pub const fn name(self, kind: Kind) -> &'static str {
+    pub const fn name(self, kind: AxisKind) -> &'static str {
         match (self, kind) {
-            (Self::Tracking, Kind::Torque) => "Close",
-            (Self::TorqueControl, Kind::Torque) => "Open",
+            (Self::Tracking, AxisKind::Torque) => "Close",
+            (Self::TorqueControl, AxisKind::Torque) => "Open",
             (Self::Execute, _) => "Execute",
             (Self::Tracking, _) => "Tracking",
             (Self::TorqueControl, _) => "TorqueControl",

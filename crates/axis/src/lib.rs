@@ -24,7 +24,7 @@ pub use reflexes::{Reflexes, UNKNOWN_COMMAND};
 
 /// What an axis is for: decides which commands make sense, and the names of two of its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum AxisKind {
     /// Moves to positions.
     #[default]
     Position,
@@ -36,7 +36,7 @@ pub enum Kind {
     Tracking,
 }
 
-impl Kind {
+impl AxisKind {
     /// All kinds, with their names in a driver.cfg.
     pub const ALL: [(&'static str, Self); 4] = [
         ("position", Self::Position),
@@ -58,7 +58,7 @@ pub struct Axis {
     /// Its name, the first part of the names of its signals.
     pub name: String,
     /// Its kind.
-    pub kind: Kind,
+    pub kind: AxisKind,
     /// Unit of its position, for people.
     pub unit: Option<String>,
     /// Lowest and highest position, in its unit.

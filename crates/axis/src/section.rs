@@ -9,7 +9,7 @@ use commands::read_commands;
 use switches::read_switches;
 
 use super::field::Quantity;
-use super::{Axis, COMMAND_BYTES, EXTENDED_FEEDBACK_BYTES, FEEDBACK_BYTES, Field, Kind};
+use super::{Axis, AxisKind, COMMAND_BYTES, EXTENDED_FEEDBACK_BYTES, FEEDBACK_BYTES, Field};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, short_number, shown};
 use tickbus_image::signal::section::{
@@ -30,12 +30,12 @@ const LIST_LIMIT: usize = 1000;
 
 /// The bytes that the preceding axis tables occupy.
 #[derive(Debug, Default)]
-pub struct Places<'a> {
+pub struct OffsetAllocator<'a> {
     /// By name of the station: the first free bytes of `%Q` and of `%I`.
     free: HashMap<&'a str, (usize, usize)>,
 }
 
-impl<'a> Places<'a> {
+impl<'a> OffsetAllocator<'a> {
     /// Allocates the two structures of an axis: at the offsets of its table, or right behind the preceding
     /// axis.
     fn take(
@@ -112,7 +112,7 @@ pub fn read<'a>(
     mut table: Table<'a>,
     number: usize,
     addressing: Addressing,
-    places: &mut Places<'a>,
+    places: &mut OffsetAllocator<'a>,
 ) -> Option<Read<'a>> {
     let name = table.require("name", "give the axis a name of its own");
     let kind = table.take("kind");
@@ -134,8 +134,8 @@ pub fn read<'a>(
         .as_ref()
         .and_then(|value| name_of(value).map(|name| (name, value)))
         .filter(|(name, value)| is_short(name, value));
-    let kind = kind.map_or(Some(Kind::Position), |value| {
-        value.choice("kinds of axes", &Kind::ALL)
+    let kind = kind.map_or(Some(AxisKind::Position), |value| {
+        value.choice("kinds of axes", &AxisKind::ALL)
     });
     let unit = unit.and_then(|unit| unit.label(UNIT_LIMIT, "leave it out if the axis has no unit"));
     let scaled = scale.as_ref().map(|value| scale_of(value, DataType::Real));
@@ -292,7 +292,7 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
             Quantity::Velocity | Quantity::Magnitude(1) => unit.map(|unit| format!("{unit}/s")),
             Quantity::Magnitude(2) => unit.map(|unit| format!("{unit}/s²")),
             Quantity::Magnitude(_) => unit.map(|unit| format!("{unit}/s³")),
-            Quantity::Torque if axis.kind == Kind::Torque => Some("%".to_owned()),
+            Quantity::Torque if axis.kind == AxisKind::Torque => Some("%".to_owned()),
             _ => None,
         },
         // Their pulses may be shorter than a tick or a bus cycle.

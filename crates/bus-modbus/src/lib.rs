@@ -3,6 +3,33 @@
 //! The codec knows no port and no image: [`answer()`] is the server's half, which takes a request and makes
 //! the answer using [`Tables`]; [`Query`] is the client's half. [`mbap`] and [`rtu`] frame their PDUs as
 //! telegrams.
+//!
+//! The codec can be used without the rest. A server answers from bytes of its own:
+//!
+//! ```
+//! use tickbus_bus_modbus::mbap::{self, Telegram};
+//! use tickbus_bus_modbus::{Identification, Map, Side, Tables, answer};
+//!
+//! let inputs = [0x12, 0x34];
+//! let mut outputs = [0, 0];
+//! let mut tables = Tables {
+//!     map: Map { input: Side::Sends, window: None },
+//!     sends: &inputs,
+//!     holds: &mut outputs,
+//!     holds_len: 2,
+//! };
+//! let who = Identification::of_driver("press");
+//! // Read one input register: what came over TCP, in pieces of any size.
+//! let came = [0, 7, 0, 0, 0, 6, 1, 4, 0, 0, 0, 1];
+//! let (telegram, length) = Telegram::parse(&came)?.expect("it is complete");
+//! assert_eq!(length, came.len());
+//! let mut reply = Vec::new();
+//! mbap::append(telegram.transaction, telegram.unit, &mut reply, |pdu| {
+//!     answer(telegram.pdu, &mut tables, &who, pdu)
+//! });
+//! assert_eq!(reply, [0, 7, 0, 0, 0, 5, 1, 4, 2, 0x12, 0x34]);
+//! # Ok::<(), mbap::NoTelegram>(())
+//! ```
 
 mod answer;
 mod client;

@@ -9,7 +9,7 @@ use tickbus_base::os;
 const VARIABLE: &str = "TICKBUS_HELPER";
 
 /// A place to look in: its description, and the file, or why there is none.
-type Place = (&'static str, Result<PathBuf, String>);
+type Candidate = (&'static str, Result<PathBuf, String>);
 
 /// The tickbus command.
 ///
@@ -24,7 +24,7 @@ pub(super) fn helper(named: Option<PathBuf>, directory: &Path) -> Result<PathBuf
 }
 
 /// A named command is the only candidate: running any other one would not be what was asked for.
-fn places(named: Option<PathBuf>, directory: &Path) -> Vec<Place> {
+fn places(named: Option<PathBuf>, directory: &Path) -> Vec<Candidate> {
     if let Some(path) = named {
         return vec![("`helper` in the driver.cfg", Ok(path))];
     }
@@ -54,7 +54,7 @@ fn places(named: Option<PathBuf>, directory: &Path) -> Vec<Place> {
     places
 }
 
-fn search(places: Vec<Place>) -> Result<PathBuf, String> {
+fn search(places: Vec<Candidate>) -> Result<PathBuf, String> {
     let mut tried = Vec::new();
     for (name, place) in places {
         let why = match place {

@@ -3,6 +3,60 @@
 //! The core has no I/O: [`transport`] has the packets, [`pdu`] the PDUs within them, [`item`] the variables,
 //! [`szl`] the system status lists. [`Conversation`] is a server's side of one connection, [`Dialog`] a
 //! client's. The buses [`S7Server`] and [`S7Client`] use them.
+//!
+//! The core can be used without the rest. A server takes bytes, in pieces of any size, and gives bytes:
+//!
+//! ```
+//! use std::ops::Range;
+//!
+//! use tickbus_base::time::Nanos;
+//! use tickbus_bus_s7::item::{Code, Object};
+//! use tickbus_bus_s7::szl::{Facts, Identity};
+//! use tickbus_bus_s7::{Conversation, Memory};
+//!
+//! /// A CPU with eight bytes of inputs.
+//! struct Cpu([u8; 8]);
+//!
+//! impl Memory for Cpu {
+//!     fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+//!         match object {
+//!             Object::Inputs => self.0.get(range).ok_or(Code::ADDRESS),
+//!             _ => Err(Code::MISSING),
+//!         }
+//!     }
+//!
+//!     fn write(&mut self, _: Object, _: Range<usize>) -> Result<&mut [u8], Code> {
+//!         Err(Code::ACCESS)
+//!     }
+//!
+//!     fn write_bit(&mut self, _: Object, _: usize, _: u8) -> Result<&mut u8, Code> {
+//!         Err(Code::ACCESS)
+//!     }
+//!
+//!     fn done(&mut self) {}
+//!
+//!     fn blocks(&self) -> &[(u16, usize)] {
+//!         &[]
+//!     }
+//! }
+//!
+//! let facts = Facts {
+//!     identity: Identity::of_driver("press"),
+//!     pdu: 480,
+//!     clients: 1,
+//!     epoch: Facts::NEVER_SET,
+//! };
+//! let (mut conversation, mut cpu) = (Conversation::default(), Cpu([0; 8]));
+//! // A client asks for a connection to rack 0, slot 1.
+//! let came = [
+//!     3, 0, 0, 22, 17, 0xe0, 0, 0, 0, 1, 0, 0xc1, 2, 1, 0, 0xc2, 2, 1, 1, 0xc0, 1, 10,
+//! ];
+//! let mut reply = Vec::new();
+//! let taken = conversation.packet(Nanos::ZERO, &came, &facts, &mut cpu, &mut reply)?;
+//! assert_eq!(taken, came.len());
+//! assert_eq!(reply[5], 0xd0, "it is confirmed");
+//! # Ok::<(), tickbus_bus_s7::Fault>(())
+//! ```
 
 mod client;
 mod conversation;

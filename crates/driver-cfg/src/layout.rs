@@ -61,7 +61,7 @@ pub(super) fn read_signals<'a>(
         all.extend(section::read(table, addressing).map(|section| (at, section)));
     }
     let mut read = Vec::new();
-    let mut places = axis::section::Places::default();
+    let mut places = axis::section::OffsetAllocator::default();
     for (number, table) in axes.into_iter().enumerate() {
         let at = table.at();
         if let Some(axis) = axis::section::read(table, number, addressing, &mut places) {

@@ -18,7 +18,7 @@ use tickbus_base::toml_text::did_you_mean;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{BusError, Port, Stepped};
 use tickbus_image::signal::{Signal, Slot};
-use tickbus_record::{Columns, Kind, Place, Recording, RecordingError, Tick};
+use tickbus_record::{Columns, FileClaim, Recording, RecordingError, Tick, ValueKind};
 
 /// The most missing signals that a message names.
 const NAMED: usize = 5;
@@ -85,7 +85,7 @@ pub(super) struct Replay {
     differences: Differences,
     tally: Arc<ReplayTally>,
     /// Keeps recorders of this process from writing to the file.
-    _place: Place,
+    _place: FileClaim,
 }
 
 impl Replay {
@@ -99,7 +99,7 @@ impl Replay {
         path: &Path,
     ) -> Result<(Self, Arc<ReplayTally>), DriverError> {
         let refused = |error: RecordingError| DriverError::Config(error.to_string());
-        let place = Place::to_replay(path).map_err(DriverError::Config)?;
+        let place = FileClaim::to_replay(path).map_err(DriverError::Config)?;
         let mut recording = Recording::open(path, Some(&config.table)).map_err(refused)?;
         let map = Map::new(config, recording.columns()).map_err(|what| {
             DriverError::Config(format!(
@@ -321,7 +321,7 @@ impl Map {
                 continue;
             };
             let column = &columns.columns[index];
-            let kind = Kind::of(signal.data_type, signal.scale.is_some());
+            let kind = ValueKind::of(signal.data_type, signal.scale.is_some());
             let was = match (column.address, column.data_type) {
                 (Some(address), Some(data_type)) => format!("{address} {data_type}"),
                 _ => "of another type".to_owned(),

@@ -9,12 +9,12 @@ use tickbus_image::signal::{Address, Area, ByteOrder, DataType, Signal, SignalTa
 pub(super) struct Record<'a> {
     pub(super) bytes: usize,
     /// In the order of their bytes.
-    pub(super) places: Vec<Place<'a>>,
+    pub(super) places: Vec<PlacedSignal<'a>>,
 }
 
 /// The place of a signal in the PLC, and its name there.
 #[derive(Clone, Debug)]
-pub(super) struct Place<'a> {
+pub(super) struct PlacedSignal<'a> {
     pub(super) signal: &'a Signal,
     /// The name of its station; empty if there is only one.
     pub(super) station: &'a str,
@@ -24,7 +24,7 @@ pub(super) struct Place<'a> {
     pub(super) name: String,
 }
 
-impl Place<'_> {
+impl PlacedSignal<'_> {
     pub(super) fn data_type(&self) -> DataType {
         self.signal.data_type
     }
@@ -106,8 +106,8 @@ impl<'a> Record<'a> {
         }
         let several = table.stations.len() > 1;
         let here = table.signals.iter().filter(|signal| signal.area == area);
-        let mut places: Vec<Place<'a>> = here
-            .map(|signal| Place {
+        let mut places: Vec<PlacedSignal<'a>> = here
+            .map(|signal| PlacedSignal {
                 signal,
                 station: if several {
                     &table.stations[signal.station].name

@@ -1,6 +1,6 @@
 //! Siemens' notation of addresses and types.
 
-use super::record::Place;
+use super::record::PlacedSignal;
 use tickbus_image::signal::{DataType, Width};
 
 /// A type as TIA Portal writes it.
@@ -25,7 +25,7 @@ pub(super) fn spelling(data_type: DataType) -> &'static str {
 }
 
 /// An address in Siemens' notation, `%I0.3` for `%IX0.3` of IEC 61131-3; it counts bytes.
-pub(super) fn address(place: &Place<'_>) -> String {
+pub(super) fn address(place: &PlacedSignal<'_>) -> String {
     let address = place.address();
     match address.width {
         Width::Bit => format!("{}{}.{}", address.area, address.byte, address.bit),

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::File;
 use super::names::Names;
-use super::record::{Place, Record, block_prefix, facts};
+use super::record::{PlacedSignal, Record, block_prefix, facts};
 use super::siemens::{address, spelling};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Area;
@@ -30,7 +30,7 @@ pub(super) fn file(config: &Config) -> File {
 }
 
 /// Direction, station, unit and scale of a signal.
-pub(super) fn comment(place: &Place<'_>, area: Area) -> String {
+pub(super) fn comment(place: &PlacedSignal<'_>, area: Area) -> String {
     let mut parts = vec![
         match area {
             Area::Input => "simulation to PLC",

@@ -4,7 +4,7 @@ use tickbus_image::signal::{Address, AddressError, Addressing};
 
 /// The contents of an address cell.
 #[derive(Debug)]
-pub(super) enum Place {
+pub(super) enum ParsedAddress {
     /// An address of an input or output.
     Image(Address),
     /// Something in the PLC outside the process image, and what it is.
@@ -16,7 +16,7 @@ pub(super) enum Place {
 }
 
 /// Reads an address: `%I0.0`, `I      0.0`, `%IW4:P`, `EW 4`, `PIW 256`.
-pub(super) fn place(text: &str, addressing: Addressing) -> Place {
+pub(super) fn place(text: &str, addressing: Addressing) -> ParsedAddress {
     let mut plain: String = text
         .chars()
         .filter(|c| !c.is_whitespace())
@@ -37,11 +37,11 @@ pub(super) fn place(text: &str, addressing: Addressing) -> Place {
     }
     let digits = plain.find(|c: char| c.is_ascii_digit());
     let Some(digits) = digits else {
-        return Place::Nothing;
+        return ParsedAddress::Nothing;
     };
     let (letters, numbers) = plain.split_at(digits);
     if !numbers.chars().all(|c| c.is_ascii_digit() || c == '.') && !letters.starts_with("DB") {
-        return Place::Nothing;
+        return ParsedAddress::Nothing;
     }
     let elsewhere = match letters {
         "M" | "MX" | "MB" | "MW" | "MD" | "ML" => "a marker",
@@ -53,21 +53,21 @@ pub(super) fn place(text: &str, addressing: Addressing) -> Place {
         _ => "",
     };
     if !elsewhere.is_empty() {
-        return Place::Elsewhere(elsewhere);
+        return ParsedAddress::Elsewhere(elsewhere);
     }
     // German mnemonics; an address without a size letter is a bit's.
     let international = match letters.chars().next() {
         Some('E') => letters.replacen('E', "I", 1),
         Some('A') => letters.replacen('A', "Q", 1),
         Some('I' | 'Q') => letters.to_owned(),
-        _ => return Place::Nothing,
+        _ => return ParsedAddress::Nothing,
     };
     if !["", "X", "B", "W", "D", "L"].contains(&&international[1..]) {
-        return Place::Nothing;
+        return ParsedAddress::Nothing;
     }
     match Address::parse(&format!("%{international}{numbers}"), addressing) {
-        Ok(address) => Place::Image(address),
-        Err(error) => Place::Wrong(error),
+        Ok(address) => ParsedAddress::Image(address),
+        Err(error) => ParsedAddress::Wrong(error),
     }
 }
 
@@ -90,7 +90,7 @@ mod tests {
             ("%ix3.1", "%IX3.1"),
         ] {
             match place(text, Addressing::Bytes) {
-                Place::Image(address) => assert_eq!(address.to_string(), printed, "{text}"),
+                ParsedAddress::Image(address) => assert_eq!(address.to_string(), printed, "{text}"),
                 other => panic!("{text}: {other:?}"),
             }
         }
@@ -105,7 +105,7 @@ mod tests {
             "%MD100",
         ] {
             assert!(
-                matches!(place(text, Addressing::Bytes), Place::Elsewhere(_)),
+                matches!(place(text, Addressing::Bytes), ParsedAddress::Elsewhere(_)),
                 "{text}"
             );
         }
@@ -113,14 +113,14 @@ mod tests {
             assert!(
                 matches!(
                     place(text, Addressing::Bytes),
-                    Place::Wrong(_) | Place::Nothing
+                    ParsedAddress::Wrong(_) | ParsedAddress::Nothing
                 ),
                 "{text}"
             );
         }
         for text in ["", "Bool", "Start", "Motor 1", "5", "AUTO1", "IN5", "True"] {
             assert!(
-                matches!(place(text, Addressing::Bytes), Place::Nothing),
+                matches!(place(text, Addressing::Bytes), ParsedAddress::Nothing),
                 "{text}"
             );
         }

@@ -1,6 +1,6 @@
 //! Finds the meaning of columns: by their headings, or by their contents.
 
-use super::address::{Place, place};
+use super::address::{ParsedAddress, place};
 use super::cells::Record;
 use super::device;
 use tickbus_image::signal::Addressing;
@@ -111,7 +111,7 @@ pub(super) fn find(records: &[Record]) -> Option<Columns> {
     let is_address = |record: &Record, column: usize| {
         let cell = record.get(column);
         cell.is_some_and(|cell| {
-            !matches!(place(&cell.text, Addressing::Bytes), Place::Nothing)
+            !matches!(place(&cell.text, Addressing::Bytes), ParsedAddress::Nothing)
                 || device::is_address(&cell.text)
         })
     };

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::address::{Place, place};
+use super::address::{ParsedAddress, place};
 use super::cells::{Cell, Record};
 use super::columns::Columns;
 use super::device::{self, Client, kepserver_type};
@@ -66,7 +66,9 @@ pub(super) fn client<'a>(addresses: impl Iterator<Item = &'a str>) -> Option<Cli
                 counts[usize::from(client == Client::S7)] += 1;
                 typed |= client == Client::Modbus || address.contains([':', ',']);
             }
-            None => of_image |= matches!(place(address, Addressing::Bytes), Place::Image(_)),
+            None => {
+                of_image |= matches!(place(address, Addressing::Bytes), ParsedAddress::Image(_))
+            }
         }
     }
     let [modbus, s7] = counts;
@@ -195,7 +197,7 @@ impl Row<'_> {
 
     fn in_image(&self, cell: &Cell, addressing: Addressing) -> Option<Found> {
         let (what, right) = match place(&cell.text, addressing) {
-            Place::Image(address) => {
+            ParsedAddress::Image(address) => {
                 let (data_type, address) = kind(self.cell(self.columns.kind), address, self.wrong)?;
                 return Some(Found {
                     area: address.area,
@@ -204,7 +206,7 @@ impl Row<'_> {
                     data_type,
                 });
             }
-            Place::Elsewhere(what) => {
+            ParsedAddress::Elsewhere(what) => {
                 self.skipped.report(
                     cell.at,
                     format!(
@@ -215,7 +217,7 @@ impl Row<'_> {
                 );
                 return None;
             }
-            Place::Nothing if cell.text.ends_with('*') => {
+            ParsedAddress::Nothing if cell.text.ends_with('*') => {
                 self.skipped.report(
                     cell.at,
                     format!("{} has no place yet: skipped", quoted(&cell.text)),
@@ -223,8 +225,8 @@ impl Row<'_> {
                 );
                 return None;
             }
-            Place::Wrong(error) => (error.what, error.right),
-            Place::Nothing => (
+            ParsedAddress::Wrong(error) => (error.what, error.right),
+            ParsedAddress::Nothing => (
                 format!("{} is no address", quoted(&cell.text)),
                 "addresses look like %I0.0, %IB4, %QW2, %ID8".to_owned(),
             ),

@@ -5,7 +5,7 @@ use tickbus_image::signal::{Address, DataType, Signal, SignalTable, Slot};
 
 /// The type of a column's values, in a slot and in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum ValueKind {
     /// A BOOL: a double that is 0 or 1, or NaN.
     Bit,
     /// A double.
@@ -18,7 +18,7 @@ pub enum Kind {
     Count,
 }
 
-impl Kind {
+impl ValueKind {
     /// The kind for a signal of this type, with or without a scale.
     pub const fn of(data_type: DataType, scaled: bool) -> Self {
         match data_type {
@@ -49,7 +49,7 @@ pub struct Column {
     /// Whether it counts the signal's edges since the previous tick.
     pub is_edges: bool,
     /// The type of its values.
-    pub kind: Kind,
+    pub kind: ValueKind,
     /// The signal's address; unknown in a CSV file.
     pub address: Option<Address>,
     /// The signal's type; unknown in a CSV file.
@@ -63,8 +63,8 @@ pub struct Column {
 impl Column {
     /// Whether it represents a 64-bit integer as a double, because of a scale.
     pub(super) fn is_scaled_integer(&self) -> bool {
-        let plain = |data_type| Kind::of(data_type, false) != self.kind;
-        self.kind == Kind::Real && self.data_type.is_some_and(plain)
+        let plain = |data_type| ValueKind::of(data_type, false) != self.kind;
+        self.kind == ValueKind::Real && self.data_type.is_some_and(plain)
     }
 
     /// Its name for people: `Start button`, or `Start button.edges`.
@@ -95,9 +95,9 @@ impl Columns {
             name: signal.name.clone(),
             is_edges,
             kind: if is_edges {
-                Kind::Count
+                ValueKind::Count
             } else {
-                Kind::of(signal.data_type, signal.scale.is_some())
+                ValueKind::of(signal.data_type, signal.scale.is_some())
             },
             address: Some(signal.address()),
             data_type: Some(signal.data_type),

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use super::columns::{Columns, Kind, Tick};
+use super::columns::{Columns, Tick, ValueKind};
 use super::sink::{Sink, count, real};
 
 /// The columns before the signals; their names are reserved, so that no signal can have them.
@@ -42,16 +42,16 @@ impl Sink for CsvSink {
         for (column, value) in self.0.columns.iter().zip(&tick.values) {
             out.push(b',');
             let _ = match column.kind {
-                Kind::Bit if !value.real().is_nan() => {
+                ValueKind::Bit if !value.real().is_nan() => {
                     write!(out, "{}", u8::from(value.real() != 0.0))
                 }
-                Kind::Bit | Kind::Real => {
+                ValueKind::Bit | ValueKind::Real => {
                     real(value.real(), out);
                     Ok(())
                 }
-                Kind::Signed => write!(out, "{}", value.signed()),
-                Kind::Unsigned => write!(out, "{}", value.unsigned()),
-                Kind::Count => write!(out, "{}", count(value.real())),
+                ValueKind::Signed => write!(out, "{}", value.signed()),
+                ValueKind::Unsigned => write!(out, "{}", value.unsigned()),
+                ValueKind::Count => write!(out, "{}", count(value.real())),
             };
         }
         out.push(b'\n');

@@ -23,9 +23,9 @@ mod vcd;
 )]
 mod tests;
 
-pub use columns::{Column, Columns, Kind, Tick};
+pub use columns::{Column, Columns, Tick, ValueKind};
 pub use options::{Format, Options, When, file_of};
-pub use places::Place;
+pub use places::FileClaim;
 pub use reading::{Recording, RecordingError};
 pub use recorder::{Recorder, RecorderError, Tally};
 

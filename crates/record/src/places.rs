@@ -27,9 +27,9 @@ enum Use {
 
 /// A claim on a file: exclusive for a recording, shared among replays.
 #[derive(Debug)]
-pub struct Place(Identity);
+pub struct FileClaim(Identity);
 
-impl Place {
+impl FileClaim {
     /// Claims a file for a recording; if it is in use already, gives how.
     ///
     /// # Errors
@@ -76,7 +76,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for FileClaim {
     fn drop(&mut self) {
         let mut in_use = lock();
         match in_use.get_mut(&self.0) {

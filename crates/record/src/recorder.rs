@@ -12,7 +12,7 @@ use std::time::Duration;
 use super::columns::{Columns, Tick};
 use super::csv::CsvSink;
 use super::file::{Out, Target};
-use super::places::Place;
+use super::places::FileClaim;
 use super::sink::Sink;
 use super::vcd::VcdSink;
 use super::{Format, Options};
@@ -166,7 +166,7 @@ fn is_pipe(_path: &Path) -> bool {
 
 /// Creates the file at `path`, once it is certain that nothing else in this process uses it. A device is used
 /// as it is.
-fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
+fn create(path: &Path) -> Result<(File, Option<FileClaim>), RecorderError> {
     let shown = path.display();
     let cannot = |error: std::io::Error| {
         RecorderError::File(format!(
@@ -188,7 +188,7 @@ fn create(path: &Path) -> Result<(File, Option<Place>), RecorderError> {
     if !file.metadata().map_err(cannot)?.is_file() {
         return Ok((file, None));
     }
-    let place = Place::to_record(path, &file)
+    let place = FileClaim::to_record(path, &file)
         .map_err(cannot)?
         .map_err(|why| {
             RecorderError::File(format!("{shown}: {why}; name another file in [record]"))
@@ -237,7 +237,7 @@ impl Recorder {
         ticks: usize,
         lossless: bool,
         path: PathBuf,
-        place: Option<Place>,
+        place: Option<FileClaim>,
     ) -> std::io::Result<Self> {
         let head = HEAD + columns.stations.len();
         let slots = columns.columns.len();
@@ -365,14 +365,14 @@ struct Writing {
     ring: TickReader,
     words: Box<[u64]>,
     tick: Tick,
-    kinds: Box<[super::Kind]>,
+    kinds: Box<[super::ValueKind]>,
     sink: Box<dyn Sink>,
     out: Out,
     /// Number and time of the previous tick.
     before: Option<(u64, Nanos)>,
     tally: Arc<Tally>,
     bell: Arc<Bell>,
-    _place: Option<Place>,
+    _place: Option<FileClaim>,
 }
 
 impl Writing {

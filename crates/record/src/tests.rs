@@ -93,12 +93,12 @@ fn read(mut recording: Recording) -> (Vec<Tick>, Result<bool, RecordingError>) {
 }
 
 /// Slots that a tick may hold, by kind.
-fn value(kind: Kind, word: u64) -> Slot {
+fn value(kind: ValueKind, word: u64) -> Slot {
     kind.kept(match kind {
-        Kind::Bit => Slot::from_real([0.0, 1.0, f64::NAN, 0.5][(word % 4) as usize]),
-        Kind::Real if word.is_multiple_of(3) => Slot::from_real((word % 1000) as f64 / 8.0),
-        Kind::Real | Kind::Signed | Kind::Unsigned => Slot(word),
-        Kind::Count => Slot::from_real(f64::from(word as u32)),
+        ValueKind::Bit => Slot::from_real([0.0, 1.0, f64::NAN, 0.5][(word % 4) as usize]),
+        ValueKind::Real if word.is_multiple_of(3) => Slot::from_real((word % 1000) as f64 / 8.0),
+        ValueKind::Real | ValueKind::Signed | ValueKind::Unsigned => Slot(word),
+        ValueKind::Count => Slot::from_real(f64::from(word as u32)),
     })
 }
 

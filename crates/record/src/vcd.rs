@@ -11,7 +11,7 @@ use std::io::Write as _;
 use vcd::{IdCode, TimescaleUnit, VarType, Writer};
 
 use super::VERSION;
-use super::columns::{Column, Columns, Kind, Tick};
+use super::columns::{Column, Columns, Tick, ValueKind};
 use super::sink::{Sink, count, real};
 use tickbus_image::signal::Area;
 
@@ -19,7 +19,7 @@ use tickbus_image::signal::Area;
 const STATUS_BITS: u32 = 32;
 
 /// A station's name, and one of its areas.
-type Place<'a> = (&'a str, Option<Area>);
+type Scope<'a> = (&'a str, Option<Area>);
 
 /// Writes VCD.
 pub(super) struct VcdSink {
@@ -129,11 +129,11 @@ impl VcdSink {
             for index in members {
                 let column = &self.columns.columns[index];
                 let (kind, width) = match column.kind {
-                    Kind::Bit => (VarType::Wire, 1),
-                    Kind::Real => (VarType::Real, 64),
-                    Kind::Signed => (VarType::Integer, 64),
-                    Kind::Unsigned => (VarType::Wire, 64),
-                    Kind::Count => (VarType::Integer, 32),
+                    ValueKind::Bit => (VarType::Wire, 1),
+                    ValueKind::Real => (VarType::Real, 64),
+                    ValueKind::Signed => (VarType::Integer, 64),
+                    ValueKind::Unsigned => (VarType::Wire, 64),
+                    ValueKind::Count => (VarType::Integer, 32),
                 };
                 let name = names.unique(&column.title());
                 var(&mut writer, kind, width, &self.ids[index], &name)?;
@@ -145,8 +145,8 @@ impl VcdSink {
     }
 
     /// The columns by station and area, in order of first occurrence.
-    fn places(&self) -> Vec<(Place<'_>, Vec<usize>)> {
-        let mut places: Vec<(Place<'_>, Vec<usize>)> = Vec::new();
+    fn places(&self) -> Vec<(Scope<'_>, Vec<usize>)> {
+        let mut places: Vec<(Scope<'_>, Vec<usize>)> = Vec::new();
         let place = |column: &'_ Column| column.address.map(|address| address.area);
         for (index, column) in self.columns.columns.iter().enumerate() {
             let key = (column.station.as_str(), place(column));
@@ -191,15 +191,17 @@ impl Sink for VcdSink {
                 continue;
             }
             let _ = match column.kind {
-                Kind::Bit if value.real().is_nan() => writeln!(out, "x{id}"),
-                Kind::Bit => writeln!(out, "{}{id}", u8::from(value.real() != 0.0)),
-                Kind::Real => {
+                ValueKind::Bit if value.real().is_nan() => writeln!(out, "x{id}"),
+                ValueKind::Bit => writeln!(out, "{}{id}", u8::from(value.real() != 0.0)),
+                ValueKind::Real => {
                     out.push(b'r');
                     real(value.real(), out);
                     writeln!(out, " {id}")
                 }
-                Kind::Signed | Kind::Unsigned => writeln!(out, "b{:b} {id}", value.unsigned()),
-                Kind::Count => writeln!(out, "b{:b} {id}", count(value.real())),
+                ValueKind::Signed | ValueKind::Unsigned => {
+                    writeln!(out, "b{:b} {id}", value.unsigned())
+                }
+                ValueKind::Count => writeln!(out, "b{:b} {id}", count(value.real())),
             };
         }
         let statuses = std::iter::once(&tick.status).chain(&tick.stations);

@@ -1,6 +1,6 @@
 //! A run from a recording.
 
-use super::{Kind, Mark, MarkKind, Run};
+use super::{Mark, MarkKind, Run, SignalKind};
 use tickbus_base::time::Nanos;
 use tickbus_record as record;
 use tickbus_record::{Columns, Recording, RecordingError, Tick};
@@ -11,7 +11,7 @@ const STALE: i32 = 2;
 /// The destination of a column's values.
 enum Target {
     /// The signal with this number; its slots hold this kind of value.
-    Signal(usize, record::Kind),
+    Signal(usize, record::ValueKind),
     /// The edge count of the signal with this number.
     Edges(usize),
     /// The signal does not exist.
@@ -104,8 +104,8 @@ fn targets(columns: &Columns, run: &mut Run) -> Vec<Target> {
     let mut targets = Vec::with_capacity(columns.columns.len());
     for column in columns.columns.iter().filter(|column| !column.is_edges) {
         let kind = match column.kind {
-            record::Kind::Bit => Kind::Bool,
-            _ => Kind::Real,
+            record::ValueKind::Bit => SignalKind::Bool,
+            _ => SignalKind::Real,
         };
         let place = run.add_signal(
             &column.name,
@@ -128,10 +128,10 @@ fn targets(columns: &Columns, run: &mut Run) -> Vec<Target> {
     clippy::cast_precision_loss,
     reason = "a chart shows no more than a double has"
 )]
-fn number(kind: record::Kind, slot: tickbus_image::signal::Slot) -> f64 {
+fn number(kind: record::ValueKind, slot: tickbus_image::signal::Slot) -> f64 {
     match kind {
-        record::Kind::Signed => slot.signed() as f64,
-        record::Kind::Unsigned => slot.unsigned() as f64,
+        record::ValueKind::Signed => slot.signed() as f64,
+        record::ValueKind::Unsigned => slot.unsigned() as f64,
         _ => slot.real(),
     }
 }
@@ -217,8 +217,8 @@ mod tests {
         assert_eq!(
             names,
             [
-                ("lamp", Kind::Bool, 3, Some(3)),
-                ("height", Kind::Real, 2, None)
+                ("lamp", SignalKind::Bool, 3, Some(3)),
+                ("height", SignalKind::Real, 2, None)
             ]
         );
         assert_eq!(run.ticks(), 4);

@@ -22,5 +22,5 @@ mod tables;
 pub use file::{page_beside, write_file};
 pub use from::read;
 pub use page::{Contents, write};
-pub use run::{Change, DEFAULT_BUDGET, Kind, Mark, MarkKind, Run, Signal};
+pub use run::{Change, DEFAULT_BUDGET, Mark, MarkKind, Run, Signal, SignalKind};
 pub use statistics::Statistics;

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::html::{Json, Text, count, counted, digits, span};
 use super::spans::{self, Span};
 use super::tables::{self, Scale};
-use super::{Kind, MarkKind, Run, Statistics, code, figures};
+use super::{MarkKind, Run, SignalKind, Statistics, code, figures};
 use tickbus_base::time::Nanos;
 
 const TEMPLATE: &str = include_str!("template.html");
@@ -382,8 +382,8 @@ fn data(
     )?;
     for (number, (signal, coding)) in signals.iter().zip(codings).enumerate() {
         let kind = match signal.kind {
-            Kind::Bool => "bool",
-            Kind::Real => "real",
+            SignalKind::Bool => "bool",
+            SignalKind::Real => "real",
         };
         let comma = if number > 0 { "," } else { "" };
         write!(

@@ -11,7 +11,7 @@ const MOST_MARKS: usize = 10_000;
 
 /// The type of a signal's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum SignalKind {
     /// 0 or 1.
     Bool,
     /// A number.
@@ -33,7 +33,7 @@ pub struct Signal {
     /// Its name; may contain any characters.
     pub name: String,
     /// The type of its values.
-    pub kind: Kind,
+    pub kind: SignalKind,
     /// The unit of its values; empty if it has none.
     pub unit: String,
     changes: Vec<Change>,
@@ -216,7 +216,7 @@ impl Run {
     }
 
     /// Adds a signal and returns its number.
-    pub fn add_signal(&mut self, name: &str, kind: Kind, unit: &str) -> usize {
+    pub fn add_signal(&mut self, name: &str, kind: SignalKind, unit: &str) -> usize {
         self.signals.push(Signal {
             name: name.to_owned(),
             kind,
@@ -285,7 +285,7 @@ impl Run {
             && signal.seen > 1
             && values.all(|value| same(value, 0.0) || same(value, 1.0))
         {
-            signal.kind = Kind::Bool;
+            signal.kind = SignalKind::Bool;
         }
     }
 
@@ -356,7 +356,7 @@ mod tests {
 
     fn run() -> (Run, usize) {
         let mut run = Run::new(1000);
-        let signal = run.add_signal("x", Kind::Real, "mm");
+        let signal = run.add_signal("x", SignalKind::Real, "mm");
         (run, signal)
     }
 
@@ -376,7 +376,7 @@ mod tests {
     #[test]
     fn a_budget_that_is_used_up_thins_the_busiest_signal_and_keeps_its_peaks() {
         let (mut run, busy) = run();
-        let calm = run.add_signal("calm", Kind::Bool, "");
+        let calm = run.add_signal("calm", SignalKind::Bool, "");
         for at in 0..100_000_i32 {
             let peak = if at == 54_321 { 1e6 } else { 0.0 };
             run.change(busy, Nanos(i64::from(at)), f64::from(at % 7) + peak);
@@ -403,7 +403,7 @@ mod tests {
     fn a_tiny_budget_ends_and_keeps_what_cannot_be_thinned() {
         let mut run = Run::new(0);
         for number in 0..50 {
-            let signal = run.add_signal(&number.to_string(), Kind::Real, "");
+            let signal = run.add_signal(&number.to_string(), SignalKind::Real, "");
             for at in 0..100_i32 {
                 run.change(signal, Nanos(i64::from(at)), f64::from(at));
             }

@@ -128,7 +128,7 @@ pub(super) fn state_class(word: &str) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Kind, Mark};
+    use super::super::{Mark, SignalKind};
     use super::*;
 
     fn mark(at: i64, kind: MarkKind, text: &str) -> Mark {
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn steps_come_from_a_signal_or_from_marks() {
         let mut run = Run::new(100);
-        let step = run.add_signal("Step", Kind::Real, "");
+        let step = run.add_signal("Step", SignalKind::Real, "");
         for (at, value) in [(0, 0.0), (10, 1.0), (20, 2.0), (30, 0.0), (40, 1.0)] {
             run.change(step, Nanos(at), value);
         }
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn a_signal_can_tell_of_faults() {
         let mut run = Run::new(100);
-        let lamp = run.add_signal("Lamp", Kind::Real, "");
+        let lamp = run.add_signal("Lamp", SignalKind::Real, "");
         for (at, value) in [(0, 0.0), (3, 1.0), (4, 2.0), (6, 0.0), (8, 1.0)] {
             run.change(lamp, Nanos(at), value);
         }

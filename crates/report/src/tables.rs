@@ -6,7 +6,7 @@ use std::fmt::{self, Write as _};
 use super::html::{Text, count, counted, digits, seconds, span};
 use super::spans::{Span, state_class};
 use super::statistics::Distribution;
-use super::{Kind, Run, Signal, Statistics, figures};
+use super::{Run, Signal, SignalKind, Statistics, figures};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 
@@ -298,7 +298,7 @@ pub(super) fn signals(out: &mut String, run: &Run) {
 #[expect(clippy::cast_precision_loss, reason = "a share, for people")]
 fn share_on(signal: &Signal, run: &Run) -> Option<f64> {
     let (begin, end) = run.extent();
-    if signal.kind != Kind::Bool || begin == end || signal.resolution() != Nanos::ZERO {
+    if signal.kind != SignalKind::Bool || begin == end || signal.resolution() != Nanos::ZERO {
         return None;
     }
     let changes = signal.changes();

@@ -20,4 +20,4 @@ pub use condition::{Condition, Demand};
 pub use junit::{Case, Group, Verdict, junit_xml};
 pub use run::{Failure, Ran};
 pub use suite::Suite;
-pub use test::{Place, Test};
+pub use test::{Test, TextPosition};

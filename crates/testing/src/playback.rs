@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{nearest, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
-use tickbus_record::{Kind, Recording, RecordingError, Tick};
+use tickbus_record::{ValueKind, Recording, RecordingError, Tick};
 
-use super::test::Place;
+use super::test::TextPosition;
 
 /// A recording that fits a signal table.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub(super) struct Tape {
     /// Column and signal of each value that the PLC must send as recorded.
     compared: Vec<(usize, usize)>,
     /// Its position in the test file.
-    pub(super) place: Place,
+    pub(super) place: TextPosition,
 }
 
 /// What is wrong with a recording, and what would be right.
@@ -31,7 +31,7 @@ impl Tape {
         file: &Path,
         table: &SignalTable,
         own: Area,
-        place: Place,
+        place: TextPosition,
     ) -> Result<Self, Wrong> {
         let recording = Recording::open(file, Some(table))
             .map_err(|error| (format!("{}: {}", file.display(), error.what), error.right))?;
@@ -106,8 +106,8 @@ fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Wrong
     Ok(Some(index))
 }
 
-fn kind(signal: &Signal) -> Kind {
-    Kind::of(signal.data_type, signal.scale.is_some())
+fn kind(signal: &Signal) -> ValueKind {
+    ValueKind::of(signal.data_type, signal.scale.is_some())
 }
 
 /// A signal that differs from the recording.

@@ -11,7 +11,7 @@ use super::condition::{Bookmark, Condition};
 use super::machine::Stub;
 use super::playback::{Difference, Playback, Tape};
 use super::suite::Suite;
-use super::test::{Passage, Place, Step, Test};
+use super::test::{Passage, Step, Test, TextPosition};
 use super::watch::{Watch, moment, real, span, text_of};
 
 /// The result of one test.
@@ -37,7 +37,7 @@ impl Ran {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// Where in the test file.
-    pub place: Place,
+    pub place: TextPosition,
     /// The time, what was expected and what was seen, as one line.
     pub what: String,
     /// Further information, such as the last changes of the signal, one per line.
@@ -101,7 +101,7 @@ impl Suite {
 #[derive(Clone, Debug)]
 struct Watched {
     condition: Condition,
-    place: Place,
+    place: TextPosition,
     since: Bookmark,
 }
 
@@ -201,12 +201,12 @@ impl Stand<'_> {
         self.slots[signal] = value;
     }
 
-    fn pass(&mut self, count: u64, place: Place) -> Result<(), Failure> {
+    fn pass(&mut self, count: u64, place: TextPosition) -> Result<(), Failure> {
         (0..count).try_for_each(|_| self.tick(place))
     }
 
     /// One tick: the machine moves, then the PLC is scanned if due.
-    fn tick(&mut self, place: Place) -> Result<(), Failure> {
+    fn tick(&mut self, place: TextPosition) -> Result<(), Failure> {
         let now = self.time() + self.step;
         if let Some(playback) = &mut self.playback
             && let Err(error) = playback.step(now, &mut self.slots)
@@ -262,7 +262,7 @@ impl Stand<'_> {
         })
     }
 
-    fn broken(&self, place: Place, what: &str) -> Failure {
+    fn broken(&self, place: TextPosition, what: &str) -> Failure {
         Failure {
             place,
             what: format!("{}: {what}", moment(self.ticks, self.step)),
@@ -272,9 +272,9 @@ impl Stand<'_> {
 
     fn wait(
         &mut self,
-        conditions: &[(Condition, Place)],
+        conditions: &[(Condition, TextPosition)],
         limit: u64,
-        place: Place,
+        place: TextPosition,
     ) -> Result<(), Failure> {
         let awaited = self.watched(conditions);
         let from = self.ticks;
@@ -288,8 +288,8 @@ impl Stand<'_> {
         Ok(())
     }
 
-    fn watched(&self, conditions: &[(Condition, Place)]) -> Vec<Watched> {
-        let watched = |(condition, place): &(Condition, Place)| Watched {
+    fn watched(&self, conditions: &[(Condition, TextPosition)]) -> Vec<Watched> {
+        let watched = |(condition, place): &(Condition, TextPosition)| Watched {
             condition: condition.clone(),
             place: *place,
             since: Bookmark::of(&self.watches[condition.signal]),

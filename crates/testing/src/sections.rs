@@ -11,7 +11,7 @@ use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::condition::{Condition, Demand};
 use super::playback::Tape;
-use super::test::{Passage, Place, Ramp, Rule, Step, Test};
+use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition};
 
 /// The longest time that may pass in one step: ten minutes on a fast machine.
 const MOST_TICKS: i128 = 1_000_000_000;
@@ -373,7 +373,7 @@ impl Reader<'_> {
     }
 
     /// One fault or a list of them.
-    fn faults(&self, value: &Value<'_>) -> Option<Vec<(Fault, Place)>> {
+    fn faults(&self, value: &Value<'_>) -> Option<Vec<(Fault, TextPosition)>> {
         const RIGHT: &str =
             "write a fault, such as { kind = \"stuck\", signal = \"LA1 bottom\", value = true }";
         let values = if value.is_table() {
@@ -392,7 +392,7 @@ impl Reader<'_> {
     }
 
     /// A condition, a list of them, or a table of signals and values.
-    fn conditions(&self, value: Option<&Value<'_>>) -> Option<Vec<(Condition, Place)>> {
+    fn conditions(&self, value: Option<&Value<'_>>) -> Option<Vec<(Condition, TextPosition)>> {
         const RIGHT: &str = "write a condition such as \"Ready lamp\", a list of them, or \
                              { \"Phase\" = 3 }";
         let Some(value) = value else {
@@ -418,7 +418,7 @@ impl Reader<'_> {
         read.into_iter().collect()
     }
 
-    fn condition(&self, value: &Value<'_>) -> Option<(Condition, Place)> {
+    fn condition(&self, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
         let text = value.text("write a condition in quotes, such as \"Phase == 3\"")?;
         match Condition::parse(text, self.table) {
             Ok(condition) => Some((condition, value.place())),
@@ -430,7 +430,7 @@ impl Reader<'_> {
     }
 
     /// `"Phase" = 3` among expectations.
-    fn equality(&self, name: &str, value: &Value<'_>) -> Option<(Condition, Place)> {
+    fn equality(&self, name: &str, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
         let Some(signal) = self.table.position(name) else {
             let (what, right) = unknown(name, self.table);
             value.wrong(what, right);
@@ -443,7 +443,7 @@ impl Reader<'_> {
 }
 
 /// Names of faults: one, or a list of them.
-fn ended(value: &Value<'_>) -> Option<Vec<(String, Place)>> {
+fn ended(value: &Value<'_>) -> Option<Vec<(String, TextPosition)>> {
     const RIGHT: &str = "write the name of a fault in quotes, or a list of names";
     let values = match value.as_text() {
         Some(_) => vec![value.clone()],

@@ -7,7 +7,7 @@ use tickbus_image::signal::Slot;
 use super::condition::Condition;
 
 /// Line and column, both from 1.
-pub type Place = (usize, usize);
+pub type TextPosition = (usize, usize);
 
 /// One test.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct Test {
     /// Its name, unique in its file.
     pub name: String,
     /// Where it begins.
-    pub place: Place,
+    pub place: TextPosition,
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) steps: Vec<Step>,
 }
@@ -23,19 +23,19 @@ pub struct Test {
 /// One step: sets some signals, lets time pass, expects something; in this order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
-    pub(super) place: Place,
+    pub(super) place: TextPosition,
     pub(super) set: Vec<(usize, Slot)>,
     pub(super) force: Vec<(usize, Slot)>,
     pub(super) release: Vec<usize>,
-    pub(super) inject: Vec<(Fault, Place)>,
+    pub(super) inject: Vec<(Fault, TextPosition)>,
     /// Faults to end, by name.
-    pub(super) end: Vec<(String, Place)>,
+    pub(super) end: Vec<(String, TextPosition)>,
     pub(super) passage: Option<Passage>,
-    pub(super) expect: Vec<(Condition, Place)>,
+    pub(super) expect: Vec<(Condition, TextPosition)>,
     /// For how many ticks the expectations must hold.
     pub(super) during: u64,
-    pub(super) always: Vec<(Condition, Place)>,
-    pub(super) never: Vec<(Condition, Place)>,
+    pub(super) always: Vec<(Condition, TextPosition)>,
+    pub(super) never: Vec<(Condition, TextPosition)>,
 }
 
 /// How time passes in a step.
@@ -46,7 +46,7 @@ pub(super) enum Passage {
     /// This many ticks, with a button pressed.
     Press(usize, u64),
     /// Until all of these hold, for at most this many ticks.
-    Await(Vec<(Condition, Place)>, u64),
+    Await(Vec<(Condition, TextPosition)>, u64),
 }
 
 /// One rule of the machine's stub.

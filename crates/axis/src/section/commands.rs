@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 use super::{LIST_LIMIT, check_within};
-use crate::{Command, Kind, Mode, Motion};
+use crate::{AxisKind, Command, Mode, Motion};
 use tickbus_base::toml_text::{Table, Value};
 
 /// Reads the numbered commands of an axis of this `kind`.
 pub(super) fn read_commands(
     value: &Value<'_>,
-    kind: Option<Kind>,
+    kind: Option<AxisKind>,
     limits: Option<[f64; 2]>,
 ) -> Vec<Command> {
     let tables = value.tables("[[axis.command]]");
@@ -29,7 +29,7 @@ pub(super) fn read_commands(
 
 fn read_command(
     mut table: Table<'_>,
-    kind: Option<Kind>,
+    kind: Option<AxisKind>,
     limits: Option<[f64; 2]>,
     lines: &mut HashMap<u16, usize>,
 ) -> Option<Command> {
@@ -45,10 +45,10 @@ fn read_command(
     .map(|key| table.take(key));
     table.finish();
     let usual = match kind {
-        Some(Kind::Speed) => Mode::Speed,
-        Some(Kind::Tracking) => Mode::Tracking,
-        Some(Kind::Torque) => Mode::Close,
-        Some(Kind::Position) | None => Mode::Position,
+        Some(AxisKind::Speed) => Mode::Speed,
+        Some(AxisKind::Tracking) => Mode::Tracking,
+        Some(AxisKind::Torque) => Mode::Close,
+        Some(AxisKind::Position) | None => Mode::Position,
     };
     let chosen = match &mode {
         None => Some(usual),
@@ -56,7 +56,9 @@ fn read_command(
     };
     if let (Some(chosen), Some(value), Some(kind)) = (chosen, &mode, kind) {
         let opens = matches!(chosen, Mode::Open | Mode::Close);
-        if opens != (kind == Kind::Torque) || (chosen == Mode::Tracking && kind != Kind::Tracking) {
+        if opens != (kind == AxisKind::Torque)
+            || (chosen == Mode::Tracking && kind != AxisKind::Tracking)
+        {
             value.wrong(
                 format!(
                     "an axis of the kind \"{}\" has no mode \"{}\"",
@@ -64,9 +66,9 @@ fn read_command(
                     chosen.name()
                 ),
                 match kind {
-                    Kind::Torque => "write \"open\" or \"close\"",
-                    Kind::Tracking => "write \"tracking\", \"position\" or \"speed\"",
-                    Kind::Position | Kind::Speed => "write \"position\" or \"speed\"",
+                    AxisKind::Torque => "write \"open\" or \"close\"",
+                    AxisKind::Tracking => "write \"tracking\", \"position\" or \"speed\"",
+                    AxisKind::Position | AxisKind::Speed => "write \"position\" or \"speed\"",
                 },
             );
         }

@@ -20,7 +20,7 @@ pub(super) enum Kind {
 
 /// One syntax error.
 #[derive(Debug)]
-pub(super) struct Fault {
+pub(super) struct SyntaxError {
     /// Byte offset of the error.
     pub(super) at: usize,
     pub(super) kind: Kind,
@@ -31,7 +31,7 @@ pub(super) struct Fault {
 }
 
 /// The syntax errors of a text in order, the first of each line, without mere consequences.
-pub(super) fn faults(text: &str) -> Vec<Fault> {
+pub(super) fn faults(text: &str) -> Vec<SyntaxError> {
     let (root, mut errors) = DeTable::parse_recoverable(text);
     let begin = |error: &Error| begin(error, text);
     let endless = errors
@@ -43,7 +43,7 @@ pub(super) fn faults(text: &str) -> Vec<Fault> {
         })
         .and_then(|error| endless(error, text, root.get_ref()));
     errors.sort_by_key(begin);
-    let mut faults: Vec<Fault> = Vec::new();
+    let mut faults: Vec<SyntaxError> = Vec::new();
     let mut end = None;
     for error in &errors {
         let at = begin(error);
@@ -72,7 +72,7 @@ fn begin(error: &Error, text: &str) -> usize {
 }
 
 /// Drops duplicate keys that only result from a broken table header above them.
-fn without_consequences(mut faults: Vec<Fault>, text: &str) -> Vec<Fault> {
+fn without_consequences(mut faults: Vec<SyntaxError>, text: &str) -> Vec<SyntaxError> {
     // Where the last broken header is, unless another header has followed it.
     let mut lost: Option<usize> = None;
     faults.retain(|fault| {
@@ -119,7 +119,7 @@ const ENDLESS: [&str; 4] = [
 ];
 
 /// The value that is not closed, or nested too deeply, that one of the [`ENDLESS`] messages is about.
-fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<Fault> {
+fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<SyntaxError> {
     let message = error.message();
     let end = begin(error, text);
     let (at, what, right) = if message.starts_with(ENDLESS[0]) {
@@ -141,7 +141,7 @@ fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<Fault> {
         }
     };
     let (what, right) = (what.to_owned(), right.to_owned());
-    Some(Fault {
+    Some(SyntaxError {
         at,
         kind: Kind::Endless,
         header: false,
@@ -214,7 +214,7 @@ fn kind_of(message: &str) -> Kind {
 }
 
 /// A parser's message in this project's words.
-fn translate(error: &Error, text: &str) -> Fault {
+fn translate(error: &Error, text: &str) -> SyntaxError {
     let at = begin(error, text);
     let piece = shown(text.get(error.span().unwrap_or(0..0)).unwrap_or("").trim());
     let line = text[line_around(text, at)].trim();
@@ -224,7 +224,7 @@ fn translate(error: &Error, text: &str) -> Fault {
         .unwrap_or((error.message(), ""));
     let opens_no_header = message == "key with no value" && line.ends_with(']');
     let (what, right) = words(message, expected, &piece, line);
-    Fault {
+    SyntaxError {
         at,
         kind: kind_of(message),
         header: line.starts_with('[') || opens_no_header,

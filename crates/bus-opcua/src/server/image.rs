@@ -23,7 +23,7 @@ pub(super) struct Image {
     role: Role,
     sends: Values,
     receives: Values,
-    places: Vec<Place>,
+    places: Vec<PublishedSignal>,
     frames: Vec<Box<[u8]>>,
     show: Show,
     /// Whether a write is an event even if it changes nothing.
@@ -59,7 +59,7 @@ impl Show {
     }
 
     /// Reports what the sampling intervals of subscribers have held back.
-    fn tell_due(&self, places: &[Place]) {
+    fn tell_due(&self, places: &[PublishedSignal]) {
         let node = |variable: Variable| {
             let place = &places[variable.signal];
             if variable.is_scaled {
@@ -85,7 +85,7 @@ impl Show {
 }
 
 /// A signal's nodes, and their current value.
-struct Place {
+struct PublishedSignal {
     node: NodeId,
     scaled: Option<(NodeId, Scale)>,
     /// The node's value; `None` at first.
@@ -106,7 +106,7 @@ impl Image {
         every_write: bool,
     ) -> Self {
         let (tx, rx) = role.areas();
-        let place = |signal: &Signal| Place {
+        let place = |signal: &Signal| PublishedSignal {
             node: space::node(&signal.name),
             scaled: space::scaled(table, signal),
             shown: None,

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use tickbus_image::signal::Slot;
-use tickbus_record::{Kind, Tick};
+use tickbus_record::{Tick, ValueKind};
 
 /// The most differences listed; further ones are counted.
 const MOST_LISTED: u64 = 100_000;
@@ -53,7 +53,14 @@ impl Differences {
     }
 
     /// Lists one difference.
-    pub(super) fn add(&mut self, tick: &Tick, name: &str, kind: Kind, expected: Slot, seen: Slot) {
+    pub(super) fn add(
+        &mut self,
+        tick: &Tick,
+        name: &str,
+        kind: ValueKind,
+        expected: Slot,
+        seen: Slot,
+    ) {
         self.listed += 1;
         if self.listed > MOST_LISTED {
             return;
@@ -116,10 +123,10 @@ impl Differences {
     }
 }
 
-fn shown(kind: Kind, slot: Slot) -> String {
+fn shown(kind: ValueKind, slot: Slot) -> String {
     match kind {
-        Kind::Signed => slot.signed().to_string(),
-        Kind::Unsigned => slot.unsigned().to_string(),
-        Kind::Bit | Kind::Real | Kind::Count => slot.real().to_string(),
+        ValueKind::Signed => slot.signed().to_string(),
+        ValueKind::Unsigned => slot.unsigned().to_string(),
+        ValueKind::Bit | ValueKind::Real | ValueKind::Count => slot.real().to_string(),
     }
 }

@@ -5,7 +5,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Area, Latch, Plan, Slot};
 use tickbus_image::{BusStation, LatchedBit, TickStation, latched_bits, station};
-use tickbus_record::{Kind, Tick};
+use tickbus_record::{Tick, ValueKind};
 
 use super::UNCHANGED;
 
@@ -23,7 +23,7 @@ struct Latched {
 struct Sent {
     signal: usize,
     name: String,
-    kind: Kind,
+    kind: ValueKind,
 }
 
 pub(super) struct Station {
@@ -71,7 +71,7 @@ impl Station {
                         .map(|(number, signal)| Sent {
                             signal: number,
                             name: signal.name.clone(),
-                            kind: Kind::of(signal.data_type, signal.scale.is_some()),
+                            kind: ValueKind::of(signal.data_type, signal.scale.is_some()),
                         })
                         .collect(),
                     fed: directions.rx_fail_safe.clone(),
@@ -164,7 +164,7 @@ impl Station {
         &mut self,
         now: Nanos,
         slots: &[Slot],
-        mut differs: impl FnMut(usize, Kind, &str, Slot, Slot),
+        mut differs: impl FnMut(usize, ValueKind, &str, Slot, Slot),
     ) {
         let (tick, bus) = &mut self.expected;
         tick.write(now, |frame| self.send.encode(slots, frame));

@@ -4,7 +4,7 @@ use super::link::counting;
 use super::members::Path;
 use super::s7comm::direct;
 use super::{Image, Plan, line, source};
-use crate::record::Place;
+use crate::record::PlacedSignal;
 use crate::siemens::address;
 use tickbus_image::signal::{DataType, Width};
 
@@ -57,7 +57,7 @@ fn function(
     line(text, "{ S7_Optimized_Access := 'TRUE' }");
     line(text, "VERSION : 0.1");
     // 64-bit values cannot be addressed in %I and %Q: they are copied as two halves.
-    let is_long = |place: &Place<'_>| {
+    let is_long = |place: &PlacedSignal<'_>| {
         place.data_type().width() == Width::Long
             && matches!(Path::of(place, plan.cpu), Path::Value(_))
     };
@@ -86,7 +86,7 @@ fn bits(data_type: DataType) -> Option<&'static str> {
 }
 
 /// Copies a value from the image to %I.
-fn put(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
+fn put(text: &mut String, place: &PlacedSignal<'_>, plan: &Plan<'_>) {
     let remark = format!("   // \"{}\"", place.signal.name);
     match Path::of(place, plan.cpu) {
         Path::Bytes(names) => {
@@ -116,7 +116,7 @@ fn put(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
 }
 
 /// Copies a value from %Q to the image.
-fn take(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
+fn take(text: &mut String, place: &PlacedSignal<'_>, plan: &Plan<'_>) {
     let remark = format!("   // \"{}\"", place.signal.name);
     match Path::of(place, plan.cpu) {
         Path::Bytes(names) => {
@@ -146,14 +146,14 @@ fn take(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
 }
 
 /// Whether the driver's `alive` requires this signal to change while the PLC's program runs.
-fn is_watched(place: &Place<'_>, plan: &Plan<'_>) -> bool {
+fn is_watched(place: &PlacedSignal<'_>, plan: &Plan<'_>) -> bool {
     let signals = &plan.config.table.signals;
     let mut alive = plan.config.life_signs.alive.iter();
     alive.any(|alive| std::ptr::eq(&raw const signals[alive.signal], place.signal))
 }
 
 /// Changes the value of a signal in every scan: a BOOL toggles, others count up and restart at 100.
-fn count(text: &mut String, place: &Place<'_>, plan: &Plan<'_>) {
+fn count(text: &mut String, place: &PlacedSignal<'_>, plan: &Plan<'_>) {
     let (value, kind) = counting(plan, &plan.outputs, place);
     let remark = format!("   // \"{}\": alive in driver.cfg", place.signal.name);
     let next = match kind {

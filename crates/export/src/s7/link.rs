@@ -3,7 +3,7 @@
 use super::body::{Body, by_hand, time};
 use super::members::Path;
 use super::{Image, Plan, line, modbus, s7comm, socket, source};
-use crate::record::Place;
+use crate::record::PlacedSignal;
 use crate::siemens::spelling;
 use tickbus_bus_s7::Variable;
 use tickbus_bus_socket::Message;
@@ -101,7 +101,7 @@ fn watch(plan: &Plan<'_>, body: &mut Body) {
 pub(super) fn counting(
     plan: &Plan<'_>,
     image: &Image<'_>,
-    place: &Place<'_>,
+    place: &PlacedSignal<'_>,
 ) -> (String, &'static str) {
     let least = place.signal.order.byte_position(place.size(), 0);
     if let Some(variable) = s7comm::direct(plan, place) {

@@ -5,7 +5,7 @@
 //! byte; wider values and arrays start at an even byte; structures and arrays end at an even byte.
 
 use super::Cpu;
-use crate::record::{Place, Record};
+use crate::record::{PlacedSignal, Record};
 use crate::siemens::spelling;
 use tickbus_image::signal::{ByteOrder, DataType, Width};
 
@@ -32,7 +32,7 @@ pub(super) enum Kind {
 
 /// Whether a single member of the signal's own type can hold its value: the CPU has the type, the byte order
 /// is that of S7, and the place is one where S7 puts such a value. Other values are arrays of bytes.
-fn is_native(place: &Place<'_>, cpu: Cpu) -> bool {
+fn is_native(place: &PlacedSignal<'_>, cpu: Cpu) -> bool {
     place.size() == 1
         || (place.signal.order == ByteOrder::Abcd
             && place.byte.is_multiple_of(2)
@@ -50,7 +50,7 @@ pub(super) enum Path {
 
 impl Path {
     /// The members of `place`.
-    pub(super) fn of(place: &Place<'_>, cpu: Cpu) -> Self {
+    pub(super) fn of(place: &PlacedSignal<'_>, cpu: Cpu) -> Self {
         let name = &place.name;
         if is_native(place, cpu) {
             return Self::Value(name.clone());
@@ -89,7 +89,7 @@ impl Members {
         members.finish(record.bytes)
     }
 
-    fn put(&mut self, place: &Place<'_>, cpu: Cpu) {
+    fn put(&mut self, place: &PlacedSignal<'_>, cpu: Cpu) {
         self.fill(place.byte * 8 + usize::from(place.bit()));
         let path = Path::of(place, cpu);
         let (kind, mut remark) = match &path {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::body::{Body, by_hand};
 use super::{Image, Plan};
-use crate::record::Place;
+use crate::record::PlacedSignal;
 use tickbus_bus_s7::item::Object;
 use tickbus_bus_s7::{ClientOptions, ServerOptions, Start, Variable};
 use tickbus_driver_cfg::Options;
@@ -204,7 +204,7 @@ impl<'a> Jobs<'a> {
 
 /// The CPU variable that the simulation itself reads or writes for a signal: named in `[fieldbus.at]`, or
 /// part of the process image. Copying would overwrite it.
-pub(super) fn direct(plan: &Plan<'_>, place: &Place<'_>) -> Option<Variable> {
+pub(super) fn direct(plan: &Plan<'_>, place: &PlacedSignal<'_>) -> Option<Variable> {
     let Options::S7Client(options) = &plan.config.bus else {
         return None;
     };

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use super::Plan;
 use crate::File;
-use crate::record::Place;
+use crate::record::PlacedSignal;
 use crate::siemens::{address, spelling};
 use crate::symbols::comment;
 use tickbus_driver_cfg::Exported;
@@ -52,7 +52,7 @@ pub(super) fn file(plan: &Plan<'_>) -> File {
 }
 
 /// A 64-bit value if no type exists: two tags of 32 bits each, in order of their addresses.
-fn halves(text: &mut String, place: &Place<'_>, area: Area, comment: &str) {
+fn halves(text: &mut String, place: &PlacedSignal<'_>, area: Area, comment: &str) {
     let kind = spelling(DataType::Dword);
     for (half, byte) in [("first half", place.byte), ("second half", place.byte + 4)] {
         let name = format!("{} ({half})", place.signal.name);

@@ -11,7 +11,7 @@ use super::life::{self, ALIVE, Life};
 use super::registers::{BITS_OF, REAL_OF, kind};
 use super::{comment, copies, records, remark, taken, temporaries};
 use crate::plcopen::{Kind, Project, Unit, Variable, variable};
-use crate::record::{Place, Record, block_prefix};
+use crate::record::{PlacedSignal, Record, block_prefix};
 use crate::{Export, File, head};
 use parts::Link;
 use tickbus_driver_cfg::Config;
@@ -101,7 +101,7 @@ pub(crate) fn export(config: &Config, editor: Editor) -> Export {
             ..variable(ALIVE, Kind::Basic("BOOL"))
         });
     }
-    let is_real = |place: &Place<'_>| place.data_type() == DataType::Real;
+    let is_real = |place: &PlacedSignal<'_>| place.data_type() == DataType::Real;
     let mut units = Vec::new();
     let mut places = records.iter().flat_map(|record| &record.places);
     if !link.is_by_name && places.any(is_real) {

@@ -1,7 +1,7 @@
 //! Life signs: the simulation's heartbeat, which the program watches, and the signal that the simulation
 //! watches, which the program counts up.
 
-use crate::record::{Place, Record};
+use crate::record::{PlacedSignal, Record};
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
@@ -42,7 +42,7 @@ impl Life {
     pub(super) fn of(
         config: &Config,
         records: &[Record<'_>; 2],
-        kind: &dyn Fn(&Place<'_>) -> DataType,
+        kind: &dyn Fn(&PlacedSignal<'_>) -> DataType,
         variable: &dyn Fn(&str) -> String,
         [alive, simulated]: [&str; 2],
         is_known: bool,

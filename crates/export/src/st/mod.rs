@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 
 use super::head;
 use super::names::Names;
-use super::record::{Place, Record};
+use super::record::{PlacedSignal, Record};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Area, DataType, Width};
 
@@ -77,7 +77,7 @@ fn source(config: &Config, aligned: usize, what: &str, editor: &str, compiled: &
 }
 
 /// The comment of a signal's variable.
-fn remark(place: &Place<'_>) -> String {
+fn remark(place: &PlacedSignal<'_>) -> String {
     let mut text = place.remark();
     if place.data_type() == DataType::Lreal {
         text.push_str(", the bits of an LREAL");

@@ -3,7 +3,7 @@
 //! Register n holds bytes 2n (high byte) and 2n + 1 of a record. Only bit strings, shifts and type
 //! conversions of IEC 61131-3 are used, so that both CODESYS and `iec2c` accept the code.
 
-use crate::record::Place;
+use crate::record::PlacedSignal;
 use tickbus_image::signal::{DataType, Width};
 
 /// How a program writes register n.
@@ -15,7 +15,7 @@ pub(super) const BITS_OF: &str = "tickbus_bits";
 
 /// The type of a signal's variable. A 64-bit float cannot be made from bits without pointers: its variable
 /// has the bits.
-pub(super) fn kind(place: &Place<'_>) -> DataType {
+pub(super) fn kind(place: &PlacedSignal<'_>) -> DataType {
     match place.data_type() {
         DataType::Lreal => DataType::Lword,
         other => other,
@@ -23,7 +23,7 @@ pub(super) fn kind(place: &Place<'_>) -> DataType {
 }
 
 /// An expression for the value of a signal.
-pub(super) fn value(place: &Place<'_>, register: Register<'_>) -> String {
+pub(super) fn value(place: &PlacedSignal<'_>, register: Register<'_>) -> String {
     let data_type = kind(place);
     let size = place.size();
     let at =
@@ -69,7 +69,7 @@ pub(super) fn value(place: &Place<'_>, register: Register<'_>) -> String {
 }
 
 /// The statements that put a signal's value into registers, which must be zero before.
-pub(super) fn put(place: &Place<'_>, name: &str, register: Register<'_>) -> Vec<String> {
+pub(super) fn put(place: &PlacedSignal<'_>, name: &str, register: Register<'_>) -> Vec<String> {
     let data_type = kind(place);
     let size = place.size();
     let at =
@@ -159,7 +159,7 @@ pub(super) fn put(place: &Place<'_>, name: &str, register: Register<'_>) -> Vec<
 }
 
 /// The bit of a BOOL in its register.
-fn mask(place: &Place<'_>) -> String {
+fn mask(place: &PlacedSignal<'_>) -> String {
     let bit = usize::from(place.bit()) + if place.byte.is_multiple_of(2) { 8 } else { 0 };
     format!("WORD#16#{:04X}", 1_u32 << bit)
 }

@@ -8,13 +8,13 @@ use super::link::End;
 /// A free-running loopback.
 #[derive(Debug)]
 pub struct FreeLoopback {
-    place: Place,
+    place: EndSource,
     cycle: Nanos,
 }
 
 /// How the end is obtained.
 #[derive(Debug)]
-enum Place {
+enum EndSource {
     /// By joining the link of this name.
     Named(String),
     /// It was handed in.
@@ -25,7 +25,7 @@ impl FreeLoopback {
     /// A loopback over the link called `name`, with a bus cycle of `cycle`.
     pub fn named(name: &str, cycle: Nanos) -> Self {
         Self {
-            place: Place::Named(name.to_owned()),
+            place: EndSource::Named(name.to_owned()),
             cycle,
         }
     }
@@ -33,7 +33,7 @@ impl FreeLoopback {
     /// A loopback over an existing end.
     pub fn over(end: End, cycle: Nanos) -> Self {
         Self {
-            place: Place::Given(end),
+            place: EndSource::Given(end),
             cycle,
         }
     }
@@ -42,8 +42,8 @@ impl FreeLoopback {
 impl Free for FreeLoopback {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         match &mut self.place {
-            Place::Given(end) => serve(end, self.cycle, port, stop),
-            Place::Named(name) => serve(&mut End::join(name, port)?, self.cycle, port, stop),
+            EndSource::Given(end) => serve(end, self.cycle, port, stop),
+            EndSource::Named(name) => serve(&mut End::join(name, port)?, self.cycle, port, stop),
         }
         Ok(())
     }

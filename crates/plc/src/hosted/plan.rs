@@ -16,7 +16,7 @@ pub(super) struct Settings {
 
 /// One variable and its address.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct LocatedVariable {
     /// Index of the declared variable.
     pub(super) variable: usize,
     pub(super) address: Address,
@@ -28,13 +28,13 @@ pub(super) struct Place {
 /// All variables of a program, by direction.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Plan {
-    pub(super) inputs: Vec<Place>,
-    pub(super) outputs: Vec<Place>,
+    pub(super) inputs: Vec<LocatedVariable>,
+    pub(super) outputs: Vec<LocatedVariable>,
     /// The variables that receive `alive`.
     pub(super) alive: Vec<usize>,
 }
 
-impl Place {
+impl LocatedVariable {
     /// Reads the value from the image; bytes beyond its end read as 0.
     pub(super) fn take(&self, image: &[u8]) -> u64 {
         let byte = |at: usize| image.get(at).copied().unwrap_or(0);
@@ -128,9 +128,9 @@ impl Plan {
             }
             Addressing::Elements => keep.to_owned(),
         };
-        let mut sorted: Vec<&Place> = self.outputs.iter().collect();
+        let mut sorted: Vec<&LocatedVariable> = self.outputs.iter().collect();
         sorted.sort_by_key(|place| place.address.bits().start);
-        let mut last: Option<&Place> = None;
+        let mut last: Option<&LocatedVariable> = None;
         for place in sorted {
             if let Some(last) = last
                 && place.address.bits().start < last.address.bits().end
@@ -156,7 +156,7 @@ impl Plan {
     ) -> Result<(), Refusal> {
         let address =
             Address::parse(text, addressing).map_err(|error| (error.what, error.right))?;
-        let on_it = |place: &Place| place.address == address;
+        let on_it = |place: &LocatedVariable| place.address == address;
         let Some(at) = self.inputs.iter().position(on_it) else {
             return Err((
                 format!("has no variable at {text}, which the option \"alive\" names"),
@@ -227,7 +227,7 @@ fn place(
     settings: &Settings,
     addressing: Addressing,
     table: Option<&SignalTable>,
-) -> Result<Place, Refusal> {
+) -> Result<LocatedVariable, Refusal> {
     let numbers: Vec<String> = declared.numbers.iter().map(u32::to_string).collect();
     let written = format!("%{}{}{}", declared.area, declared.size, numbers.join("."));
     let wrong = |what: String, right: String| {
@@ -285,7 +285,7 @@ fn place(
             "give both the same type".to_owned(),
         );
     }
-    Ok(Place {
+    Ok(LocatedVariable {
         variable,
         address,
         order: signal.map_or(settings.order, |signal| signal.order),

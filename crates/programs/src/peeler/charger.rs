@@ -11,29 +11,29 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use super::io::{Axis, Io, Place, tally};
+use super::io::{Axis, Io, SignalIndex, tally};
 use super::options::Options;
 use super::report::Tally;
-use tickbus_axis::{Kind, Mode, Motion};
+use tickbus_axis::{AxisKind, Mode, Motion};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, SignalTable};
 use tickbus_plc::blocks::{AxisCommand, Simulation, SimulationTime, Ton};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
 
 /// The axes, in the program's own order.
-const AXES: [(&str, Kind); 12] = [
-    ("step feeder", Kind::Position),
-    ("linear feeder", Kind::Position),
-    ("centring spindle left", Kind::Position),
-    ("centring spindle right", Kind::Position),
-    ("centring x left", Kind::Position),
-    ("centring y left", Kind::Position),
-    ("centring x right", Kind::Position),
-    ("centring y right", Kind::Position),
-    ("transfer arm", Kind::Position),
-    ("transfer clamp left", Kind::Torque),
-    ("transfer clamp right", Kind::Torque),
-    ("charger gate", Kind::Torque),
+const AXES: [(&str, AxisKind); 12] = [
+    ("step feeder", AxisKind::Position),
+    ("linear feeder", AxisKind::Position),
+    ("centring spindle left", AxisKind::Position),
+    ("centring spindle right", AxisKind::Position),
+    ("centring x left", AxisKind::Position),
+    ("centring y left", AxisKind::Position),
+    ("centring x right", AxisKind::Position),
+    ("centring y right", AxisKind::Position),
+    ("transfer arm", AxisKind::Position),
+    ("transfer clamp left", AxisKind::Torque),
+    ("transfer clamp right", AxisKind::Torque),
+    ("charger gate", AxisKind::Torque),
 ];
 
 const STEP_FEEDER: usize = 0;
@@ -138,15 +138,15 @@ impl<S: Copy + PartialEq> Chain<S> {
 
 /// The signals other than the axes.
 #[derive(Clone, Copy, Debug, Default)]
-struct Places {
+struct Signals {
     /// Steps 1 to 4, linear feeder, centring spindles, clamps, gate.
-    blocks: [Place; 8],
-    distances: [Place; 2],
-    time: Place,
-    presented: Place,
-    clear: Place,
-    lathe_ready: Place,
-    lathe_holds: Place,
+    blocks: [SignalIndex; 8],
+    distances: [SignalIndex; 2],
+    time: SignalIndex,
+    presented: SignalIndex,
+    clear: SignalIndex,
+    lathe_ready: SignalIndex,
+    lathe_holds: SignalIndex,
 }
 
 /// The charger's program, described at the [module](self).
@@ -154,7 +154,7 @@ struct Places {
 pub struct Charger {
     options: Options,
     io: Option<Io>,
-    places: Places,
+    places: Signals,
     tally: Arc<Tally>,
     time: SimulationTime,
     /// A fault has occurred, and no axis is enabled.
@@ -220,7 +220,7 @@ impl Charger {
         Ok(Self {
             options,
             io: None,
-            places: Places::default(),
+            places: Signals::default(),
             tally,
             time: SimulationTime::default(),
             failed: false,
@@ -506,7 +506,7 @@ impl Program for Charger {
 
     fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
         let place = |name: &str| Io::place(Self::NAME, table, name);
-        let mut places = Places::default();
+        let mut places = Signals::default();
         for (number, block) in places.blocks.iter_mut().enumerate() {
             *block = place(&format!("block at feeder step {}", number + 1))?;
         }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::report::Tally;
-use tickbus_axis::{Field, Kind, Motion};
+use tickbus_axis::{AxisKind, Field, Motion};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, Plan, SignalTable, Slot};
 use tickbus_plc::blocks::{AxisCommand, AxisControl, AxisInputs, Execute};
@@ -35,7 +35,7 @@ const NOWHERE: usize = usize::MAX;
 
 /// A signal of the table.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Place(usize);
+pub(super) struct SignalIndex(usize);
 
 /// The fields that every axis must have.
 const NEEDED: [Field; 13] = [
@@ -60,7 +60,7 @@ impl Io {
     pub(super) fn new(
         program: &str,
         table: &SignalTable,
-        axes: &[(&str, Kind)],
+        axes: &[(&str, AxisKind)],
         hold: Option<Nanos>,
     ) -> Result<Self, ProgramError> {
         let axis = |&(name, kind)| {
@@ -167,25 +167,25 @@ impl Io {
         program: &str,
         table: &SignalTable,
         name: &str,
-    ) -> Result<Place, ProgramError> {
+    ) -> Result<SignalIndex, ProgramError> {
         table
             .position(name)
-            .map(Place)
+            .map(SignalIndex)
             .ok_or_else(|| missing(program, name))
     }
 
     /// The value of a signal.
-    pub(super) fn value(&self, place: Place) -> f64 {
+    pub(super) fn value(&self, place: SignalIndex) -> f64 {
         self.slots[place.0].real()
     }
 
     /// Whether a signal is on.
-    pub(super) fn is_on(&self, place: Place) -> bool {
+    pub(super) fn is_on(&self, place: SignalIndex) -> bool {
         self.value(place) != 0.0
     }
 
     /// Sets a BOOL signal.
-    pub(super) fn switch(&mut self, place: Place, on: bool) {
+    pub(super) fn switch(&mut self, place: SignalIndex, on: bool) {
         self.slots[place.0] = Slot::from_real(f64::from(u8::from(on)));
     }
 
@@ -248,6 +248,6 @@ fn missing(program: &str, signal: &str) -> ProgramError {
 }
 
 /// The report's counters for the axes with these names.
-pub(super) fn tally(axes: &[(&'static str, Kind)]) -> Arc<Tally> {
+pub(super) fn tally(axes: &[(&'static str, AxisKind)]) -> Arc<Tally> {
     Arc::new(Tally::new(axes.iter().map(|(name, _)| *name)))
 }

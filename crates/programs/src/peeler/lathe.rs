@@ -19,30 +19,30 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use super::io::{Axis, Io, Place, tally};
+use super::io::{Axis, Io, SignalIndex, tally};
 use super::options::Options;
 use super::report::Tally;
-use tickbus_axis::{Kind, Mode, Motion};
+use tickbus_axis::{AxisKind, Mode, Motion};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, SignalTable};
 use tickbus_plc::blocks::{AxisCommand, Ton};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
 
 /// The axes, in the program's own order.
-const AXES: [(&str, Kind); 13] = [
-    ("spindle left", Kind::Torque),
-    ("spindle right", Kind::Torque),
-    ("spindle rotation", Kind::Speed),
-    ("knife carriage", Kind::Tracking),
-    ("pitch angle", Kind::Tracking),
-    ("nosebar", Kind::Position),
-    ("top roll", Kind::Tracking),
-    ("bottom roll left", Kind::Tracking),
-    ("bottom roll right", Kind::Tracking),
-    ("roll rotation", Kind::Tracking),
-    ("veneer gate", Kind::Torque),
-    ("round-up gate", Kind::Torque),
-    ("core drop", Kind::Torque),
+const AXES: [(&str, AxisKind); 13] = [
+    ("spindle left", AxisKind::Torque),
+    ("spindle right", AxisKind::Torque),
+    ("spindle rotation", AxisKind::Speed),
+    ("knife carriage", AxisKind::Tracking),
+    ("pitch angle", AxisKind::Tracking),
+    ("nosebar", AxisKind::Position),
+    ("top roll", AxisKind::Tracking),
+    ("bottom roll left", AxisKind::Tracking),
+    ("bottom roll right", AxisKind::Tracking),
+    ("roll rotation", AxisKind::Tracking),
+    ("veneer gate", AxisKind::Torque),
+    ("round-up gate", AxisKind::Torque),
+    ("core drop", AxisKind::Torque),
 ];
 
 const SPINDLES: [usize; 2] = [0, 1];
@@ -108,11 +108,11 @@ enum Step {
 
 /// The signals other than the axes.
 #[derive(Clone, Copy, Debug, Default)]
-struct Places {
-    ready: Place,
-    holds: Place,
-    presented: Place,
-    clear: Place,
+struct Signals {
+    ready: SignalIndex,
+    holds: SignalIndex,
+    presented: SignalIndex,
+    clear: SignalIndex,
 }
 
 /// The lathe's program, described at the [module](self).
@@ -120,7 +120,7 @@ struct Places {
 pub struct Lathe {
     options: Options,
     io: Option<Io>,
-    places: Places,
+    places: Signals,
     tally: Arc<Tally>,
     failed: bool,
     well: Ton,
@@ -210,7 +210,7 @@ impl Lathe {
         Ok(Self {
             options,
             io: None,
-            places: Places::default(),
+            places: Signals::default(),
             tally,
             failed: false,
             well: Ton::default(),
@@ -435,7 +435,7 @@ impl Program for Lathe {
 
     fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
         let place = |name: &str| Io::place(Self::NAME, table, name);
-        self.places = Places {
+        self.places = Signals {
             ready: place("lathe ready")?,
             holds: place("lathe holds block")?,
             presented: place("block presented")?,

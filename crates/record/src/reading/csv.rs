@@ -5,9 +5,9 @@ use std::io::BufRead;
 use std::str::FromStr;
 
 use super::lines::WholeLines;
-use super::{Fault, RECORD_AGAIN};
+use super::{RECORD_AGAIN, ReadError};
 use crate::csv::{HEAD, STATION};
-use crate::{Column, Columns, Kind, Tick};
+use crate::{Column, Columns, Tick, ValueKind};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Signal, SignalTable, Slot};
 
@@ -20,7 +20,7 @@ impl<R: BufRead> CsvReader<R> {
     pub(super) fn open(
         from: R,
         table: Option<&SignalTable>,
-    ) -> Result<(Self, Columns), (Fault, u64)> {
+    ) -> Result<(Self, Columns), (ReadError, u64)> {
         let mut reader = Self {
             lines: WholeLines::new(from),
         };
@@ -28,25 +28,29 @@ impl<R: BufRead> CsvReader<R> {
         Ok((reader, columns))
     }
 
-    fn header(&mut self, table: Option<&SignalTable>) -> Result<Columns, Fault> {
-        if !self.lines.advance().map_err(|error| Fault::io(&error))? {
+    fn header(&mut self, table: Option<&SignalTable>) -> Result<Columns, ReadError> {
+        if !self
+            .lines
+            .advance()
+            .map_err(|error| ReadError::io(&error))?
+        {
             let what = if self.lines.is_cut() {
                 "the recording is cut within its header"
             } else {
                 "the recording is empty"
             };
-            return Err(Fault::new(what, RECORD_AGAIN));
+            return Err(ReadError::new(what, RECORD_AGAIN));
         }
         let line = std::str::from_utf8(self.lines.line())
-            .map_err(|_| Fault::new("the header is no UTF-8 text", RECORD_AGAIN))?;
+            .map_err(|_| ReadError::new("the header is no UTF-8 text", RECORD_AGAIN))?;
         let names = cells(line.trim_end_matches(['\n', '\r'])).ok_or_else(|| {
-            Fault::new(
+            ReadError::new(
                 "the header has a quotation mark in the wrong place",
                 RECORD_AGAIN,
             )
         })?;
         if names.len() < HEAD.len() || names.iter().zip(HEAD).any(|(name, head)| name != head) {
-            return Err(Fault::new(
+            return Err(ReadError::new(
                 format!("the header does not begin with {}", HEAD.join(",")),
                 "only recordings of tickbus can be read",
             ));
@@ -74,9 +78,9 @@ impl<R: BufRead> CsvReader<R> {
                 name: base.to_owned(),
                 is_edges,
                 kind: match signal {
-                    _ if is_edges => Kind::Count,
-                    Some(signal) => Kind::of(signal.data_type, signal.scale.is_some()),
-                    None => Kind::Real,
+                    _ if is_edges => ValueKind::Count,
+                    Some(signal) => ValueKind::of(signal.data_type, signal.scale.is_some()),
+                    None => ValueKind::Real,
                 },
                 address: signal.map(Signal::address),
                 data_type: signal.map(|signal| signal.data_type),
@@ -108,12 +112,16 @@ impl<R: BufRead> CsvReader<R> {
     }
 
     /// Reads the next line.
-    pub(super) fn next(&mut self, tick: &mut Tick, columns: &Columns) -> Result<bool, Fault> {
-        if !self.lines.advance().map_err(|error| Fault::io(&error))? {
+    pub(super) fn next(&mut self, tick: &mut Tick, columns: &Columns) -> Result<bool, ReadError> {
+        if !self
+            .lines
+            .advance()
+            .map_err(|error| ReadError::io(&error))?
+        {
             return Ok(false);
         }
         let line = std::str::from_utf8(self.lines.line())
-            .map_err(|_| Fault::new("this line is no UTF-8 text", RECORD_AGAIN))?;
+            .map_err(|_| ReadError::new("this line is no UTF-8 text", RECORD_AGAIN))?;
         let mut cells = Cells {
             rest: Some(line.trim_end_matches(['\n', '\r'])),
             taken: 0,
@@ -122,11 +130,11 @@ impl<R: BufRead> CsvReader<R> {
         let (number, time) = (cells.number::<u64>()?, Nanos(cells.number()?));
         if number <= tick.number {
             let what = format!("tick {number} comes after tick {}", tick.number);
-            return Err(Fault::new(what, RECORD_AGAIN));
+            return Err(ReadError::new(what, RECORD_AGAIN));
         }
         if tick.number > 0 && time < tick.time {
             let what = format!("the time goes back from {} to {time}", tick.time);
-            return Err(Fault::new(what, RECORD_AGAIN));
+            return Err(ReadError::new(what, RECORD_AGAIN));
         }
         (tick.number, tick.time) = (number, time);
         tick.status = cells.number()?;
@@ -136,8 +144,8 @@ impl<R: BufRead> CsvReader<R> {
         }
         for (column, value) in columns.columns.iter().zip(&mut tick.values) {
             *value = match column.kind {
-                Kind::Signed => Slot::from_signed(cells.number()?),
-                Kind::Unsigned => Slot::from_unsigned(cells.number()?),
+                ValueKind::Signed => Slot::from_signed(cells.number()?),
+                ValueKind::Unsigned => Slot::from_unsigned(cells.number()?),
                 kind => kind.kept(Slot::from_real(cells.number()?)),
             };
         }
@@ -154,7 +162,7 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    fn number<T: FromStr>(&mut self) -> Result<T, Fault> {
+    fn number<T: FromStr>(&mut self) -> Result<T, ReadError> {
         let Some(rest) = self.rest else {
             return Err(self.miscounted(self.taken));
         };
@@ -170,20 +178,20 @@ impl Cells<'_> {
                 "\"{shown}\" in column {} is no number of its kind",
                 self.taken
             );
-            Fault::new(what, RECORD_AGAIN)
+            ReadError::new(what, RECORD_AGAIN)
         })
     }
 
-    fn end(&self) -> Result<(), Fault> {
+    fn end(&self) -> Result<(), ReadError> {
         match self.rest {
             None => Ok(()),
             Some(rest) => Err(self.miscounted(self.taken + 1 + rest.matches(',').count())),
         }
     }
 
-    fn miscounted(&self, has: usize) -> Fault {
+    fn miscounted(&self, has: usize) -> ReadError {
         let wanted = self.wanted;
-        Fault::new(
+        ReadError::new(
             format!("this line has {has} values, the header names {wanted}"),
             RECORD_AGAIN,
         )

@@ -29,14 +29,14 @@ pub struct RecordingError {
 
 /// What a reader finds wrong at its current line.
 #[derive(Debug)]
-struct Fault {
+struct ReadError {
     what: String,
     right: String,
     /// No single line is at fault.
     of_file: bool,
 }
 
-impl Fault {
+impl ReadError {
     fn new(what: impl Into<String>, right: impl Into<String>) -> Self {
         Self {
             what: what.into(),
@@ -136,7 +136,7 @@ impl Recording {
         from: Box<dyn BufRead + Send>,
         table: Option<&SignalTable>,
     ) -> Result<Self, RecordingError> {
-        let placed = |(fault, line): (Fault, u64)| error(file, fault, line);
+        let placed = |(fault, line): (ReadError, u64)| error(file, fault, line);
         let (reader, columns) = match format {
             Format::Vcd => {
                 let (reader, columns) = VcdReader::open(from).map_err(placed)?;
@@ -192,7 +192,7 @@ impl Recording {
     }
 }
 
-fn error(file: &str, fault: Fault, line: u64) -> RecordingError {
+fn error(file: &str, fault: ReadError, line: u64) -> RecordingError {
     RecordingError {
         file: file.to_owned(),
         line: (!fault.of_file).then_some(line),

@@ -6,8 +6,8 @@ use std::io::{self, BufRead, ErrorKind};
 use vcd::{Command, IdCode, ParseError, Parser, TimescaleUnit, Value, Vector};
 
 use super::lines::WholeLines;
-use super::{Fault, RECORD_AGAIN};
-use crate::{Column, Columns, Kind, Tick, VERSION};
+use super::{RECORD_AGAIN, ReadError};
+use crate::{Column, Columns, Tick, VERSION, ValueKind};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Address, DataType, Slot};
 
@@ -21,7 +21,7 @@ enum Variable {
     Dropped,
     Status,
     Station(usize),
-    Column(usize, Kind),
+    Column(usize, ValueKind),
 }
 
 pub(super) struct VcdReader<R> {
@@ -35,7 +35,7 @@ pub(super) struct VcdReader<R> {
 
 impl<R: BufRead> VcdReader<R> {
     /// Reads the header.
-    pub(super) fn open(from: R) -> Result<(Self, Columns), (Fault, u64)> {
+    pub(super) fn open(from: R) -> Result<(Self, Columns), (ReadError, u64)> {
         let mut reader = Self {
             parser: Parser::new(WholeLines::new(from)),
             variables: HashMap::new(),
@@ -78,7 +78,7 @@ impl<R: BufRead> VcdReader<R> {
     }
 
     /// Reads to the end of the next tick.
-    pub(super) fn next(&mut self, tick: &mut Tick) -> Result<bool, Fault> {
+    pub(super) fn next(&mut self, tick: &mut Tick) -> Result<bool, ReadError> {
         loop {
             let command = match self.parser.next() {
                 Some(Ok(command)) => command,
@@ -95,7 +95,7 @@ impl<R: BufRead> VcdReader<R> {
                 Command::Timestamp(time) => {
                     let time = Nanos(i64::try_from(time).unwrap_or(i64::MAX));
                     if time < self.time {
-                        return Err(Fault::new(
+                        return Err(ReadError::new(
                             format!("the time goes back from {} to {time}", self.time),
                             RECORD_AGAIN,
                         ));
@@ -122,20 +122,20 @@ impl<R: BufRead> VcdReader<R> {
                 Command::Begin(_) | Command::End(_) => {}
                 other => {
                     let what = format!("{} stands among the values", name_of(&other));
-                    return Err(Fault::new(what, RECORD_AGAIN));
+                    return Err(ReadError::new(what, RECORD_AGAIN));
                 }
             }
         }
     }
 
     /// Applies one change to the tick; true if it ends the tick.
-    fn change(&self, id: IdCode, change: Change<'_>, tick: &mut Tick) -> Result<bool, Fault> {
+    fn change(&self, id: IdCode, change: Change<'_>, tick: &mut Tick) -> Result<bool, ReadError> {
         let Some(variable) = self.variables.get(&id) else {
             let what = format!("the value of \"{id}\", which the header does not have");
-            return Err(Fault::new(what, RECORD_AGAIN));
+            return Err(ReadError::new(what, RECORD_AGAIN));
         };
         let wrong = || {
-            Fault::new(
+            ReadError::new(
                 format!("the value of \"{id}\" is none of its kind"),
                 RECORD_AGAIN,
             )
@@ -145,7 +145,7 @@ impl<R: BufRead> VcdReader<R> {
                 let number = change.integer().ok_or_else(wrong)?;
                 if number <= tick.number {
                     let what = format!("tick {number} comes after tick {}", tick.number);
-                    return Err(Fault::new(what, RECORD_AGAIN));
+                    return Err(ReadError::new(what, RECORD_AGAIN));
                 }
                 tick.number = number;
                 tick.time = self.time;
@@ -193,16 +193,18 @@ impl Change<'_> {
         Some(bits.cast_signed())
     }
 
-    fn slot(self, kind: Kind) -> Option<Slot> {
+    fn slot(self, kind: ValueKind) -> Option<Slot> {
         match (kind, self) {
-            (Kind::Bit, Self::Bit(Value::X | Value::Z)) => Some(Slot::from_real(f64::NAN)),
-            (Kind::Bit, Self::Bit(bit)) => {
+            (ValueKind::Bit, Self::Bit(Value::X | Value::Z)) => Some(Slot::from_real(f64::NAN)),
+            (ValueKind::Bit, Self::Bit(bit)) => {
                 let set = bit == Value::V1;
                 Some(Slot::from_real(f64::from(u8::from(set))))
             }
-            (Kind::Real, Self::Real(value)) => Some(Kind::Real.kept(Slot::from_real(value))),
-            (Kind::Signed | Kind::Unsigned, _) => self.integer().map(Slot::from_unsigned),
-            (Kind::Count, _) => {
+            (ValueKind::Real, Self::Real(value)) => {
+                Some(ValueKind::Real.kept(Slot::from_real(value)))
+            }
+            (ValueKind::Signed | ValueKind::Unsigned, _) => self.integer().map(Slot::from_unsigned),
+            (ValueKind::Count, _) => {
                 let count = u32::try_from(self.integer()?).ok()?;
                 Some(Slot::from_real(f64::from(count)))
             }
@@ -221,7 +223,7 @@ struct Header {
 }
 
 impl Header {
-    fn take(&mut self, command: Command) -> Result<(), Fault> {
+    fn take(&mut self, command: Command) -> Result<(), ReadError> {
         match command {
             Command::Timescale(1, TimescaleUnit::NS) => self.nanoseconds = true,
             Command::Comment(text) => self.comment(&text)?,
@@ -233,13 +235,13 @@ impl Header {
             | Command::Upscope => {}
             other => {
                 let what = format!("{} stands in the header", name_of(&other));
-                return Err(Fault::new(what, RECORD_AGAIN));
+                return Err(ReadError::new(what, RECORD_AGAIN));
             }
         }
         Ok(())
     }
 
-    fn comment(&mut self, text: &str) -> Result<(), Fault> {
+    fn comment(&mut self, text: &str) -> Result<(), ReadError> {
         if let Some(version) = text.strip_prefix("tickbus recording ") {
             self.version = version.trim().parse().ok();
             return Ok(());
@@ -261,7 +263,7 @@ impl Header {
             _ => Some(()),
         };
         understood.ok_or_else(|| {
-            Fault::new(
+            ReadError::new(
                 format!("the comment \"{what} …\" is not as tickbus writes it"),
                 RECORD_AGAIN,
             )
@@ -300,7 +302,7 @@ impl Header {
         let mut column = Column {
             name: words.next()?.quoted()?,
             is_edges,
-            kind: Kind::Count,
+            kind: ValueKind::Count,
             address: Some(address),
             data_type: Some(data_type),
             unit: None,
@@ -318,7 +320,7 @@ impl Header {
             }
         }
         if !is_edges {
-            column.kind = Kind::of(data_type, scaled);
+            column.kind = ValueKind::of(data_type, scaled);
         }
         let variable = Variable::Column(self.columns.columns.len(), column.kind);
         self.columns.columns.push(column);
@@ -327,17 +329,17 @@ impl Header {
     }
 
     /// Checks the header for completeness once it is over.
-    fn check(&self) -> Result<bool, Fault> {
+    fn check(&self) -> Result<bool, ReadError> {
         match self.version {
             None => {
-                return Err(Fault::of_file(
+                return Err(ReadError::of_file(
                     "this VCD file was not made by tickbus",
                     "only recordings of tickbus can be read: they say in comments what their variables are",
                 ));
             }
             Some(VERSION) => {}
             Some(other) => {
-                return Err(Fault::of_file(
+                return Err(ReadError::of_file(
                     format!(
                         "this recording has version {other}, this tickbus reads version {VERSION}"
                     ),
@@ -348,7 +350,7 @@ impl Header {
         let has = |variable| self.variables.values().any(|known| *known == variable);
         let needed = [Variable::Tick, Variable::Dropped, Variable::Status];
         if !self.nanoseconds || !needed.into_iter().all(has) {
-            return Err(Fault::of_file(
+            return Err(ReadError::of_file(
                 "the header lacks the time scale of 1 ns, the tick, its status or the dropped ticks",
                 RECORD_AGAIN,
             ));
@@ -434,19 +436,19 @@ fn unescaped(text: &str) -> String {
     out
 }
 
-fn cut_header() -> Fault {
-    Fault::new("the recording is cut within its header", RECORD_AGAIN)
+fn cut_header() -> ReadError {
+    ReadError::new("the recording is cut within its header", RECORD_AGAIN)
 }
 
 /// The VCD parser's error in our words.
-fn fault(error: &io::Error) -> Fault {
+fn fault(error: &io::Error) -> ReadError {
     let inner = error.get_ref().and_then(|inner| inner.downcast_ref());
     match inner {
         Some(parse) => {
             let parse: &ParseError = parse;
-            Fault::new(format!("this is no VCD: {}", parse.kind()), RECORD_AGAIN)
+            ReadError::new(format!("this is no VCD: {}", parse.kind()), RECORD_AGAIN)
         }
-        None => Fault::io(error),
+        None => ReadError::io(error),
     }
 }
 

@@ -1,7 +1,7 @@
 //! A program hosted by tickbus: its located variables are the image.
 
 use super::{COMPILED, EDITOR, configuration, declared, program, remarks};
-use crate::record::Place;
+use crate::record::PlacedSignal;
 use crate::st::life::{self, ALIVE, Life};
 use crate::st::{add, comment, records, source, taken};
 use tickbus_base::toml_text::Mistakes;
@@ -130,7 +130,7 @@ fn is_life_sign(config: &Config, signal: &Signal) -> bool {
 }
 
 /// The address of a signal in elements of its size; `None` if it starts between two of them.
-fn element(place: &Place<'_>) -> Option<String> {
+fn element(place: &PlacedSignal<'_>) -> Option<String> {
     let (area, byte) = (place.signal.area, place.byte);
     if place.data_type() == DataType::Bool {
         return Some(format!("{area}X{byte}.{}", place.bit()));

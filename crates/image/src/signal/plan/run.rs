@@ -164,7 +164,7 @@ impl<C: Codec, O: Order> Run for Dense<C, O> {
 
 /// The slot and the byte of one signal of a scattered run.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct SlotOffset {
     slot: u32,
     byte: u32,
 }
@@ -172,7 +172,7 @@ struct Place {
 /// Any slots, any bytes.
 #[derive(Debug)]
 struct Scattered<C: Codec, O> {
-    places: Box<[Place]>,
+    places: Box<[SlotOffset]>,
     values: Values<C>,
     order: PhantomData<O>,
 }
@@ -181,7 +181,7 @@ impl<C: Codec, O: Order> Scattered<C, O> {
     const BYTES: usize = <C::Word as Word>::BYTES;
 
     fn new(members: &[Member]) -> Self {
-        let places = members.iter().map(|(slot, signal)| Place {
+        let places = members.iter().map(|(slot, signal)| SlotOffset {
             slot: index(*slot),
             byte: index(signal.byte),
         });

@@ -109,10 +109,16 @@ fn main() {
             run(case, ticks.parse().expect("a number of ticks"));
         }
         (Some(list), _) if list == "--list" => {
-            CASES.iter().for_each(|case| println!("{}", case.name));
+            for case in CASES {
+                println!("{}", case.name);
+            }
         }
         // `cargo test` and `cargo bench` want to see that it runs.
-        _ => CASES.iter().for_each(|case| run(case, 2)),
+        _ => {
+            for case in CASES {
+                run(case, 2);
+            }
+        }
     }
 }
 

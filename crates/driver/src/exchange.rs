@@ -57,7 +57,17 @@ impl Driver {
             self.end(self.last, slots);
             return self.last;
         }
-        self.last = found;
+        // Each by itself: read back as a whole, what was just written in parts would be waited for.
+        let Exchange {
+            code,
+            sequence,
+            age,
+            granted,
+        } = found;
+        self.last.code = code;
+        self.last.sequence = sequence;
+        self.last.age = age;
+        self.last.granted = granted;
         self.end(found, slots);
         found
     }

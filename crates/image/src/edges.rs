@@ -122,8 +122,8 @@ impl Word {
 
 impl LatchedBit {
     /// Its place in its [`Word`].
-    fn place(&self) -> u32 {
-        8 * (self.byte as u32 % 8) + self.mask.trailing_zeros()
+    fn place(&self) -> usize {
+        8 * (self.byte % 8) + self.mask.trailing_zeros() as usize
     }
 }
 
@@ -175,7 +175,7 @@ impl EdgeCounter {
             if edges != 0 {
                 let counts = &mut self.counts[word.bits.clone()];
                 for (count, place) in counts.iter_mut().zip(&self.places[word.bits.clone()]) {
-                    *count = count.wrapping_add((edges >> place) as u32 & 1);
+                    *count = count.wrapping_add(u32::from(edges >> place & 1 != 0));
                 }
             }
         }

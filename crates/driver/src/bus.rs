@@ -13,46 +13,9 @@ use tickbus_plc as plc;
 
 use super::DriverError;
 use super::frames::area_bytes;
-use super::host::{HostTally, HostThread, Hosted, SteppedHost, Tally};
-use super::replay::{Replay, ReplayTally};
+use super::host::{HostThread, Hosted, Program, SteppedHost, check_fit, program_error};
+use super::replay::Replay;
 use tickbus_driver_cfg::Config;
-
-/// What is at the other end, within this process: a PLC program or a recording.
-#[derive(Debug)]
-pub(super) enum Program {
-    Thread(Box<HostThread>),
-    Stepped(Arc<Tally>),
-    Replay(Arc<ReplayTally>),
-}
-
-/// The counters of such a program, readable from any thread.
-#[derive(Clone, Debug)]
-pub(super) enum ProgramTally {
-    Thread(HostTally),
-    Stepped(Arc<Tally>),
-    Replay(Arc<ReplayTally>),
-}
-
-impl Program {
-    pub(super) fn tally(&self) -> ProgramTally {
-        match self {
-            Self::Thread(host) => ProgramTally::Thread(host.told.clone()),
-            Self::Stepped(tally) => ProgramTally::Stepped(Arc::clone(tally)),
-            Self::Replay(tally) => ProgramTally::Replay(Arc::clone(tally)),
-        }
-    }
-}
-
-impl ProgramTally {
-    /// Appends the counters, one `key=value` per line.
-    pub(super) fn write(&self, text: &mut String) {
-        match self {
-            Self::Thread(host) => host.write(text),
-            Self::Stepped(tally) => tally.write(text),
-            Self::Replay(tally) => tally.write(text),
-        }
-    }
-}
 
 /// Creates the bus that `config` names, and starts the hosted program at its other end, if any.
 pub(super) fn open(
@@ -136,47 +99,6 @@ fn open_hosted(
         Bus::Free(bus(device)),
         Some(Program::Thread(Box::new(host))),
     ))
-}
-
-fn program_error(config: &Config, source: plc::ProgramError) -> DriverError {
-    let file = config.path.display().to_string();
-    DriverError::Program { file, source }
-}
-
-/// Checks that the program, at the end with `role`, finds the image that it needs.
-pub(super) fn check_fit(
-    config: &Config,
-    program: &mut dyn plc::Program,
-    role: Role,
-) -> Result<(), DriverError> {
-    let name = program.name().to_owned();
-    let refused = |what: String| DriverError::Config(format!("{}: {what}", config.path.display()));
-    let stations = &config.table.stations;
-    if stations.len() > 1 && program.for_another_station().is_none() {
-        return Err(refused(format!(
-            "the PLC program \"{name}\" serves one station, but this driver has {}; use one \
-             driver.cfg per station",
-            stations.len()
-        )));
-    }
-    program
-        .fit(&config.table, config.addressing)
-        .map_err(|source| program_error(config, source))?;
-    let (writes, reads) = role.areas();
-    let needs = [
-        (reads, program.input_bytes()),
-        (writes, program.output_bytes()),
-    ];
-    for (station, (area, needs)) in stations.iter().flat_map(|s| needs.map(|need| (s, need))) {
-        let has = station.bytes(area);
-        if has < needs {
-            return Err(refused(format!(
-                "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \
-                 this driver cover {has}; complete the signal table"
-            )));
-        }
-    }
-    Ok(())
 }
 
 #[cfg(all(test, not(feature = "opcua")))]

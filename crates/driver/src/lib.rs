@@ -1,25 +1,31 @@
 //! One device: configuration, open, exchange, supervision, statistics, close.
 
 mod bus;
+mod controller;
+mod driver;
+mod error;
 mod exchange;
 mod extras;
 mod faults;
 mod frames;
 mod heartbeat;
 mod host;
+mod line;
 mod open;
+mod recording;
 mod replay;
 mod slots;
 mod station;
 mod statistics;
 mod status;
 mod supervise;
-mod tape;
+mod tick;
 
-pub use exchange::Exchange;
-pub use host::Host;
-pub use open::{Driver, DriverError};
+pub use controller::Host;
+pub use driver::Driver;
+pub use error::DriverError;
 pub use slots::SlotMap;
 pub use statistics::{Counters, Snapshot};
 pub use status::Code;
 pub use supervise::panic_text;
+pub use tick::Exchange;

@@ -4,7 +4,7 @@ use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
 use super::Code;
-use super::bus::ProgramTally;
+use super::host::ProgramTally;
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::time::{Nanos, Spans};
 use tickbus_driver_cfg::Config;

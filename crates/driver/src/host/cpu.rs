@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use crate::Code;
-use crate::faults::FrameFaults;
 use crate::frames::{area_bytes, directions};
 use crate::heartbeat::FrameBeats;
-use crate::tape::Tape;
+use crate::recording::Tape;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
@@ -15,6 +14,7 @@ use tickbus_image::{BusEnd, Receiver, TickEnd, TickStation, image};
 use tickbus_plc::{Program, Scan};
 
 use super::Tally;
+use super::faults::FrameFaults;
 
 /// A program with the tick's end of its process image: a PLC without its bus.
 pub(super) struct Cpu {

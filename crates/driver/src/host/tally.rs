@@ -144,7 +144,7 @@ impl Tally {
     }
 
     /// The number of scans so far, and of those with stale data.
-    pub(super) fn scans(&self) -> (u64, u64) {
+    pub(crate) fn scans(&self) -> (u64, u64) {
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         (count(&self.scans), count(&self.stale))
     }

@@ -7,9 +7,8 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use crate::faults::FrameFaults;
+use crate::recording::Tape;
 use crate::supervise::{BusThread, panic_text};
-use crate::tape::Tape;
 use tickbus_base::time::{Clock, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::Board;
@@ -19,6 +18,7 @@ use tickbus_record as record;
 
 use super::Tally;
 use super::cpu::{Cpu, half};
+use super::faults::FrameFaults;
 
 /// The longest time that a scan may take before it counts as hung. A PLC's own watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
@@ -55,12 +55,12 @@ pub(crate) struct Hosted {
 /// What a program's thread publishes about itself.
 #[derive(Clone, Debug)]
 pub(crate) struct HostTally {
-    pub(super) tally: Arc<Tally>,
+    pub(crate) tally: Arc<Tally>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
     report: Option<Arc<dyn Report>>,
     record: Option<Arc<record::Tally>>,
-    pub(super) clock: Arc<dyn Clock>,
+    pub(crate) clock: Arc<dyn Clock>,
 }
 
 /// A program on its own thread, and the bus thread of its end of the line; dropping it stops both.
@@ -69,8 +69,8 @@ pub(crate) struct HostThread {
     pub(crate) told: HostTally,
     /// Disconnected when the thread ends.
     ended: Receiver<()>,
-    pub(super) status: LinkStatus,
-    pub(super) board: Arc<Board>,
+    pub(crate) status: LinkStatus,
+    pub(crate) board: Arc<Board>,
     stop: Stop,
     thread: Option<JoinHandle<()>>,
     #[expect(dead_code, reason = "kept for its drop")]
@@ -166,7 +166,7 @@ impl HostTally {
         }
     }
 
-    pub(super) fn fault(&self) -> Option<String> {
+    pub(crate) fn fault(&self) -> Option<String> {
         if let Some(span) = self.scanning.too_long(self.clock.now()) {
             let span = span.rounded();
             return Some(format!("the PLC program has been in one scan for {span}"));
@@ -180,7 +180,7 @@ impl HostTally {
 
 impl HostThread {
     /// Stops scanning. Returns why the program did not end, if so: its thread is then left behind.
-    pub(super) fn end(&mut self) -> Option<String> {
+    pub(crate) fn end(&mut self) -> Option<String> {
         let thread = self.thread.take()?;
         self.stop.stop();
         if self.ended.recv_timeout(LONGEST_SCAN.to_duration()) == Err(Timeout) {

@@ -1,14 +1,34 @@
-//! Recording a hosted program: its inputs and outputs in each scan.
+//! Recordings: of a driver's ticks, and of the scans of a hosted program.
 
 use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Plan, Slot};
-use tickbus_record::{Recorder, Tally};
+use tickbus_record::{Columns, Recorder, Tally, When};
 
-use super::{Code, DriverError, SlotMap, open};
+use super::{Code, DriverError, SlotMap};
 use tickbus_driver_cfg::Config;
+
+/// Starts the recording that `config` asks for.
+pub(super) fn recorder(
+    config: &Config,
+    slots: &SlotMap,
+    lossless: bool,
+) -> Result<Option<Recorder>, DriverError> {
+    let wanted = config.record.as_ref();
+    let Some(options) = wanted.filter(|options| options.when == When::Always) else {
+        return Ok(None);
+    };
+    let columns = Columns::new(
+        &config.name,
+        config.role.name(),
+        &config.table,
+        &slots.edges,
+    );
+    let recorder = Recorder::start(options, config.folder(), columns, lossless)?;
+    Ok(Some(recorder))
+}
 
 /// The recording of a hosted program, one tick per scan.
 pub(super) struct Tape {
@@ -27,7 +47,7 @@ impl Tape {
     pub(super) fn start(config: &Config, role: Role) -> Result<Option<Self>, DriverError> {
         let map = SlotMap::new(&config.table, role);
         let (writes, reads) = role.areas();
-        let recorder = open::recorder(config, &map, false)?;
+        let recorder = recorder(config, &map, false)?;
         Ok(recorder.map(|recorder| Self {
             recorder,
             reads: Plan::new(&config.table, 0, reads),

@@ -1,0 +1,104 @@
+//! A PLC program at one end of a bus, by itself: the other front door, beside that of a simulation.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use tickbus_base::os::dropped_log_lines;
+use tickbus_base::time::{Clock, Nanos};
+use tickbus_fieldbus::faults::Injected;
+use tickbus_fieldbus::{Bus, Link};
+use tickbus_plc::Program;
+
+use super::host::{HostThread, Hosted, check_fit};
+use super::recording::Tape;
+use super::{DriverError, bus};
+use tickbus_driver_cfg::Config;
+
+/// A PLC program at one end of a bus, scanned at a fixed interval: a PLC without its hardware.
+///
+/// In the role Device, a program replaces the machine: `%Q` are its inputs, `%I` its outputs.
+#[derive(Debug)]
+pub struct Host(HostThread);
+
+impl Host {
+    /// Opens the bus that `config` describes and starts scanning `program` every `interval`. It does not wait
+    /// for the peer: scans begin at once, and are told that the peer is not there.
+    ///
+    /// # Errors
+    ///
+    /// Program and signal table do not fit, the bus must be stepped by a simulation, the recording cannot be
+    /// created, or the system refused a thread.
+    pub fn open(
+        config: &Config,
+        mut program: Box<dyn Program>,
+        interval: Nanos,
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self, DriverError> {
+        check_fit(config, &mut *program, config.role)?;
+        if config.table.stations.len() > 1 && !(config.faults.is_empty() && config.record.is_none())
+        {
+            return Err(DriverError::Config(format!(
+                "{}: a program behind several stations can neither be recorded nor have faults injected; use one \
+                 driver.cfg per station for that",
+                config.path.display()
+            )));
+        }
+        let (Bus::Free(bus), None) = bus::open(config, &clock)? else {
+            return Err(DriverError::Config(format!(
+                "{}: this bus runs on the ticks of a simulation, so that no PLC program can run on it \
+                 by itself; choose mode = \"free\" and a \"link\", or another kind of bus",
+                config.path.display()
+            )));
+        };
+        let title = format!("plc {}", program.name());
+        let role = config.role;
+        let hosted = Hosted {
+            program,
+            interval,
+            tape: Tape::start(config, role)?,
+        };
+        HostThread::start(hosted, title, config, role, bus, clock)
+            .map(Self)
+            .map_err(DriverError::Thread)
+    }
+
+    /// The state of the line.
+    pub fn link(&self) -> Link {
+        self.0.status.observe_call(self.0.told.clock.now());
+        self.0.status.link()
+    }
+
+    /// The counters and the state of the line, one `key=value` per line.
+    pub fn statistics(&self) -> String {
+        let now = self.0.told.clock.now();
+        let mut text = String::new();
+        self.0.status.observe_call(now);
+        self.0.status.write(now, &mut text);
+        self.0.board.tell(self.0.status.driver());
+        self.0.board.write(&mut text);
+        self.0.told.write(&mut text);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
+        text
+    }
+
+    /// The injected faults of this end.
+    pub fn injected_faults(&self) -> Vec<Injected> {
+        self.0.board.list()
+    }
+
+    /// The number of scans so far, and of those with stale data.
+    pub fn scans(&self) -> (u64, u64) {
+        self.0.told.tally.scans()
+    }
+
+    /// Why the program is no longer scanned, if so: it panicked, or a scan does not end.
+    pub fn fault(&self) -> Option<String> {
+        self.0.told.fault()
+    }
+
+    /// Stops scanning and closes the bus. Returns why the program did not end, if so.
+    pub fn close(mut self) -> Option<String> {
+        self.0.end()
+    }
+}

@@ -1,0 +1,124 @@
+//! An open driver, and what can be asked of it between ticks.
+
+use std::sync::Arc;
+
+use tickbus_base::time::{Clock, Nanos};
+use tickbus_fieldbus::faults::Board;
+use tickbus_fieldbus::{Link, LinkStatus};
+use tickbus_image::signal::Slot;
+use tickbus_image::{Consumer, Event};
+use tickbus_record::Recorder;
+
+use super::extras::Extras;
+use super::host::Program;
+use super::line::Line;
+use super::station::Station;
+use super::statistics::Samples;
+use super::tick::Tick;
+use super::{Counters, Exchange, SlotMap, Snapshot};
+use tickbus_driver_cfg::Config;
+
+/// An open driver: one device, or one controller, on its bus.
+#[derive(Debug)]
+pub struct Driver {
+    pub(super) config: Arc<Config>,
+    pub(super) slots: SlotMap,
+    pub(super) stations: Vec<Station>,
+    pub(super) line: Line,
+    pub(super) clock: Arc<dyn Clock>,
+    pub(super) max_age: Nanos,
+    pub(super) status: LinkStatus,
+    pub(super) counters: Counters,
+    pub(super) samples: Samples,
+    /// The clock's time and the tick's time at the first tick.
+    pub(super) first_now: Nanos,
+    pub(super) first_time: Nanos,
+    /// The last simulation time given.
+    pub(super) given: Option<Nanos>,
+    /// The current tick, between its halves.
+    pub(super) tick: Option<Tick>,
+    /// The result of the last tick.
+    pub(super) last: Exchange,
+    /// What is done around every exchange; nothing in most drivers.
+    pub(super) extras: Option<Box<Extras>>,
+    pub(super) board: Arc<Board>,
+    pub(super) events: Consumer,
+    pub(super) program: Option<Program>,
+    pub(super) recorder: Option<Recorder>,
+}
+
+impl Driver {
+    /// What the driver was opened with.
+    pub fn config(&self) -> &Arc<Config> {
+        &self.config
+    }
+
+    /// The arrangement of values in the slots.
+    pub fn slots(&self) -> &SlotMap {
+        &self.slots
+    }
+
+    /// The slots before the first exchange: every signal at its fail-safe value.
+    pub fn initial_slots(&self) -> Vec<Slot> {
+        let mut slots = vec![Slot::default(); self.slots.count];
+        for (slot, signal) in slots.iter_mut().zip(&self.config.table.signals) {
+            *slot = signal.fail_safe;
+        }
+        slots
+    }
+
+    /// The state of the line.
+    pub fn link(&self) -> Link {
+        self.observe();
+        self.status.link()
+    }
+
+    /// The counters and the state of the line, one `key=value` per line.
+    pub fn statistics(&self) -> String {
+        self.snapshot().to_string()
+    }
+
+    /// A copy of the data for the statistics, to be formatted when the driver is no longer locked.
+    pub fn snapshot(&self) -> Snapshot {
+        let now = self.clock.now();
+        let stations = self.stations.iter();
+        Snapshot {
+            config: Arc::clone(&self.config),
+            counters: self.counters,
+            stations: stations
+                .map(|station| (station.peer_age(now), station.is_valid(), station.cycles()))
+                .collect(),
+            events_lost: self.events.lost(),
+            now,
+            samples: self.samples.clone(),
+            status: self.status.clone(),
+            board: Arc::clone(&self.board),
+            program: self.program.as_ref().map(Program::tally),
+            record: self
+                .recorder
+                .as_ref()
+                .map(|recorder| Arc::clone(recorder.tally())),
+        }
+    }
+
+    /// Checks the line from outside, in case the bus cannot.
+    fn observe(&self) {
+        let now = self.clock.now();
+        let ages = self.stations.iter().map(|station| station.peer_age(now));
+        self.status.observe(now, ages);
+        self.status.observe_call(now);
+    }
+
+    /// Takes the oldest events, as many as fit into `into`; returns their number.
+    pub fn poll_events(&mut self, into: &mut [Event]) -> usize {
+        let mut taken = 0;
+        while let Some(place) = into.get_mut(taken) {
+            match self.events.pop() {
+                Some(event) => *place = event,
+                None => break,
+            }
+            taken += 1;
+        }
+        taken
+    }
+}

@@ -1,0 +1,48 @@
+//! Whether a program and a signal table fit.
+
+use crate::DriverError;
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::Role;
+use tickbus_plc as plc;
+
+/// Checks that the program, at the end with `role`, finds the image that it needs.
+pub(crate) fn check_fit(
+    config: &Config,
+    program: &mut dyn plc::Program,
+    role: Role,
+) -> Result<(), DriverError> {
+    let name = program.name().to_owned();
+    let refused = |what: String| DriverError::Config(format!("{}: {what}", config.path.display()));
+    let stations = &config.table.stations;
+    if stations.len() > 1 && program.for_another_station().is_none() {
+        return Err(refused(format!(
+            "the PLC program \"{name}\" serves one station, but this driver has {}; use one \
+             driver.cfg per station",
+            stations.len()
+        )));
+    }
+    program
+        .fit(&config.table, config.addressing)
+        .map_err(|source| program_error(config, source))?;
+    let (writes, reads) = role.areas();
+    let needs = [
+        (reads, program.input_bytes()),
+        (writes, program.output_bytes()),
+    ];
+    for (station, (area, needs)) in stations.iter().flat_map(|s| needs.map(|need| (s, need))) {
+        let has = station.bytes(area);
+        if has < needs {
+            return Err(refused(format!(
+                "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \
+                 this driver cover {has}; complete the signal table"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// A program that does not exist, or does not fit this driver.cfg.
+pub(crate) fn program_error(config: &Config, source: plc::ProgramError) -> DriverError {
+    let file = config.path.display().to_string();
+    DriverError::Program { file, source }
+}

@@ -1,0 +1,44 @@
+//! What is at the other end of a bus within this process, and its counters.
+
+use std::sync::Arc;
+
+use crate::replay::ReplayTally;
+
+use super::{HostTally, HostThread, Tally};
+
+/// What is at the other end, within this process: a PLC program or a recording.
+#[derive(Debug)]
+pub(crate) enum Program {
+    Thread(Box<HostThread>),
+    Stepped(Arc<Tally>),
+    Replay(Arc<ReplayTally>),
+}
+
+/// The counters of such a program, readable from any thread.
+#[derive(Clone, Debug)]
+pub(crate) enum ProgramTally {
+    Thread(HostTally),
+    Stepped(Arc<Tally>),
+    Replay(Arc<ReplayTally>),
+}
+
+impl Program {
+    pub(crate) fn tally(&self) -> ProgramTally {
+        match self {
+            Self::Thread(host) => ProgramTally::Thread(host.told.clone()),
+            Self::Stepped(tally) => ProgramTally::Stepped(Arc::clone(tally)),
+            Self::Replay(tally) => ProgramTally::Replay(Arc::clone(tally)),
+        }
+    }
+}
+
+impl ProgramTally {
+    /// Appends the counters, one `key=value` per line.
+    pub(crate) fn write(&self, text: &mut String) {
+        match self {
+            Self::Thread(host) => host.write(text),
+            Self::Stepped(tally) => tally.write(text),
+            Self::Replay(tally) => tally.write(text),
+        }
+    }
+}

@@ -6,21 +6,17 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[allow(dead_code, reason = "the conformance suite needs all of it")]
-#[path = "conformance/rig.rs"]
-mod rig;
-
 use std::fmt::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use rig::{Bus, CYCLE, End, Liar, MAX_AGE, Rig, await_that, config, pass};
 use tickbus::driver::{Code, Host};
 use tickbus::driver_cfg::Config;
 use tickbus::faults::Phase;
 use tickbus::fieldbus::{Cause, LinkState};
 use tickbus::programs::Mirror;
 use tickbus::time::{Manual, Nanos};
+use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, MAX_AGE, Rig, await_that, config, pass};
 
 /// A link name used by one test only.
 struct Link(String);

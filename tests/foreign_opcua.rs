@@ -8,7 +8,6 @@
     reason = "tests; they use a part of the rig"
 )]
 
-mod conformance;
 mod foreign;
 #[path = "peers/opcua.rs"]
 mod opcua;
@@ -16,6 +15,7 @@ mod opcua;
 mod served;
 
 use std::path::{Path, PathBuf};
+use tickbus_conformance as conformance;
 
 use foreign::{Absent, pcap};
 use opcua::{Device, IDENTITY, Peer, free_address, nodes, plc};

@@ -7,10 +7,6 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[allow(dead_code, reason = "the conformance suite needs all of it")]
-#[path = "conformance/rig.rs"]
-mod rig;
-
 #[path = "peers/full_pipe.rs"]
 mod full_pipe;
 
@@ -21,8 +17,8 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use full_pipe::full_pipe;
-use rig::{End, await_that};
 use tickbus::time::Monotonic;
+use tickbus_conformance::rig::{End, await_that};
 
 const DEVICE: &str = "[driver]\nid = 1\nname = \"stormed\"\n[fieldbus]\nkind = \"socket\"\n\
                       address = \"127.0.0.1:0\"\nsend = \"reply\"\n[[signal]]\nname = \"in\"\naddress = \"%IB0\"\n\

@@ -6,10 +6,10 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-mod conformance;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use tickbus_conformance as conformance;
+use tickbus_conformance::conformance;
 
 use conformance::rig::{Bus, End, Liar, Rig, await_that, config};
 use tickbus::driver::Code;

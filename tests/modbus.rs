@@ -6,7 +6,6 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-mod conformance;
 #[path = "peers/descriptors.rs"]
 mod descriptors;
 #[path = "peers/modbus.rs"]
@@ -21,6 +20,8 @@ mod pty;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Duration;
+use tickbus_conformance as conformance;
+use tickbus_conformance::conformance;
 
 use conformance::rig::{MAX_AGE, await_that, logged, pass};
 use modbus::{Tcp, request};

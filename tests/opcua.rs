@@ -7,7 +7,6 @@
     reason = "tests; the values are small whole numbers, and the peers of TCP are used in part"
 )]
 
-mod conformance;
 mod peers;
 
 use std::io::Write;
@@ -15,6 +14,8 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
+use tickbus_conformance as conformance;
+use tickbus_conformance::conformance;
 
 use conformance::rig::{Bus, End, Liar, await_that, pass};
 use peers::{leave, own_address};

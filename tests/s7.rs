@@ -6,7 +6,6 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-mod conformance;
 mod peers;
 #[path = "peers/s7.rs"]
 mod s7_peers;
@@ -16,6 +15,8 @@ mod state;
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::{Arc, Mutex};
+use tickbus_conformance as conformance;
+use tickbus_conformance::conformance;
 
 use conformance::rig::{await_that, config, logged, pass};
 use peers::{Alone, is_closed};

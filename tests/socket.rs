@@ -6,7 +6,6 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-mod conformance;
 mod peers;
 #[path = "peers/socket.rs"]
 mod socket_peers;
@@ -14,6 +13,8 @@ mod socket_peers;
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::time::Duration;
+use tickbus_conformance as conformance;
+use tickbus_conformance::conformance;
 
 use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, logged, pass};
 use peers::{Alone, client, is_closed, leave};

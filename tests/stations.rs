@@ -8,7 +8,6 @@
 )]
 
 #[allow(dead_code, unused_macros, reason = "each test uses a part of it")]
-mod conformance;
 mod peers;
 
 use std::fmt::Write as _;
@@ -16,6 +15,7 @@ use std::fs::File;
 use std::io::Write as _;
 use std::net::{SocketAddr, TcpStream};
 use std::os::fd::AsRawFd as _;
+use tickbus_conformance as conformance;
 
 use conformance::resources;
 use conformance::rig::{await_that, logged};

@@ -2,6 +2,7 @@
 //! clocks are confined to certain files, and no file grows without limit.
 
 mod circles;
+mod glossary;
 mod rules;
 mod source;
 
@@ -9,6 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use circles::circles;
+use glossary::unknown;
 use rules::{File, mistakes};
 
 /// All Rust sources below `directory`, in order.
@@ -73,6 +75,22 @@ fn every_crate_has_its_row_in_the_table_of_rooms() {
         let row = format!("| `{}` |", folder.trim_end_matches("/src"));
         assert!(text.contains(&row), "docs/ARCHITECTURE.md has no row {row}");
     }
+}
+
+#[test]
+fn the_glossary_names_what_there_is() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("docs/ARCHITECTURE.md")).expect("it is there");
+    let files = crates(root)
+        .into_iter()
+        .flat_map(|folder| sources(&root.join(folder)));
+    let sources = files.map(|file| fs::read_to_string(file).expect("sources are UTF-8"));
+    // build.rs makes an enum of the table of status codes.
+    let codes = "enum Code { Fresh, Unchanged, Stale }".to_owned();
+    let sources: Vec<String> = sources.chain([codes]).collect();
+    assert_eq!(unknown(&text, &sources), Vec::<String>::new());
+    let wrong = "## Glossary\n| a | b | `driver::Driver`, `x::Nobody` |\n";
+    assert_eq!(unknown(wrong, &sources), ["x::Nobody"]);
 }
 
 /// Checks that exactly these lines of an imaginary file are complained about, each with a word of the

@@ -7,14 +7,14 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[path = "../conformance/mod.rs"]
-mod conformance;
 mod fixture;
 mod isolation;
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use tickbus_conformance as conformance;
+use tickbus_conformance::conformance;
 
 use conformance::rig::{CYCLE, await_that, logged};
 use fixture::{HELPER, Misbehaving, Udp, build, misbehaving, until, until_by, until_it_echoes};

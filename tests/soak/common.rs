@@ -1,13 +1,10 @@
 //! What the soaks share: how long they last, what they ask a driver, and what must not have happened to it.
 
-#[path = "../conformance/resources.rs"]
-mod resources;
-
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-pub use resources::Resources;
 use tickbus::driver::Driver;
+pub use tickbus_conformance::resources::Resources;
 
 /// When it is over: some seconds from now, or what `make soak` asks for.
 pub fn end() -> Instant {

@@ -3,6 +3,7 @@
 //! Every build reads their options in a driver.cfg. The buses themselves use the crate `async-opcua` and are
 //! only built with the cargo feature `opcua`.
 
+mod kind;
 mod node;
 mod options;
 mod security;
@@ -12,8 +13,6 @@ mod url;
 mod application;
 #[cfg(feature = "opcua")]
 mod client;
-mod kind;
-#[cfg(feature = "opcua")]
 #[cfg(feature = "opcua")]
 mod pki;
 #[cfg(feature = "opcua")]
@@ -27,7 +26,6 @@ mod values;
 
 #[cfg(feature = "opcua")]
 pub use client::Client;
-#[cfg(feature = "opcua")]
 pub use node::{Identifier, Namespace, NodeName, NodeNameError, Pattern};
 pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};

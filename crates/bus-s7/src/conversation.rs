@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::item::{self, Addresses, Code, Data, Element, Item, Object};
-use super::pdu::{Draft, Kind, LONGEST, Pdu, SHORTEST, error, function};
+use super::length::{LONGEST, SHORTEST};
+use super::pdu::{Draft, Kind, Pdu, error, function};
 use super::szl::Facts;
 use super::transport::{self, Connect, Tpdu};
 use super::userdata::{self, Ask, Rest};

@@ -1,6 +1,6 @@
 //! How a peer can violate the protocol, in words.
 
-use super::pdu::LONGEST;
+use super::length::LONGEST;
 use tickbus_fieldbus::BusError;
 
 /// Why a connection cannot continue.

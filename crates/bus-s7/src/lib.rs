@@ -9,6 +9,7 @@ mod conversation;
 mod fault;
 pub mod item;
 mod kind;
+mod length;
 pub mod pdu;
 mod place;
 mod server;
@@ -25,14 +26,6 @@ pub use place::Start;
 pub use server::{Block, S7Server, ServerOptions};
 pub use tsap::Tsap;
 pub use variable::Variable;
-
-/// Reads the longest PDU length to agree to.
-fn read_pdu(value: &tickbus_base::toml_text::Value<'_>) -> Option<u16> {
-    let range = i128::from(pdu::LEAST)..=i128::from(pdu::LONGEST);
-    value
-        .whole(range)
-        .and_then(|length| u16::try_from(length).ok())
-}
 
 /// The bytes written as hexadecimal digits; blanks are ignored.
 #[cfg(test)]

@@ -1,15 +1,7 @@
 //! The protocol data units of S7 communication: a header, parameters, data.
 
 use super::Fault;
-
-/// The longest PDU that our server agrees to, as of the largest CPUs.
-pub const LONGEST: u16 = 960;
-
-/// The PDU length of the smallest CPUs.
-pub const LEAST: u16 = 240;
-
-/// The shortest PDU with room for an item.
-pub const SHORTEST: u16 = 64;
+pub use super::length::{LEAST, LONGEST, SHORTEST};
 
 const PROTOCOL: u8 = 0x32;
 /// `S7CommPlus`, the protocol of TIA Portal and newer panels.

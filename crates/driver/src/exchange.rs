@@ -4,8 +4,12 @@
 //! [`Driver::receive`] and [`Driver::send`] are the two halves in the other order, with the simulation's
 //! model between them, so that it answers within the same tick.
 //!
-//! Nothing here allocates, locks or makes a system call, unless the bus is stepped. The clock is read once
-//! per call, where that is not a system call.
+//! Nothing here allocates, locks or calls the system, unless the bus is a stepped one. The clock is read, once in each
+//! call, where that is no system call.
+#![allow(
+    clippy::inline_always,
+    reason = "the parts of an exchange are functions for the reader alone"
+)]
 
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::Moment;
@@ -61,20 +65,43 @@ impl Driver {
     /// # Panics
     ///
     /// When there are fewer slots than [`SlotMap::count`](super::SlotMap::count).
+    #[inline]
     pub fn exchange(&mut self, time: impl Into<Option<Nanos>>, slots: &mut [Slot]) -> Exchange {
-        let done = self.begin(time.into(), slots).and_then(|now| {
-            if let Some(reflexes) = &mut self.reflexes {
-                reflexes.sending(slots);
+        self.exchange_at(time.into(), slots)
+    }
+
+    fn exchange_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        let (found, done) = match self.begin(time, slots) {
+            Ok(now) => {
+                if let Some(extras) = &mut self.extras {
+                    extras.handed_over(slots);
+                }
+                self.begin_extras(slots);
+                let sent = self.put(now, slots);
+                let (found, done) = self.take(now, slots);
+                self.lap(now);
+                (found, sent.and(done))
             }
-            self.begin_faults(slots);
-            let sent = self.put(now, slots);
-            let found = self.take(now, slots);
-            self.lap(now);
-            sent.and(found)
-        });
-        self.last = self.judged(done);
-        self.end(self.last.code, slots);
-        self.last
+            Err(error) => (self.last, Err(error)),
+        };
+        if let Err(error) = done {
+            self.last = self.failed(found, &error);
+            self.end(self.last, slots);
+            return self.last;
+        }
+        // Each by itself: read back as a whole, what was just written in parts would be waited for.
+        let Exchange {
+            code,
+            sequence,
+            age,
+            granted,
+        } = found;
+        self.last.code = code;
+        self.last.sequence = sequence;
+        self.last.age = age;
+        self.last.granted = granted;
+        self.end(found, slots);
+        found
     }
 
     /// Begins a tick by receiving: puts the received values into `slots`. The simulation computes its answer
@@ -86,15 +113,27 @@ impl Driver {
     /// # Panics
     ///
     /// As [`exchange`](Self::exchange).
+    #[inline]
     pub fn receive(&mut self, time: impl Into<Option<Nanos>>, slots: &mut [Slot]) -> Exchange {
-        let done = self.begin(time.into(), slots).and_then(|now| {
-            self.begin_faults(slots);
-            let found = self.take(now, slots);
-            self.lap(now);
-            found
-        });
-        self.last = self.judged(done);
-        self.last
+        self.receive_at(time.into(), slots)
+    }
+
+    fn receive_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        let (found, done) = match self.begin(time, slots) {
+            Ok(now) => {
+                self.begin_extras(slots);
+                let (found, done) = self.take(now, slots);
+                self.lap(now);
+                (found, done)
+            }
+            Err(error) => (self.last, Err(error)),
+        };
+        if let Err(error) = done {
+            self.last = self.failed(found, &error);
+            return self.last;
+        }
+        self.last = found;
+        found
     }
 
     /// Ends the tick that [`receive`](Self::receive) began: sends this end's values from `slots`. Returns
@@ -109,17 +148,20 @@ impl Driver {
     pub fn send(&mut self, slots: &mut [Slot]) -> Exchange {
         self.check(slots);
         if self.last.code == Code::BusFailed {
-            self.end(self.last.code, slots);
+            self.end(self.last, slots);
             return self.last;
         }
         let now = self.now();
-        if let Some(reflexes) = &mut self.reflexes {
-            reflexes.sending(slots);
+        if let Some(extras) = &mut self.extras {
+            extras.handed_over(slots);
         }
         let sent = self.put(now, slots);
         self.lap(now);
-        let done = self.judged(sent);
-        self.end(done.code, slots);
+        let done = match sent {
+            Ok(()) => self.last,
+            Err(error) => self.failed(self.last, &error),
+        };
+        self.end(done, slots);
         done
     }
 
@@ -132,9 +174,10 @@ impl Driver {
     /// As [`exchange`](Self::exchange).
     pub fn end_tick(&mut self, slots: &[Slot]) {
         self.check(slots);
-        self.end(self.last.code, slots);
+        self.end(self.last, slots);
     }
 
+    #[inline]
     fn check(&self, slots: &[Slot]) {
         assert!(
             slots.len() >= self.slots.count,
@@ -145,7 +188,7 @@ impl Driver {
 
     /// The time on the line: the clock's, or the simulation's on a stepped bus.
     #[inline]
-    fn now(&self) -> Nanos {
+    fn now(&mut self) -> Nanos {
         match &self.line {
             Line::Free(_) => self.clock.now(),
             // Simulation time stands still during an exchange.
@@ -154,9 +197,12 @@ impl Driver {
     }
 
     /// Begins a tick and gives the time on the line.
+    #[inline(always)]
     fn begin(&mut self, asked: Option<Nanos>, slots: &[Slot]) -> Result<Nanos, BusError> {
         self.check(slots);
-        self.end(self.last.code, slots);
+        if self.tick.is_some() {
+            self.end_unanswered(slots);
+        }
         let before = self.now();
         self.given = asked.or(self.given);
         self.counters.ticks += 1;
@@ -179,41 +225,34 @@ impl Driver {
             return Ok(before);
         };
         if time < before {
-            return Err(BusError::Refused(format!(
-                "simulation time went back from {before} to {time}, and what runs on it cannot; hand in the \
-                 nanoseconds since the simulation began, and open the driver again when it begins anew"
-            )));
+            return Err(went_back(before, time));
         }
         shown.set(time);
         Ok(time)
     }
 
-    fn begin_faults(&mut self, slots: &mut [Slot]) {
-        if let (Some(faults), Some(tick)) = (&mut self.faults, &self.tick) {
+    #[inline]
+    fn begin_extras(&mut self, slots: &mut [Slot]) {
+        if let (Some(extras), Some(tick)) = (&mut self.extras, &self.tick) {
             let moment = Moment {
                 time: tick.time - self.first_time,
                 tick: self.counters.ticks,
             };
-            faults.begin_tick(moment, slots);
+            extras.begin_tick(moment, slots);
         }
     }
 
-    /// The sending half.
+    /// The half that sends.
+    #[inline(always)]
     fn put(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
-        for beat in &mut self.beats {
-            beat.beat(now, slots);
-        }
-        if let Some(faults) = &mut self.faults {
-            faults.sending(slots);
+        if let Some(extras) = &mut self.extras {
+            extras.sending(now, slots);
         }
         for station in &mut self.stations {
             station.send(now, slots, &mut self.counters);
         }
-        if let Some(faults) = &mut self.faults {
-            faults.sent(slots);
-        }
-        if let Some(reflexes) = &mut self.reflexes {
-            reflexes.sent(slots);
+        if let Some(extras) = &mut self.extras {
+            extras.sent(slots);
         }
         match &mut self.line {
             Line::Free(_) => Ok(()),
@@ -221,11 +260,15 @@ impl Driver {
         }
     }
 
-    /// The receiving half.
-    fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
-        let granted = match &mut self.line {
-            Line::Free(_) => Ok(self.tick.map_or(now, |tick| tick.time)),
-            Line::Stepped { bus, port, .. } => bus.receive(now, port),
+    /// The half that receives: what it found, and whether it could.
+    #[inline(always)]
+    fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
+        let (granted, done) = match &mut self.line {
+            Line::Free(_) => (self.tick.map_or(now, |tick| tick.time), Ok(())),
+            Line::Stepped { bus, port, .. } => match bus.receive(now, port) {
+                Ok(granted) => (granted, Ok(())),
+                Err(error) => (now, Err(error)),
+            },
         };
         let (mut code, mut sequence, mut age) = (Code::Fresh, 0, Nanos::ZERO);
         for station in &mut self.stations {
@@ -239,33 +282,28 @@ impl Driver {
             };
             code = code.worse(station.status);
         }
-        if let Some(reflexes) = &mut self.reflexes {
-            reflexes.received(slots);
+        if let Some(extras) = &mut self.extras {
+            extras.received(slots);
         }
-        if let Some(faults) = &mut self.faults {
-            faults.received(slots);
-        }
-        self.last = Exchange {
+        let found = Exchange {
             code,
             sequence,
             age,
-            granted: *granted.as_ref().unwrap_or(&now),
+            granted,
         };
-        granted.map(|_| ())
+        (found, done)
     }
 
-    /// The result of a half: what was found last, or that the bus failed.
-    fn judged(&self, done: Result<(), BusError>) -> Exchange {
-        let Err(error) = done else {
-            return self.last;
-        };
+    /// What there is to say when the bus failed and this was found.
+    #[cold]
+    fn failed(&mut self, found: Exchange, error: &BusError) -> Exchange {
         let now = self.now();
-        let (state, cause, reason) = (LinkState::Failed, (&error).into(), error.to_string());
+        let (state, cause, reason) = (LinkState::Failed, error.into(), error.to_string());
         self.status.enter(now, state, cause, &reason);
         Exchange {
             code: Code::BusFailed,
             granted: now,
-            ..self.last
+            ..found
         }
     }
 
@@ -277,18 +315,39 @@ impl Driver {
         }
     }
 
-    /// Ends the current tick, if there is one: counts and records it.
-    fn end(&mut self, code: Code, slots: &[Slot]) {
+    #[cold]
+    fn end_unanswered(&mut self, slots: &[Slot]) {
+        self.end(self.last, slots);
+    }
+
+    /// Ends the tick that is under way, if there is one: counts it, and records it.
+    #[inline]
+    fn end(&mut self, found: Exchange, slots: &[Slot]) {
         let Some(tick) = self.tick.take() else {
             return;
         };
-        self.counters.count(code);
-        if let Some(recorder) = &mut self.recorder {
-            let stations = self.stations.iter().map(|station| station.status.code());
-            recorder.record(self.counters.ticks, tick.time, code.code(), stations, slots);
+        self.counters.count(found.code);
+        if self.recorder.is_some() {
+            self.record(tick, found.code, slots);
         }
         if matches!(self.line, Line::Free(_)) && Samples::takes(self.counters.ticks) {
             self.samples.add(tick.taken, self.last.age);
         }
     }
+
+    #[inline(never)]
+    fn record(&mut self, tick: Tick, code: Code, slots: &[Slot]) {
+        if let Some(recorder) = &mut self.recorder {
+            let stations = self.stations.iter().map(|station| station.status.code());
+            recorder.record(self.counters.ticks, tick.time, code.code(), stations, slots);
+        }
+    }
+}
+
+#[cold]
+fn went_back(before: Nanos, time: Nanos) -> BusError {
+    BusError::Refused(format!(
+        "simulation time went back from {before} to {time}, and what runs on it cannot; hand in the \
+         nanoseconds since the simulation began, and open the driver again when it begins anew"
+    ))
 }

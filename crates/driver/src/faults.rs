@@ -16,9 +16,10 @@ impl Driver {
     /// Too many faults wait or are active.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, String> {
         let board = &self.board;
-        let faults = self
+        let extras = self.extras.get_or_insert_default();
+        let faults = extras
             .faults
-            .get_or_insert_with(|| Box::new(Faults::new(Arc::clone(board))));
+            .get_or_insert_with(|| Faults::new(Arc::clone(board)));
         let slots = Slots {
             table: &self.config.table,
             writes: self.config.role.areas().0,
@@ -57,7 +58,9 @@ impl Driver {
 
     /// Ends a fault at the next exchange; false if no fault has this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
-        self.faults.as_mut().is_some_and(|faults| faults.end(id))
+        let extras = self.extras.as_mut();
+        let faults = extras.and_then(|extras| extras.faults.as_mut());
+        faults.is_some_and(|faults| faults.end(id))
     }
 
     /// Where the faults publish their state, readable from any thread.

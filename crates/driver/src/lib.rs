@@ -2,6 +2,7 @@
 
 mod bus;
 mod exchange;
+mod extras;
 mod faults;
 mod frames;
 mod heartbeat;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
 use tickbus_base::time::{Clock, Manual, Nanos};
-use tickbus_fieldbus::faults::{Board, Faults};
+use tickbus_fieldbus::faults::Board;
 use tickbus_fieldbus::{
     Bus, Cause, ChangeEvents, Link, LinkState, LinkStatus, Port, Role, Stepped,
 };
@@ -15,6 +15,7 @@ use tickbus_record::{Columns, Recorder, RecorderError, When};
 
 use super::bus::{self, Program};
 use super::exchange::{Exchange, Tick};
+use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::station::Station;
@@ -44,13 +45,9 @@ pub struct Driver {
     pub(super) tick: Option<Tick>,
     /// The result of the last tick.
     pub(super) last: Exchange,
-    /// Injected faults; `None` for most drivers.
-    pub(super) faults: Option<Box<Faults>>,
+    /// What is done around every exchange; nothing in most drivers.
+    pub(super) extras: Option<Box<Extras>>,
     pub(super) board: Arc<Board>,
-    /// What the axes need done on every tick; `None` for most drivers.
-    pub(super) reflexes: Option<Reflexes>,
-    /// The heartbeats of this end; empty for most drivers.
-    pub(super) beats: Box<[Beat]>,
     events: Consumer,
     program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
@@ -188,6 +185,11 @@ impl Driver {
         let stations = stations
             .map(|(index, tick)| Station::new(tick, &config.table, index, (tx, rx)))
             .collect();
+        // They are the machine's: a PLC has its own.
+        let reflexes = match config.role {
+            Role::Device => Reflexes::new(&config.axes),
+            Role::Controller => None,
+        };
         let list = config.faults.clone();
         let mut driver = Self {
             slots,
@@ -204,13 +206,8 @@ impl Driver {
             given: None,
             tick: None,
             last: Exchange::NONE,
-            faults: None,
+            extras: Extras::new(reflexes, Beat::all(&config, config.role)),
             board,
-            // Only a machine has reflexes; a PLC program handles its axes itself.
-            reflexes: (config.role == Role::Device)
-                .then(|| Reflexes::new(&config.axes))
-                .flatten(),
-            beats: Beat::all(&config, config.role),
             events: tick.events,
             program,
             config: Arc::new(config),

@@ -47,6 +47,7 @@ impl Station {
         self.tick.is_valid()
     }
 
+    #[inline]
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
         let encode = &self.encode;
         let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
@@ -56,6 +57,7 @@ impl Station {
         }
     }
 
+    #[inline]
     pub(super) fn receive(
         &mut self,
         now: Nanos,
@@ -67,7 +69,8 @@ impl Station {
         self.receive_as(valid, (now, max_age), slots, map)
     }
 
-    /// Receives data that were `valid` when it was asked.
+    /// Receives data that were `valid` a moment ago.
+    #[inline]
     fn receive_as(
         &mut self,
         valid: bool,
@@ -92,11 +95,16 @@ impl Station {
         }
         let stale = !still_valid || arrival.age > max_age;
         if stale && (arrival.changed || !self.stale) {
-            self.decode.fail_safe(slots);
-            self.tick.shown_instead();
+            self.show_fail_safe(slots);
         }
         self.stale = stale;
         arrival
+    }
+
+    #[cold]
+    fn show_fail_safe(&mut self, slots: &mut [Slot]) {
+        self.decode.fail_safe(slots);
+        self.tick.shown_instead();
     }
 }
 

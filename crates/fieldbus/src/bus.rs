@@ -2,7 +2,7 @@
 
 use tickbus_base::time::{Nanos, Stop};
 
-use super::Port;
+use super::{BusError, Port};
 
 /// The default bus cycle of a bus that has a cycle of its own.
 pub const CYCLE: Nanos = Nanos::from_millis(10);
@@ -59,21 +59,4 @@ pub trait Stepped: Send {
     ///
     /// Why nothing was received.
     fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError>;
-}
-
-/// Why a bus cannot go on; the variant tells who is at fault.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BusError {
-    /// The line is broken, or was never up; trying again may help.
-    #[error("the link failed: {0}")]
-    Link(String),
-    /// The peer closed the connection properly.
-    #[error("the peer left: {0}")]
-    Left(String),
-    /// The peer violates the protocol.
-    #[error("the protocol was broken: {0}")]
-    Protocol(String),
-    /// The peer understood the request, and refused it.
-    #[error("refused: {0}")]
-    Refused(String),
 }

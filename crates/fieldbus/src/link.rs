@@ -263,7 +263,12 @@ impl LinkStatus {
         LinkState::ALL[usize::from(self.0.state.load(Ordering::Relaxed)) % LinkState::ALL.len()]
     }
 
-    /// The reason of the last running state; empty before the line ran for the first time.
+    /// Whether the peer is there, as it was entered last: the line is running or stale.
+    pub fn is_up(&self) -> bool {
+        matches!(self.state(), LinkState::Running | LinkState::Stale)
+    }
+
+    /// What a running line says of itself; empty before it ran for the first time.
     pub fn running_reason(&self) -> String {
         self.lock().running.clone()
     }
@@ -285,7 +290,7 @@ impl LinkStatus {
 
     /// The peer is there. A line that is running or stale keeps its state.
     pub fn running(&self, now: Nanos, reason: &str) {
-        if matches!(self.state(), LinkState::Running | LinkState::Stale) {
+        if self.is_up() {
             return;
         }
         let mut record = self.lock();

@@ -389,6 +389,10 @@ impl Port {
     /// The peer is there. The port itself checks that it sends: a line that is silent for too long becomes
     /// stale.
     pub fn running(&mut self, reason: &str) {
+        // Said in every cycle of some buses.
+        if !self.troubles.are_there() && self.status.is_up() {
+            return;
+        }
         self.enter(LinkState::Running, Cause::Running, reason);
     }
 

@@ -3,8 +3,7 @@
 use std::io::Write as _;
 
 use super::columns::{Columns, Kind, Tick};
-use super::recorder::Sink;
-use super::vcd::{count, real};
+use super::sink::{Sink, count, real};
 
 /// The columns before the signals; their names are reserved, so that no signal can have them.
 pub(super) const HEAD: [&str; 4] = ["bus.tick", "bus.time_ns", "bus.status", "bus.dropped"];

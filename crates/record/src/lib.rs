@@ -11,6 +11,7 @@ mod options;
 mod places;
 mod reading;
 mod recorder;
+mod sink;
 mod vcd;
 
 #[cfg(all(test, not(loom)))]

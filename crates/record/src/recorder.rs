@@ -13,6 +13,7 @@ use super::columns::{Columns, Tick};
 use super::csv::CsvSink;
 use super::file::{Out, Target};
 use super::places::Place;
+use super::sink::Sink;
 use super::vcd::VcdSink;
 use super::{Format, Options};
 use tickbus_base::time::Nanos;
@@ -34,18 +35,6 @@ const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Words of a tick in the ring before the statuses of the stations: number, time, status.
 const HEAD: usize = 3;
-
-/// Converts ticks to the bytes of a file.
-pub(super) trait Sink: Send {
-    /// Writes the beginning of the file.
-    fn header(&mut self, out: &mut Vec<u8>);
-
-    /// One tick; values are as [`Kind::kept`](super::Kind::kept) gives them.
-    fn tick(&mut self, tick: &Tick, out: &mut Vec<u8>);
-
-    /// Writes the end of a recording that was closed properly.
-    fn end(&mut self, note: &str, out: &mut Vec<u8>);
-}
 
 impl Format {
     /// A sink for files of this format.

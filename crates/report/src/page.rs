@@ -144,16 +144,6 @@ fn bands(contents: &Contents<'_>) -> Vec<Band> {
     bands
 }
 
-/// The CSS class of a line state, by its word.
-pub(super) fn state_class(word: &str) -> &'static str {
-    match word {
-        "running" | "live" => "good",
-        "stale" => "stale",
-        "failed" => "bad",
-        _ => "idle",
-    }
-}
-
 fn of_kind<'b>(bands: &'b [Band], kind: &'b str) -> impl Iterator<Item = &'b Span> {
     bands
         .iter()
@@ -218,7 +208,7 @@ fn share_good(bands: &[Band]) -> Option<f64> {
         let length = (state.until - state.from).0;
         all = all.saturating_add(length);
         let word = state.text.split(": ").next().unwrap_or_default();
-        if state_class(word) == "good" {
+        if spans::state_class(word) == "good" {
             good = good.saturating_add(length);
         }
     }
@@ -316,7 +306,7 @@ fn line(out: &mut String, statistics: &Statistics) {
     let Some(state) = statistics.get("state") else {
         return;
     };
-    let class = state_class(state);
+    let class = spans::state_class(state);
     let _ = write!(
         out,
         "<p>At the end: <span class=\"tag {class}\">{}</span>",
@@ -429,7 +419,7 @@ fn data(
             let comma = if number > 0 { "," } else { "" };
             let word = span.text.split(": ").next().unwrap_or_default();
             let class = if band.kind == "link" {
-                state_class(word)
+                spans::state_class(word)
             } else {
                 band.kind
             };

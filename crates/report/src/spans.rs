@@ -116,6 +116,16 @@ fn one_after_another(
     spans
 }
 
+/// The CSS class of a line state, by its word.
+pub(super) fn state_class(word: &str) -> &'static str {
+    match word {
+        "running" | "live" => "good",
+        "stale" => "stale",
+        "failed" => "bad",
+        _ => "idle",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{Kind, Mark};

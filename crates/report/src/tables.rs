@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 
 use super::html::{Text, count, counted, digits, seconds, span};
-use super::spans::Span;
+use super::spans::{Span, state_class};
 use super::statistics::Distribution;
 use super::{Kind, Run, Signal, Statistics, figures};
 use tickbus_base::time::Nanos;
@@ -178,7 +178,7 @@ pub(super) fn states(out: &mut String, states: &[Span], scale: Scale) {
             let _ = write!(out, "<td>{}</td>", Text(&state.of));
         }
         let (word, reason) = state.text.split_once(": ").unwrap_or((&state.text, ""));
-        let class = super::page::state_class(word);
+        let class = state_class(word);
         let _ = write!(
             out,
             "<td><span class=\"tag {class}\">{}</span> {}</td>",

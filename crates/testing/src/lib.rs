@@ -13,9 +13,11 @@ mod playback;
 mod run;
 mod sections;
 mod suite;
+mod test;
 mod watch;
 
 pub use condition::{Condition, Demand};
 pub use junit::{Case, Group, Verdict, junit_xml};
 pub use run::{Failure, Ran};
-pub use suite::{Place, Suite, Test};
+pub use suite::Suite;
+pub use test::{Place, Test};

@@ -4,7 +4,7 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
 
 use super::condition::{Bookmark, Condition};
-use super::suite::Rule;
+use super::test::Rule;
 use super::watch::Watch;
 
 /// Rules, and their state from tick to tick.

@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{nearest, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
 use tickbus_record::{Kind, Recording, RecordingError, Tick};
 
-use super::suite::Place;
+use super::test::Place;
 
 /// A recording that fits a signal table.
 #[derive(Clone, Debug)]

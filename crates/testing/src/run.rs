@@ -10,7 +10,8 @@ use tickbus_record as record;
 use super::condition::{Bookmark, Condition};
 use super::machine::Stub;
 use super::playback::{Difference, Playback, Tape};
-use super::suite::{Passage, Place, Step, Suite, Test};
+use super::suite::Suite;
+use super::test::{Passage, Place, Step, Test};
 use super::watch::{Watch, moment, real, span, text_of};
 
 /// The result of one test.

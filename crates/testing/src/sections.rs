@@ -11,7 +11,7 @@ use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::condition::{Condition, Demand};
 use super::playback::Tape;
-use super::suite::{Passage, Place, Ramp, Rule, Step, Test};
+use super::test::{Passage, Place, Ramp, Rule, Step, Test};
 
 /// The longest time that may pass in one step: ten minutes on a fast machine.
 const MOST_TICKS: i128 = 1_000_000_000;

@@ -3,26 +3,21 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::faults::Fault;
-
-use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::loopback::{self, Mode, Peer};
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
 
-use super::condition::Condition;
 use super::playback::Tape;
 use super::sections::{Machine, Reader};
+use super::test::{Rule, Test};
 
 /// The default step of a test file.
 const STEP: Nanos = Nanos::from_millis(1);
-
-/// Line and column, both from 1.
-pub type Place = (usize, usize);
 
 /// One test file, read and checked.
 #[derive(Clone, Debug)]
@@ -42,66 +37,6 @@ pub(super) struct Bench {
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
     pub(super) tape: Option<Tape>,
-}
-
-/// One test.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Test {
-    /// Its name, unique in its file.
-    pub name: String,
-    /// Where it begins.
-    pub place: Place,
-    pub(super) initial: Vec<(usize, Slot)>,
-    pub(super) steps: Vec<Step>,
-}
-
-/// One step: sets some signals, lets time pass, expects something; in this order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Step {
-    pub(super) place: Place,
-    pub(super) set: Vec<(usize, Slot)>,
-    pub(super) force: Vec<(usize, Slot)>,
-    pub(super) release: Vec<usize>,
-    pub(super) inject: Vec<(Fault, Place)>,
-    /// Faults to end, by name.
-    pub(super) end: Vec<(String, Place)>,
-    pub(super) passage: Option<Passage>,
-    pub(super) expect: Vec<(Condition, Place)>,
-    /// For how many ticks the expectations must hold.
-    pub(super) during: u64,
-    pub(super) always: Vec<(Condition, Place)>,
-    pub(super) never: Vec<(Condition, Place)>,
-}
-
-/// How time passes in a step.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Passage {
-    /// This many ticks.
-    Ticks(u64),
-    /// This many ticks, with a button pressed.
-    Press(usize, u64),
-    /// Until all of these hold, for at most this many ticks.
-    Await(Vec<(Condition, Place)>, u64),
-}
-
-/// One rule of the machine's stub.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Rule {
-    /// All of these must hold. Never empty.
-    pub(super) when: Vec<Condition>,
-    pub(super) after: Nanos,
-    pub(super) set: Vec<(usize, Slot)>,
-    pub(super) otherwise: Vec<(usize, Slot)>,
-    pub(super) ramp: Option<Ramp>,
-}
-
-/// A signal that moves towards a value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ramp {
-    pub(super) signal: usize,
-    pub(super) to: f64,
-    /// Units per second. Positive.
-    pub(super) per_second: f64,
 }
 
 impl Suite {

@@ -1,7 +1,7 @@
 //! Injected clocks.
 
 use std::fmt;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -86,6 +86,8 @@ impl Clock for Monotonic {
 pub struct Manual {
     now: AtomicI64,
     waiters: Mutex<Vec<Waiter>>,
+    /// How many there are: mostly none where simulation time is the clock, and then the tick takes no lock.
+    waiting: AtomicUsize,
 }
 
 /// A thread that waits on a manual clock.
@@ -108,9 +110,17 @@ impl Manual {
 
     /// Sets the clock to `now`; a clock never runs backwards, so an earlier time changes nothing.
     pub fn set(&self, now: Nanos) {
-        self.now.fetch_max(now.0, Ordering::SeqCst);
-        let now = self.now();
-        // Collected first: a waker may take its time, and threads may be added or removed meanwhile.
+        let now = Nanos(now.0.max(self.now.fetch_max(now.0, Ordering::SeqCst)));
+        // Whoever waits is counted before it looks at the time: it sees this one, or is seen here.
+        if self.waiting.load(Ordering::SeqCst) > 0 {
+            self.wake(now);
+        }
+    }
+
+    /// Wakes every wait whose deadline has come.
+    #[cold]
+    fn wake(&self, now: Nanos) {
+        // Collected first: a waker may take its time, and threads come and go meanwhile.
         let due: Vec<_> = self
             .lock()
             .iter()
@@ -159,12 +169,14 @@ impl Manual {
     /// advance.
     fn wait_listed(&self, deadline: Nanos, stop: &Stop, wait: impl FnOnce()) {
         let me = stop.downgrade();
+        self.waiting.fetch_add(1, Ordering::SeqCst);
         self.lock().push(Waiter {
             deadline,
             stop: me.clone(),
         });
         wait();
         self.lock().retain(|waiter| !waiter.stop.ptr_eq(&me));
+        self.waiting.fetch_sub(1, Ordering::SeqCst);
     }
 }
 

@@ -6,7 +6,8 @@ use super::traffic::{Traffic, function_of, write_data};
 use super::{End, Frames, News, Refusal, Terms};
 use crate::Fault;
 use crate::item::{self, Code, Data};
-use crate::pdu::{Draft, Kind, LONGEST, Pdu, SHORTEST, error, function};
+use crate::length::{LONGEST, SHORTEST};
+use crate::pdu::{Draft, Kind, Pdu, error, function};
 use crate::szl::{self, Identity};
 use crate::transport::{self, Connect, Tpdu};
 use tickbus_base::time::Nanos;
@@ -68,9 +69,16 @@ enum Phase {
     Working(usize),
 }
 
+impl Frames {
+    /// A dialog that transfers them.
+    pub fn dialog(&self, terms: Terms, now: Nanos) -> Dialog {
+        Dialog::new(terms, now, self.clone())
+    }
+}
+
 impl Dialog {
     /// A dialog that starts at `now` and transfers these frames.
-    pub(super) fn new(terms: Terms, now: Nanos, frames: Frames) -> Self {
+    fn new(terms: Terms, now: Nanos, frames: Frames) -> Self {
         let mut dialog = Self {
             phase: Phase::Connecting,
             inbox: Vec::new(),

@@ -2,11 +2,10 @@
 
 use std::fmt::Write as _;
 
+use super::ClientOptions;
 use super::plan::{self, Field, Job, Way};
-use super::{ClientOptions, Dialog, Terms};
 use crate::item::Item;
-use crate::pdu;
-use tickbus_base::time::Nanos;
+use crate::length::LEAST;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::SignalTable;
 
@@ -48,11 +47,6 @@ impl Frames {
         }
     }
 
-    /// A dialog that transfers them.
-    pub fn dialog(&self, terms: Terms, now: Nanos) -> Dialog {
-        Dialog::new(terms, now, self.clone())
-    }
-
     /// Whether any data of a station are written, and whether any are read.
     pub(super) fn has(&self, station: usize) -> [bool; 2] {
         let any = |fields: &[Field]| fields.iter().any(|field| field.station == station);
@@ -64,7 +58,7 @@ impl Frames {
     pub fn summary(&self, longest: u16) -> [String; 2] {
         let one = |way, fields: &[Field]| {
             let jobs = |limit: u16| plan::jobs(way, fields, usize::from(limit));
-            let (few, many) = (jobs(longest), jobs(pdu::LEAST));
+            let (few, many) = (jobs(longest), jobs(LEAST));
             if few.is_empty() {
                 return "nothing".to_owned();
             }
@@ -76,12 +70,27 @@ impl Frames {
             // Writing to a string cannot fail.
             let _ = write!(text, "; {} a cycle", count(&few));
             if few.len() != many.len() {
-                let (many, least) = (count(&many), pdu::LEAST);
-                let _ = write!(text, " with units of {longest} bytes, {many} with {least}");
+                let many = count(&many);
+                let _ = write!(text, " with units of {longest} bytes, {many} with {LEAST}");
             }
             text
         };
         [one(Way::Write, &self.written), one(Way::Read, &self.read)]
+    }
+}
+
+impl ClientOptions {
+    /// What is written and read in one cycle, for people.
+    pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
+        let frames = Frames::new(self, table, self.role);
+        let writes = match self.write_to {
+            Some(_) => "writes",
+            None => "would write",
+        };
+        let ways = [writes, "reads"].into_iter();
+        ways.zip(frames.summary(self.pdu))
+            .map(|(way, what)| format!("{way} {what}"))
+            .collect()
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::Frames;
 use crate::item::Object;
+use crate::length::{LONGEST, read_length};
 use crate::transport::PORT;
 use crate::tsap::{RACK, SLOT};
-use crate::{Start, Tsap, Variable, pdu, read_pdu};
+use crate::{Start, Tsap, Variable};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::both_ways;
 use tickbus_fieldbus::tcp::{Address, AddressError};
@@ -41,7 +41,7 @@ pub struct ClientOptions {
     /// The offset of the `[fieldbus]` table, for mistakes, and whether `[[station]]` tables have been read.
     at: usize,
     has_stations: bool,
-    role: Role,
+    pub(super) role: Role,
 }
 
 impl ClientOptions {
@@ -77,19 +77,6 @@ impl ClientOptions {
             width: signal.data_type.width(),
             data_type: Some(signal.data_type),
         })
-    }
-
-    /// What is written and read in one cycle, for people.
-    pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
-        let frames = Frames::new(self, table, self.role);
-        let writes = match self.write_to {
-            Some(_) => "writes",
-            None => "would write",
-        };
-        let ways = [writes, "reads"].into_iter();
-        ways.zip(frames.summary(self.pdu))
-            .map(|(way, what)| format!("{way} {what}"))
-            .collect()
     }
 
     /// Takes the lines of `[fieldbus.at]`.
@@ -208,7 +195,7 @@ impl ClientOptions {
             None => rack.zip(slot).map(|(rack, slot)| Tsap::of_slot(rack, slot)),
         };
         let calling = local.as_ref().map_or(Some(Tsap::new(&CALLING)), read_tsap);
-        let unit = unit.as_ref().map_or(Some(pdu::LONGEST), read_pdu);
+        let unit = unit.as_ref().map_or(Some(LONGEST), read_length);
         let write_to = write_to.map(|value| {
             let right = "write the identity that the CPU reports; log and statistics have it";
             value.label(IDENTITY_LIMIT, right).map(str::to_owned)

@@ -1,7 +1,7 @@
 //! The options of the bus `s7-server` in a driver.cfg.
 
+use crate::length::{LONGEST, read_length};
 use crate::tsap::{RACK, SLOT};
-use crate::{pdu, read_pdu};
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::read_events;
 use tickbus_fieldbus::tcp::{Address, AddressError};
@@ -96,7 +96,7 @@ impl ServerOptions {
         let flags = flags
             .as_ref()
             .map_or(Some(FLAGS), |value| size(value, 0..=65_536));
-        let unit = unit.as_ref().map_or(Some(pdu::LONGEST), read_pdu);
+        let unit = unit.as_ref().map_or(Some(LONGEST), read_length);
         let clients = clients
             .as_ref()
             .map_or(Some(CLIENTS), |value| size(value, 1..=1_000));

@@ -75,14 +75,14 @@ impl Other {
             outputs_before,
             beats,
         } = self;
-        inputs.before.copy_from_slice(&inputs.bytes);
+        tally.keep((*station, reads), &mut inputs.before, &inputs.bytes);
         let valid = image.is_valid();
         let arrival = image.read(now, &mut Taking { inputs, tape: None });
         tally.count((*station, reads), &inputs.before, &inputs.bytes);
         // The PLC may have stopped between the check and the read, and the frame may be from after that:
         // checked again.
         let alive = valid && image.is_valid() && arrival.age <= max_age;
-        outputs_before.copy_from_slice(outputs);
+        tally.keep((*station, writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
             alive,
@@ -154,7 +154,7 @@ impl Cpu {
             others,
         } = self;
         let (station, further) = tick.stations.split_first_mut().expect("at least one");
-        inputs.before.copy_from_slice(&inputs.bytes);
+        tally.keep((0, *reads), &mut inputs.before, &inputs.bytes);
         if let Some(faults) = faults {
             faults.begin_scan(now, &mut inputs.bytes, outputs);
         }
@@ -172,7 +172,7 @@ impl Cpu {
         tally.count((0, *reads), &inputs.before, &inputs.bytes);
         // Checked twice as for the other stations, see `scan` above.
         let alive = in_time && valid && station.is_valid() && arrival.age <= *max_age;
-        outputs_before.copy_from_slice(outputs);
+        tally.keep((0, *writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
             alive,

@@ -23,8 +23,6 @@ pub(crate) struct SteppedHost {
     due: Option<Nanos>,
     /// Whether the program was sent the machine's latest values.
     carried: bool,
-    /// A frame in transit from one port to the other.
-    wire: Box<[u8]>,
 }
 
 impl SteppedHost {
@@ -42,9 +40,6 @@ impl SteppedHost {
             .life_signs
             .watches(&config.table, Role::Controller, max_age);
         port.watch_life(watches);
-        let sizes = (0..port.stations()).map(|station| port.sizes(station));
-        let longest = sizes.map(|(tx, rx)| tx.max(rx)).max();
-        let wire = vec![0; longest.unwrap_or_default()].into();
         (
             Self {
                 cpu,
@@ -52,23 +47,19 @@ impl SteppedHost {
                 interval,
                 due: None,
                 carried: false,
-                wire,
             },
             tally,
         )
     }
 }
 
-/// Transfers the frames that `from` sends to `to`; false if an injected fault loses them.
-fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) -> bool {
+/// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
+fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
     if !from.sends(now) {
         return false;
     }
     for station in 0..from.stations() {
-        let frame = from.outgoing(station, now);
-        let wire = &mut wire[..frame.len()];
-        wire.copy_from_slice(frame);
-        to.received(station, now, wire);
+        to.received(station, now, from.outgoing(station, now));
         from.sent(station);
     }
     true
@@ -77,7 +68,7 @@ fn carry(from: &mut Port, to: &mut Port, now: Nanos, wire: &mut [u8]) -> bool {
 impl Stepped for SteppedHost {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
-        self.carried = !port.is_down(now) && carry(port, &mut self.port, now, &mut self.wire);
+        self.carried = !port.is_down(now) && carry(port, &mut self.port, now);
         Ok(())
     }
 
@@ -110,7 +101,7 @@ impl Stepped for SteppedHost {
         }
         self.due = Some(due);
         if !port.is_down(now) {
-            carry(&mut self.port, port, now, &mut self.wire);
+            carry(&mut self.port, port, now);
         }
         Ok(due)
     }

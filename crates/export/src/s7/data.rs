@@ -1,6 +1,6 @@
 //! Types and data blocks: both images, each signal at its own offset.
 
-use super::link::Body;
+use super::body::Body;
 use super::members::{Kind, Member};
 use super::{Image, Plan, line, source};
 use crate::siemens::spelling;

@@ -1,5 +1,6 @@
 //! The block that communicates with the simulation: one body per bus.
 
+use super::body::{Body, by_hand, time};
 use super::members::Path;
 use super::{Image, Plan, line, modbus, s7comm, socket, source};
 use crate::record::Place;
@@ -10,61 +11,6 @@ use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::Exported;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{DataType, Width};
-
-/// A body: its declarations and statements.
-#[derive(Default)]
-pub(super) struct Body {
-    /// Its description, for the head.
-    pub(super) what: String,
-    /// Lines between `VAR` and `END_VAR`.
-    pub(super) variables: Vec<String>,
-    /// Lines between `VAR_TEMP` and `END_VAR`.
-    pub(super) temporary: Vec<String>,
-    pub(super) code: Vec<String>,
-    /// It counts received images in `Received`.
-    pub(super) receives: bool,
-    /// It counts sent images in `Sent`.
-    pub(super) sends: bool,
-    /// An expression that is TRUE in each call in which something was received from the simulation; empty if
-    /// the block cannot know.
-    pub(super) heard: String,
-    /// The driver has heartbeat signals, by which the PLC sees that the simulation ticks.
-    pub(super) has_heartbeat: bool,
-}
-
-impl Body {
-    /// The declarations of the control block's members that some statement sets, in addition to `Simulated`.
-    pub(super) fn status(&self) -> Vec<&'static str> {
-        let members = [
-            (
-                self.has_heartbeat,
-                "Alive : Bool;   // the simulation ticks: its heartbeat changes",
-            ),
-            (
-                !self.has_heartbeat && !self.heard.is_empty(),
-                "Alive : Bool;   // the simulation was heard of not longer ago than the driver's max_age",
-            ),
-            (
-                self.receives,
-                "Received : UDInt;   // images that have come since Simulated was set",
-            ),
-            (
-                self.sends,
-                "Sent : UDInt;   // images that have gone since then",
-            ),
-            (
-                self.receives || self.sends,
-                "Errors : UDInt;   // jobs that failed",
-            ),
-            (
-                self.receives || self.sends,
-                "Last_error : Word;   // STATUS of the last of them",
-            ),
-        ];
-        let members = members.into_iter().filter(|(is_set, _)| *is_set);
-        members.map(|(_, member)| member).collect()
-    }
-}
 
 /// The body for the bus of the driver.cfg.
 pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
@@ -239,20 +185,6 @@ pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
     }
 }
 
-/// A bus without a block: the user has to add one here.
-pub(super) fn by_hand(kind: &str, notes: &mut Vec<String>) -> Body {
-    notes.push(format!(
-        "the bus \"{kind}\" has no block of its own for S7: what brings the images is to be written by hand"
-    ));
-    Body {
-        what: format!("The bus \"{kind}\" needs no call here, or one that only you can write."),
-        code: vec![
-            ";   // Put here what receives \"…_in\".Image and sends \"…_out\".Image.".to_owned(),
-        ],
-        ..Body::default()
-    }
-}
-
 /// The CPU is the OPC UA server, which gives access to single variables by name: those of both images.
 fn opcua_server(plan: &Plan<'_>) -> Body {
     Body {
@@ -288,9 +220,4 @@ fn opcua_client(plan: &Plan<'_>, address: &str) -> Body {
         ],
         ..Body::default()
     }
-}
-
-/// A duration for a timer, in whole milliseconds, at least one.
-pub(super) fn time(span: tickbus_base::time::Nanos) -> String {
-    format!("T#{}ms", span.0.div_euclid(1_000_000).max(1))
 }

@@ -4,6 +4,7 @@
 //! images, the block that communicates with the simulation, and the two blocks for the beginning and the end
 //! of OB1.
 
+mod body;
 mod connection;
 mod copy;
 mod data;

@@ -1,8 +1,8 @@
 //! Modbus TCP: `MB_CLIENT` if the simulation is the server, `MB_SERVER` if it connects.
 
 use super::Plan;
+use super::body::{Body, by_hand};
 use super::connection;
-use super::link::{Body, by_hand};
 use tickbus_bus_modbus::{ClientOptions, Line, ServerOptions, Table};
 use tickbus_image::signal::Area;
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::link::{Body, by_hand};
+use super::body::{Body, by_hand};
 use super::{Image, Plan};
 use crate::record::Place;
 use tickbus_bus_s7::item::Object;

@@ -1,8 +1,8 @@
 //! Records over TCP: `TSEND_C` and `TRCV_C` on one connection.
 
 use super::Plan;
+use super::body::{Body, time};
 use super::connection;
-use super::link::{Body, time};
 use tickbus_base::time::Nanos;
 use tickbus_bus_socket::{Options, TcpRole};
 

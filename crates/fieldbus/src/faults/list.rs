@@ -3,21 +3,12 @@
 use std::sync::Arc;
 
 use super::bend::Bend;
-use super::board::Cell;
+use super::cell::Cell;
 use super::random::Random;
 use super::schedule::{Schedule, Step};
-use super::{Board, Effect, Fault, LIMIT, LineFault, Phase};
+use super::{Board, Effect, Fault, LIMIT, LineFault, Moment, Phase};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, SignalTable, Slot};
-
-/// A tick: its time and its number.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Moment {
-    /// Time since the first tick.
-    pub time: Nanos,
-    /// Number of the tick; the first is 1.
-    pub tick: u64,
-}
 
 /// How the values of one end are arranged: slots in the order of the signal table, then those that count
 /// edges.

@@ -7,22 +7,28 @@
 
 mod bend;
 mod board;
+mod cell;
 mod condition;
 mod fault;
+mod line_fault;
 mod list;
 mod measure;
+mod moment;
 mod random;
 mod ring;
 mod schedule;
 mod section;
 mod wires;
 
-pub use board::{Board, Injected, Phase};
+pub use board::Board;
+pub use cell::{Injected, Phase};
 pub use condition::{Condition, unknown};
 pub use fault::{Begin, Change, Direction, Effect, Fault, Lasts, Trouble};
-pub use list::{Faults, Moment, Slots};
+pub use line_fault::LineFault;
+pub use list::{Faults, Slots};
+pub use moment::Moment;
 pub use section::{LIMIT, read_file, read_one, read_sections};
-pub use wires::{Fate, LineFault, Shape, Wires};
+pub use wires::{Fate, Shape, Wires};
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,6 @@
 //! When a fault begins and ends.
 
-use super::list::Moment;
-use super::{Begin, Fault, Lasts};
+use super::{Begin, Fault, Lasts, Moment};
 use tickbus_image::signal::Slot;
 
 /// The life of a fault, tick by tick.

@@ -4,33 +4,13 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::board::Cell;
-use super::random::Random;
 use super::ring::Ring;
-use super::{Board, Phase, Trouble};
+use super::{Board, LineFault, Phase, Trouble};
 use tickbus_base::time::Nanos;
 
 /// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
 /// often than that.
 const PATIENCE: Nanos = Nanos::from_secs(1);
-
-/// One line fault on the bus's side.
-#[derive(Debug)]
-pub struct LineFault {
-    trouble: Trouble,
-    cell: Arc<Cell>,
-    random: Random,
-}
-
-impl LineFault {
-    pub(super) fn new(trouble: Trouble, cell: Arc<Cell>, random: Random) -> Self {
-        Self {
-            trouble,
-            cell,
-            random,
-        }
-    }
-}
 
 /// The combined effect of the active faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,8 +3,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::DataType;
-
 /// The largest size of one area of one station, in bytes.
 pub const AREA_LIMIT: usize = 65_536;
 
@@ -68,17 +66,6 @@ impl Width {
     /// The number of bytes that contain those bits: one for a bit.
     pub const fn bytes(self) -> usize {
         self.bits().div_ceil(8)
-    }
-
-    /// The default type of a signal at such an address: BOOL, BYTE, WORD, DWORD or LWORD.
-    pub const fn data_type(self) -> DataType {
-        match self {
-            Self::Bit => DataType::Bool,
-            Self::Byte => DataType::Byte,
-            Self::Word => DataType::Word,
-            Self::Double => DataType::Dword,
-            Self::Long => DataType::Lword,
-        }
     }
 
     fn of_letter(letter: char) -> Option<Self> {

@@ -123,6 +123,19 @@ impl DataType {
     }
 }
 
+impl Width {
+    /// The default type of a signal at such an address: BOOL, BYTE, WORD, DWORD or LWORD.
+    pub const fn data_type(self) -> DataType {
+        match self {
+            Self::Bit => DataType::Bool,
+            Self::Byte => DataType::Byte,
+            Self::Word => DataType::Word,
+            Self::Double => DataType::Dword,
+            Self::Long => DataType::Lword,
+        }
+    }
+}
+
 impl fmt::Display for DataType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())

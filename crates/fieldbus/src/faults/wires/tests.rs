@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::faults::list::Moment;
+use crate::faults::Moment;
 use crate::faults::{Begin, Direction, Effect, Fault, Faults, Lasts, Slots};
 use tickbus_image::signal::{Area, SignalTable};
 

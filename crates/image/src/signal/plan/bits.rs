@@ -1,7 +1,6 @@
 //! Runs of BOOL signals: bytes that are all signals, and bytes of which only some bits are.
 
 use std::array;
-use std::ops::Range;
 
 use wide::{CmpNe, f64x4};
 
@@ -73,15 +72,13 @@ impl Octets {
 
 impl Run for Octets {
     fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        let mut any_nan = false;
+        let mut nans = f64x4::ZERO;
         for octet in &self.0 {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                let (byte, nan) = pack(slots);
-                frame[octet.byte as usize] = byte;
-                any_nan |= nan;
+                frame[octet.byte as usize] = pack(slots, &mut nans);
             }
         }
-        if any_nan {
+        if nans.any() {
             self.encode_any(slots, frame, conversions);
         }
     }
@@ -98,21 +95,15 @@ impl Run for Octets {
 /// Bytes with fewer than eight signals, or with signals in another order.
 #[derive(Debug, Default)]
 struct Partials {
-    bytes: Vec<Partial>,
+    bytes: Vec<u32>,
     /// The bits of all bytes.
     bits: Vec<Bit>,
 }
 
 #[derive(Debug)]
-struct Partial {
-    byte: u32,
-    /// Range in [`Partials::bits`].
-    bits: Range<u32>,
-}
-
-#[derive(Debug)]
 struct Bit {
     slot: u32,
+    byte: u32,
     place: u8,
     fail_safe: bool,
 }
@@ -120,41 +111,32 @@ struct Bit {
 impl Partials {
     /// Adds the members in one byte.
     fn push(&mut self, members: &[Member]) {
-        let start = index(self.bits.len());
+        let byte = index(members[0].1.byte);
+        self.bytes.push(byte);
         self.bits.extend(members.iter().map(|(slot, signal)| Bit {
             slot: index(*slot),
+            byte,
             place: signal.bit,
             fail_safe: is_high(signal.fail_safe),
         }));
-        self.bytes.push(Partial {
-            byte: index(members[0].1.byte),
-            bits: start..index(self.bits.len()),
-        });
-    }
-
-    fn bits_of(&self, partial: &Partial) -> &[Bit] {
-        &self.bits[partial.bits.start as usize..partial.bits.end as usize]
     }
 }
 
 impl Run for Partials {
     fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        for partial in &self.bytes {
-            let mut byte = 0;
-            for bit in self.bits_of(partial) {
-                let high = high(slots[bit.slot as usize], bit.fail_safe, conversions);
-                byte |= u8::from(high) << bit.place;
-            }
-            frame[partial.byte as usize] = byte;
+        for byte in &self.bytes {
+            frame[*byte as usize] = 0;
+        }
+        for bit in &self.bits {
+            let high = high(slots[bit.slot as usize], bit.fail_safe, conversions);
+            frame[bit.byte as usize] |= u8::from(high) << bit.place;
         }
     }
 
     fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
-        for partial in &self.bytes {
-            let byte = frame[partial.byte as usize];
-            for bit in self.bits_of(partial) {
-                slots[bit.slot as usize] = NIBBLES[usize::from(byte >> bit.place & 1)][0];
-            }
+        for bit in &self.bits {
+            let level = frame[bit.byte as usize] >> bit.place & 1;
+            slots[bit.slot as usize] = Slot::from_real(f64::from(level));
         }
     }
 }
@@ -175,14 +157,15 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0, and whether any of them is NaN; if so, the byte is
-/// invalid.
+/// Eight slots as one byte, the first slot as bit 0; notes in `nans` whether any of them is NaN, and then the byte is
+/// wrong.
 #[inline]
-fn pack(slots: &[Slot; 8]) -> (u8, bool) {
+fn pack(slots: &[Slot; 8], nans: &mut f64x4) -> u8 {
     let [low, high] = [0, 4].map(|first| f64x4::new(array::from_fn(|i| slots[first + i].real())));
+    *nans = *nans | low.is_nan() | high.is_nan();
     let [low_bits, high_bits] = [low, high].map(|four| four.cmp_ne(f64x4::ZERO).move_mask());
     let [byte, ..] = (low_bits | high_bits << 4).to_le_bytes();
-    (byte, (low.is_nan() | high.is_nan()).any())
+    byte
 }
 
 /// As [`pack`], checking each value; NaN slots take their bit from `fail_safe` and are counted.

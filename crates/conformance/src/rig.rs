@@ -5,11 +5,11 @@ pub use tickbus_test_log as logged;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tickbus::driver::{Code, Driver, Exchange};
-use tickbus::driver_cfg::Config;
-use tickbus::fieldbus::Link;
-use tickbus::signal::Slot;
-use tickbus::time::{Clock, Manual, Nanos};
+use tickbus_base::time::{Clock, Manual, Nanos};
+use tickbus_driver::{Code, Driver, Exchange};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::Link;
+use tickbus_image::signal::Slot;
 
 /// The signals at both ends; `{fieldbus}` is replaced by the bus's own table.
 pub const SIGNALS: &str = r#"

@@ -1,5 +1,12 @@
 //! What every bus must do, written once and instantiated per bus by [`conformance!`].
 
+#![allow(
+    missing_docs,
+    clippy::missing_panics_doc,
+    clippy::float_cmp,
+    reason = "tests: a name is the sentence that it proves, and the values are small whole numbers"
+)]
+
 pub mod resources;
 pub mod rig;
 
@@ -7,10 +14,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use resources::Resources;
 use rig::{Bus, End, MAX_AGE, Rig, await_that, config, pass};
-use tickbus::driver::{Code, Driver};
-use tickbus::driver_cfg::Config;
-use tickbus::fieldbus::{Cause, LinkState};
-use tickbus::time::{Manual, Nanos};
+use tickbus_base::time::{Manual, Nanos};
+use tickbus_driver::{Code, Driver};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::{Cause, LinkState};
 
 pub fn opens_and_exchanges_both_ways(bus: &impl Bus) {
     let mut rig = Rig::new(bus);
@@ -157,7 +164,7 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
 pub fn keeps_events_in_order(bus: &impl Bus) {
     let mut rig = Rig::with(bus, "events = true");
     rig.connect();
-    let mut events = vec![tickbus::image::Event::default(); 64];
+    let mut events = vec![tickbus_image::Event::default(); 64];
     rig.device.driver.poll_events(&mut events);
     for value in [5.0, 6.0, 7.0] {
         rig.controller.set("speed", value);
@@ -489,13 +496,13 @@ macro_rules! conformance {
 
             #[test]
             fn keeps_several_instances_apart() {
-                $crate::conformance::keeps_several_instances_apart(&$bus, &$bus);
+                $crate::keeps_several_instances_apart(&$bus, &$bus);
             }
 
             #[test]
             fn survives_200_peers() {
                 let test = concat!(module_path!(), "::survives_200_peers");
-                $crate::conformance::survives_200_peers(&$bus, test);
+                $crate::survives_200_peers(&$bus, test);
             }
         }
     };
@@ -503,7 +510,7 @@ macro_rules! conformance {
         $(
             #[test]
             fn $test() {
-                $crate::conformance::$test(&$bus);
+                $crate::$test(&$bus);
             }
         )*
     };

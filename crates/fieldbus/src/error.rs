@@ -1,0 +1,18 @@
+//! The errors of all buses.
+
+/// Why a bus cannot go on; the variant tells who is at fault.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BusError {
+    /// The line is broken, or was never up; trying again may help.
+    #[error("the link failed: {0}")]
+    Link(String),
+    /// The peer closed the connection properly.
+    #[error("the peer left: {0}")]
+    Left(String),
+    /// The peer violates the protocol.
+    #[error("the protocol was broken: {0}")]
+    Protocol(String),
+    /// The peer understood the request, and refused it.
+    #[error("refused: {0}")]
+    Refused(String),
+}

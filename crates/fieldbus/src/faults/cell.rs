@@ -1,0 +1,177 @@
+//! The state of one fault, as the tick publishes it.
+
+use std::fmt::{self, Write as _};
+use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU64, Ordering};
+
+use super::Moment;
+use tickbus_base::os::{is_told, is_told_rarely};
+use tickbus_base::time::Nanos;
+
+/// The state of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// It has not begun, or may begin again.
+    Waiting,
+    /// It has its effect.
+    Active,
+    /// It is over for good.
+    Over,
+}
+
+impl Phase {
+    const ALL: [Self; 3] = [Self::Waiting, Self::Active, Self::Over];
+
+    /// Its name, in lower case.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::Active => "active",
+            Self::Over => "over",
+        }
+    }
+}
+
+/// One fault as others see it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Injected {
+    /// Its number, from 1, in order of injection.
+    pub id: u32,
+    /// Its name.
+    pub name: String,
+    /// Its kind, as a driver.cfg names it.
+    pub kind: &'static str,
+    /// What it does, as text.
+    pub what: String,
+    /// Its state.
+    pub phase: Phase,
+    /// How often it has begun.
+    pub begun: u64,
+    /// When it last began or ended, as time since the first tick.
+    pub since: Nanos,
+    /// The number of that tick.
+    pub tick: u64,
+}
+
+/// The state of one fault; the tick writes it, any thread reads it.
+#[derive(Debug)]
+pub(super) struct Cell {
+    id: u32,
+    name: String,
+    kind: &'static str,
+    what: String,
+    phase: AtomicU8,
+    begun: AtomicU64,
+    since: AtomicI64,
+    tick: AtomicU64,
+    /// Beginnings and ends so far, and how many of them were logged.
+    changes: AtomicU64,
+    told: AtomicU64,
+}
+
+impl Cell {
+    pub(super) fn new(id: u32, name: String, kind: &'static str, what: String) -> Self {
+        Self {
+            id,
+            name,
+            kind,
+            what,
+            phase: AtomicU8::new(Phase::Waiting as u8),
+            begun: AtomicU64::new(0),
+            since: AtomicI64::new(0),
+            tick: AtomicU64::new(0),
+            changes: AtomicU64::new(0),
+            told: AtomicU64::new(0),
+        }
+    }
+
+    pub(super) fn phase(&self) -> Phase {
+        Phase::ALL[usize::from(self.phase.load(Ordering::Acquire)) % Phase::ALL.len()]
+    }
+
+    /// The fault's number.
+    pub(super) fn id(&self) -> u32 {
+        self.id
+    }
+
+    /// How often it has begun.
+    pub(super) fn begun(&self) -> u64 {
+        self.begun.load(Ordering::Relaxed)
+    }
+
+    /// Appends name and kind, for messages.
+    pub(super) fn write_title(&self, text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "\"{}\" ({})", self.name, self.kind);
+    }
+
+    /// The length of that text in bytes.
+    pub(super) fn title_len(&self) -> usize {
+        self.name.len() + self.kind.len() + "\"\" ()".len()
+    }
+
+    pub(super) fn enter(&self, phase: Phase, moment: Moment) {
+        let before = self.phase();
+        self.since.store(moment.time.0, Ordering::Relaxed);
+        self.tick.store(moment.tick, Ordering::Relaxed);
+        self.phase.store(phase as u8, Ordering::Release);
+        if (before == Phase::Active) != (phase == Phase::Active) {
+            self.changes.fetch_add(1, Ordering::Release);
+        }
+        if phase == Phase::Active {
+            self.begun.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    pub(super) fn seen(&self) -> Injected {
+        Injected {
+            id: self.id,
+            name: self.name.clone(),
+            kind: self.kind,
+            what: self.what.clone(),
+            phase: self.phase(),
+            begun: self.begun(),
+            since: Nanos(self.since.load(Ordering::Relaxed)),
+            tick: self.tick.load(Ordering::Relaxed),
+        }
+    }
+
+    /// The log message about what has begun or ended since the last call.
+    pub(super) fn news(&self, driver: &str) -> Option<String> {
+        let changes = self.changes.load(Ordering::Acquire);
+        let told = self.told.swap(changes, Ordering::Relaxed);
+        // No text is made if the log drops it: on a stepped bus this runs within the tick.
+        if told >= changes || !is_told(changes) || !log::log_enabled!(log::Level::Warn) {
+            return None;
+        }
+        let happens = match (self.phase(), changes - told) {
+            (Phase::Active, _) => "begins",
+            (_, 1) => "ends",
+            _ => "has begun and ended",
+        };
+        Some(format!(
+            "driver \"{driver}\": injected fault \"{}\" ({}) {happens} at {}, tick {}{}: {}",
+            self.name,
+            self.kind,
+            Nanos(self.since.load(Ordering::Relaxed)).rounded(),
+            self.tick.load(Ordering::Relaxed),
+            Often(changes),
+            self.what
+        ))
+    }
+}
+
+/// Says that not every change is logged any more.
+struct Often(u64);
+
+impl fmt::Display for Often {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !is_told_rarely(self.0) {
+            return Ok(());
+        }
+        write!(
+            f,
+            ", begun {} times, and told more rarely from now on",
+            self.0.div_ceil(2)
+        )
+    }
+}

@@ -5,6 +5,7 @@ use std::fmt;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
+use tickbus_fieldbus::BusError;
 use tickbus_fieldbus::tcp::{Address, AddressError};
 
 use super::rtu;
@@ -167,4 +168,11 @@ fn read_settings(
         two_stop_bits: two_stop_bits?,
         rs485: rs485?,
     })
+}
+
+/// The serial port `device` is gone.
+pub(super) fn gone(device: &str, why: impl fmt::Display) -> BusError {
+    BusError::Link(format!(
+        "the serial port {device} is gone ({why}); see whether it is still plugged in"
+    ))
 }

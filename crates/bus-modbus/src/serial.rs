@@ -1,6 +1,5 @@
 //! Serial ports, for both ends.
 
-use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -35,12 +34,4 @@ pub(super) fn open(line: &Serial) -> Result<SerialPort, BusError> {
             line.device, line.settings
         ))
     })
-}
-
-/// The port is gone.
-pub(super) fn gone(line: &Serial, why: impl Display) -> BusError {
-    BusError::Link(format!(
-        "the serial port {} is gone ({why}); see whether it is still plugged in",
-        line.device
-    ))
 }

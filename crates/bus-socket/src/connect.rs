@@ -1,12 +1,12 @@
 //! The end that connects.
 
-use tickbus_base::os::{Poller, Source};
 use tickbus_base::time::Stop;
-use tickbus_fieldbus::tcp::{self, Address, no_wait};
+use tickbus_fieldbus::tcp::{self, Address};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::connection::Connection;
-use super::{Frames, Terms};
+use super::connection::{Connection, Transfer};
+use super::lines::Lines;
+use super::{Frames, Session, Terms};
 
 /// Connects, and serves the connection until it ends or `stop` comes.
 ///
@@ -20,30 +20,19 @@ pub(super) fn connect(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
-    let Some((stream, peer)) = tcp::connect(address, &mut poller, port, stop)? else {
+    let patience = Session::patience(terms.max_age);
+    let Some((mut call, peer)) = tcp::dial(address, patience, port, stop)? else {
         return Ok(());
     };
-    port.opening(&format!(
-        "connected with {peer}; waiting for its first record"
-    ));
-    let mut connection = Connection::new(stream, peer, terms, port)?;
+    let mut lines = Lines::new([String::new()].into_iter());
+    let reason = format!("connected with {peer}; waiting for its first record");
+    lines.opening(0, &reason, port);
     frames.begin();
-    let mut ready = (false, false);
-    while !stop.is_stopped() {
-        connection.turn(ready, port, frames)?;
-        if let Some(news) = connection.news() {
-            port.running(&news);
-        }
-        let mut sources = [Source::new(connection.stream(), connection.interest())];
-        poller
-            .wait(
-                &**port.clock(),
-                connection.deadline().min(port.due()),
-                &mut sources,
-            )
-            .map_err(|error| no_wait(&error))?;
-        ready = (sources[0].is_readable(), sources[0].is_writable());
-    }
-    Ok(())
+    let mut transfer = Transfer {
+        connection: &mut Connection::new(peer, terms, port),
+        frames,
+        line: 0,
+        lines: &mut lines,
+    };
+    call.run(&mut transfer, port, stop)
 }

@@ -1,16 +1,18 @@
 //! The end that listens: at each address it serves one peer at a time.
 
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{self, Address, bow_out, is_of_the_client, no_wait, not_accepted};
+use tickbus_fieldbus::tcp::{
+    self, Address, Call, bow_out, is_of_the_client, no_wait, not_accepted, prepare,
+};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::connection::Connection;
+use super::connection::{Connection, Transfer};
 use super::lines::Lines;
-use super::{Frames, Terms};
+use super::{Frames, Session, Terms};
 
 /// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
@@ -78,7 +80,7 @@ fn turn(
     let mut deadline = port.due();
     for server in &mut *servers {
         server.watch(now, set).map_err(|error| no_wait(&error))?;
-        if let Some(served) = &server.served {
+        if let Some((_, served)) = &server.served {
             deadline = deadline.min(served.deadline());
         }
         if server.is_deaf(now) {
@@ -89,9 +91,9 @@ fn turn(
         .map_err(|error| no_wait(&error))?;
     for server in servers {
         let ready = |key| set.ready().iter().find(|ready| ready.key == key);
-        let served = ready(server.key()).map(|ready| (ready.is_readable, ready.is_writable));
+        let readable = ready(server.key()).is_some_and(|ready| ready.is_readable);
         let knocked = ready(server.key() + 1).is_some();
-        server.serve(served.unwrap_or_default(), knocked, lines, set, port);
+        server.serve(readable, knocked, lines, set, port);
         if knocked {
             server.accept(lines, set, port);
         }
@@ -108,7 +110,7 @@ struct Server<'a> {
     waiting: String,
     terms: Terms,
     frames: &'a mut Frames,
-    served: Option<Connection>,
+    served: Option<(Call<TcpStream>, Connection)>,
     /// What the set waits for on the connection, if there is one; and whether it waits for the listener.
     watched: Option<Interest>,
     hears: bool,
@@ -125,12 +127,12 @@ impl Server<'_> {
     /// Makes `set` wait for what this server needs.
     fn watch(&mut self, now: Nanos, set: &mut PollSet) -> io::Result<()> {
         let key = self.key();
-        if let Some(served) = &self.served {
-            let interest = Some(served.interest());
+        if let Some((call, _)) = &self.served {
+            let interest = Some(call.interest());
             if self.watched.is_none() {
-                set.add(key, served.stream(), served.interest())?;
+                set.add(key, call.stream(), call.interest())?;
             } else if self.watched != interest {
-                set.change(key, served.stream(), served.interest())?;
+                set.change(key, call.stream(), call.interest())?;
             }
             self.watched = interest;
         }
@@ -148,10 +150,10 @@ impl Server<'_> {
 
     /// Closes the current connection.
     fn part(&mut self, set: &mut PollSet) {
-        if let Some(served) = self.served.take()
+        if let Some((call, _)) = self.served.take()
             && self.watched.take().is_some()
         {
-            set.remove(self.key(), served.stream());
+            set.remove(self.key(), call.stream());
         }
     }
 
@@ -162,25 +164,26 @@ impl Server<'_> {
     /// Lets the connection do what is due.
     fn serve(
         &mut self,
-        ready: (bool, bool),
+        readable: bool,
         knocked: bool,
         lines: &mut Lines,
         set: &mut PollSet,
         port: &mut Port,
     ) {
-        let Some(served) = &mut self.served else {
+        let Some((call, connection)) = &mut self.served else {
             return;
         };
-        let mut turned = served.turn(ready, port, self.frames);
-        if turned.is_ok()
-            && let Some(news) = served.news()
-        {
-            lines.running(self.line, &news, port);
-        }
+        let mut transfer = Transfer {
+            connection,
+            frames: self.frames,
+            line: self.line,
+            lines,
+        };
+        let mut turned = call.turn(readable, &mut transfer, port);
         if turned.is_ok() && knocked {
             // A new client may be the current one, which has reconnected: read the end of its old connection
             // before judging the new one.
-            turned = served.read_all(port, self.frames);
+            turned = call.read_all(&mut transfer, port);
         }
         if let Err(error) = turned {
             self.part(set);
@@ -201,7 +204,7 @@ impl Server<'_> {
                 return;
             }
         };
-        if let Some(served) = &self.served {
+        if let Some((_, served)) = &self.served {
             let Some(silence) = served.stale_for(now) else {
                 let served = served.peer();
                 if stream.set_nonblocking(true).is_ok() {
@@ -218,16 +221,17 @@ impl Server<'_> {
             self.part(set);
             lines.lost(self.line, &error, &format!("{peer} takes its place"), port);
         }
-        match Connection::new(stream, peer, self.terms, port) {
-            Ok(connection) => {
-                let reason = format!("{peer} has connected; waiting for its first record");
-                lines.opening(self.line, &reason, port);
-                self.frames.begin();
-                self.served = Some(connection);
-            }
-            // It left again at once.
-            Err(error) => log::debug!("{error}"),
+        let patience = Session::patience(self.terms.max_age);
+        // If it cannot be prepared, it is gone already.
+        if let Err(error) = prepare(&stream, patience) {
+            log::debug!("the connection with {peer} broke at once: {error}");
+            return;
         }
+        let connection = Connection::new(peer, self.terms, port);
+        let reason = format!("{peer} has connected; waiting for its first record");
+        lines.opening(self.line, &reason, port);
+        self.frames.begin();
+        self.served = Some((Call::new(stream), connection));
     }
 }
 

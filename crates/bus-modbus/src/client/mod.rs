@@ -8,15 +8,11 @@ mod plan;
 mod poll;
 mod query;
 
-use std::io::{self, Read, Write};
-use std::net::TcpStream;
-
-use rustix::fd::AsFd;
-
-use tickbus_base::os::{Interest, Poller, Source};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::Guard;
-use tickbus_fieldbus::tcp::{bow_out, connect, is_for_later, no_wait, prepare};
+#[cfg(unix)]
+use tickbus_fieldbus::tcp::Call;
+use tickbus_fieldbus::tcp::dial;
 use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
 use tickbus_image::signal::SignalTable;
 
@@ -86,18 +82,12 @@ impl ModbusClient {
 
 impl Free for ModbusClient {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
         match self.options.line.clone() {
             Line::Tcp(address) => {
-                let Some((stream, peer)) = connect(&address, &mut poller, port, stop)? else {
+                let patience = port.max_age().times(PATIENCE);
+                let Some((mut call, peer)) = dial(&address, patience, port, stop)? else {
                     return Ok(());
                 };
-                let broken = |error: io::Error| {
-                    BusError::Link(format!(
-                        "the connection with {peer} broke ({error}); see whether the server still runs"
-                    ))
-                };
-                prepare(&stream, port.max_age().times(PATIENCE)).map_err(broken)?;
                 port.opening(&format!(
                     "connected with {peer}; waiting for its first answer"
                 ));
@@ -105,26 +95,12 @@ impl Free for ModbusClient {
                     transaction: 0,
                     inbox: Vec::new(),
                 };
-                let poll = self.poll(framing, peer.to_string(), port, port.clock().now());
-                let left = |asked_identity| {
-                    BusError::Left(if asked_identity {
-                        format!(
-                            "{peer} closed the connection when it was asked who it is (function 43); if it does so \
-                             again, it is not asked any more"
-                        )
-                    } else {
-                        format!(
-                            "{peer} closed the connection; if it serves one client at a time, end the other one"
-                        )
-                    })
-                };
-                let mut stream = Leaving(stream);
-                serve(&mut stream, poll, &mut poller, port, stop, left, broken)
+                let mut poll = self.poll(framing, peer.to_string(), port, port.clock().now());
+                call.run(&mut poll, port, stop)
             }
             #[cfg(unix)]
             Line::Serial(line) => {
-                use super::serial::{gone, open};
-                let mut serial = open(&line)?;
+                let mut call = Call::new(super::serial::open(&line)?);
                 port.tell("device", &line.device);
                 port.opening(&format!("asking on {}", line.device));
                 let now = port.clock().now();
@@ -135,94 +111,11 @@ impl Free for ModbusClient {
                     quiet_until: now + line.silence,
                     echo: line.new_echo(),
                 };
-                let poll = self.poll(framing, line.device.clone(), port, now);
-                let left = |_| gone(&line, "it was closed");
-                let broken = |error| gone(&line, error);
-                serve(&mut serial, poll, &mut poller, port, stop, left, broken)
+                let mut poll = self.poll(framing, line.device, port, now);
+                call.run(&mut poll, port, stop)
             }
             #[cfg(not(unix))]
             Line::Serial(_) => Err(super::no_serial_port()),
         }
     }
-}
-
-/// A connection that is closed properly when dropped.
-struct Leaving(TcpStream);
-
-impl Drop for Leaving {
-    fn drop(&mut self) {
-        bow_out(&self.0);
-    }
-}
-
-impl Read for Leaving {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.0.read(bytes)
-    }
-}
-
-impl Write for Leaving {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
-    }
-}
-
-impl AsFd for Leaving {
-    fn as_fd(&self) -> rustix::fd::BorrowedFd<'_> {
-        self.0.as_fd()
-    }
-}
-
-/// Transfers bytes between the line and the polling until `stop`.
-fn serve(
-    line: &mut (impl Read + Write + AsFd),
-    mut poll: Poll<'_>,
-    poller: &mut Poller,
-    port: &mut Port,
-    stop: &Stop,
-    left: impl Fn(bool) -> BusError,
-    broken: impl Fn(io::Error) -> BusError,
-) -> Result<(), BusError> {
-    let mut bytes = [0; 4096];
-    let mut readable = false;
-    while !stop.is_stopped() {
-        let now = port.clock().now();
-        if readable {
-            match line.read(&mut bytes) {
-                Ok(0) => return Err(left(poll.hung_up())),
-                Ok(count) => poll.arrived(now, &bytes[..count], port)?,
-                Err(error) if is_for_later(&error) => {}
-                Err(error) => {
-                    poll.hung_up();
-                    return Err(broken(error));
-                }
-            }
-        }
-        poll.turn(now, port)?;
-        let mut blocked = false;
-        while !blocked && !poll.to_write(now).is_empty() {
-            match line.write(poll.to_write(now)) {
-                Ok(count) => poll.wrote(now, count),
-                Err(error) if is_for_later(&error) => blocked = true,
-                Err(error) => return Err(broken(error)),
-            }
-        }
-        port.observe(now);
-        let interest = if blocked {
-            Interest::ReadWrite
-        } else {
-            Interest::Read
-        };
-        let mut sources = [Source::new(&*line, interest)];
-        let deadline = poll.deadline().min(port.due());
-        poller
-            .wait(&**port.clock(), deadline, &mut sources)
-            .map_err(|error| no_wait(&error))?;
-        readable = sources[0].is_readable();
-    }
-    Ok(())
 }

@@ -5,14 +5,17 @@ mod identify;
 mod station;
 mod trouble;
 
+use std::io;
 use std::ops::Range;
 
 use crate::function::EXCEPTION_BIT;
+use crate::line::gone;
 use crate::mbap::{self, Telegram};
 use crate::rtu;
 use crate::{Function, Identification};
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::Guard;
+use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Port};
 
 use super::plan::Abilities;
@@ -122,9 +125,10 @@ impl<'a> Poll<'a> {
             lost: false,
         }
     }
+}
 
-    /// Until when the owner of the line may wait if nothing arrives and nothing can be written.
-    pub(super) fn deadline(&self) -> Nanos {
+impl Caller for Poll<'_> {
+    fn deadline(&self) -> Nanos {
         let Some(asking) = &self.asking else {
             return self.pace.due();
         };
@@ -138,16 +142,14 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// The bytes to be written at `now`.
-    pub(super) fn to_write(&self, now: Nanos) -> &[u8] {
+    fn to_write(&self, now: Nanos) -> &[u8] {
         match self.framing {
             Framing::Rtu { quiet_until, .. } if now < quiet_until => &[],
             _ => &self.request[self.written..],
         }
     }
 
-    /// The system accepted `count` of them at `now`.
-    pub(super) fn wrote(&mut self, now: Nanos, count: usize) {
+    fn wrote(&mut self, now: Nanos, count: usize, _port: &mut Port) {
         if let Framing::Rtu {
             echo: Some(echo), ..
         } = &mut self.framing
@@ -157,8 +159,7 @@ impl<'a> Poll<'a> {
         self.written += count;
     }
 
-    /// Does what is due at `now`: begins a cycle, gives up on an answer.
-    pub(super) fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         self.looked = now;
         match &self.asking {
             Some(asking) if now >= asking.limit => self.give_up(now, port),
@@ -167,13 +168,7 @@ impl<'a> Poll<'a> {
         }
     }
 
-    /// `bytes` arrived at `now`.
-    pub(super) fn arrived(
-        &mut self,
-        now: Nanos,
-        bytes: &[u8],
-        port: &mut Port,
-    ) -> Result<(), BusError> {
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         match &mut self.framing {
             Framing::Tcp { inbox, .. } => {
                 let mut all = std::mem::take(inbox);
@@ -214,7 +209,7 @@ impl<'a> Poll<'a> {
                 match expected.map(|pdu| 1 + pdu + rtu::CHECKSUM) {
                     Some(expected) if inbox.len() >= expected => {
                         let telegram = inbox[..expected].to_vec();
-                        self.hear(&telegram, now, port)
+                        self.telegram(&telegram, now, port)
                     }
                     _ => Ok(()),
                 }
@@ -222,8 +217,39 @@ impl<'a> Poll<'a> {
         }
     }
 
+    fn left(&mut self) -> BusError {
+        let asked_identity = self.hung_up();
+        let peer = &self.peer;
+        match self.framing {
+            Framing::Rtu { .. } => gone(peer, "it was closed"),
+            Framing::Tcp { .. } if asked_identity => BusError::Left(format!(
+                "{peer} closed the connection when it was asked who it is (function 43); if it does so again, it is \
+                 not asked any more"
+            )),
+            Framing::Tcp { .. } => BusError::Left(format!(
+                "{peer} closed the connection; if it serves one client at a time, end the other one"
+            )),
+        }
+    }
+
+    fn broke(&mut self, error: &io::Error) -> BusError {
+        // A device is not blamed for a question that it has not got.
+        if self.written == self.request.len() {
+            self.hung_up();
+        }
+        let peer = &self.peer;
+        match self.framing {
+            Framing::Rtu { .. } => gone(peer, error),
+            Framing::Tcp { .. } => BusError::Link(format!(
+                "the connection with {peer} broke ({error}); see whether the server still runs"
+            )),
+        }
+    }
+}
+
+impl Poll<'_> {
     /// An RTU telegram arrived.
-    fn hear(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
+    fn telegram(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let Some(asking) = &self.asking else {
             return Ok(());
         };

@@ -4,9 +4,9 @@ use std::io::{Read as _, Write as _};
 
 use crate::Function;
 use crate::function::EXCEPTION_BIT;
-use crate::line::Serial;
+use crate::line::{Serial, gone};
 use crate::rtu::{self, Echo, Framer};
-use crate::serial::{gone, open};
+use crate::serial::open;
 use tickbus_base::os::{Interest, Poller, SerialPort, Source};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{is_for_later, no_wait};
@@ -108,10 +108,10 @@ impl Server<'_> {
     fn read(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let mut bytes = [0; rtu::ADU_LIMIT];
         let count = match self.serial.read(&mut bytes) {
-            Ok(0) => return Err(gone(self.line, "it was closed")),
+            Ok(0) => return Err(gone(&self.line.device, "it was closed")),
             Ok(count) => count,
             Err(error) if is_for_later(&error) => return Ok(()),
-            Err(error) => return Err(gone(self.line, &error)),
+            Err(error) => return Err(gone(&self.line.device, &error)),
         };
         // Silence may have ended a telegram before these bytes arrived.
         self.attend(now, port);
@@ -197,7 +197,7 @@ impl Server<'_> {
                 self.written += count;
             }
             Err(error) if is_for_later(&error) => return Ok(()),
-            Err(error) => return Err(gone(self.line, &error)),
+            Err(error) => return Err(gone(&self.line.device, &error)),
         }
         if self.written == self.reply.len()
             && let Some(carried) = self.carried.take()

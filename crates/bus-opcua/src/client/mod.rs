@@ -13,9 +13,8 @@ use std::sync::Arc;
 
 use opcua::types::EndpointDescription;
 
-use tickbus_base::os::Poller;
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{self, no_wait};
+use tickbus_fieldbus::tcp;
 use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Guard, Port, Role};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
@@ -85,15 +84,9 @@ impl Client {
     }
 
     fn stream(&self, port: &mut Port, stop: &Stop) -> Result<Option<TcpStream>, BusError> {
-        let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
-        let address = &self.options.url.address;
-        let Some((stream, peer)) = tcp::connect(address, &mut poller, port, stop)? else {
-            return Ok(None);
-        };
-        tcp::prepare(&stream, port.max_age().times(SILENCE)).map_err(|error| {
-            BusError::Link(format!("the connection with {peer} broke at once: {error}"))
-        })?;
-        Ok(Some(stream))
+        let patience = port.max_age().times(SILENCE);
+        let reached = tcp::connect(&self.options.url.address, patience, port, stop)?;
+        Ok(reached.map(|(stream, _)| stream))
     }
 
     /// The server's endpoint that matches the options.

@@ -1,17 +1,13 @@
-//! One connection and its socket: transfers bytes between the socket, the dialog and the port.
+//! One connection without its socket: the dialog, and what it transfers to and from the port.
 
-use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
+use std::io;
+use std::net::SocketAddr;
 
 use super::{Dialog, News, Refusal, S7Client, Terms};
 use crate::szl::Identity;
-use tickbus_base::os::{Interest, Source};
 use tickbus_base::time::{Nanos, Pace};
-use tickbus_fieldbus::tcp::{bow_out, is_for_later};
+use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, PlcState, Port};
-
-/// At most this many bytes are read at once.
-const BUFFER: usize = 4096;
 
 /// How often a CPU is asked for its operating state.
 const STATE: Nanos = Nanos::from_millis(200);
@@ -27,7 +23,6 @@ const RETRY: Nanos = Nanos::from_secs(1);
 /// One connection.
 pub(super) struct Connection<'a> {
     bus: &'a mut S7Client,
-    stream: TcpStream,
     peer: SocketAddr,
     dialog: Dialog,
     pace: Pace,
@@ -37,7 +32,6 @@ pub(super) struct Connection<'a> {
     /// A cycle became due while the question was pending.
     is_due: bool,
     stations: Vec<Station>,
-    buffer: [u8; BUFFER],
 }
 
 /// The state of a station after the last cycles.
@@ -51,13 +45,7 @@ struct Station {
 }
 
 impl<'a> Connection<'a> {
-    pub(super) fn new(
-        bus: &'a mut S7Client,
-        stream: TcpStream,
-        peer: SocketAddr,
-        terms: Terms,
-        port: &Port,
-    ) -> Self {
+    pub(super) fn new(bus: &'a mut S7Client, peer: SocketAddr, terms: Terms, port: &Port) -> Self {
         let now = port.clock().now();
         let station = |station| Station {
             has: bus.frames.has(station),
@@ -70,8 +58,6 @@ impl<'a> Connection<'a> {
             state: None,
             is_due: false,
             stations: (0..port.stations()).map(station).collect(),
-            buffer: [0; BUFFER],
-            stream,
             peer,
             bus,
         }
@@ -83,72 +69,6 @@ impl<'a> Connection<'a> {
             self.bus.identity.unanswered += 1;
         } else if self.dialog.asks_state() {
             self.bus.state.unanswered += 1;
-        }
-    }
-
-    pub(super) fn source(&self) -> Source<'_> {
-        let interest = if self.dialog.to_write().is_empty() {
-            Interest::Read
-        } else {
-            Interest::ReadWrite
-        };
-        Source::new(&self.stream, interest)
-    }
-
-    pub(super) fn deadline(&self, port: &Port) -> Nanos {
-        let mut deadline = self.dialog.deadline().min(port.due());
-        if self.has_identity {
-            deadline = deadline.min(self.pace.due());
-        }
-        if let (Some(state), true) = (self.state, self.dialog.is_idle()) {
-            deadline = deadline.min(state);
-        }
-        deadline
-    }
-
-    pub(super) fn turn(
-        &mut self,
-        (is_readable, is_writable): (bool, bool),
-        port: &mut Port,
-    ) -> Result<(), BusError> {
-        let now = port.clock().now();
-        if is_readable {
-            self.read(now, port)?;
-        }
-        // Before the cycle, or an overloaded line would never get to it.
-        if self.has_identity {
-            self.ask_state(now);
-        }
-        if self.has_identity && self.pace.take(now) {
-            self.cycle(now, port)?;
-        }
-        if is_writable || !self.dialog.to_write().is_empty() {
-            self.write()?;
-        }
-        self.dialog
-            .check(now)
-            .map_err(|end| end.into_error(self.peer))?;
-        port.observe(now);
-        Ok(())
-    }
-
-    fn read(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let count = match self.stream.read(&mut self.buffer) {
-            Ok(0) => return Err(self.left()),
-            Ok(count) => count,
-            Err(error) if is_for_later(&error) => return Ok(()),
-            Err(error) => return Err(self.broke(&error)),
-        };
-        let mut count = count;
-        loop {
-            let news = self.dialog.hear(now, &self.buffer[..count]);
-            count = 0;
-            match news.map_err(|end| end.into_error(self.peer))? {
-                None => return Ok(()),
-                Some(News::Met(length, identity)) => self.meet(now, length, identity, port),
-                Some(News::Done) => self.done(now, port)?,
-                Some(News::State(state)) => self.learn(now, state, port)?,
-            }
         }
     }
 
@@ -328,22 +248,60 @@ impl<'a> Connection<'a> {
         }
         Ok(())
     }
+}
 
-    fn write(&mut self) -> Result<(), BusError> {
+impl Caller for Connection<'_> {
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
+        let mut bytes = bytes;
         loop {
-            let rest = self.dialog.to_write();
-            if rest.is_empty() {
-                return Ok(());
-            }
-            match self.stream.write(rest) {
-                Ok(count) => self.dialog.wrote(count),
-                Err(error) if is_for_later(&error) => return Ok(()),
-                Err(error) => return Err(self.broke(&error)),
+            let news = self.dialog.hear(now, bytes);
+            bytes = &[];
+            match news.map_err(|end| end.into_error(self.peer))? {
+                None => return Ok(()),
+                Some(News::Met(length, identity)) => self.meet(now, length, identity, port),
+                Some(News::Done) => self.done(now, port)?,
+                Some(News::State(state)) => self.learn(now, state, port)?,
             }
         }
     }
 
-    fn left(&self) -> BusError {
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        if !self.has_identity {
+            return Ok(());
+        }
+        // Before the cycle, or an overloaded line would never get to it.
+        self.ask_state(now);
+        if self.pace.take(now) {
+            self.cycle(now, port)?;
+        }
+        Ok(())
+    }
+
+    fn to_write(&self, _now: Nanos) -> &[u8] {
+        self.dialog.to_write()
+    }
+
+    fn wrote(&mut self, _now: Nanos, count: usize, _port: &mut Port) {
+        self.dialog.wrote(count);
+    }
+
+    fn check(&mut self, now: Nanos, _port: &mut Port) -> Result<(), BusError> {
+        let checked = self.dialog.check(now);
+        checked.map_err(|end| end.into_error(self.peer))
+    }
+
+    fn deadline(&self) -> Nanos {
+        let mut deadline = self.dialog.deadline();
+        if self.has_identity {
+            deadline = deadline.min(self.pace.due());
+        }
+        if let (Some(state), true) = (self.state, self.dialog.is_idle()) {
+            deadline = deadline.min(state);
+        }
+        deadline
+    }
+
+    fn left(&mut self) -> BusError {
         let peer = self.peer;
         BusError::Left(format!(
             "{peer} closed the connection; if it did so at once, check \"rack\" and \"slot\", and whether all its \
@@ -351,7 +309,7 @@ impl<'a> Connection<'a> {
         ))
     }
 
-    fn broke(&self, error: &std::io::Error) -> BusError {
+    fn broke(&mut self, error: &io::Error) -> BusError {
         let peer = self.peer;
         BusError::Link(format!(
             "the connection with {peer} broke ({error}); see whether the CPU still runs"
@@ -367,11 +325,5 @@ fn refusals(told: &[String]) -> String {
         "nothing".to_owned()
     } else {
         told.join("; ")
-    }
-}
-
-impl Drop for Connection<'_> {
-    fn drop(&mut self) {
-        bow_out(&self.stream);
     }
 }

@@ -9,10 +9,9 @@ mod refusal;
 mod terms;
 mod traffic;
 
-use tickbus_base::os::Poller;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::Rarely;
-use tickbus_fieldbus::tcp::{self, no_wait};
+use tickbus_fieldbus::tcp;
 use tickbus_fieldbus::{BusError, CYCLE, Free, Guard, PlcState, Port, Role};
 use tickbus_image::signal::SignalTable;
 
@@ -96,15 +95,11 @@ impl S7Client {
 impl Free for S7Client {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         self.guard.part();
-        let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
-        let reached = tcp::connect(&self.options.address, &mut poller, port, stop)?;
-        let Some((stream, peer)) = reached else {
+        let patience = port.max_age().times(4).max(PATIENCE);
+        let reached = tcp::dial(&self.options.address, patience, port, stop)?;
+        let Some((mut call, peer)) = reached else {
             return Ok(());
         };
-        let patience = port.max_age().times(4).max(PATIENCE);
-        tcp::prepare(&stream, patience).map_err(|error| {
-            BusError::Link(format!("the connection with {peer} broke at once: {error}"))
-        })?;
         port.opening(&format!("connected with {peer}; waiting for its answer"));
         let terms = Terms {
             calling: self.options.calling,
@@ -113,20 +108,11 @@ impl Free for S7Client {
             patience,
             asks_who: self.identity.is_asked(),
         };
-        let mut connection = Connection::new(self, stream, peer, terms, port);
-        let mut is_ready = (false, false);
-        while !stop.is_stopped() {
-            if let Err(error) = connection.turn(is_ready, port) {
-                connection.end();
-                return Err(error);
-            }
-            let mut sources = [connection.source()];
-            let deadline = connection.deadline(port);
-            poller
-                .wait(&**port.clock(), deadline, &mut sources)
-                .map_err(|error| no_wait(&error))?;
-            is_ready = (sources[0].is_readable(), sources[0].is_writable());
+        let mut connection = Connection::new(self, peer, terms, port);
+        let ended = call.run(&mut connection, port, stop);
+        if ended.is_err() {
+            connection.end();
         }
-        Ok(())
+        ended
     }
 }

@@ -11,33 +11,37 @@ use tickbus_base::os::{Interest, Poller, Source};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::resolve::resolve;
-use super::{Address, no_wait};
+use super::{Address, no_wait, prepare};
 
 /// How long an address has to answer. The system itself would try for minutes.
 const PATIENCE: Nanos = Nanos::from_secs(5);
 
 /// Connects without blocking, within a few seconds; `None` if `stop` came first.
 ///
-/// The stream is non-blocking, and otherwise as the system creates it; see [`prepare`](super::prepare).
+/// The stream is [prepared](prepare); the peer may leave sent data unacknowledged for `patience`.
 ///
 /// # Errors
 ///
 /// The host is unknown, or does not answer.
 pub fn connect(
     address: &Address,
-    poller: &mut Poller,
+    patience: Nanos,
     port: &mut Port,
     stop: &Stop,
 ) -> Result<Option<(TcpStream, SocketAddr)>, BusError> {
+    let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
     port.opening(&format!("connecting to {address}"));
     let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
         return Ok(None);
     };
-    let Some(stream) = reach_any(&addresses, poller, port, stop)? else {
+    let Some(stream) = reach_any(&addresses, &mut poller, port, stop)? else {
         return Ok(None);
     };
     let peer = stream.peer_addr().map_err(|error| no_wait(&error))?;
     port.tell("address", &peer.to_string());
+    prepare(&stream, patience).map_err(|error| {
+        BusError::Link(format!("the connection with {peer} broke at once: {error}"))
+    })?;
     Ok(Some((stream, peer)))
 }
 

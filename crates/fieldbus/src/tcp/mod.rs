@@ -1,7 +1,9 @@
-//! TCP for all buses that use it: addresses, connecting and listening, and a server for many clients.
+//! TCP for all buses that use it: addresses, connecting and listening, a connection with one peer, and a server
+//! for many clients.
 
 mod address;
 mod connect;
+mod dial;
 mod listen;
 mod resolve;
 mod server;
@@ -11,6 +13,7 @@ use super::BusError;
 
 pub use address::{Address, AddressError, Host};
 pub use connect::connect;
+pub use dial::{Call, Caller, Stream, dial};
 pub use listen::{is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};

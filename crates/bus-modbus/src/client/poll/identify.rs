@@ -167,7 +167,7 @@ impl Poll<'_> {
     }
 
     /// The connection has ended: returns whether it did while a device was being asked for its identity.
-    pub(in super::super) fn hung_up(&mut self) -> bool {
+    pub(super) fn hung_up(&mut self) -> bool {
         let Some(asking) = &self.asking else {
             return false;
         };

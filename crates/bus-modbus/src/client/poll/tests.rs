@@ -135,7 +135,7 @@ impl Line<'_> {
             self.poll.turn(self.now, self.port).expect("it goes on");
             let telegram = self.poll.to_write(self.now).to_vec();
             if !telegram.is_empty() {
-                self.poll.wrote(self.now, telegram.len());
+                self.poll.wrote(self.now, telegram.len(), self.port);
                 return match self.poll.framing {
                     Framing::Rtu { .. } => {
                         let (unit, pdu) = rtu::parse(&telegram).expect("a telegram");
@@ -179,7 +179,7 @@ impl Line<'_> {
 
     /// These bytes arrive.
     fn hear(&mut self, bytes: &[u8]) -> Result<(), BusError> {
-        self.poll.arrived(self.now, bytes, self.port)
+        self.poll.hear(self.now, bytes, self.port)
     }
 
     #[track_caller]

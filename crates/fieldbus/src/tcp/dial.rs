@@ -1,0 +1,245 @@
+//! A connection with one peer, for any protocol that implements [`Caller`].
+
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+
+use rustix::fd::AsFd;
+
+use crate::{BusError, Port};
+#[cfg(unix)]
+use tickbus_base::os::SerialPort;
+use tickbus_base::os::{Interest, Poller, Source};
+use tickbus_base::time::{Nanos, Stop};
+
+use super::{Address, bow_out, connect, is_for_later, no_wait};
+
+/// At most this many bytes are read at once.
+const BUFFER: usize = 16 * 1024;
+
+/// At most this many reads in a row, before anything else is done.
+const READS: usize = 64;
+
+/// A protocol as one end of a connection speaks it: bytes in, bytes out, and the image behind the port.
+/// It does no I/O itself.
+///
+/// In each turn a [`Call`] passes on what has arrived, by [`hear`](Self::hear); lets the caller do what is
+/// due, by [`turn`](Self::turn); writes [`to_write`](Self::to_write) until it is empty or the system accepts
+/// no more, and reports each piece by [`wrote`](Self::wrote); and asks by [`check`](Self::check) whether the
+/// connection may go on. Then it waits for the peer until [`deadline`](Self::deadline). The first error of
+/// any of them ends the connection.
+pub trait Caller {
+    /// `bytes` have arrived, at least one; any part of a telegram, or several.
+    ///
+    /// # Errors
+    ///
+    /// The peer violates the protocol, or refuses.
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError>;
+
+    /// Does what is due at `now`. Called in every turn, with or without new bytes.
+    ///
+    /// # Errors
+    ///
+    /// The connection may not go on.
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError>;
+
+    /// The bytes to be written at `now`; empty if there are none.
+    fn to_write(&self, now: Nanos) -> &[u8];
+
+    /// The system has accepted the first `count` bytes of [`to_write`](Self::to_write), at least one. More
+    /// may be made at once: they are written in the same turn.
+    fn wrote(&mut self, now: Nanos, count: usize, port: &mut Port);
+
+    /// Checks the time-outs at `now`, last of all: if this process was held up, the peer is not blamed for
+    /// what it has sent or taken in the meantime.
+    ///
+    /// # Errors
+    ///
+    /// The peer has taken too long.
+    fn check(&mut self, _now: Nanos, _port: &mut Port) -> Result<(), BusError> {
+        Ok(())
+    }
+
+    /// Until when to wait if nothing arrives and nothing can be written. A time that has passed means at
+    /// once.
+    fn deadline(&self) -> Nanos;
+
+    /// The error that ends the connection, now that the peer has closed it.
+    fn left(&mut self) -> BusError;
+
+    /// The error that ends the connection, now that reading or writing has failed.
+    fn broke(&mut self, error: &io::Error) -> BusError;
+}
+
+/// A stream of bytes that never blocks.
+pub trait Stream: Read + Write + AsFd {
+    /// It is about to be dropped.
+    fn close(&mut self) {}
+}
+
+impl Stream for TcpStream {
+    fn close(&mut self) {
+        bow_out(self);
+    }
+}
+
+#[cfg(unix)]
+impl Stream for SerialPort {}
+
+/// Connects with `address`, for a [`Caller`] that is made once the peer is known; `None` if `stop` came
+/// first. The peer may leave sent data unacknowledged for `patience`.
+///
+/// # Errors
+///
+/// The host is unknown, or does not answer.
+pub fn dial(
+    address: &Address,
+    patience: Nanos,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<Option<(Call<TcpStream>, SocketAddr)>, BusError> {
+    let reached = connect(address, patience, port, stop)?;
+    Ok(reached.map(|(stream, peer)| (Call::new(stream), peer)))
+}
+
+/// A connection with one peer: transfers bytes between a stream and a [`Caller`]. It is closed properly when
+/// dropped.
+#[derive(Debug)]
+pub struct Call<S: Stream> {
+    stream: S,
+    buffer: Box<[u8]>,
+    /// Whether the system has not accepted all that was to be written.
+    blocked: bool,
+}
+
+impl<S: Stream> Call<S> {
+    /// A call over a stream that never blocks.
+    pub fn new(stream: S) -> Self {
+        Self {
+            stream,
+            buffer: vec![0; BUFFER].into(),
+            blocked: false,
+        }
+    }
+
+    /// Transfers bytes until the connection ends or `stop` comes.
+    ///
+    /// # Errors
+    ///
+    /// Why the connection has ended.
+    pub fn run(
+        &mut self,
+        caller: &mut impl Caller,
+        port: &mut Port,
+        stop: &Stop,
+    ) -> Result<(), BusError> {
+        let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
+        let mut readable = false;
+        while !stop.is_stopped() {
+            self.turn(readable, caller, port)?;
+            let deadline = caller.deadline().min(port.due());
+            let mut sources = [Source::new(&self.stream, self.interest())];
+            let waited = poller.wait(&**port.clock(), deadline, &mut sources);
+            waited.map_err(|error| no_wait(&error))?;
+            readable = sources[0].is_readable();
+        }
+        Ok(())
+    }
+
+    /// The stream to wait for.
+    pub fn stream(&self) -> &S {
+        &self.stream
+    }
+
+    /// What to wait for before the next [`turn`](Self::turn).
+    pub fn interest(&self) -> Interest {
+        if self.blocked {
+            Interest::ReadWrite
+        } else {
+            Interest::Read
+        }
+    }
+
+    /// One turn of `caller`, for an owner that waits for several streams; see [`run`](Self::run).
+    ///
+    /// # Errors
+    ///
+    /// Why the connection has ended.
+    pub fn turn(
+        &mut self,
+        readable: bool,
+        caller: &mut impl Caller,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let now = port.clock().now();
+        if readable {
+            self.read(now, caller, port)?;
+        }
+        caller.turn(now, port)?;
+        self.write(now, caller, port)?;
+        caller.check(now, port)?;
+        port.observe(now);
+        Ok(())
+    }
+
+    /// Reads everything that has arrived.
+    ///
+    /// # Errors
+    ///
+    /// Why the connection has ended.
+    pub fn read_all(&mut self, caller: &mut impl Caller, port: &mut Port) -> Result<(), BusError> {
+        let now = port.clock().now();
+        for _ in 0..READS {
+            if !self.read(now, caller, port)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads once; returns whether there was anything.
+    fn read(
+        &mut self,
+        now: Nanos,
+        caller: &mut impl Caller,
+        port: &mut Port,
+    ) -> Result<bool, BusError> {
+        match self.stream.read(&mut self.buffer) {
+            Ok(0) => Err(caller.left()),
+            Ok(count) => caller.hear(now, &self.buffer[..count], port).map(|()| true),
+            Err(error) if is_for_later(&error) => Ok(false),
+            Err(error) => Err(caller.broke(&error)),
+        }
+    }
+
+    /// Writes as much as the system accepts.
+    fn write(
+        &mut self,
+        now: Nanos,
+        caller: &mut impl Caller,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        self.blocked = false;
+        while !self.blocked {
+            let rest = caller.to_write(now);
+            if rest.is_empty() {
+                break;
+            }
+            match self.stream.write(rest) {
+                Ok(0) => self.blocked = true,
+                Ok(count) => caller.wrote(now, count, port),
+                Err(error) if is_for_later(&error) => self.blocked = true,
+                Err(error) => return Err(caller.broke(&error)),
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<S: Stream> Drop for Call<S> {
+    fn drop(&mut self) {
+        self.stream.close();
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,288 @@
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::thread::{scope, yield_now};
+use std::time::Duration;
+
+use socket2::SockRef;
+
+use super::*;
+use crate::tcp::prepare;
+use crate::{LinkStatus, Role};
+use tickbus_base::time::{Clock, Manual, Monotonic};
+use tickbus_image::image;
+
+const SECOND: Nanos = Nanos::from_secs(1);
+
+/// Says what it is told to say, remembers what it hears, and ends when it is told to.
+#[derive(Debug)]
+struct Speaker {
+    heard: Vec<u8>,
+    /// What is to be written, and what follows when that is written.
+    says: Vec<u8>,
+    written: usize,
+    then: Vec<u8>,
+    deadline: Nanos,
+    /// The peer has to say something before this.
+    limit: Nanos,
+    /// After this many turns it ends the connection.
+    turns: usize,
+    /// The calls of the last turn, without those of `to_write`.
+    calls: Vec<&'static str>,
+}
+
+impl Default for Speaker {
+    fn default() -> Self {
+        Self {
+            heard: Vec::new(),
+            says: Vec::new(),
+            written: 0,
+            then: Vec::new(),
+            deadline: Nanos::MAX,
+            limit: Nanos::MAX,
+            turns: usize::MAX,
+            calls: Vec::new(),
+        }
+    }
+}
+
+impl Caller for Speaker {
+    fn hear(&mut self, _now: Nanos, bytes: &[u8], _port: &mut Port) -> Result<(), BusError> {
+        self.heard.extend_from_slice(bytes);
+        self.limit = Nanos::MAX;
+        self.calls = vec!["hear"];
+        Ok(())
+    }
+
+    fn turn(&mut self, _now: Nanos, _port: &mut Port) -> Result<(), BusError> {
+        self.calls.retain(|call| *call == "hear");
+        self.calls.push("turn");
+        self.turns -= 1;
+        if self.turns == 0 {
+            return Err(BusError::Refused("it has talked enough".to_owned()));
+        }
+        Ok(())
+    }
+
+    fn to_write(&self, _now: Nanos) -> &[u8] {
+        &self.says[self.written..]
+    }
+
+    fn wrote(&mut self, _now: Nanos, count: usize, _port: &mut Port) {
+        self.calls.push("wrote");
+        self.written += count;
+        if self.written == self.says.len() {
+            self.says = std::mem::take(&mut self.then);
+            self.written = 0;
+        }
+    }
+
+    fn check(&mut self, now: Nanos, _port: &mut Port) -> Result<(), BusError> {
+        self.calls.push("check");
+        if now >= self.limit {
+            return Err(BusError::Link(format!("silent at {now}")));
+        }
+        Ok(())
+    }
+
+    fn deadline(&self) -> Nanos {
+        self.deadline
+    }
+
+    fn left(&mut self) -> BusError {
+        BusError::Left(format!("after {:?}", self.heard))
+    }
+
+    fn broke(&mut self, error: &io::Error) -> BusError {
+        BusError::Link(format!("broke ({:?})", error.kind()))
+    }
+}
+
+/// A port over an image without stations, with a clock that stands still.
+fn port() -> (Port, Arc<Manual>, LinkStatus) {
+    let clock = Manual::new();
+    let status = LinkStatus::new("test", Nanos::from_secs(3600));
+    let (_, end) = image(Vec::new());
+    let port = Port::new(
+        end,
+        Arc::clone(&clock) as _,
+        Role::Device,
+        None,
+        status.clone(),
+    );
+    (port, clock, status)
+}
+
+/// A call and its peer.
+fn connected() -> (Call<TcpStream>, TcpStream) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("it is bound");
+    let stream = TcpStream::connect(address).expect("it listens");
+    prepare(&stream, SECOND).expect("options");
+    let (peer, _) = listener.accept().expect("a client");
+    let limit = Some(Duration::from_secs(20));
+    peer.set_read_timeout(limit).expect("an option");
+    (Call::new(stream), peer)
+}
+
+/// Waits until the other thread waits for nothing but the clock and its socket.
+#[track_caller]
+fn settle(clock: &Manual) {
+    let real = Monotonic::shared();
+    let limit = real.now() + Nanos::from_secs(20);
+    while !clock.is_settled(1) {
+        assert!(real.now() < limit, "it does not come to rest");
+        yield_now();
+    }
+}
+
+/// Runs a call whose end comes of itself.
+fn run(call: &mut Call<TcpStream>, speaker: &mut Speaker) -> String {
+    let (mut port, ..) = port();
+    let ended = call.run(speaker, &mut port, &Stop::new());
+    ended.expect_err("it ends").to_string()
+}
+
+#[test]
+fn a_peer_that_closes_has_left_after_all_it_said() {
+    let (mut call, mut peer) = connected();
+    peer.write_all(&[7, 8]).expect("room");
+    drop(peer);
+    let error = run(&mut call, &mut Speaker::default());
+    assert!(error.contains("after [7, 8]"), "{error}");
+}
+
+#[test]
+fn a_connection_that_is_reset_is_broken() {
+    let (mut call, peer) = connected();
+    let now = Some(Duration::ZERO);
+    SockRef::from(&peer).set_linger(now).expect("an option");
+    drop(peer);
+    let error = run(&mut call, &mut Speaker::default());
+    assert!(error.contains("broke (ConnectionReset)"), "{error}");
+}
+
+#[test]
+fn a_peer_that_says_nothing_is_waited_for_until_the_deadline() {
+    let (mut call, _peer) = connected();
+    let (mut port, clock, _) = port();
+    let mut speaker = Speaker {
+        deadline: SECOND,
+        limit: SECOND,
+        ..Speaker::default()
+    };
+    let ended = scope(|scope| {
+        let thread = scope.spawn(|| call.run(&mut speaker, &mut port, &Stop::new()));
+        settle(&clock);
+        clock.advance(SECOND);
+        thread.join().expect("no panic")
+    });
+    let error = ended.expect_err("it ends").to_string();
+    assert!(error.contains("silent at 1s"), "{error}");
+}
+
+#[test]
+fn what_has_arrived_in_the_meantime_counts_before_the_time_is_checked() {
+    let (mut call, mut peer) = connected();
+    let (mut port, clock, _) = port();
+    let mut speaker = Speaker {
+        limit: SECOND,
+        says: vec![1],
+        then: vec![2],
+        ..Speaker::default()
+    };
+    peer.write_all(&[7]).expect("room");
+    clock.advance(SECOND);
+    let stop = Stop::new();
+    let mut poller = Poller::new(&stop).expect("a poller");
+    let mut sources = [Source::new(call.stream(), Interest::Read)];
+    let waited = poller.wait(&*clock, Nanos::MAX, &mut sources);
+    waited.expect("it can wait");
+    let turned = call.turn(true, &mut speaker, &mut port);
+    turned.expect("it goes on");
+    assert_eq!(speaker.calls, ["hear", "turn", "wrote", "wrote", "check"]);
+    let mut said = [0; 2];
+    peer.read_exact(&mut said).expect("both at once");
+    assert_eq!(said, [1, 2]);
+}
+
+#[test]
+fn what_the_peer_does_not_take_waits_for_it_and_nothing_is_lost() {
+    let (mut call, mut peer) = connected();
+    let (mut port, ..) = port();
+    // More than the system takes while nobody reads.
+    let all: Vec<u8> = (0..32_000_000_u32)
+        .map(|index| index.to_be_bytes()[2])
+        .collect();
+    let mut speaker = Speaker {
+        says: all.clone(),
+        ..Speaker::default()
+    };
+    let turned = call.turn(false, &mut speaker, &mut port);
+    turned.expect("it goes on");
+    assert_eq!(call.interest(), Interest::ReadWrite);
+    assert!(!speaker.says.is_empty());
+    let stop = Stop::new();
+    let taken = scope(|scope| {
+        let thread = scope.spawn(|| call.run(&mut speaker, &mut port, &stop));
+        let mut taken = vec![0; all.len()];
+        peer.read_exact(&mut taken).expect("all of it");
+        stop.stop();
+        thread.join().expect("no panic").expect("no error");
+        taken
+    });
+    assert!(taken == all, "other bytes");
+    let turned = call.turn(false, &mut speaker, &mut port);
+    turned.expect("it goes on");
+    assert_eq!(call.interest(), Interest::Read);
+}
+
+#[test]
+fn a_stop_ends_the_wait_and_the_peer_gets_a_proper_end() {
+    let (mut call, mut peer) = connected();
+    let (mut port, clock, _) = port();
+    let stop = Stop::new();
+    scope(|scope| {
+        let thread = scope.spawn(|| call.run(&mut Speaker::default(), &mut port, &stop));
+        settle(&clock);
+        stop.stop();
+        thread.join().expect("no panic").expect("no error");
+    });
+    // Unread bytes would make the system reset the connection.
+    peer.write_all(&[7]).expect("room");
+    drop(call);
+    assert_eq!(peer.read(&mut [0]).expect("an end, no reset"), 0);
+}
+
+#[test]
+fn a_deadline_in_the_past_means_at_once() {
+    let (mut call, _peer) = connected();
+    let mut speaker = Speaker {
+        deadline: Nanos(i64::MIN),
+        turns: 5,
+        ..Speaker::default()
+    };
+    let error = run(&mut call, &mut speaker);
+    assert!(error.contains("talked enough"), "{error}");
+}
+
+#[test]
+fn dialling_reaches_whoever_listens_and_says_who_that_is() {
+    let (mut port, clock, status) = port();
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let bound = listener.local_addr().expect("it is bound");
+    let stop = Stop::new();
+    let address = Address::local(bound.port());
+    let dialled = dial(&address, SECOND, &mut port, &stop).expect("it listens");
+    let (_call, peer) = dialled.expect("no stop came");
+    assert_eq!(peer, bound);
+    let mut text = String::new();
+    status.write(clock.now(), &mut text);
+    assert!(text.contains(&format!("address={bound}\n")), "{text}");
+    drop(listener);
+    let error = dial(&address, SECOND, &mut port, &stop).expect_err("nobody listens");
+    let error = error.to_string();
+    assert!(error.contains("start the program"), "{error}");
+    stop.stop();
+    let dialled = dial(&address, SECOND, &mut port, &stop).expect("no failure");
+    assert!(dialled.is_none());
+}

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{nearest, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
-use tickbus_record::{ValueKind, Recording, RecordingError, Tick};
+use tickbus_record::{Recording, RecordingError, Tick, ValueKind};
 
 use super::test::TextPosition;
 

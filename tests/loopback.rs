@@ -38,7 +38,7 @@ impl Bus for Link {
             controller.statistic("reason").contains("waiting")
         });
         Liar {
-            _peer: Box::new(controller),
+            peer: Box::new(controller),
             cause: "refused",
             words: "this end sends and receives [(6, 6)] bytes per station, the other end expects [(6, 12)]",
         }

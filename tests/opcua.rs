@@ -88,7 +88,7 @@ impl Bus for OpcUa {
             ("waiting", "nobody has written yet")
         };
         Liar {
-            _peer: Box::new(Ending {
+            peer: Box::new(Ending {
                 over,
                 thread: Some(thread),
             }),

@@ -7,7 +7,7 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[allow(dead_code, unused_macros, reason = "each test uses a part of it")]
+#[allow(unused_macros, reason = "each test uses a part of it")]
 mod peers;
 
 use std::fmt::Write as _;

@@ -83,7 +83,7 @@ impl Bus for Tcp {
             "left in the middle of a telegram, after 9 bytes of it"
         };
         Liar {
-            _peer: Box::new(Ending {
+            peer: Box::new(Ending {
                 over,
                 thread: Some(thread),
             }),

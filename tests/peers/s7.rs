@@ -97,7 +97,7 @@ impl Bus for Pair {
             }
         });
         Liar {
-            _peer: Box::new(Ending {
+            peer: Box::new(Ending {
                 over,
                 thread: Some(thread),
             }),

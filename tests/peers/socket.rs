@@ -70,7 +70,7 @@ impl Bus for Tcp {
             }
         });
         Liar {
-            _peer: Box::new(Ending {
+            peer: Box::new(Ending {
                 over,
                 thread: Some(thread),
             }),

@@ -125,7 +125,7 @@ impl Bus for Udp {
             }
         });
         Liar {
-            _peer: Box::new(running),
+            peer: Box::new(running),
             cause: "protocol",
             words: "libudp_fieldbus.so: an image of 12 bytes came from 127.0.0.1, expected 6 bytes; give",
         }

@@ -59,6 +59,10 @@ impl Serial {
 
 impl Line {
     /// Replaces the address of the driver.cfg, if `check` accepts the new one.
+    ///
+    /// # Errors
+    ///
+    /// The line is a serial one, or what is wrong with the address.
     pub fn set_address(
         &mut self,
         address: &str,

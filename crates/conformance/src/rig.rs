@@ -51,7 +51,7 @@ pub struct End {
     pub driver: Driver,
     pub slots: Vec<Slot>,
     /// Checks the log when the driver is closed.
-    pub _logged: logged::Watch,
+    pub logged: logged::Watch,
 }
 
 impl End {
@@ -63,7 +63,7 @@ impl End {
         Self {
             driver,
             slots,
-            _logged: logged,
+            logged,
         }
     }
 
@@ -139,7 +139,7 @@ pub trait Bus {
 
 /// A peer that lies; dropping it ends it.
 pub struct Liar {
-    pub _peer: Box<dyn std::any::Any>,
+    pub peer: Box<dyn std::any::Any>,
     /// What the Device reports about it: the cause, and words of the reason.
     pub cause: &'static str,
     pub words: &'static str,

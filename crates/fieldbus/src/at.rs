@@ -47,7 +47,7 @@ impl<'a> At<'a> {
         entries
     }
 
-    /// The offset of the address in the text, for [`Collector::report`](crate::config::Collector::report).
+    /// The offset of the address in the text, for [`Collector::report`](tickbus_base::toml_text::Collector::report).
     pub fn at(&self) -> usize {
         self.value.at()
     }

@@ -67,7 +67,7 @@ pub(super) fn client<'a>(addresses: impl Iterator<Item = &'a str>) -> Option<Cli
                 typed |= client == Client::Modbus || address.contains([':', ',']);
             }
             None => {
-                of_image |= matches!(place(address, Addressing::Bytes), ParsedAddress::Image(_))
+                of_image |= matches!(place(address, Addressing::Bytes), ParsedAddress::Image(_));
             }
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! A [`Program`] is a pure function of its own state, the time and the inputs: its host calls
 //! [`Program::scan`] at the scan interval, in wall time or in simulation time, and transfers the images.
-//! [`program`] finds a built-in program by its name, or a user's own by its path.
+//! [`Hosted`] is a user's own program.
 
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub const INTERVAL: Nanos = Nanos::from_millis(10);
 
 /// A PLC program.
 pub trait Program: Send {
-    /// Its name for [`program`], or the path of its file.
+    /// The name by which it is asked for, or the path of its file.
     fn name(&self) -> &str;
 
     /// Its default scan interval. Positive.

@@ -9,7 +9,7 @@ pub(super) trait Sink: Send {
     /// Writes the beginning of the file.
     fn header(&mut self, out: &mut Vec<u8>);
 
-    /// One tick; values are as [`ValueKind::kept`](super::Kind::kept) gives them.
+    /// One tick; values are as [`ValueKind::kept`](super::ValueKind::kept) gives them.
     fn tick(&mut self, tick: &Tick, out: &mut Vec<u8>);
 
     /// Writes the end of a recording that was closed properly.

@@ -92,6 +92,12 @@ pub fn times(words: &str) -> u64 {
 /// An open driver. When none is left, nothing unexpected may have been logged.
 pub struct Watch(());
 
+impl Default for Watch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Watch {
     /// All of tickbus counts.
     pub fn new() -> Self {

@@ -1,13 +1,13 @@
 //! An example of a bus: `kind = "mailbox"` carries the image in two files of a folder, one for each end.
 //!
-//! It shows what a bus needs, and how little: a [frame](frame), free of I/O; the [options](Options) that a driver.cfg
+//! It shows what a bus needs, and how little: a [frame](Frame), free of I/O; the [options](Options) that a driver.cfg
 //! gives it; and the thread that carries frames between the port and the line. `CONTRIBUTING.md` tells how a bus is
 //! added; this one is added with the feature `example-bus` of `tickbus-driver-cfg`, which its tests switch on.
 
 mod frame;
 mod options;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use tickbus_base::time::{Nanos, Pace, Stop};
@@ -25,7 +25,7 @@ pub struct Mailbox {
 }
 
 impl Mailbox {
-    fn new(folder: PathBuf, role: Role, cycle: Nanos) -> Self {
+    fn new(folder: &Path, role: Role, cycle: Nanos) -> Self {
         let (writes, reads) = match role {
             Role::Device => ("inputs", "outputs"),
             Role::Controller => ("outputs", "inputs"),
@@ -113,6 +113,6 @@ impl Free for Mailbox {
     }
 }
 
-fn failed(what: &str, file: &std::path::Path, error: &io::Error) -> BusError {
+fn failed(what: &str, file: &Path, error: &io::Error) -> BusError {
     BusError::Link(format!("could not {what} {}: {error}", file.display()))
 }

@@ -56,7 +56,7 @@ impl BusOptions for Options {
                 folder.display()
             )));
         }
-        let mailbox = Mailbox::new(folder, setup.role, setup.cycle.unwrap_or(CYCLE));
+        let mailbox = Mailbox::new(&folder, setup.role, setup.cycle.unwrap_or(CYCLE));
         Ok(Bus::Free(Box::new(mailbox)))
     }
 

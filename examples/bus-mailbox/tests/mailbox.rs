@@ -34,7 +34,7 @@ impl Bus for Folder {
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
         fs::write(self.0.path().join("outputs"), [1; 30]).expect("written");
         Liar {
-            _peer: Box::new(()),
+            peer: Box::new(()),
             cause: "protocol",
             words: "the peer's file has 30 bytes, expected 16 and an image of 6",
         }

@@ -32,6 +32,10 @@ pub fn is_for_later(error: &io::Error) -> bool {
 }
 
 /// Makes the system send at once, never block, and give up after `patience` on a peer whose cable was pulled.
+///
+/// # Errors
+///
+/// The system refuses one of these settings.
 pub fn prepare(stream: &TcpStream, patience: Nanos) -> io::Result<()> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;

@@ -271,11 +271,12 @@ fn foreign_area(shown: &str, rest: &str, letter: Option<char>) -> AddressError {
     }
 }
 
+/// Beyond every limit; sixteen times it, and a few bytes more, still fit.
+const BEYOND: usize = usize::MAX / 32;
+
 /// A decimal number without sign; one that does not fit becomes a number beyond every limit.
 fn number(text: &str) -> Option<usize> {
     let digits = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    // Sixteen times it, and a few bytes more, still fit.
-    const BEYOND: usize = usize::MAX / 32;
     digits.then(|| {
         text.parse()
             .map_or(BEYOND, |number: usize| number.min(BEYOND))

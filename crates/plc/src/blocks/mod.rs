@@ -1,7 +1,7 @@
 //! The function blocks of IEC 61131-3 that the programs here use, and blocks for the axes of the axis link.
 //!
 //! A block only changes when it is called, and uses only the time passed to the call. Times are
-//! [`Nanos`](crate::time::Nanos) where the standard has `TIME`.
+//! [`Nanos`](tickbus_base::time::Nanos) where the standard has `TIME`.
 
 mod action;
 mod axis;

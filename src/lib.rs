@@ -1,8 +1,9 @@
 //! Puts a simulated machine on a real PLC's fieldbus.
 //!
-//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms of this crate
-//! follow the data flow, and each uses only the rooms above it in this list (a test checks that;
-//! `docs/ARCHITECTURE.md` explains why):
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are crates of their own
+//! under `crates/`, each of use without the others; this crate is the native library of the Java driver, the `tickbus`
+//! command, and one name for all of them. They stand in the order of the data's way; what each uses is in its manifest
+//! (`docs/ARCHITECTURE.md` tells why):
 //!
 //! | room | what lives there |
 //! |---|---|

@@ -64,10 +64,14 @@ impl Mailbox {
             if !pace.take(now) {
                 port.observe(now);
             } else if !port.is_down(now) {
-                if let Some(bytes) = self.read()? {
-                    let peers = Frame::parse(&bytes, receives)
-                        .map_err(|error| BusError::Protocol(error.to_string()))?;
-                    take(port, now, &peers, &mut own, &sizes);
+                match self.read()? {
+                    Some(bytes) => {
+                        let peers = Frame::parse(&bytes, receives)
+                            .map_err(|error| BusError::Protocol(error.to_string()))?;
+                        take(port, now, &peers, &mut own, &sizes);
+                    }
+                    // The next one counts from 1 again.
+                    None => own.seen = 0,
                 }
                 if own.confirmed && port.sends(now) {
                     own.image.clear();
@@ -91,7 +95,10 @@ fn take(port: &mut Port, now: Nanos, peers: &Frame, own: &mut Frame, sizes: &[(u
         own.confirmed = true;
         (0..sizes.len()).for_each(|station| port.sent(station));
     }
-    if peers.sequence == own.seen || peers.image.is_empty() {
+    if peers.image.is_empty() {
+        own.seen = 0;
+    }
+    if peers.sequence == own.seen {
         return;
     }
     own.seen = peers.sequence;

@@ -113,10 +113,10 @@ mod tests {
     #[test]
     fn a_level_is_that_of_tickbus_own_messages() {
         for (variable, target, level, shown) in [
-            (None, "tickbus::fieldbus", Level::Warn, true),
-            (None, "tickbus::fieldbus", Level::Info, false),
+            (None, "tickbus_fieldbus::tcp", Level::Warn, true),
+            (None, "tickbus_fieldbus::tcp", Level::Info, false),
             (None, "tracing::span", Level::Warn, true),
-            (Some("info"), "tickbus::fieldbus", Level::Info, true),
+            (Some("info"), "tickbus_fieldbus::tcp", Level::Info, true),
             (Some("info"), "tracing::span", Level::Info, false),
             (Some("info"), "tracing::span", Level::Warn, true),
             (Some("error"), "tracing::span", Level::Warn, false),

@@ -53,11 +53,24 @@ impl Mailbox {
         }
     }
 
+    /// The last sequence of an end that was killed: its successor counts on, or the peer would not know its frames
+    /// from those that it has seen.
+    fn left_behind(&self, image: usize) -> u64 {
+        let frame = fs::read(&self.own)
+            .ok()
+            .map(|bytes| Frame::parse(&bytes, image));
+        frame.and_then(Result::ok).map_or(0, |frame| frame.sequence)
+    }
+
     fn serve(&self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         port.opening("waiting for the peer's file");
         let sizes: Vec<(usize, usize)> = (0..port.stations()).map(|n| port.sizes(n)).collect();
         let receives = sizes.iter().map(|(_, rx)| rx).sum();
-        let mut own = Frame::default();
+        let sends = sizes.iter().map(|(tx, _)| tx).sum();
+        let mut own = Frame {
+            sequence: self.left_behind(sends),
+            ..Frame::default()
+        };
         let mut pace = Pace::new(port.clock().now(), self.cycle);
         while !stop.is_stopped() {
             let now = port.clock().now();

@@ -141,7 +141,7 @@ impl Caller for Transfer<'_> {
         Ok(())
     }
 
-    fn deadline(&self) -> Nanos {
+    fn deadline(&self, _port: &Port) -> Nanos {
         self.connection.deadline()
     }
 

@@ -128,7 +128,7 @@ impl<'a> Poll<'a> {
 }
 
 impl Caller for Poll<'_> {
-    fn deadline(&self) -> Nanos {
+    fn deadline(&self, _port: &Port) -> Nanos {
         let Some(asking) = &self.asking else {
             return self.pace.due();
         };

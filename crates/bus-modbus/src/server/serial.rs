@@ -1,15 +1,14 @@
 //! The units of a server on a serial line.
 
-use std::io::{Read as _, Write as _};
+use std::io;
 
 use crate::Function;
 use crate::function::EXCEPTION_BIT;
 use crate::line::{Serial, gone};
 use crate::rtu::{self, Echo, Framer};
 use crate::serial::open;
-use tickbus_base::os::{Interest, Poller, SerialPort, Source};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{is_for_later, no_wait};
+use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
 use super::units::{Carried, UnitSet};
@@ -32,13 +31,11 @@ pub(super) fn serve(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    let serial = open(line)?;
+    let mut call = Call::new(open(line)?);
     port.tell("device", &line.device);
     port.opening(&format!("listening on {}", line.device));
-    let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
     let mut server = Server {
         line,
-        serial,
         // A line has a single client.
         writes: vec![true; units.len()].into(),
         units,
@@ -49,15 +46,11 @@ pub(super) fn serve(
         written: 0,
         carried: None,
     };
-    while !stop.is_stopped() {
-        server.turn(&mut poller, port)?;
-    }
-    Ok(())
+    call.run(&mut server, port, stop)
 }
 
 struct Server<'a> {
     line: &'a Serial,
-    serial: SerialPort,
     units: &'a mut UnitSet,
     /// The stations that the client has written to.
     writes: Box<[bool]>,
@@ -72,55 +65,6 @@ struct Server<'a> {
 }
 
 impl Server<'_> {
-    fn turn(&mut self, poller: &mut Poller, port: &mut Port) -> Result<(), BusError> {
-        let interest = if self.written < self.reply.len() {
-            Interest::ReadWrite
-        } else {
-            Interest::Read
-        };
-        let mut sources = [Source::new(&self.serial, interest)];
-        let clock = port.clock();
-        let now = clock.now();
-        // Data are stale when older than the limit, not when equal.
-        let age = port.silence(now);
-        let stale = if age <= port.max_age() {
-            now + (port.max_age() - age) + Nanos(1)
-        } else {
-            Nanos::MAX
-        };
-        let deadline = self.framer.deadline().min(port.due()).min(stale);
-        poller
-            .wait(&**clock, deadline, &mut sources)
-            .map_err(|error| no_wait(&error))?;
-        let (readable, writable) = (sources[0].is_readable(), sources[0].is_writable());
-        let now = port.clock().now();
-        if readable {
-            self.read(now, port)?;
-        }
-        self.attend(now, port);
-        if writable || interest == Interest::Read {
-            self.write(port)?;
-        }
-        port.observe(now);
-        Ok(())
-    }
-
-    fn read(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let mut bytes = [0; rtu::ADU_LIMIT];
-        let count = match self.serial.read(&mut bytes) {
-            Ok(0) => return Err(gone(&self.line.device, "it was closed")),
-            Ok(count) => count,
-            Err(error) if is_for_later(&error) => return Ok(()),
-            Err(error) => return Err(gone(&self.line.device, &error)),
-        };
-        // Silence may have ended a telegram before these bytes arrived.
-        self.attend(now, port);
-        let own = self.echo.as_mut();
-        let own = own.map_or(0, |echo| echo.strip(now, &bytes[..count]));
-        self.framer.arrived(now, &bytes[own..count]);
-        Ok(())
-    }
-
     /// Answers the telegram that silence has ended, if it is complete and addressed to a unit here.
     fn attend(&mut self, now: Nanos, port: &mut Port) {
         let Self {
@@ -183,28 +127,57 @@ impl Server<'_> {
             port.running("a client is talking");
         });
     }
+}
 
-    fn write(&mut self, port: &mut Port) -> Result<(), BusError> {
-        if self.written == self.reply.len() {
-            return Ok(());
+impl Caller for Server<'_> {
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
+        // Silence may have ended a telegram before these bytes arrived.
+        self.attend(now, port);
+        let own = self.echo.as_mut();
+        let own = own.map_or(0, |echo| echo.strip(now, bytes));
+        self.framer.arrived(now, &bytes[own..]);
+        Ok(())
+    }
+
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        self.attend(now, port);
+        Ok(())
+    }
+
+    fn to_write(&self, _now: Nanos) -> &[u8] {
+        &self.reply[self.written..]
+    }
+
+    fn wrote(&mut self, now: Nanos, count: usize, port: &mut Port) {
+        if let Some(echo) = &mut self.echo {
+            echo.sent(now, &self.reply[self.written..][..count]);
         }
-        let rest = &self.reply[self.written..];
-        match self.serial.write(rest) {
-            Ok(count) => {
-                if let Some(echo) = &mut self.echo {
-                    echo.sent(port.clock().now(), &rest[..count]);
-                }
-                self.written += count;
-            }
-            Err(error) if is_for_later(&error) => return Ok(()),
-            Err(error) => return Err(gone(&self.line.device, &error)),
-        }
+        self.written += count;
         if self.written == self.reply.len()
             && let Some(carried) = self.carried.take()
         {
             self.units.carried(carried, port);
         }
-        Ok(())
+    }
+
+    fn deadline(&self, port: &Port) -> Nanos {
+        let now = port.clock().now();
+        // Data are stale when older than the limit, not when equal.
+        let age = port.silence(now);
+        let stale = if age <= port.max_age() {
+            now + (port.max_age() - age) + Nanos(1)
+        } else {
+            Nanos::MAX
+        };
+        self.framer.deadline().min(stale)
+    }
+
+    fn left(&mut self) -> BusError {
+        gone(&self.line.device, "it was closed")
+    }
+
+    fn broke(&mut self, error: &io::Error) -> BusError {
+        gone(&self.line.device, error)
     }
 }
 

@@ -290,7 +290,7 @@ impl Caller for Connection<'_> {
         checked.map_err(|end| end.into_error(self.peer))
     }
 
-    fn deadline(&self) -> Nanos {
+    fn deadline(&self, _port: &Port) -> Nanos {
         let mut deadline = self.dialog.deadline();
         if self.has_identity {
             deadline = deadline.min(self.pace.due());

@@ -59,9 +59,9 @@ pub trait Caller {
         Ok(())
     }
 
-    /// Until when to wait if nothing arrives and nothing can be written. A time that has passed means at
-    /// once.
-    fn deadline(&self) -> Nanos;
+    /// Until when to wait if nothing arrives and nothing can be written, beside what the port itself is
+    /// [due](Port::due) for. A time that has passed means at once.
+    fn deadline(&self, port: &Port) -> Nanos;
 
     /// The error that ends the connection, now that the peer has closed it.
     fn left(&mut self) -> BusError;
@@ -136,7 +136,7 @@ impl<S: Stream> Call<S> {
         let mut readable = false;
         while !stop.is_stopped() {
             self.turn(readable, caller, port)?;
-            let deadline = caller.deadline().min(port.due());
+            let deadline = caller.deadline(port).min(port.due());
             let mut sources = [Source::new(&self.stream, self.interest())];
             let waited = poller.wait(&**port.clock(), deadline, &mut sources);
             waited.map_err(|error| no_wait(&error))?;

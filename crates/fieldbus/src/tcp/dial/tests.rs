@@ -26,7 +26,7 @@ struct Speaker {
     limit: Nanos,
     /// After this many turns it ends the connection.
     turns: usize,
-    /// The calls of the last turn, without those of `to_write`.
+    /// The calls, without those that ask.
     calls: Vec<&'static str>,
 }
 
@@ -39,7 +39,7 @@ impl Default for Speaker {
             then: Vec::new(),
             deadline: Nanos::MAX,
             limit: Nanos::MAX,
-            turns: usize::MAX,
+            turns: 1000,
             calls: Vec::new(),
         }
     }
@@ -49,12 +49,11 @@ impl Caller for Speaker {
     fn hear(&mut self, _now: Nanos, bytes: &[u8], _port: &mut Port) -> Result<(), BusError> {
         self.heard.extend_from_slice(bytes);
         self.limit = Nanos::MAX;
-        self.calls = vec!["hear"];
+        self.calls.push("hear");
         Ok(())
     }
 
     fn turn(&mut self, _now: Nanos, _port: &mut Port) -> Result<(), BusError> {
-        self.calls.retain(|call| *call == "hear");
         self.calls.push("turn");
         self.turns -= 1;
         if self.turns == 0 {
@@ -84,7 +83,7 @@ impl Caller for Speaker {
         Ok(())
     }
 
-    fn deadline(&self) -> Nanos {
+    fn deadline(&self, _port: &Port) -> Nanos {
         self.deadline
     }
 
@@ -124,22 +123,44 @@ fn connected() -> (Call<TcpStream>, TcpStream) {
     (Call::new(stream), peer)
 }
 
-/// Waits until the other thread waits for nothing but the clock and its socket.
+/// Waits with a limit in real time.
 #[track_caller]
-fn settle(clock: &Manual) {
+fn until(what: &str, done: impl Fn() -> bool) {
     let real = Monotonic::shared();
     let limit = real.now() + Nanos::from_secs(20);
-    while !clock.is_settled(1) {
-        assert!(real.now() < limit, "it does not come to rest");
+    while !done() {
+        assert!(real.now() < limit, "waited in vain: {what}");
         yield_now();
     }
 }
 
-/// Runs a call whose end comes of itself.
-fn run(call: &mut Call<TcpStream>, speaker: &mut Speaker) -> String {
-    let (mut port, ..) = port();
-    let ended = call.run(speaker, &mut port, &Stop::new());
-    ended.expect_err("it ends").to_string()
+/// Waits until the other thread waits for nothing but the clock and its socket.
+#[track_caller]
+fn settle(clock: &Manual) {
+    until("it comes to rest", || clock.is_settled(1));
+}
+
+/// Stops a call also when the test fails, so that it ends.
+struct Stopping<'a>(&'a Stop);
+
+impl Drop for Stopping<'_> {
+    fn drop(&mut self) {
+        self.0.stop();
+    }
+}
+
+/// Runs a call whose end comes of itself, after `act`; returns why.
+fn run(call: &mut Call<TcpStream>, speaker: &mut Speaker, act: impl FnOnce(&Manual)) -> String {
+    let (mut port, clock, _) = port();
+    let stop = Stop::new();
+    let ended = scope(|scope| {
+        let _stopping = Stopping(&stop);
+        let thread = scope.spawn(|| call.run(speaker, &mut port, &stop));
+        act(&clock);
+        until("it ends", || thread.is_finished());
+        thread.join().expect("no panic")
+    });
+    ended.expect_err("it ends by itself").to_string()
 }
 
 #[test]
@@ -147,7 +168,7 @@ fn a_peer_that_closes_has_left_after_all_it_said() {
     let (mut call, mut peer) = connected();
     peer.write_all(&[7, 8]).expect("room");
     drop(peer);
-    let error = run(&mut call, &mut Speaker::default());
+    let error = run(&mut call, &mut Speaker::default(), |_| ());
     assert!(error.contains("after [7, 8]"), "{error}");
 }
 
@@ -157,26 +178,22 @@ fn a_connection_that_is_reset_is_broken() {
     let now = Some(Duration::ZERO);
     SockRef::from(&peer).set_linger(now).expect("an option");
     drop(peer);
-    let error = run(&mut call, &mut Speaker::default());
+    let error = run(&mut call, &mut Speaker::default(), |_| ());
     assert!(error.contains("broke (ConnectionReset)"), "{error}");
 }
 
 #[test]
 fn a_peer_that_says_nothing_is_waited_for_until_the_deadline() {
     let (mut call, _peer) = connected();
-    let (mut port, clock, _) = port();
     let mut speaker = Speaker {
         deadline: SECOND,
         limit: SECOND,
         ..Speaker::default()
     };
-    let ended = scope(|scope| {
-        let thread = scope.spawn(|| call.run(&mut speaker, &mut port, &Stop::new()));
-        settle(&clock);
+    let error = run(&mut call, &mut speaker, |clock| {
+        settle(clock);
         clock.advance(SECOND);
-        thread.join().expect("no panic")
     });
-    let error = ended.expect_err("it ends").to_string();
     assert!(error.contains("silent at 1s"), "{error}");
 }
 
@@ -210,11 +227,17 @@ fn what_the_peer_does_not_take_waits_for_it_and_nothing_is_lost() {
     let (mut call, mut peer) = connected();
     let (mut port, ..) = port();
     // More than the system takes while nobody reads.
-    let all: Vec<u8> = (0..32_000_000_u32)
+    let size = 64 * 1024;
+    let room = SockRef::from(call.stream()).set_send_buffer_size(size);
+    room.expect("an option");
+    let room = SockRef::from(&peer).set_recv_buffer_size(size);
+    room.expect("an option");
+    let all: Vec<u8> = (0..4_000_000_u32)
         .map(|index| index.to_be_bytes()[2])
         .collect();
     let mut speaker = Speaker {
         says: all.clone(),
+        turns: usize::MAX,
         ..Speaker::default()
     };
     let turned = call.turn(false, &mut speaker, &mut port);
@@ -223,6 +246,7 @@ fn what_the_peer_does_not_take_waits_for_it_and_nothing_is_lost() {
     assert!(!speaker.says.is_empty());
     let stop = Stop::new();
     let taken = scope(|scope| {
+        let _stopping = Stopping(&stop);
         let thread = scope.spawn(|| call.run(&mut speaker, &mut port, &stop));
         let mut taken = vec![0; all.len()];
         peer.read_exact(&mut taken).expect("all of it");
@@ -242,6 +266,7 @@ fn a_stop_ends_the_wait_and_the_peer_gets_a_proper_end() {
     let (mut port, clock, _) = port();
     let stop = Stop::new();
     scope(|scope| {
+        let _stopping = Stopping(&stop);
         let thread = scope.spawn(|| call.run(&mut Speaker::default(), &mut port, &stop));
         settle(&clock);
         stop.stop();
@@ -261,7 +286,7 @@ fn a_deadline_in_the_past_means_at_once() {
         turns: 5,
         ..Speaker::default()
     };
-    let error = run(&mut call, &mut speaker);
+    let error = run(&mut call, &mut speaker, |_| ());
     assert!(error.contains("talked enough"), "{error}");
 }
 

@@ -20,7 +20,7 @@ use tickbus::driver_cfg::{Asked, Config};
 use tickbus::fieldbus::Role;
 use tickbus::plc::Program;
 use tickbus::programs::{Mirror, Reaction};
-use tickbus::time::{Clock, Monotonic, Nanos, Pace, Spans, Stop};
+use tickbus::time::{Clock, Histogram, Monotonic, Nanos, Pace, Stop};
 
 /// Bytes from the PLC and to it: %Q and %I.
 const REQUEST: usize = 360;
@@ -114,7 +114,7 @@ fn ping_pong(exchanges: usize) -> f64 {
         }
     });
     let (request, mut answer) = ([0; REQUEST], [0; ANSWER]);
-    let mut spans = Spans::new();
+    let mut spans = Histogram::new();
     for _ in 0..exchanges {
         let begin = Instant::now();
         client.write_all(&request).expect("the server reads");

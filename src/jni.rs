@@ -36,7 +36,7 @@ use handles::Handles;
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
 
 /// How long closing waits for the log to reach stderr.
-const LAST_WORDS: Nanos = Nanos::from_millis(100);
+const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
 
 /// Called by the JVM when it loads the library.
 ///
@@ -117,7 +117,7 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
     env.with_env(|_| {
         let closed = DRIVERS.close(handle, Device::close);
         // The process may end right after this, and the driver's messages must not be lost.
-        tickbus_base::os::flush_log(LAST_WORDS);
+        tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
         closed.map_err(Failure::plain)
     })
     .resolve::<ThrowFieldbusException>();
@@ -222,7 +222,10 @@ fn initialize(
     let place = DRIVERS.reserve().map_err(|code| {
         Failure::coded(
             code,
-            format!("{} drivers are open, and that is the most", handles::PLACES),
+            format!(
+                "{} drivers are open, and that is the most",
+                handles::MAX_DRIVERS
+            ),
         )
     })?;
     let path = driver_cfg.try_to_string(env)?;

@@ -8,7 +8,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use tickbus_bus_modbus::{
-    Abilities, Fault, Identification, Map, PDU_LIMIT, Piece, Query, Side, Spot, Table, Tables,
+    Capabilities, AnswerError, Identification, Map, PDU_LIMIT, Piece, Request, Side, TagAddress, Table, Tables,
     answer, queries,
 };
 
@@ -19,10 +19,10 @@ fuzz_target!(|data: &[u8]| {
     let Some((&[flags, gap, reads, writes], rest)) = data.split_first_chunk::<4>() else {
         return;
     };
-    let able = Abilities {
+    let able = Capabilities {
         many_coils: flags & 2 == 0,
         many_registers: flags & 4 == 0,
-        ..Abilities::new(flags & 1 == 1, usize::from(gap) * 16)
+        ..Capabilities::new(flags & 1 == 1, usize::from(gap) * 16)
     };
     let (reads, rest) = pieces(usize::from(reads % 64), rest, false);
     let (writes, mut answers) = pieces(usize::from(writes % 64), rest, true);
@@ -43,7 +43,7 @@ fuzz_target!(|data: &[u8]| {
             Ok(()) => assert_eq!(pdu[0], request[0]),
             Err(fault) => {
                 assert_eq!(receives, before, "what is refused brings nothing");
-                if let Fault::Refused(_) = fault {
+                if let AnswerError::Refused(_) = fault {
                     assert_eq!(pdu[0], request[0] | 0x80);
                 }
             }
@@ -53,7 +53,7 @@ fuzz_target!(|data: &[u8]| {
 
 /// A valid address is also valid in the notation used in messages.
 fn address(text: &str) {
-    let Ok(spot) = text.parse::<Spot>() else {
+    let Ok(spot) = text.parse::<TagAddress>() else {
         return;
     };
     let place = spot.place;
@@ -65,7 +65,7 @@ fn address(text: &str) {
         format!("{element}:{}", place.offset + 1),
         format!("{}{:05}", place.table.digit(), place.offset + 1),
     ] {
-        assert_eq!(same.parse::<Spot>().map(|spot| spot.place), Ok(place));
+        assert_eq!(same.parse::<TagAddress>().map(|spot| spot.place), Ok(place));
     }
 }
 
@@ -122,7 +122,7 @@ fn length(pieces: &[Piece]) -> usize {
 }
 
 /// Our server accepts every request, and only what the query says changes in it.
-fn serve(query: &Query, request: &[u8], receives: &mut [u8]) {
+fn serve(query: &Request, request: &[u8], receives: &mut [u8]) {
     let mut holds = vec![0x55; 0x1_0000];
     let mut tables = Tables {
         map: Map {
@@ -145,7 +145,7 @@ fn serve(query: &Query, request: &[u8], receives: &mut [u8]) {
     };
     let width = write.table.width();
     let all = write.span.first * width..write.span.end() * width;
-    let is_masked = matches!(query, Query::Mask(_));
+    let is_masked = matches!(query, Request::Mask(_));
     let is_own = |bit: usize| {
         let mut own = write.pieces.iter();
         if is_masked {

@@ -6,7 +6,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use tickbus_driver_cfg::Config;
-use tickbus_import::{Reading, import};
+use tickbus_import::{ImportOptions, import};
 use tickbus_image::signal::Addressing;
 
 fuzz_target!(|data: &[u8]| {
@@ -17,7 +17,7 @@ fuzz_target!(|data: &[u8]| {
     if bytes.first() != Some(&b'<') {
         return;
     }
-    let reading = Reading {
+    let reading = ImportOptions {
         addressing: if choice & 1 == 0 {
             Addressing::Bytes
         } else {

@@ -9,7 +9,7 @@ use libfuzzer_sys::fuzz_target;
 use tickbus_driver_cfg::Config;
 use tickbus_bus_s7::item;
 use tickbus_bus_s7::pdu::{Pdu, function};
-use tickbus_bus_s7::{Frames, News, Terms, Tsap, transport};
+use tickbus_bus_s7::{Frames, SessionEvent, ConnectionParameters, Tsap, transport};
 use tickbus_driver_cfg::Options;
 use tickbus_fieldbus::Role;
 use tickbus_base::time::Nanos;
@@ -36,7 +36,7 @@ fuzz_target!(|data: &[u8]| {
     let Some((choice, mut pieces)) = data.split_first() else {
         return;
     };
-    let terms = Terms {
+    let terms = ConnectionParameters {
         calling: Tsap::new(&[1, 0]),
         called: Tsap::of_slot(0, 1),
         pdu: 960,
@@ -53,13 +53,13 @@ fuzz_target!(|data: &[u8]| {
         loop {
             match dialog.hear(now, bytes) {
                 Ok(None) => break,
-                Ok(Some(News::Met(..))) => dialog.allow(choice & 2 == 0),
-                Ok(Some(News::Done)) => {
+                Ok(Some(SessionEvent::Met(..))) => dialog.allow(choice & 2 == 0),
+                Ok(Some(SessionEvent::Done)) => {
                     assert!(dialog.is_idle());
                     let is_refused = dialog.refusal(0).is_some();
                     dialog.suspend(0, is_refused);
                 }
-                Ok(Some(News::State(_))) => assert!(dialog.is_idle()),
+                Ok(Some(SessionEvent::State(_))) => assert!(dialog.is_idle()),
                 Err(end) => {
                     assert!(!end.into_error("peer").to_string().is_empty());
                     return;

@@ -8,11 +8,11 @@
 use std::ops::Range;
 
 use libfuzzer_sys::fuzz_target;
-use tickbus_bus_s7::item::{Code, Object};
+use tickbus_bus_s7::item::{ReturnCode, Object};
 use tickbus_bus_s7::szl::{Facts, Identity};
 use tickbus_bus_s7::pdu::Pdu;
 use tickbus_bus_s7::transport::{self, Tpdu};
-use tickbus_bus_s7::{Conversation, Fault, Memory};
+use tickbus_bus_s7::{ServerSession, ProtocolError, Memory};
 use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: (u8, &[u8])| {
@@ -29,24 +29,24 @@ struct Bytes {
 }
 
 impl Memory for Bytes {
-    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], ReturnCode> {
         let all = match object {
             Object::Inputs => &self.inputs[..],
             Object::Outputs | Object::Block(1) => &self.outputs[..],
-            _ => return Err(Code::MISSING),
+            _ => return Err(ReturnCode::MISSING),
         };
-        all.get(range).ok_or(Code::ADDRESS)
+        all.get(range).ok_or(ReturnCode::ADDRESS)
     }
 
-    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], Code> {
+    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], ReturnCode> {
         match object {
-            Object::Outputs | Object::Block(1) => self.outputs.get_mut(range).ok_or(Code::ADDRESS),
-            Object::Inputs => Err(Code::ACCESS),
-            _ => Err(Code::MISSING),
+            Object::Outputs | Object::Block(1) => self.outputs.get_mut(range).ok_or(ReturnCode::ADDRESS),
+            Object::Inputs => Err(ReturnCode::ACCESS),
+            _ => Err(ReturnCode::MISSING),
         }
     }
 
-    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, Code> {
+    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, ReturnCode> {
         assert!(bit < 8);
         Ok(&mut self.write(object, byte..byte + 1)?[0])
     }
@@ -59,8 +59,8 @@ impl Memory for Bytes {
 }
 
 /// All answers to `bytes`, passed in pieces of `piece` bytes, and how it ended.
-fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<Fault>) {
-    let mut conversation = Conversation::default();
+fn talk(bytes: &[u8], piece: usize) -> (Vec<u8>, Option<ProtocolError>) {
+    let mut conversation = ServerSession::default();
     let mut memory = Bytes { outputs: [0; 64], inputs: [7; 700] };
     let facts = Facts { identity: Identity::of_driver("fuzz"), pdu: 480, clients: 1, epoch: Facts::NEVER_SET };
     let (mut begun, mut answers) = (Vec::new(), Vec::new());

@@ -6,7 +6,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus_bus_socket::{Sending, Session, Terms};
+use tickbus_bus_socket::{Sending, Session, SessionParameters};
 use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: &[u8]| {
@@ -15,11 +15,11 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-fn terms(data: &[u8]) -> Option<(Terms, &[u8])> {
+fn terms(data: &[u8]) -> Option<(SessionParameters, &[u8])> {
     let (header, operations) = data.split_first_chunk::<7>()?;
     let [sending, cycle, least, age, receives, sends, wide] = *header;
     let wide = 1 + usize::from(wide) * 8;
-    let terms = Terms {
+    let terms = SessionParameters {
         sending: [Sending::Cyclic, Sending::OnChange, Sending::Reply][usize::from(sending) % 3],
         cycle: Nanos(1 + i64::from(cycle)),
         min_interval: Nanos(i64::from(least)),
@@ -31,7 +31,7 @@ fn terms(data: &[u8]) -> Option<(Terms, &[u8])> {
 }
 
 struct Run {
-    terms: Terms,
+    terms: SessionParameters,
     session: Session,
     now: Nanos,
     /// Everything received, and the records extracted from it.
@@ -43,7 +43,7 @@ struct Run {
 }
 
 impl Run {
-    fn new(terms: Terms) -> Self {
+    fn new(terms: SessionParameters) -> Self {
         let (heard, records, said) = (Vec::new(), Vec::new(), Vec::new());
         let session = Session::new(terms, Nanos::ZERO);
         Self { terms, session, now: Nanos::ZERO, heard, records, said, image: 0 }
@@ -116,7 +116,7 @@ impl Run {
         self.speak(usize::MAX);
         // Every ending can be put into words.
         let _ = self.session.left().of("peer").to_string();
-        let Terms { receives, sends, sending, .. } = self.terms;
+        let SessionParameters { receives, sends, sending, .. } = self.terms;
         if receives > 0 {
             let whole = self.heard.len() / receives * receives;
             assert_eq!(self.records, self.heard[..whole], "the records are the stream, cut");

@@ -6,14 +6,14 @@
 
 use libfuzzer_sys::fuzz_target;
 use tickbus_driver_cfg::Config;
-use tickbus_import::{Client, Reading, import};
+use tickbus_import::{Client, ImportOptions, import};
 use tickbus_image::signal::Addressing;
 
 fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else {
         return;
     };
-    let reading = Reading {
+    let reading = ImportOptions {
         addressing: if choice & 1 == 0 {
             Addressing::Bytes
         } else {

@@ -9,7 +9,7 @@ use super::Outcome;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::Host;
 use tickbus_driver_cfg::{Asked, Config};
-use tickbus_fieldbus::faults::{Injected, Phase};
+use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_plc::Program;
 use tickbus_record as record;
@@ -219,12 +219,12 @@ struct ToldFaults(Vec<(u64, Phase)>);
 
 impl ToldFaults {
     /// Reports every fault that has begun or ended since the last call.
-    fn tell(&mut self, title: &str, faults: Vec<Injected>, text: &mut String) {
+    fn tell(&mut self, title: &str, faults: Vec<FaultStatus>, text: &mut String) {
         self.0.resize(faults.len(), (0, Phase::Waiting));
         for (told, fault) in self.0.iter_mut().zip(faults) {
             let is = (fault.begun, fault.phase);
             if std::mem::replace(told, is) != is {
-                let Injected { name, what, .. } = fault;
+                let FaultStatus { name, what, .. } = fault;
                 let (state, begun) = (fault.phase.name(), fault.begun);
                 // Writing to a string cannot fail.
                 let _ = writeln!(

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use super::Outcome;
 use tickbus_base::toml_text::{Mistake, Mistakes};
 use tickbus_image::signal::Addressing;
-use tickbus_import::{Client, Imported, Reading, import};
+use tickbus_import::{Client, ImportOptions, Imported, import};
 
 /// Make a driver.cfg from a list of PLC tags: name, address, type, comment.
 ///
@@ -101,7 +101,7 @@ fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
     import(
         &file,
         &bytes,
-        Reading {
+        ImportOptions {
             addressing,
             lenient: arguments.lenient,
             client: arguments.bus,

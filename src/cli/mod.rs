@@ -69,7 +69,7 @@ impl From<Outcome> for ExitCode {
 }
 
 /// How long the process waits at its end for the log to reach stderr.
-const LAST_WORDS: Nanos = Nanos::from_secs(1);
+const LOG_FLUSH_LIMIT: Nanos = Nanos::from_secs(1);
 
 /// Runs the command with the arguments of the process.
 pub fn main() -> ExitCode {
@@ -88,6 +88,6 @@ pub fn main() -> ExitCode {
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),
     };
-    tickbus_base::os::flush_log(LAST_WORDS);
+    tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
     outcome.into()
 }

@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         Err(error) => {
             eprintln!("plc: {error}");
             // A wrong name is a mistake on the command line; a wrong file is wrong input.
-            return if plc::Hosted::is_path(&arguments.program) {
+            return if plc::HostedProgram::is_path(&arguments.program) {
                 Outcome::WrongInput
             } else {
                 Outcome::Usage

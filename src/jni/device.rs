@@ -7,7 +7,7 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver::{Driver, Exchange, Snapshot};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::faults::{Board, Fault, Injected};
+use tickbus_fieldbus::faults::{Fault, FaultBoard, FaultStatus};
 use tickbus_image::Event;
 
 use super::shared::{NO_TIME, Shared, Word};
@@ -19,10 +19,10 @@ pub(super) const EVENTS: usize = 64;
 pub(super) const EVENT_WORDS: usize = 3;
 
 /// The injected faults, one per line: number, state, how often begun, kind, name, effect; separated by tabs.
-pub(super) fn faults(board: &Board) -> String {
+pub(super) fn faults(board: &FaultBoard) -> String {
     let mut text = String::new();
     for fault in board.list() {
-        let Injected {
+        let FaultStatus {
             id,
             phase,
             begun,
@@ -123,7 +123,7 @@ impl<K> Device<K> {
     }
 
     /// Where the injected faults publish their state.
-    pub(super) fn board(&self) -> Arc<Board> {
+    pub(super) fn board(&self) -> Arc<FaultBoard> {
         Arc::clone(self.driver.board())
     }
 

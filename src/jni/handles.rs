@@ -17,11 +17,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tickbus_driver::{Code, panic_text};
 
 /// How many drivers can be open in one process at once.
-pub(super) const PLACES: usize = 64;
+pub(super) const MAX_DRIVERS: usize = 64;
 
 /// A handle's low bits are the index, the rest the generation.
 const INDEX_BITS: u32 = 8;
-const _: () = assert!(PLACES <= 1 << INDEX_BITS);
+const _: () = assert!(MAX_DRIVERS <= 1 << INDEX_BITS);
 
 /// A place's word: its generation, and in the low bits one of the states below.
 const STATE_BITS: u32 = 2;
@@ -54,7 +54,7 @@ struct Content<T> {
 }
 
 /// A table of tenants of type `T`.
-pub(super) struct Handles<T, const N: usize = PLACES> {
+pub(super) struct Handles<T, const N: usize = MAX_DRIVERS> {
     places: [HandleEntry<T>; N],
 }
 

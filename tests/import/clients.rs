@@ -1,7 +1,7 @@
 //! Tag lists of clients, PLC4X and KEPServer: their addresses go to `[fieldbus.at]`.
 
 use tickbus::driver_cfg::Config;
-use tickbus::import::{Client, Reading, import};
+use tickbus::import::{Client, ImportOptions, import};
 
 use crate::{read, signals, told};
 
@@ -114,9 +114,9 @@ fn an_address_of_either_bus_is_read_as_the_one_that_is_asked_for() {
     let text = "name;address;type\nLevel;%MW20;INT\n";
     assert!(told(text).contains("--bus s7-client"), "{}", told(text));
     for client in [Client::S7, Client::Modbus] {
-        let reading = Reading {
+        let reading = ImportOptions {
             client: Some(client),
-            ..Reading::default()
+            ..ImportOptions::default()
         };
         let imported = import("tags.csv", text.as_bytes(), reading).expect("a list");
         let config = Config::parse("driver.cfg", &imported.text).expect("right");
@@ -154,9 +154,9 @@ fn wrong_addresses_types_and_directions_of_a_client_are_told_with_their_places()
 
 /// The positions and messages of lines that are left out when wrong lines may be.
 fn left_out(text: &str) -> Vec<String> {
-    let reading = Reading {
+    let reading = ImportOptions {
         lenient: true,
-        ..Reading::default()
+        ..ImportOptions::default()
     };
     let imported = import("tags.csv", text.as_bytes(), reading).expect("the rest");
     let skipped = imported.skipped.iter();

@@ -13,7 +13,7 @@ use std::process::{Command, Output};
 use proptest::prelude::*;
 use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
-use tickbus::import::{Imported, Reading, import};
+use tickbus::import::{ImportOptions, Imported, import};
 
 fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -33,7 +33,7 @@ fn err(output: &Output) -> String {
 }
 
 fn read(text: &str) -> Imported {
-    import("tags.csv", text.as_bytes(), Reading::default())
+    import("tags.csv", text.as_bytes(), ImportOptions::default())
         .unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
@@ -55,7 +55,7 @@ fn signals(imported: &Imported) -> Vec<(String, String, String)> {
 }
 
 fn told(text: &str) -> String {
-    import("tags.csv", text.as_bytes(), Reading::default())
+    import("tags.csv", text.as_bytes(), ImportOptions::default())
         .expect_err("mistakes")
         .to_string()
 }
@@ -159,9 +159,9 @@ fn every_wrong_table_has_exactly_its_mistakes() {
 fn lines_with_mistakes_are_left_out_when_asked_for() {
     let text = "a;%I0.0;Bool\nb;%I0.0;Bool\nc;%I0.9;Bool\nd;%M0.0;Bool\ne;%IW2;Int\n";
     assert_eq!(told(text).lines().count(), 2);
-    let reading = Reading {
+    let reading = ImportOptions {
         lenient: true,
-        ..Reading::default()
+        ..ImportOptions::default()
     };
     let imported = import("tags.csv", text.as_bytes(), reading).expect("the rest");
     let lines: Vec<usize> = imported
@@ -228,7 +228,7 @@ fn assert_same_of(config: &Config, target: Target) {
     if config.table.signals.is_empty() {
         return;
     }
-    let imported = import(&tags.name, tags.text.as_bytes(), Reading::default())
+    let imported = import(&tags.name, tags.text.as_bytes(), ImportOptions::default())
         .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", tags.text));
     let mut read = signals(&imported);
     let mut expected: Vec<_> = config
@@ -278,9 +278,9 @@ proptest! {
 
 fn assert_sound(bytes: &[u8]) {
     for lenient in [false, true] {
-        let reading = Reading {
+        let reading = ImportOptions {
             lenient,
-            ..Reading::default()
+            ..ImportOptions::default()
         };
         if let Ok(imported) = import("tags.csv", bytes, reading) {
             let config = Config::parse("driver.cfg", &imported.text);

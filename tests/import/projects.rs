@@ -1,16 +1,17 @@
 //! PLCopen XML and L5X.
 
-use tickbus::import::{Imported, Reading, import};
+use tickbus::import::{ImportOptions, Imported, import};
 
 use crate::signals;
 
 fn read(file: &str, text: &str) -> Imported {
-    import(file, text.as_bytes(), Reading::default())
+    import(file, text.as_bytes(), ImportOptions::default())
         .unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
 fn told(text: &str) -> String {
-    let wrong = import("plant.xml", text.as_bytes(), Reading::default()).expect_err("mistakes");
+    let wrong =
+        import("plant.xml", text.as_bytes(), ImportOptions::default()).expect_err("mistakes");
     wrong.to_string()
 }
 

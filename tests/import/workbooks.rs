@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 
-use tickbus::import::{Imported, Reading, import};
+use tickbus::import::{ImportOptions, Imported, import};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -135,7 +135,7 @@ const TIA: &[&[&str]] = &[
 ];
 
 fn read(bytes: &[u8]) -> Result<Imported, String> {
-    import("tags.xlsx", bytes, Reading::default()).map_err(|mistakes| mistakes.to_string())
+    import("tags.xlsx", bytes, ImportOptions::default()).map_err(|mistakes| mistakes.to_string())
 }
 
 #[test]

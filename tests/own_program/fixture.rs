@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use tempfile::TempDir;
-use tickbus::plc::{Hosted, Program, Scan};
+use tickbus::plc::{HostedProgram, Program, Scan};
 use tickbus::time::Nanos;
 
 /// Compiles C files in tests/plc, with the named ones of plc/glue, to a shared object in `folder`.
@@ -58,7 +58,7 @@ pub(crate) const IEC: (&str, &str) = ("addressing", "iec");
 
 /// A program with its image.
 pub(crate) struct Cpu {
-    pub(crate) program: Hosted,
+    pub(crate) program: HostedProgram,
     pub(crate) inputs: [u8; 10],
     pub(crate) outputs: [u8; 16],
     pub(crate) now: Nanos,
@@ -67,7 +67,7 @@ pub(crate) struct Cpu {
 
 impl Cpu {
     pub(crate) fn load(path: &Path, pairs: &[(&str, &str)]) -> Self {
-        let program = Hosted::load(path, &options(pairs));
+        let program = HostedProgram::load(path, &options(pairs));
         Self {
             program: program.unwrap_or_else(|error| panic!("{error}")),
             inputs: [0; 10],

@@ -10,7 +10,7 @@ use std::process::Command;
 use fixture::{Cpu, IEC, by_hand, compile, folder, options};
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
-use tickbus::plc::{self, Hosted, Program};
+use tickbus::plc::{self, HostedProgram, Program};
 use tickbus::programs;
 use tickbus::signal::{Addressing, Slot};
 use tickbus::time::{Manual, Nanos};
@@ -224,20 +224,26 @@ fn programs_with_something_wrong_are_refused_with_what_would_be_right() {
             &["tests/plc/wrong.c"],
             &[&format!("-DMISTAKE={mistake}")],
         );
-        let error = Hosted::load(&path, &[]).expect_err(mistake).to_string();
+        let error = HostedProgram::load(&path, &[])
+            .expect_err(mistake)
+            .to_string();
         let start = format!("the PLC program \"{}\" {says}", path.display());
         assert!(error.starts_with(&start), "{mistake}: {error}");
     }
     let folder = folder();
     let path = compile(folder.path(), &["tests/plc/wrong.c"], &["-DMISTAKE=GOOD"]);
-    Hosted::load(&path, &[]).expect("nothing is wrong with the rest of it");
+    HostedProgram::load(&path, &[]).expect("nothing is wrong with the rest of it");
 }
 
 #[test]
 #[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
 fn files_that_cannot_be_loaded_are_refused_with_what_they_lack() {
     let folder = folder();
-    let refusal = |path: &Path| Hosted::load(path, &[]).expect_err("refused").to_string();
+    let refusal = |path: &Path| {
+        HostedProgram::load(path, &[])
+            .expect_err("refused")
+            .to_string()
+    };
     let without = compile(
         folder.path(),
         &["tests/plc/wrong.c"],
@@ -655,7 +661,7 @@ fn the_glue_takes_every_type_and_the_loader_names_those_that_have_no_place() {
         let here = format!("-I{}", folder.path().display());
         let sources = [source.to_str().expect("text"), "plc/glue/tickbus_plc.c"];
         let path = compile(folder.path(), &sources, &[&here]);
-        match (Hosted::load(&path, &[]), data_type) {
+        match (HostedProgram::load(&path, &[]), data_type) {
             (Err(error), "TIME" | "DATE" | "TOD" | "DT" | "STRING") => {
                 assert!(
                     error

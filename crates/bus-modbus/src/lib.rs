@@ -1,7 +1,7 @@
 //! Modbus over TCP and, as RTU, over a serial line; server and client.
 //!
 //! The codec knows no port and no image: [`answer()`] is the server's half, which takes a request and makes
-//! the answer using [`Tables`]; [`Query`] is the client's half. [`mbap`] and [`rtu`] frame their PDUs as
+//! the answer using [`Tables`]; [`Request`] is the client's half. [`mbap`] and [`rtu`] frame their PDUs as
 //! telegrams.
 //!
 //! The codec can be used without the rest. A server answers from bytes of its own:
@@ -28,40 +28,40 @@
 //!     answer(telegram.pdu, &mut tables, &who, pdu)
 //! });
 //! assert_eq!(reply, [0, 7, 0, 0, 0, 5, 1, 4, 2, 0x12, 0x34]);
-//! # Ok::<(), mbap::NoTelegram>(())
+//! # Ok::<(), mbap::TelegramError>(())
 //! ```
 
 mod answer;
 mod client;
+mod element_address;
 mod function;
 mod identification;
 mod kind;
 mod line;
 pub mod mbap;
-mod place;
 pub mod rtu;
 #[cfg(unix)]
 mod serial;
 mod server;
 mod shown;
-mod spot;
 mod stations;
 mod table;
 mod tables;
+mod tag_address;
 
 pub use answer::{Done, answer, refuse};
 pub use client::{
-    Abilities, Block, ClientOptions, Fault, ModbusClient, Piece, Query, Region, queries,
+    AnswerError, Block, Capabilities, ClientOptions, ModbusClient, Piece, Region, Request, queries,
 };
+pub use element_address::{ElementAddress, ElementAddressError};
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;
 pub use line::{Line, Serial};
-pub use place::{Place, PlaceError};
 pub use server::{ModbusServer, ServerOptions};
-pub use spot::Spot;
 pub use stations::Stations;
 pub use table::{Span, Table, put_bits, take_bits};
 pub use tables::{Map, Side, Tables};
+pub use tag_address::TagAddress;
 
 /// The default holding register at which `%I` begins in a server, PLC or machine: behind the outputs except
 /// for very large ones, and where `OpenPLC` has its memory words.

@@ -21,7 +21,7 @@ pub struct Telegram<'a> {
 
 /// Why bytes are not a telegram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoTelegram {
+pub enum TelegramError {
     /// The protocol identifier is not that of Modbus.
     #[error("its header has the protocol {0}, and Modbus is 0; check that it speaks Modbus TCP")]
     Protocol(u16),
@@ -38,7 +38,7 @@ impl<'a> Telegram<'a> {
     /// # Errors
     ///
     /// The bytes cannot become a telegram.
-    pub fn parse(bytes: &'a [u8]) -> Result<Option<(Self, usize)>, NoTelegram> {
+    pub fn parse(bytes: &'a [u8]) -> Result<Option<(Self, usize)>, TelegramError> {
         let word = |at: usize| {
             let pair = bytes.get(at..at + 2)?;
             Some(u16::from_be_bytes([pair[0], pair[1]]))
@@ -46,14 +46,14 @@ impl<'a> Telegram<'a> {
         if let Some(protocol) = word(2)
             && protocol != 0
         {
-            return Err(NoTelegram::Protocol(protocol));
+            return Err(TelegramError::Protocol(protocol));
         }
         let Some(length) = word(4) else {
             return Ok(None);
         };
         let end = 6 + usize::from(length);
         if end <= HEADER || end > ADU_LIMIT {
-            return Err(NoTelegram::Length(length));
+            return Err(TelegramError::Length(length));
         }
         let Some(whole) = bytes.get(..end) else {
             return Ok(None);
@@ -116,12 +116,12 @@ mod tests {
     #[test]
     fn what_cannot_become_a_telegram_is_told_at_once() {
         for (bytes, expected) in [
-            (&[0, 1, 0, 1][..], NoTelegram::Protocol(1)),
-            (&[0, 1, 0x47, 0x45, 0, 6], NoTelegram::Protocol(0x4745)),
-            (&[0, 1, 0, 0, 0, 0], NoTelegram::Length(0)),
-            (&[0, 1, 0, 0, 0, 1], NoTelegram::Length(1)),
-            (&[0, 1, 0, 0, 0, 255], NoTelegram::Length(255)),
-            (&[0, 1, 0, 0, 0xFF, 0xFF], NoTelegram::Length(0xFFFF)),
+            (&[0, 1, 0, 1][..], TelegramError::Protocol(1)),
+            (&[0, 1, 0x47, 0x45, 0, 6], TelegramError::Protocol(0x4745)),
+            (&[0, 1, 0, 0, 0, 0], TelegramError::Length(0)),
+            (&[0, 1, 0, 0, 0, 1], TelegramError::Length(1)),
+            (&[0, 1, 0, 0, 0, 255], TelegramError::Length(255)),
+            (&[0, 1, 0, 0, 0xFF, 0xFF], TelegramError::Length(0xFFFF)),
         ] {
             assert_eq!(Telegram::parse(bytes), Err(expected));
         }

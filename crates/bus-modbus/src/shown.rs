@@ -3,7 +3,7 @@
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
-use super::{Block, ClientOptions, Place, Query, ServerOptions, Side, Table};
+use super::{Block, ClientOptions, ElementAddress, Request, ServerOptions, Side, Table};
 
 impl ServerOptions {
     /// What the line is and does, given the signal table.
@@ -22,13 +22,16 @@ impl ServerOptions {
         if bytes(Area::Input) > Some(0)
             && let Some(offset) = self.map(outputs).window
         {
-            parts.push(format!("%I also from {} on", Place { table, offset }));
+            parts.push(format!(
+                "%I also from {} on",
+                ElementAddress { table, offset }
+            ));
         }
         if outputs > 0 && self.input == Side::Sends {
             // A client that expects %I there would read plausible numbers: the outputs that it wrote itself.
             parts.push(format!(
                 "{} and the {} behind it are %Q: read, they give back what was written last",
-                Place { table, offset: 0 },
+                ElementAddress { table, offset: 0 },
                 table.elements(outputs) - 1
             ));
         }
@@ -112,7 +115,7 @@ impl ClientOptions {
                     continue;
                 };
                 let zeros = match query {
-                    Query::Mask(_) => 0,
+                    Request::Mask(_) => 0,
                     _ => write.zeros(),
                 };
                 let rest = match zeros {
@@ -147,7 +150,7 @@ fn place_in(block: Block, signal: &Signal) -> String {
     } else {
         byte / 2
     };
-    let place = Place {
+    let place = ElementAddress {
         table,
         offset: block.first + element,
     };

@@ -29,7 +29,7 @@ pub struct Map {
 
 /// Bits of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
+struct FrameBits {
     side: Side,
     bit: usize,
 }
@@ -57,7 +57,7 @@ impl Tables<'_> {
     }
 
     /// The bits of consecutive elements.
-    fn place(&self, table: Table, span: Span) -> Result<Place, Exception> {
+    fn place(&self, table: Table, span: Span) -> Result<FrameBits, Exception> {
         let input = self.map.input;
         let output = match input {
             Side::Sends => Side::Holds,
@@ -79,7 +79,7 @@ impl Tables<'_> {
             let behind = first + table.elements(self.len(side));
             if span.first >= first && span.end() <= behind {
                 let bit = (span.first - first) * table.width();
-                return Ok(Place { side, bit });
+                return Ok(FrameBits { side, bit });
             }
         }
         Err(Exception::ILLEGAL_DATA_ADDRESS)
@@ -118,7 +118,7 @@ impl Tables<'_> {
         span: Span,
         reply: &mut Vec<u8>,
     ) -> Result<Option<Range<usize>>, Exception> {
-        let Place { side, bit } = self.place(table, span)?;
+        let FrameBits { side, bit } = self.place(table, span)?;
         let frame = match side {
             Side::Sends => self.sends,
             Side::Holds => &*self.holds,

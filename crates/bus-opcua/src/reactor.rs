@@ -142,7 +142,7 @@ impl Reactor {
 
     /// A token that was woken before this wait would not wake it again.
     fn patience(&self, patience: Option<Duration>) -> Option<Duration> {
-        if self.stop.is_roused() {
+        if self.stop.is_woken() {
             Some(Duration::ZERO)
         } else {
             patience

@@ -101,7 +101,7 @@ impl Direct {
                 .insert(port.calling(&calls.load, limits.open, || Library::load(&setup.library))?),
         };
         let bus = port.calling(&calls.open, limits.open, || library.open(setup))?;
-        let mut line = Line {
+        let mut line = OpenBus {
             bus,
             timeout_ms: setup.timeout_ms,
             call: &calls.exchange,
@@ -119,14 +119,14 @@ impl Direct {
 }
 
 /// An open bus of the library.
-struct Line<'a> {
+struct OpenBus<'a> {
     bus: Bus<'a>,
     timeout_ms: u32,
     call: &'a Arc<str>,
     limit: Nanos,
 }
 
-impl Exchange for Line<'_> {
+impl Exchange for OpenBus<'_> {
     fn input(&mut self) -> &mut [u8] {
         self.bus.input()
     }

@@ -67,7 +67,7 @@ impl Free for Isolated {
         if !helper.open(self, stop)? {
             return Ok(());
         }
-        let mut line = Line {
+        let mut line = OpenBus {
             helper,
             setup,
             input: vec![0; setup.tx()].into(),
@@ -87,7 +87,7 @@ impl Free for Isolated {
 }
 
 /// A bus that is open in a helper.
-struct Line<'a> {
+struct OpenBus<'a> {
     helper: Helper,
     setup: &'a Setup,
     input: Box<[u8]>,
@@ -96,7 +96,7 @@ struct Line<'a> {
     limit: Nanos,
 }
 
-impl Exchange for Line<'_> {
+impl Exchange for OpenBus<'_> {
     fn input(&mut self) -> &mut [u8] {
         &mut self.input
     }

@@ -127,9 +127,9 @@ impl Element {
 
 /// The return code of one item.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Code(pub u8);
+pub struct ReturnCode(pub u8);
 
-impl Code {
+impl ReturnCode {
     /// Done.
     pub const OK: Self = Self(0xFF);
     /// The item must not be written, or not by this client.
@@ -158,13 +158,13 @@ impl Code {
     }
 }
 
-impl fmt::Debug for Code {
+impl fmt::Debug for ReturnCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{self}")
     }
 }
 
-impl fmt::Display for Code {
+impl fmt::Display for ReturnCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} (code 0x{:02X})", self.words(), self.0)
     }
@@ -218,27 +218,27 @@ impl Item {
         self.byte..self.byte + usize::from(self.count) * self.element.width()
     }
 
-    fn read(specification: &[u8]) -> Result<Self, Code> {
+    fn read(specification: &[u8]) -> Result<Self, ReturnCode> {
         let [ANY, element, c0, c1, b0, b1, area, a0, a1, a2] = *specification else {
-            return Err(Code::TYPE);
+            return Err(ReturnCode::TYPE);
         };
         let object = match area {
             0x81 => Object::Inputs,
             0x82 => Object::Outputs,
             0x83 => Object::Flags,
             0x84 => Object::Block(u16::from_be_bytes([b0, b1])),
-            _ => return Err(Code::MISSING),
+            _ => return Err(ReturnCode::MISSING),
         };
-        let element = Element::of(element).ok_or(Code::TYPE)?;
+        let element = Element::of(element).ok_or(ReturnCode::TYPE)?;
         let count = u16::from_be_bytes([c0, c1]);
         let address = u32::from_be_bytes([0, a0, a1, a2]);
         let [.., bit] = (address % 8).to_be_bytes();
         match (element, count, bit) {
-            (_, 0, _) => return Err(Code::ADDRESS),
+            (_, 0, _) => return Err(ReturnCode::ADDRESS),
             (Element::Bit, 1, _) => {}
-            (Element::Bit, ..) => return Err(Code::TYPE),
+            (Element::Bit, ..) => return Err(ReturnCode::TYPE),
             (_, _, 0) => {}
-            _ => return Err(Code::ADDRESS),
+            _ => return Err(ReturnCode::ADDRESS),
         }
         Ok(Self {
             object,
@@ -302,7 +302,7 @@ impl<'a> Addresses<'a> {
 }
 
 impl Iterator for Addresses<'_> {
-    type Item = Result<Item, Code>;
+    type Item = Result<Item, ReturnCode>;
 
     fn next(&mut self) -> Option<Self::Item> {
         let [_, length, rest @ ..] = self.0 else {
@@ -318,7 +318,7 @@ impl Iterator for Addresses<'_> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Datum<'a> {
     /// The return code; meaningless in a job that writes.
-    pub code: Code,
+    pub code: ReturnCode,
     /// The item's data.
     pub bytes: &'a [u8],
 }
@@ -355,21 +355,21 @@ impl<'a> Iterator for Data<'a> {
             rest => rest,
         };
         Some(Datum {
-            code: Code(code),
+            code: ReturnCode(code),
             bytes,
         })
     }
 }
 
 /// Appends the header for `bytes` bytes of an item's data.
-pub fn write_header(code: Code, element: Element, bytes: usize, out: &mut Vec<u8>) {
+pub fn write_header(code: ReturnCode, element: Element, bytes: usize, out: &mut Vec<u8>) {
     let (counted, count) = element.counted(bytes);
     let [high, low] = count.to_be_bytes();
     out.extend_from_slice(&[code.0, counted, high, low]);
 }
 
 /// Appends the data header of an item that cannot be read.
-pub fn write_refusal(code: Code, out: &mut Vec<u8>) {
+pub fn write_refusal(code: ReturnCode, out: &mut Vec<u8>) {
     out.extend_from_slice(&[code.0, 0, 0, 0]);
 }
 
@@ -378,7 +378,7 @@ mod tests {
     use super::*;
     use crate::hex;
 
-    fn read(text: &str) -> Result<Item, Code> {
+    fn read(text: &str) -> Result<Item, ReturnCode> {
         let bytes = hex(text);
         let mut all = Addresses::new(1, &bytes).expect("well made");
         all.next().expect("there is one")
@@ -406,14 +406,14 @@ mod tests {
     #[test]
     fn what_an_address_cannot_be_has_its_code() {
         for (text, code) in [
-            ("12 0a 10 02 0000 0001 84 000000", Code::ADDRESS),
-            ("12 0a 10 02 0001 0001 84 000001", Code::ADDRESS),
-            ("12 0a 10 01 0002 0001 84 000001", Code::TYPE),
-            ("12 0a 10 01 0002 0001 84 000000", Code::TYPE),
-            ("12 0a 10 44 0001 0001 84 000000", Code::TYPE),
-            ("12 0a 10 02 0001 0000 1c 000000", Code::MISSING),
-            ("12 0a b2 02 0001 0000 84 000000", Code::TYPE),
-            ("12 00", Code::TYPE),
+            ("12 0a 10 02 0000 0001 84 000000", ReturnCode::ADDRESS),
+            ("12 0a 10 02 0001 0001 84 000001", ReturnCode::ADDRESS),
+            ("12 0a 10 01 0002 0001 84 000001", ReturnCode::TYPE),
+            ("12 0a 10 01 0002 0001 84 000000", ReturnCode::TYPE),
+            ("12 0a 10 44 0001 0001 84 000000", ReturnCode::TYPE),
+            ("12 0a 10 02 0001 0000 1c 000000", ReturnCode::MISSING),
+            ("12 0a b2 02 0001 0000 84 000000", ReturnCode::TYPE),
+            ("12 00", ReturnCode::TYPE),
         ] {
             assert_eq!(read(text), Err(code), "{text}");
         }
@@ -440,7 +440,7 @@ mod tests {
         let bytes = hex("ff 04 0018 010203 00 0a 00 0000 ff 09 0001 07");
         let data: Vec<_> = Data::new(3, &bytes).expect("three").collect();
         assert_eq!(data[0].bytes, [1, 2, 3]);
-        assert_eq!(data[1].code, Code::MISSING);
+        assert_eq!(data[1].code, ReturnCode::MISSING);
         assert_eq!(data[2].bytes, [7]);
         let filled = [&bytes[..], &[0]].concat();
         assert!(Data::new(3, &filled).is_some());
@@ -463,7 +463,7 @@ mod tests {
             (Element::Real, 8, "ff 07 0008"),
         ] {
             let mut out = Vec::new();
-            write_header(Code::OK, element, bytes, &mut out);
+            write_header(ReturnCode::OK, element, bytes, &mut out);
             assert_eq!(out, hex(header), "{element:?}");
             out.resize(DATA_HEADER + bytes, 0);
             let mut data = Data::new(1, &out).expect("well made");

@@ -1,6 +1,6 @@
 //! The protocol data units of S7 communication: a header, parameters, data.
 
-use super::Fault;
+use super::ProtocolError;
 pub use super::length::{LEAST, LONGEST, SHORTEST};
 
 const PROTOCOL: u8 = 0x32;
@@ -90,28 +90,30 @@ impl<'a> Pdu<'a> {
     /// # Errors
     ///
     /// It is not a PDU, or its lengths are inconsistent.
-    pub fn read(message: &'a [u8]) -> Result<Self, Fault> {
+    pub fn read(message: &'a [u8]) -> Result<Self, ProtocolError> {
         match message.first() {
             Some(&PROTOCOL) => {}
-            Some(&PLUS) => return Err(Fault::S7CommPlus),
-            Some(&other) => return Err(Fault::NoS7(other)),
-            None => return Err(Fault::Lengths),
+            Some(&PLUS) => return Err(ProtocolError::S7CommPlus),
+            Some(&other) => return Err(ProtocolError::NoS7(other)),
+            None => return Err(ProtocolError::Lengths),
         }
-        let header = message.first_chunk::<JOB_HEADER>().ok_or(Fault::Lengths)?;
+        let header = message
+            .first_chunk::<JOB_HEADER>()
+            .ok_or(ProtocolError::Lengths)?;
         let [_, kind, _, _, r0, r1, p0, p1, d0, d1] = *header;
         let kind = match kind {
             1 => Kind::Job,
             2 => Kind::Ack,
             3 => Kind::AckData,
             7 => Kind::UserData,
-            other => return Err(Fault::Kind(other)),
+            other => return Err(ProtocolError::Kind(other)),
         };
         let (parameters, data) = (u16::from_be_bytes([p0, p1]), u16::from_be_bytes([d0, d1]));
         let (header, body) = message
             .split_at_checked(kind.header())
-            .ok_or(Fault::Lengths)?;
+            .ok_or(ProtocolError::Lengths)?;
         if body.len() != usize::from(parameters) + usize::from(data) {
-            return Err(Fault::Lengths);
+            return Err(ProtocolError::Lengths);
         }
         let error = match header[JOB_HEADER..] {
             [class, code] => u16::from_be_bytes([class, code]),
@@ -196,17 +198,21 @@ mod tests {
         let bytes = hex("32 03 0000 0002 0002 0008 00 00 04 01 ff 04 0020 01020304 00");
         let whole = bytes.len() - 1;
         for cut in (0..=bytes.len()).filter(|cut| *cut != whole) {
-            assert_eq!(Pdu::read(&bytes[..cut]), Err(Fault::Lengths), "{cut}");
+            assert_eq!(
+                Pdu::read(&bytes[..cut]),
+                Err(ProtocolError::Lengths),
+                "{cut}"
+            );
         }
         assert!(Pdu::read(&bytes[..whole]).is_ok());
     }
 
     #[test]
     fn other_protocols_are_told_apart() {
-        assert_eq!(Pdu::read(&hex("72 01 00")), Err(Fault::S7CommPlus));
-        assert_eq!(Pdu::read(&hex("00 01 00")), Err(Fault::NoS7(0)));
+        assert_eq!(Pdu::read(&hex("72 01 00")), Err(ProtocolError::S7CommPlus));
+        assert_eq!(Pdu::read(&hex("00 01 00")), Err(ProtocolError::NoS7(0)));
         let kind = hex("32 05 0000 0001 0000 0000");
-        assert_eq!(Pdu::read(&kind), Err(Fault::Kind(5)));
+        assert_eq!(Pdu::read(&kind), Err(ProtocolError::Kind(5)));
     }
 
     #[test]

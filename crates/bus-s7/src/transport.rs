@@ -3,7 +3,7 @@
 //! Both directions, without I/O. A packet is a TPKT header of four bytes, which has the total length, and one
 //! transport protocol data unit (TPDU).
 
-use super::Fault;
+use super::ProtocolError;
 
 /// The port of ISO on TCP, on which every S7 CPU listens.
 pub const PORT: u16 = 102;
@@ -77,21 +77,21 @@ pub const SIZES: std::ops::RangeInclusive<u8> = 7..=13;
 /// # Errors
 ///
 /// The bytes are not ISO on TCP.
-pub fn read(bytes: &[u8]) -> Result<Option<(usize, Tpdu<'_>)>, Fault> {
+pub fn read(bytes: &[u8]) -> Result<Option<(usize, Tpdu<'_>)>, ProtocolError> {
     let Some(header) = bytes.first_chunk::<TPKT>() else {
         return match bytes.first() {
-            Some(&version) if version != VERSION => Err(Fault::NoIsoOnTcp(version)),
+            Some(&version) if version != VERSION => Err(ProtocolError::NoIsoOnTcp(version)),
             _ => Ok(None),
         };
     };
     let [version, _, high, low] = *header;
     if version != VERSION {
-        return Err(Fault::NoIsoOnTcp(version));
+        return Err(ProtocolError::NoIsoOnTcp(version));
     }
     let length = usize::from(u16::from_be_bytes([high, low]));
     // The shortest TPDU is a data TPDU without data.
     if !(DATA_HEADER..=LONGEST_PACKET).contains(&length) {
-        return Err(Fault::PacketLength(length));
+        return Err(ProtocolError::PacketLength(length));
     }
     let Some(packet) = bytes.get(TPKT..length) else {
         return Ok(None);
@@ -99,38 +99,38 @@ pub fn read(bytes: &[u8]) -> Result<Option<(usize, Tpdu<'_>)>, Fault> {
     Ok(Some((length, read_tpdu(packet)?)))
 }
 
-fn read_tpdu(packet: &[u8]) -> Result<Tpdu<'_>, Fault> {
-    let (&indicator, rest) = packet.split_first().ok_or(Fault::TransportHeader)?;
+fn read_tpdu(packet: &[u8]) -> Result<Tpdu<'_>, ProtocolError> {
+    let (&indicator, rest) = packet.split_first().ok_or(ProtocolError::TransportHeader)?;
     let header = usize::from(indicator);
     if header > rest.len() {
-        return Err(Fault::TransportHeader);
+        return Err(ProtocolError::TransportHeader);
     }
     let (header, data) = rest.split_at(header);
-    let (&code, fields) = header.split_first().ok_or(Fault::TransportHeader)?;
+    let (&code, fields) = header.split_first().ok_or(ProtocolError::TransportHeader)?;
     match code & 0xF0 {
         DATA if code == DATA => match fields {
             [number] => Ok(Tpdu::Data {
                 last: number & END != 0,
                 bytes: data,
             }),
-            _ => Err(Fault::TransportHeader),
+            _ => Err(ProtocolError::TransportHeader),
         },
         CONNECT_REQUEST => read_connect(fields).map(Tpdu::ConnectRequest),
         CONNECT_CONFIRM => read_connect(fields).map(Tpdu::ConnectConfirm),
         DISCONNECT_REQUEST => Ok(Tpdu::Disconnect(fields.get(4).copied().unwrap_or(0))),
         DISCONNECT_CONFIRM => Ok(Tpdu::Disconnect(0)),
         ERROR => Ok(Tpdu::Error(fields.get(2).copied().unwrap_or(0))),
-        _ => Err(Fault::TransportUnit(code)),
+        _ => Err(ProtocolError::TransportUnit(code)),
     }
 }
 
-fn read_connect(fields: &[u8]) -> Result<Connect<'_>, Fault> {
+fn read_connect(fields: &[u8]) -> Result<Connect<'_>, ProtocolError> {
     let (fixed, mut parameters) = fields
         .split_first_chunk::<5>()
-        .ok_or(Fault::TransportHeader)?;
+        .ok_or(ProtocolError::TransportHeader)?;
     let [to_high, to_low, from_high, from_low, class] = *fixed;
     if class & 0xF0 != 0 {
-        return Err(Fault::TransportClass(class >> 4));
+        return Err(ProtocolError::TransportClass(class >> 4));
     }
     let mut connect = Connect {
         source: u16::from_be_bytes([from_high, from_low]),
@@ -141,14 +141,14 @@ fn read_connect(fields: &[u8]) -> Result<Connect<'_>, Fault> {
     };
     while let [code, length, rest @ ..] = parameters {
         let Some((value, after)) = rest.split_at_checked(usize::from(*length)) else {
-            return Err(Fault::TransportHeader);
+            return Err(ProtocolError::TransportHeader);
         };
         parameters = after;
         match (*code, value) {
             (SIZE, [size]) if SIZES.contains(size) => connect.size = Some(*size),
-            (SIZE, _) => return Err(Fault::TransportHeader),
+            (SIZE, _) => return Err(ProtocolError::TransportHeader),
             (CALLING | CALLED, name) if name.len() > LONGEST_TSAP => {
-                return Err(Fault::TransportHeader);
+                return Err(ProtocolError::TransportHeader);
             }
             (CALLING, name) => connect.calling = name,
             (CALLED, name) => connect.called = name,
@@ -159,7 +159,7 @@ fn read_connect(fields: &[u8]) -> Result<Connect<'_>, Fault> {
     if parameters.is_empty() {
         Ok(connect)
     } else {
-        Err(Fault::TransportHeader)
+        Err(ProtocolError::TransportHeader)
     }
 }
 
@@ -309,26 +309,41 @@ mod tests {
     #[test]
     fn what_is_no_iso_on_tcp_is_told_at_its_first_byte() {
         for (bytes, fault) in [
-            ("47", Fault::NoIsoOnTcp(0x47)),
-            ("47 45 54 20", Fault::NoIsoOnTcp(0x47)),
-            ("03 00 00 06", Fault::PacketLength(6)),
-            ("03 00 ff ff", Fault::PacketLength(65_535)),
-            ("03 00 00 07 03 f0 80", Fault::TransportHeader),
-            ("03 00 00 07 00 f0 80", Fault::TransportHeader),
-            ("03 00 00 08 02 10 80 00", Fault::TransportUnit(0x10)),
-            ("03 00 00 08 02 f1 80 00", Fault::TransportUnit(0xF1)),
-            ("03 00 00 08 03 f0 80 00", Fault::TransportHeader),
-            ("03 00 00 0b 06 e0 0000 0001 40", Fault::TransportClass(4)),
+            ("47", ProtocolError::NoIsoOnTcp(0x47)),
+            ("47 45 54 20", ProtocolError::NoIsoOnTcp(0x47)),
+            ("03 00 00 06", ProtocolError::PacketLength(6)),
+            ("03 00 ff ff", ProtocolError::PacketLength(65_535)),
+            ("03 00 00 07 03 f0 80", ProtocolError::TransportHeader),
+            ("03 00 00 07 00 f0 80", ProtocolError::TransportHeader),
+            (
+                "03 00 00 08 02 10 80 00",
+                ProtocolError::TransportUnit(0x10),
+            ),
+            (
+                "03 00 00 08 02 f1 80 00",
+                ProtocolError::TransportUnit(0xF1),
+            ),
+            ("03 00 00 08 03 f0 80 00", ProtocolError::TransportHeader),
+            (
+                "03 00 00 0b 06 e0 0000 0001 40",
+                ProtocolError::TransportClass(4),
+            ),
             (
                 "03 00 00 0d 08 e0 0000 0001 00 c1 05",
-                Fault::TransportHeader,
+                ProtocolError::TransportHeader,
             ),
-            ("03 00 00 0c 07 e0 0000 0001 00 c1", Fault::TransportHeader),
+            (
+                "03 00 00 0c 07 e0 0000 0001 00 c1",
+                ProtocolError::TransportHeader,
+            ),
             (
                 "03 00 00 0e 09 e0 0000 0001 00 c0 01 0e",
-                Fault::TransportHeader,
+                ProtocolError::TransportHeader,
             ),
-            ("03 00 00 0a 05 e0 0000 0001", Fault::TransportHeader),
+            (
+                "03 00 00 0a 05 e0 0000 0001",
+                ProtocolError::TransportHeader,
+            ),
         ] {
             assert_eq!(read(&hex(bytes)), Err(fault), "{bytes}");
         }

@@ -1,6 +1,6 @@
 //! Userdata requests: status lists, the clock, and the list of blocks.
 
-use super::item::{self, Code};
+use super::item::{self, ReturnCode};
 use super::pdu::{Draft, JOB_HEADER, Kind, Pdu, error};
 use super::szl::{self, Facts};
 use tickbus_base::time::Nanos;
@@ -131,7 +131,7 @@ fn write_piece(reference: u16, mut whole: Rest, limit: usize, out: &mut Vec<u8>)
     };
     let mut draft = begin(reference, whole.of, sequence, more, error::NONE, out);
     draft.data(out);
-    item::write_header(Code::OK, item::Element::Char, whole.bytes.len(), out);
+    item::write_header(ReturnCode::OK, item::Element::Char, whole.bytes.len(), out);
     out.extend_from_slice(&whole.bytes);
     draft.end(out);
     more.then_some(Rest {
@@ -175,7 +175,7 @@ pub(super) fn refuse(pdu: &Pdu<'_>, error: u16, out: &mut Vec<u8>) {
     };
     let mut draft = begin(pdu.reference, of, [0, 0], false, error, out);
     draft.data(out);
-    item::write_refusal(Code::MISSING, out);
+    item::write_refusal(ReturnCode::MISSING, out);
     draft.end(out);
 }
 

@@ -5,8 +5,8 @@ use tickbus_fieldbus::tcp::{self, Address};
 use tickbus_fieldbus::{BusError, Port};
 
 use super::connection::{Connection, Transfer};
-use super::lines::Lines;
-use super::{Frames, Session, Terms};
+use super::connection_states::ConnectionStates;
+use super::{Frames, Session, SessionParameters};
 
 /// Connects, and serves the connection until it ends or `stop` comes.
 ///
@@ -15,7 +15,7 @@ use super::{Frames, Session, Terms};
 /// The peer does not answer, or the connection has ended.
 pub(super) fn connect(
     address: &Address,
-    terms: Terms,
+    terms: SessionParameters,
     frames: &mut Frames,
     port: &mut Port,
     stop: &Stop,
@@ -24,7 +24,7 @@ pub(super) fn connect(
     let Some((mut call, peer)) = tcp::dial(address, patience, port, stop)? else {
         return Ok(());
     };
-    let mut lines = Lines::new([String::new()].into_iter());
+    let mut lines = ConnectionStates::new([String::new()].into_iter());
     let reason = format!("connected with {peer}; waiting for its first record");
     lines.opening(0, &reason, port);
     frames.begin();

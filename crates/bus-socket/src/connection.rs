@@ -7,8 +7,8 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Port};
 
-use super::lines::Lines;
-use super::{Frames, Session, Terms};
+use super::connection_states::ConnectionStates;
+use super::{Frames, Session, SessionParameters};
 
 /// One connection.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub(super) struct Connection {
 
 impl Connection {
     /// A connection that was established just now.
-    pub(super) fn new(peer: SocketAddr, terms: Terms, port: &Port) -> Self {
+    pub(super) fn new(peer: SocketAddr, terms: SessionParameters, port: &Port) -> Self {
         log::debug!("connected with {peer}");
         Self {
             peer,
@@ -56,7 +56,7 @@ pub(super) struct Transfer<'a> {
     pub(super) connection: &'a mut Connection,
     pub(super) frames: &'a mut Frames,
     pub(super) line: usize,
-    pub(super) lines: &'a mut Lines,
+    pub(super) lines: &'a mut ConnectionStates,
 }
 
 impl Transfer<'_> {

@@ -9,10 +9,10 @@
 
 mod connect;
 mod connection;
-mod fault;
+mod connection_states;
+mod end_reason;
 mod frames;
 mod kind;
-mod lines;
 mod listen;
 mod options;
 mod parts;
@@ -25,12 +25,12 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
 
-pub use fault::Fault;
+pub use end_reason::EndReason;
 use frames::Frames;
 pub use options::{Message, Options, TcpRole};
 pub use parts::Parts;
 pub use record::{Partial, Records};
-pub use session::{Sending, Session, Terms};
+pub use session::{Sending, Session, SessionParameters};
 
 /// The bus of kind `socket`: TCP connections, initiated by this end or the other; a single one, or one per
 /// station.
@@ -78,7 +78,11 @@ impl Socket {
         }
     }
 
-    fn terms(&self, (sends, receives): (usize, usize), port: &Port) -> Result<Terms, BusError> {
+    fn terms(
+        &self,
+        (sends, receives): (usize, usize),
+        port: &Port,
+    ) -> Result<SessionParameters, BusError> {
         if self.options.sending == Sending::Reply && receives == 0 {
             return Err(BusError::Refused(
                 "send = \"reply\" answers the peer's records, but by its signals this end receives \
@@ -86,7 +90,7 @@ impl Socket {
                     .to_owned(),
             ));
         }
-        Ok(Terms {
+        Ok(SessionParameters {
             sending: self.options.sending,
             cycle: self.cycle,
             min_interval: self.options.min_interval,
@@ -108,7 +112,7 @@ fn divide(table: &SignalTable, area: Area, axes: &[Axis]) -> Parts {
 
 impl Free for Socket {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        let terms: Result<Vec<Terms>, BusError> = self
+        let terms: Result<Vec<SessionParameters>, BusError> = self
             .lines
             .iter()
             .map(|(_, frames)| self.terms(frames.sizes(port), port))
@@ -121,7 +125,7 @@ impl Free for Socket {
             TcpRole::Listen => {
                 let addresses = stations.iter().chain([address]);
                 let places = self.lines.iter_mut().zip(addresses).zip(&mut terms);
-                let places = places.map(|(((name, frames), address), terms)| listen::Place {
+                let places = places.map(|(((name, frames), address), terms)| listen::Endpoint {
                     address,
                     name: name.clone(),
                     terms,

@@ -6,24 +6,24 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{
-    self, Address, Call, bow_out, is_of_the_client, no_wait, not_accepted, prepare,
+    self, Address, Call, close_gracefully, is_of_the_client, no_wait, not_accepted, prepare,
 };
 use tickbus_fieldbus::{BusError, Port};
 
 use super::connection::{Connection, Transfer};
-use super::lines::Lines;
-use super::{Frames, Session, Terms};
+use super::connection_states::ConnectionStates;
+use super::{Frames, Session, SessionParameters};
 
 /// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// One address to listen on, and its stations.
 #[derive(Debug)]
-pub(super) struct Place<'a> {
+pub(super) struct Endpoint<'a> {
     pub(super) address: &'a Address,
     /// The name of its station; empty if one address serves all.
     pub(super) name: String,
-    pub(super) terms: Terms,
+    pub(super) terms: SessionParameters,
     pub(super) frames: &'a mut Frames,
 }
 
@@ -33,8 +33,12 @@ pub(super) struct Place<'a> {
 /// # Errors
 ///
 /// An address cannot be listened on, or the system cannot wait.
-pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-    let mut lines = Lines::new(places.iter().map(|place| place.name.clone()));
+pub(super) fn listen(
+    places: Vec<Endpoint<'_>>,
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<(), BusError> {
+    let mut lines = ConnectionStates::new(places.iter().map(|place| place.name.clone()));
     let mut servers = Vec::new();
     for (line, place) in places.into_iter().enumerate() {
         let Some((listener, bound)) = tcp::listen(place.address, port, stop)? else {
@@ -50,7 +54,7 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
             served: None,
             watched: None,
             hears: false,
-            deaf_until: Nanos(i64::MIN),
+            accept_paused_until: Nanos(i64::MIN),
         });
     }
     let bound: Vec<String> = servers
@@ -71,7 +75,7 @@ pub(super) fn listen(places: Vec<Place<'_>>, port: &mut Port, stop: &Stop) -> Re
 /// Waits for all servers, and lets each do what is due.
 fn turn(
     servers: &mut [Server<'_>],
-    lines: &mut Lines,
+    lines: &mut ConnectionStates,
     set: &mut PollSet,
     port: &mut Port,
 ) -> Result<(), BusError> {
@@ -84,7 +88,7 @@ fn turn(
             deadline = deadline.min(served.deadline());
         }
         if server.is_deaf(now) {
-            deadline = deadline.min(server.deaf_until);
+            deadline = deadline.min(server.accept_paused_until);
         }
     }
     set.wait(&**port.clock(), deadline)
@@ -108,14 +112,14 @@ struct Server<'a> {
     listener: TcpListener,
     bound: SocketAddr,
     waiting: String,
-    terms: Terms,
+    terms: SessionParameters,
     frames: &'a mut Frames,
     served: Option<(Call<TcpStream>, Connection)>,
     /// What the set waits for on the connection, if there is one; and whether it waits for the listener.
     watched: Option<Interest>,
     hears: bool,
     /// Until when no client is accepted, after the system had no socket.
-    deaf_until: Nanos,
+    accept_paused_until: Nanos,
 }
 
 impl Server<'_> {
@@ -158,7 +162,7 @@ impl Server<'_> {
     }
 
     fn is_deaf(&self, now: Nanos) -> bool {
-        now < self.deaf_until
+        now < self.accept_paused_until
     }
 
     /// Lets the connection do what is due.
@@ -166,7 +170,7 @@ impl Server<'_> {
         &mut self,
         readable: bool,
         knocked: bool,
-        lines: &mut Lines,
+        lines: &mut ConnectionStates,
         set: &mut PollSet,
         port: &mut Port,
     ) {
@@ -192,7 +196,7 @@ impl Server<'_> {
     }
 
     /// Takes the next client from the queue: serves it, or turns it away.
-    fn accept(&mut self, lines: &mut Lines, set: &mut PollSet, port: &mut Port) {
+    fn accept(&mut self, lines: &mut ConnectionStates, set: &mut PollSet, port: &mut Port) {
         let now = port.clock().now();
         let (stream, peer) = match self.listener.accept() {
             Ok(accepted) => accepted,
@@ -200,7 +204,7 @@ impl Server<'_> {
             Err(error) => {
                 // Peers at other addresses are not affected.
                 not_accepted(&error, port);
-                self.deaf_until = now + PAUSE;
+                self.accept_paused_until = now + PAUSE;
                 return;
             }
         };
@@ -208,7 +212,7 @@ impl Server<'_> {
             let Some(silence) = served.stale_for(now) else {
                 let served = served.peer();
                 if stream.set_nonblocking(true).is_ok() {
-                    bow_out(&stream);
+                    close_gracefully(&stream);
                 }
                 turn_away(peer, served, port);
                 return;

@@ -2,7 +2,7 @@
 
 use tickbus_base::time::{Nanos, Pace};
 
-use super::{Fault, Partial, Records};
+use super::{EndReason, Partial, Records};
 
 /// A connection is given up after this many times `max_age` without a record.
 const SILENCE: i64 = 4;
@@ -24,7 +24,7 @@ pub enum Sending {
 
 /// The parameters of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Terms {
+pub struct SessionParameters {
     /// When a record is sent.
     pub sending: Sending,
     /// Time between two records, or between two checks for a change. Positive.
@@ -50,7 +50,7 @@ pub struct Terms {
 /// peer is not to blame.
 #[derive(Debug)]
 pub struct Session {
-    terms: Terms,
+    terms: SessionParameters,
     began: Nanos,
     inbox: Inbox,
     outbox: Outbox,
@@ -88,7 +88,7 @@ struct Outbox {
 
 impl Session {
     /// A connection established at `now`.
-    pub fn new(terms: Terms, now: Nanos) -> Self {
+    pub fn new(terms: SessionParameters, now: Nanos) -> Self {
         let compared = match terms.sending {
             Sending::OnChange => terms.sends,
             Sending::Cyclic | Sending::Reply => 0,
@@ -267,8 +267,8 @@ impl Session {
     /// # Errors
     ///
     /// The peer leaves a record incomplete, does not read, or is silent for too long.
-    pub fn check(&mut self, now: Nanos) -> Result<(), Fault> {
-        let Terms {
+    pub fn check(&mut self, now: Nanos) -> Result<(), EndReason> {
+        let SessionParameters {
             max_age,
             receives,
             sends,
@@ -276,18 +276,18 @@ impl Session {
         } = self.terms;
         let partial = self.inbox.records.partial();
         if receives == 0 && partial.is_some() {
-            return Err(Fault::Unasked);
+            return Err(EndReason::Unasked);
         }
         let over = |since: Option<Nanos>| since.is_some_and(|since| now - since > max_age);
         if let (Some(partial), true) = (partial, over(self.inbox.incomplete_since)) {
-            return Err(Fault::Incomplete(partial, max_age));
+            return Err(EndReason::Incomplete(partial, max_age));
         }
         if over(self.outbox.waiting_since) {
             let have = self.outbox.written;
-            return Err(Fault::NotReading(Partial { have, of: sends }, max_age));
+            return Err(EndReason::NotReading(Partial { have, of: sends }, max_age));
         }
         if receives > 0 && self.silence(now) > Self::patience(max_age) {
-            return Err(Fault::Silent(Self::patience(max_age)));
+            return Err(EndReason::Silent(Self::patience(max_age)));
         }
         self.checked = now;
         Ok(())
@@ -299,18 +299,18 @@ impl Session {
     }
 
     /// Why the connection ends, now that the peer has closed it.
-    pub fn left(&self) -> Fault {
+    pub fn left(&self) -> EndReason {
         match self.inbox.records.partial() {
-            Some(_) if self.terms.receives == 0 => Fault::Unasked,
-            Some(partial) => Fault::LeftWithin(partial),
-            None if self.terms.receives > 0 && self.inbox.heard.is_none() => Fault::LeftAtOnce,
-            None => Fault::Left,
+            Some(_) if self.terms.receives == 0 => EndReason::Unasked,
+            Some(partial) => EndReason::LeftWithin(partial),
+            None if self.terms.receives > 0 && self.inbox.heard.is_none() => EndReason::LeftAtOnce,
+            None => EndReason::Left,
         }
     }
 
     /// Until when the owner of the socket may wait if nothing arrives and nothing can be written.
     pub fn deadline(&self) -> Nanos {
-        let Terms {
+        let SessionParameters {
             max_age,
             receives,
             sends,

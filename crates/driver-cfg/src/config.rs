@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::layout;
-use super::timing::{Spans, Timing};
+use super::timing::{Timing, TimingKeys};
 use crate::Options;
 use tickbus_axis as axis;
 use tickbus_axis::Axis;
@@ -52,7 +52,7 @@ pub struct Config {
 
 /// What a command line says about its end of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked {
+pub struct CommandLineEnd {
     /// The end. A file without a role serves both.
     pub role: Role,
     /// Whether the file's address will be replaced; see [`Options::set_address`].
@@ -81,7 +81,7 @@ impl Config {
     /// # Errors
     ///
     /// As [`load`](Self::load); or the file states the other role; or its bus cannot leave the process.
-    pub fn load_as(path: &Path, asked: Option<Asked>) -> Result<Self, Mistakes> {
+    pub fn load_as(path: &Path, asked: Option<CommandLineEnd>) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let mut config = Self::parse_at(path, &path.display().to_string(), &text, asked)?;
         if let Some(file) = config.fault_file.take() {
@@ -122,7 +122,11 @@ impl Config {
     /// # Errors
     ///
     /// With every mistake in the text.
-    pub fn parse_as(file_name: &str, text: &str, asked: Option<Asked>) -> Result<Self, Mistakes> {
+    pub fn parse_as(
+        file_name: &str,
+        text: &str,
+        asked: Option<CommandLineEnd>,
+    ) -> Result<Self, Mistakes> {
         Self::parse_at(Path::new(file_name), file_name, text, asked)
     }
 
@@ -132,7 +136,7 @@ impl Config {
         path: &Path,
         shown: &str,
         text: &str,
-        asked: Option<Asked>,
+        asked: Option<CommandLineEnd>,
     ) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(shown, text);
         let config = read_text(&mut collector, text, |root| read(path, root, asked));
@@ -147,7 +151,7 @@ impl Config {
     clippy::too_many_lines,
     reason = "the tables of a file, one after the other"
 )]
-fn read(path: &Path, mut root: Table<'_>, asked: Option<Asked>) -> Option<Config> {
+fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Option<Config> {
     let driver = root.require("driver", "write a [driver] table with id and name");
     let fieldbus = root.require("fieldbus", "write a [fieldbus] table with the kind of bus");
     let stations = root.take("station");
@@ -321,11 +325,11 @@ impl FieldbusTable<'_> {
     }
 }
 
-fn read_fieldbus(mut table: Table<'_>, asked: Option<Asked>) -> FieldbusTable<'_> {
+fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> FieldbusTable<'_> {
     let kind = table.require("kind", "write the kind of bus, such as kind = \"loopback\"");
     let role = table.take("role");
     let life_signs = Written::take(&mut table);
-    let spans = Spans::take(&mut table);
+    let spans = TimingKeys::take(&mut table);
     let sizes = layout::Sizes::take(&mut table);
     let at = table.take("at");
     let roles = Role::ALL.map(|role| (role.name(), role));
@@ -401,7 +405,7 @@ mod tests {
 
     fn rig_as(role: Role) -> Config {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../driver.cfg");
-        let asked = Asked { role, moved: false };
+        let asked = CommandLineEnd { role, moved: false };
         Config::load_as(&path, Some(asked)).unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }
 

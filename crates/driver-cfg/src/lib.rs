@@ -9,6 +9,6 @@ pub mod loopback;
 mod overlay;
 mod timing;
 
-pub use config::{Asked, Config};
+pub use config::{CommandLineEnd, Config};
 pub use kinds::{BUILT, Exported, Options};
 pub use timing::Timing;

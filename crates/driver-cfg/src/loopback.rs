@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
 use tickbus_image::signal::SignalTable;
-use tickbus_plc::{Hosted, INTERVAL};
+use tickbus_plc::{HostedProgram, INTERVAL};
 use tickbus_programs::{self as programs, PROGRAMS};
 use tickbus_record as record;
 
@@ -212,7 +212,7 @@ impl Peer {
     #[must_use]
     pub fn seen_from(mut self, folder: &Path) -> Self {
         if let Self::Program { name, .. } = &mut self
-            && Hosted::is_path(name)
+            && HostedProgram::is_path(name)
             && let Ok(path) = std::path::absolute(folder.join(&*name))
         {
             *name = path.to_string_lossy().into_owned();
@@ -234,11 +234,11 @@ fn read_program(
         );
     }
     let text = program.text("write the name of a program in quotes, such as \"rig\"");
-    let known = text.filter(|name| PROGRAMS.contains(name) || Hosted::is_path(name));
+    let known = text.filter(|name| PROGRAMS.contains(name) || HostedProgram::is_path(name));
     let scan = match scan {
         Some(scan) => scan.duration().map(Some),
         // In a user's own program it is compiled in.
-        None if known.is_some_and(Hosted::is_path) => Some(None),
+        None if known.is_some_and(HostedProgram::is_path) => Some(None),
         None => Some(Some(INTERVAL)),
     };
     if let (Some(name), None) = (text, known) {

@@ -42,14 +42,14 @@ pub struct Timing {
 }
 
 /// Cycle times and time-outs as written in the file.
-pub(super) struct Spans<'a> {
+pub(super) struct TimingKeys<'a> {
     cycle: Option<Value<'a>>,
     max_age: Option<Value<'a>>,
     watchdog: Option<Value<'a>>,
     reconnect: Option<Value<'a>>,
 }
 
-impl<'a> Spans<'a> {
+impl<'a> TimingKeys<'a> {
     pub(super) fn take(table: &mut Table<'a>) -> Self {
         let [cycle, max_age, watchdog] =
             ["cycle", "max_age", "watchdog"].map(|key| table.take(key));

@@ -13,7 +13,7 @@ use tickbus_plc as plc;
 
 use super::DriverError;
 use super::frames::area_bytes;
-use super::host::{HostThread, Hosted, Program, SteppedHost, check_fit, program_error};
+use super::host::{HostThread, Program, ScanSetup, SteppedHost, check_fit, program_error};
 use super::replay::Replay;
 use tickbus_driver_cfg::Config;
 
@@ -80,7 +80,7 @@ fn open_hosted(
     let (device, controller) = private_link(&sizes);
     let bus = |end| Box::new(FreeLoopback::over(end, cycle));
     let title = format!("plc {}", program.name());
-    let hosted = Hosted {
+    let hosted = ScanSetup {
         program,
         interval: scan,
         tape: None,

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::time::{Clock, Nanos};
-use tickbus_fieldbus::faults::Injected;
+use tickbus_fieldbus::faults::FaultStatus;
 use tickbus_fieldbus::{Bus, Link};
 use tickbus_plc::Program;
 
-use super::host::{HostThread, Hosted, check_fit};
-use super::recording::Tape;
+use super::host::{HostThread, ScanSetup, check_fit};
+use super::recording::ScanRecorder;
 use super::{DriverError, bus};
 use tickbus_driver_cfg::Config;
 
@@ -52,10 +52,10 @@ impl Host {
         };
         let title = format!("plc {}", program.name());
         let role = config.role;
-        let hosted = Hosted {
+        let hosted = ScanSetup {
             program,
             interval,
-            tape: Tape::start(config, role)?,
+            tape: ScanRecorder::start(config, role)?,
         };
         HostThread::start(hosted, title, config, role, bus, clock)
             .map(Self)
@@ -83,7 +83,7 @@ impl Host {
     }
 
     /// The injected faults of this end.
-    pub fn injected_faults(&self) -> Vec<Injected> {
+    pub fn injected_faults(&self) -> Vec<FaultStatus> {
         self.0.board.list()
     }
 

@@ -3,19 +3,19 @@
 use std::sync::Arc;
 
 use tickbus_base::time::{Clock, Nanos};
-use tickbus_fieldbus::faults::Board;
+use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Link, LinkStatus};
 use tickbus_image::signal::Slot;
 use tickbus_image::{Consumer, Event};
 use tickbus_record::Recorder;
 
+use super::bus_handle::BusHandle;
 use super::extras::Extras;
 use super::host::Program;
-use super::line::Line;
 use super::station::Station;
-use super::statistics::Samples;
+use super::statistics::TickTimes;
 use super::tick::Tick;
-use super::{Counters, Exchange, SlotMap, Snapshot};
+use super::{Exchange, SlotMap, Snapshot, TickCounters};
 use tickbus_driver_cfg::Config;
 
 /// An open driver: one device, or one controller, on its bus.
@@ -24,12 +24,12 @@ pub struct Driver {
     pub(super) config: Arc<Config>,
     pub(super) slots: SlotMap,
     pub(super) stations: Vec<Station>,
-    pub(super) line: Line,
+    pub(super) line: BusHandle,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
-    pub(super) counters: Counters,
-    pub(super) samples: Samples,
+    pub(super) counters: TickCounters,
+    pub(super) samples: TickTimes,
     /// The clock's time and the tick's time at the first tick.
     pub(super) first_now: Nanos,
     pub(super) first_time: Nanos,
@@ -41,7 +41,7 @@ pub struct Driver {
     pub(super) last: Exchange,
     /// What is done around every exchange; nothing in most drivers.
     pub(super) extras: Option<Box<Extras>>,
-    pub(super) board: Arc<Board>,
+    pub(super) board: Arc<FaultBoard>,
     pub(super) events: Consumer,
     pub(super) program: Option<Program>,
     pub(super) recorder: Option<Recorder>,

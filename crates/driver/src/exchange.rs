@@ -12,13 +12,13 @@
 )]
 
 use tickbus_base::time::{Clock, Nanos};
-use tickbus_fieldbus::faults::Moment;
+use tickbus_fieldbus::faults::TickTime;
 use tickbus_fieldbus::{BusError, LinkState};
 use tickbus_image::Arrival;
 use tickbus_image::signal::Slot;
 
-use super::line::Line;
-use super::statistics::Samples;
+use super::bus_handle::BusHandle;
+use super::statistics::TickTimes;
 use super::tick::Tick;
 use super::{Code, Driver, Exchange};
 
@@ -158,9 +158,9 @@ impl Driver {
     #[inline]
     fn now(&mut self) -> Nanos {
         match &self.line {
-            Line::Free(_) => self.clock.now(),
+            BusHandle::Free(_) => self.clock.now(),
             // Simulation time stands still during an exchange.
-            Line::Stepped { time, .. } => time.now(),
+            BusHandle::Stepped { time, .. } => time.now(),
         }
     }
 
@@ -179,8 +179,8 @@ impl Driver {
             self.first_now = before;
         }
         let time = self.given.unwrap_or(match &self.line {
-            Line::Free(_) => before - self.first_now,
-            Line::Stepped { .. } => self.last.granted,
+            BusHandle::Free(_) => before - self.first_now,
+            BusHandle::Stepped { .. } => self.last.granted,
         });
         if is_first {
             self.first_time = time;
@@ -189,7 +189,7 @@ impl Driver {
             time,
             taken: Nanos::ZERO,
         });
-        let Line::Stepped { time: shown, .. } = &self.line else {
+        let BusHandle::Stepped { time: shown, .. } = &self.line else {
             return Ok(before);
         };
         if time < before {
@@ -202,7 +202,7 @@ impl Driver {
     #[inline]
     fn begin_extras(&mut self, slots: &mut [Slot]) {
         if let (Some(extras), Some(tick)) = (&mut self.extras, &self.tick) {
-            let moment = Moment {
+            let moment = TickTime {
                 time: tick.time - self.first_time,
                 tick: self.counters.ticks,
             };
@@ -223,8 +223,8 @@ impl Driver {
             extras.sent(slots);
         }
         match &mut self.line {
-            Line::Free(_) => Ok(()),
-            Line::Stepped { bus, port, .. } => bus.send(now, port),
+            BusHandle::Free(_) => Ok(()),
+            BusHandle::Stepped { bus, port, .. } => bus.send(now, port),
         }
     }
 
@@ -232,8 +232,8 @@ impl Driver {
     #[inline(always)]
     fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
         let (granted, done) = match &mut self.line {
-            Line::Free(_) => (self.tick.map_or(now, |tick| tick.time), Ok(())),
-            Line::Stepped { bus, port, .. } => match bus.receive(now, port) {
+            BusHandle::Free(_) => (self.tick.map_or(now, |tick| tick.time), Ok(())),
+            BusHandle::Stepped { bus, port, .. } => match bus.receive(now, port) {
                 Ok(granted) => (granted, Ok(())),
                 Err(error) => (now, Err(error)),
             },
@@ -278,7 +278,7 @@ impl Driver {
     /// Adds the time since `begun` to the current tick, if that is in the sample.
     #[inline]
     fn lap(&mut self, begun: Nanos) {
-        if let (true, Some(tick)) = (Samples::takes(self.counters.ticks), &mut self.tick) {
+        if let (true, Some(tick)) = (TickTimes::takes(self.counters.ticks), &mut self.tick) {
             tick.taken += self.clock.now() - begun;
         }
     }
@@ -298,7 +298,7 @@ impl Driver {
         if self.recorder.is_some() {
             self.record(tick, found.code, slots);
         }
-        if matches!(self.line, Line::Free(_)) && Samples::takes(self.counters.ticks) {
+        if matches!(self.line, BusHandle::Free(_)) && TickTimes::takes(self.counters.ticks) {
             self.samples.add(tick.taken, self.last.age);
         }
     }

@@ -2,7 +2,7 @@
 
 use tickbus_axis::Reflexes;
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::faults::{Faults, Moment};
+use tickbus_fieldbus::faults::{Faults, TickTime};
 use tickbus_image::signal::Slot;
 
 use super::heartbeat::Beat;
@@ -42,7 +42,7 @@ impl Extras {
 
     /// A tick begins.
     #[cold]
-    pub(super) fn begin_tick(&mut self, moment: Moment, slots: &mut [Slot]) {
+    pub(super) fn begin_tick(&mut self, moment: TickTime, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
             faults.begin_tick(moment, slots);
         }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::Driver;
-use super::line::Line;
+use super::bus_handle::BusHandle;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_fieldbus::faults::{self, Board, Fault, Faults, Injected, Slots};
+use tickbus_fieldbus::faults::{self, Fault, FaultBoard, FaultStatus, Faults, Slots};
 
 impl Driver {
     /// Injects a fault; it can begin at the next exchange. Gives its number.
@@ -26,7 +26,7 @@ impl Driver {
         };
         let id = faults.add(fault, slots)?;
         // Adopted now, so that the tick need not allocate memory.
-        if let Line::Stepped { port, .. } = &mut self.line {
+        if let BusHandle::Stepped { port, .. } = &mut self.line {
             let now = port.clock().now();
             port.observe(now);
         }
@@ -63,12 +63,12 @@ impl Driver {
     }
 
     /// Where the faults publish their state, readable from any thread.
-    pub fn board(&self) -> &Arc<Board> {
+    pub fn board(&self) -> &Arc<FaultBoard> {
         &self.board
     }
 
     /// The injected faults in order of injection; those that ended long ago may be missing.
-    pub fn injected_faults(&self) -> Vec<Injected> {
+    pub fn injected_faults(&self) -> Vec<FaultStatus> {
         self.board.list()
     }
 }

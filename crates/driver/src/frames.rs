@@ -2,7 +2,7 @@
 
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, SignalTable, fail_safe_frame};
-use tickbus_image::{Directions, latched_bits};
+use tickbus_image::{StationStreams, latched_bits};
 
 /// Size in bytes of a station's area.
 pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
@@ -13,10 +13,10 @@ pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usi
 }
 
 /// The streams of each station's image at the end with `role`.
-pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<Directions> {
+pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<StationStreams> {
     let (tx, rx) = role.areas();
     (0..table.stations.len())
-        .map(|station| Directions {
+        .map(|station| StationStreams {
             tx_fail_safe: fail_safe_frame(table, station, tx),
             tx_latched: latched_bits(table, station, tx),
             rx_fail_safe: fail_safe_frame(table, station, rx),

@@ -1,6 +1,7 @@
 //! One device: configuration, open, exchange, supervision, statistics, close.
 
 mod bus;
+mod bus_handle;
 mod controller;
 mod driver;
 mod error;
@@ -10,7 +11,6 @@ mod faults;
 mod frames;
 mod heartbeat;
 mod host;
-mod line;
 mod open;
 mod recording;
 mod replay;
@@ -25,7 +25,7 @@ pub use controller::Host;
 pub use driver::Driver;
 pub use error::DriverError;
 pub use slots::SlotMap;
-pub use statistics::{Counters, Snapshot};
+pub use statistics::{Snapshot, TickCounters};
 pub use status::Code;
 pub use supervise::panic_text;
 pub use tick::Exchange;

@@ -4,20 +4,20 @@ use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
 use tickbus_base::time::{Clock, Manual, Nanos};
-use tickbus_fieldbus::faults::Board;
+use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Bus, Cause, ChangeEvents, LinkState, LinkStatus, Port, Role};
 use tickbus_image::image;
 
 use super::bus;
+use super::bus_handle::BusHandle;
 use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
-use super::line::Line;
 use super::recording::recorder;
 use super::station::Station;
-use super::statistics::Samples;
+use super::statistics::TickTimes;
 use super::supervise::BusThread;
-use super::{Counters, Driver, DriverError, Exchange, SlotMap};
+use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
 use tickbus_driver_cfg::Config;
 
 impl Driver {
@@ -51,7 +51,7 @@ impl Driver {
             watchdog,
             status.clone(),
         );
-        let board = Arc::<Board>::default();
+        let board = Arc::<FaultBoard>::default();
         port.suffer_from(Arc::clone(&board));
         let (signs, max_age) = (&config.life_signs, config.timing.max_age);
         port.watch_life(signs.watches(&config.table, config.role, max_age));
@@ -67,7 +67,7 @@ impl Driver {
         let line = match bus {
             Bus::Free(bus) => {
                 let reconnect = config.timing.reconnect.clone();
-                Line::Free(BusThread::start(
+                BusHandle::Free(BusThread::start(
                     bus,
                     port,
                     reconnect,
@@ -75,7 +75,7 @@ impl Driver {
                     &config.name,
                 )?)
             }
-            Bus::Stepped(bus) => Line::Stepped {
+            Bus::Stepped(bus) => BusHandle::Stepped {
                 bus,
                 port,
                 time: simulation_time,
@@ -99,8 +99,8 @@ impl Driver {
             clock,
             max_age: config.timing.max_age,
             status,
-            counters: Counters::default(),
-            samples: Samples::default(),
+            counters: TickCounters::default(),
+            samples: TickTimes::default(),
             first_now: Nanos::ZERO,
             first_time: Nanos::ZERO,
             given: None,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Plan, Slot};
-use tickbus_record::{Columns, Recorder, Tally, When};
+use tickbus_record::{Columns, Recorder, ScanCounters, When};
 
 use super::{Code, DriverError, SlotMap};
 use tickbus_driver_cfg::Config;
@@ -31,7 +31,7 @@ pub(super) fn recorder(
 }
 
 /// The recording of a hosted program, one tick per scan.
-pub(super) struct Tape {
+pub(super) struct ScanRecorder {
     recorder: Recorder,
     reads: Plan,
     writes: Plan,
@@ -42,7 +42,7 @@ pub(super) struct Tape {
     begun: Option<Nanos>,
 }
 
-impl Tape {
+impl ScanRecorder {
     /// Starts the recording that `config` asks for.
     pub(super) fn start(config: &Config, role: Role) -> Result<Option<Self>, DriverError> {
         let map = SlotMap::new(&config.table, role);
@@ -78,7 +78,7 @@ impl Tape {
     }
 
     /// The recorder's counters.
-    pub(super) fn tally(&self) -> Arc<Tally> {
+    pub(super) fn tally(&self) -> Arc<ScanCounters> {
         Arc::clone(self.recorder.tally())
     }
 }

@@ -1,6 +1,6 @@
 //! One station of an open driver, as the tick sees it.
 
-use super::{Code, Counters, SlotMap};
+use super::{Code, SlotMap, TickCounters};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, Conversions, Plan, SignalTable, Slot};
 use tickbus_image::{Arrival, TickStation};
@@ -48,7 +48,7 @@ impl Station {
     }
 
     #[inline]
-    pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut Counters) {
+    pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut TickCounters) {
         let encode = &self.encode;
         let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
         if bent != Conversions::default() {

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use super::Code;
 use super::host::ProgramTally;
 use tickbus_base::os::dropped_log_lines;
-use tickbus_base::time::{Nanos, Spans};
+use tickbus_base::time::{Histogram, Nanos};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkStatus;
-use tickbus_fieldbus::faults::Board;
-use tickbus_record::Tally;
+use tickbus_fieldbus::faults::FaultBoard;
+use tickbus_record::ScanCounters;
 
 /// Counters of the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
+pub struct TickCounters {
     /// Exchanges.
     pub ticks: u64,
     /// Exchanges that found a new bus cycle.
@@ -31,7 +31,7 @@ pub struct Counters {
     pub not_a_number: u64,
 }
 
-impl Counters {
+impl TickCounters {
     pub(super) fn count(&mut self, code: Code) {
         let counter = match code {
             Code::Fresh => &mut self.fresh,
@@ -44,7 +44,7 @@ impl Counters {
 }
 
 /// One `key=value` per line.
-impl fmt::Display for Counters {
+impl fmt::Display for TickCounters {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             ticks,
@@ -72,14 +72,14 @@ const SAMPLED: u64 = 32;
 
 /// Distributions over a sample of the ticks.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Samples {
+pub(super) struct TickTimes {
     /// Duration of an exchange.
-    exchange: Spans,
+    exchange: Histogram,
     /// Age of the data that it delivers.
-    age: Spans,
+    age: Histogram,
 }
 
-impl Samples {
+impl TickTimes {
     /// Whether this tick is one of the sample.
     #[inline]
     pub(super) const fn takes(tick: u64) -> bool {
@@ -109,16 +109,16 @@ impl Samples {
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     pub(super) config: Arc<Config>,
-    pub(super) counters: Counters,
+    pub(super) counters: TickCounters,
     /// Per station: time since its peer was last heard from, whether its data are valid, and its bus cycles.
     pub(super) stations: Vec<(Nanos, bool, u64)>,
     pub(super) events_lost: u64,
     pub(super) now: Nanos,
-    pub(super) samples: Samples,
+    pub(super) samples: TickTimes,
     pub(super) status: LinkStatus,
-    pub(super) board: Arc<Board>,
+    pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<ProgramTally>,
-    pub(super) record: Option<Arc<Tally>>,
+    pub(super) record: Option<Arc<ScanCounters>>,
 }
 
 impl Snapshot {

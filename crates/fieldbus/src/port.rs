@@ -4,12 +4,12 @@ use std::fmt::Arguments;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::faults::{Board, Fate};
+use crate::faults::{Fate, FaultBoard};
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_image::{BusEnd, Event};
 
-use super::troubles::Troubles;
-use super::vitals::Vitals;
+use super::port_faults::Troubles;
+use super::validity::Validity;
 use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role, Watch};
 
 /// A bus's access to the image, the clock and the state of its driver.
@@ -24,7 +24,7 @@ pub struct Port {
     /// When the first station's last frame arrived while the line was running.
     last_cycle: Option<Nanos>,
     troubles: Troubles,
-    vitals: Vitals,
+    vitals: Validity,
 }
 
 impl Port {
@@ -39,7 +39,7 @@ impl Port {
         status: LinkStatus,
     ) -> Self {
         Self {
-            vitals: Vitals::new(image.stations.len()),
+            vitals: Validity::new(image.stations.len()),
             image,
             clock,
             role,
@@ -52,7 +52,7 @@ impl Port {
     }
 
     /// Applies the faults on `board` to the line.
-    pub fn suffer_from(&mut self, board: Arc<Board>) {
+    pub fn suffer_from(&mut self, board: Arc<FaultBoard>) {
         self.troubles = Troubles::of(board);
     }
 
@@ -297,7 +297,7 @@ impl Port {
     /// faults it costs one comparison.
     #[inline]
     fn attend(&mut self, now: Nanos) {
-        if self.troubles.are_there() {
+        if self.troubles.any() {
             self.attend_to_troubles(now);
         }
     }
@@ -390,7 +390,7 @@ impl Port {
     /// stale.
     pub fn running(&mut self, reason: &str) {
         // Said in every cycle of some buses.
-        if !self.troubles.are_there() && self.status.is_up() {
+        if !self.troubles.any() && self.status.is_up() {
             return;
         }
         self.enter(LinkState::Running, Cause::Running, reason);

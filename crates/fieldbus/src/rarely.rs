@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use tickbus_base::os::{is_told, is_told_rarely};
+use tickbus_base::os::{is_rarely_logged, is_told};
 
 /// The topic of a message: a line's state and cause, or its own name.
 pub type Topic = (&'static str, &'static str);
@@ -39,7 +39,7 @@ impl Rarely {
 
 impl fmt::Display for Times {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !is_told_rarely(self.0) {
+        if !is_rarely_logged(self.0) {
             return Ok(());
         }
         write!(

@@ -25,7 +25,7 @@ pub mod signal;
 
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
 pub use ring::{Consumer, Event, Producer, event_ring};
-pub use station::{Arrival, BusStation, Directions, Receiver, TickStation, station};
+pub use station::{Arrival, BusStation, Receiver, StationStreams, TickStation, station};
 pub use tick_ring::{TickReader, TickWriter, tick_ring};
 pub use triple::{Reader, Writer, triple_buffer};
 
@@ -62,7 +62,7 @@ pub struct BusEnd {
 }
 
 /// Creates the image of a driver, given the directions of each station.
-pub fn image(stations: Vec<Directions>) -> (TickEnd, BusEnd) {
+pub fn image(stations: Vec<StationStreams>) -> (TickEnd, BusEnd) {
     let (producer, consumer) = event_ring(EVENT_CAPACITY);
     let (tick, bus) = stations.into_iter().map(station).unzip();
     (

@@ -9,7 +9,7 @@ use tickbus_base::time::Nanos;
 
 /// The frames of one station's two streams; tx and rx are as seen from the tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Directions {
+pub struct StationStreams {
     /// The tx frame before the first tick, and again after the tick has stopped.
     pub tx_fail_safe: Box<[u8]>,
     /// The latched signals of the tx frames.
@@ -93,8 +93,8 @@ pub struct BusStation {
 }
 
 /// Creates the two ends of one station.
-pub fn station(directions: Directions) -> (TickStation, BusStation) {
-    let Directions {
+pub fn station(directions: StationStreams) -> (TickStation, BusStation) {
+    let StationStreams {
         tx_fail_safe,
         tx_latched,
         rx_fail_safe,
@@ -370,7 +370,7 @@ mod tests {
             latch: Latch::Rising,
             hold: Nanos::ZERO,
         }]);
-        station(Directions {
+        station(StationStreams {
             tx_fail_safe: Box::new([0x80]),
             tx_latched: latched.clone(),
             rx_fail_safe: Box::new([0]),

@@ -1,6 +1,6 @@
 //! Device addresses, as in the tag lists of PLC4X, KEPServer and other clients.
 
-use tickbus_bus_modbus::Spot;
+use tickbus_bus_modbus::TagAddress;
 use tickbus_bus_s7::Variable;
 use tickbus_bus_s7::item::Object;
 use tickbus_image::signal::{Area, DataType, Width};
@@ -56,7 +56,7 @@ pub(super) fn only(text: &str) -> Option<Client> {
     ]
     .iter()
     .any(|table| bare.starts_with(table));
-    if (is_numbered || is_table) && text.parse::<Spot>().is_ok() {
+    if (is_numbered || is_table) && text.parse::<TagAddress>().is_ok() {
         return Some(Client::Modbus);
     }
     let in_block = bare
@@ -77,7 +77,7 @@ pub(super) fn only(text: &str) -> Option<Client> {
 pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String)> {
     match client {
         Client::Modbus => {
-            let spot: Spot = text
+            let spot: TagAddress = text
                 .parse()
                 .map_err(|error: tickbus_bus_modbus::PlaceError| (error.what, error.right))?;
             let table = spot.place.table;

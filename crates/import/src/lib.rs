@@ -23,7 +23,7 @@ pub use device::Client;
 use cells::Record;
 use columns::Columns;
 use rows::{Taken, World};
-use text::Kind;
+use text::FileType;
 use tickbus_base::toml_text::{Collector, Mistake, Mistakes};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Addressing;
@@ -33,7 +33,7 @@ const LONGEST: usize = 64 << 20;
 
 /// How to read a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Reading {
+pub struct ImportOptions {
     /// What the numbers of addresses count.
     pub addressing: Addressing,
     /// Skip lines with mistakes instead of refusing the table.
@@ -88,7 +88,7 @@ impl Told {
 /// # Errors
 ///
 /// With every mistake in the table, unless lines with mistakes are skipped; or when nothing is left.
-pub fn import(file: &str, bytes: &[u8], reading: Reading) -> Result<Imported, Mistakes> {
+pub fn import(file: &str, bytes: &[u8], reading: ImportOptions) -> Result<Imported, Mistakes> {
     let of_file = |what: String, right: &str| Err(Mistakes::of_file(file, what, right));
     if bytes.len() > LONGEST {
         return of_file(
@@ -99,17 +99,17 @@ pub fn import(file: &str, bytes: &[u8], reading: Reading) -> Result<Imported, Mi
     let mut told = Told::default();
     let mut is_logix = false;
     let sheets = match text::kind(bytes) {
-        Kind::OldWorkbook => {
+        FileType::OldWorkbook => {
             return of_file(
                 "this is a workbook of Excel before 2007, or one with a password".to_owned(),
                 "open it in Excel or LibreOffice, and save it as XLSX without a password, or as CSV",
             );
         }
-        Kind::Workbook => match workbook::sheets(bytes) {
+        FileType::Workbook => match workbook::sheets(bytes) {
             Ok(sheets) => sheets,
             Err((what, right)) => return of_file(what, right),
         },
-        Kind::Xml => {
+        FileType::Xml => {
             let text = text::decoded(bytes);
             let skipped = Collector::new(file, &text);
             let project = plc_xml::read(file, &text, &skipped)?;
@@ -117,7 +117,7 @@ pub fn import(file: &str, bytes: &[u8], reading: Reading) -> Result<Imported, Mi
             is_logix = project.is_logix;
             vec![project.sheet]
         }
-        Kind::Table => {
+        FileType::Table => {
             let text = text::decoded(bytes);
             let wrong = Collector::new(file, &text);
             let records = cells::records(&text, &wrong);
@@ -137,7 +137,7 @@ pub fn import(file: &str, bytes: &[u8], reading: Reading) -> Result<Imported, Mi
 fn tags_of(
     file: &str,
     sheets: &[Sheet],
-    reading: Reading,
+    reading: ImportOptions,
     is_logix: bool,
     mut told: Told,
 ) -> Result<Imported, Mistakes> {

@@ -4,7 +4,7 @@ use encoding_rs::{Encoding, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// The type of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum FileType {
     /// A table as text.
     Table,
     /// A workbook of Excel 2007 and later: a zip archive.
@@ -15,19 +15,23 @@ pub(super) enum Kind {
 }
 
 /// The type of `bytes`, by their beginning.
-pub(super) fn kind(bytes: &[u8]) -> Kind {
+pub(super) fn kind(bytes: &[u8]) -> FileType {
     if bytes.starts_with(b"PK\x03\x04") {
-        return Kind::Workbook;
+        return FileType::Workbook;
     }
     if bytes.starts_with(b"\xD0\xCF\x11\xE0") {
-        return Kind::OldWorkbook;
+        return FileType::OldWorkbook;
     }
     let start = decoded(&bytes[..bytes.len().min(200)]);
     let start = start.trim_start();
     let is_tag = start.strip_prefix('<').is_some_and(|rest| {
         rest.starts_with(|c: char| c.is_ascii_alphabetic() || c == '?' || c == '!')
     });
-    if is_tag { Kind::Xml } else { Kind::Table }
+    if is_tag {
+        FileType::Xml
+    } else {
+        FileType::Table
+    }
 }
 
 /// The text of `bytes`: UTF-16 or UTF-8 by their byte order marks, otherwise UTF-8 if valid, else
@@ -70,19 +74,19 @@ mod tests {
             WINDOWS_1252.encode(text).0.into_owned(),
         ] {
             assert_eq!(decoded(&bytes), text);
-            assert_eq!(kind(&bytes), Kind::Table);
+            assert_eq!(kind(&bytes), FileType::Table);
         }
     }
 
     #[test]
     fn files_are_known_by_how_they_begin() {
         for (bytes, expected) in [
-            (&b"PK\x03\x04"[..], Kind::Workbook),
-            (b"\xD0\xCF\x11\xE0", Kind::OldWorkbook),
-            (b"<?xml version='1.0'?>", Kind::Xml),
-            (b"\xEF\xBB\xBF  <project/>", Kind::Xml),
-            (b"<5 mm;%I0.0;Bool", Kind::Table),
-            (b"", Kind::Table),
+            (&b"PK\x03\x04"[..], FileType::Workbook),
+            (b"\xD0\xCF\x11\xE0", FileType::OldWorkbook),
+            (b"<?xml version='1.0'?>", FileType::Xml),
+            (b"\xEF\xBB\xBF  <project/>", FileType::Xml),
+            (b"<5 mm;%I0.0;Bool", FileType::Table),
+            (b"", FileType::Table),
         ] {
             assert_eq!(kind(bytes), expected);
         }

@@ -2,7 +2,7 @@
 //!
 //! A [`Program`] is a pure function of its own state, the time and the inputs: its host calls
 //! [`Program::scan`] at the scan interval, in wall time or in simulation time, and transfers the images.
-//! [`Hosted`] is a user's own program.
+//! [`HostedProgram`] is a user's own program.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ mod hosted;
 pub mod blocks;
 
 pub use axes::Axes;
-pub use hosted::Hosted;
+pub use hosted::HostedProgram;
 
 /// The inputs and outputs of one scan.
 #[derive(Debug)]
@@ -138,7 +138,7 @@ pub enum ProgramError {
     },
     /// A user's own program cannot be used.
     #[error("the PLC program \"{program}\" {what}; {right}")]
-    Hosted {
+    HostedProgram {
         /// The path of its file.
         program: String,
         /// What is wrong with it.
@@ -194,7 +194,7 @@ fn list(names: &[&str], last: &str) -> String {
 pub fn interval(program: &dyn Program, stated: Option<Nanos>) -> Nanos {
     let own = program.interval();
     let interval = stated.unwrap_or(own);
-    if interval != own && Hosted::is_path(program.name()) {
+    if interval != own && HostedProgram::is_path(program.name()) {
         log::warn!(
             "the PLC program \"{}\" was compiled for a scan every {own} and gets one every {interval}: its \
              timers are right all the same, but its tasks run at other intervals than they state",

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use tickbus_plc::{Hosted, Program, ProgramError};
+use tickbus_plc::{HostedProgram, Program, ProgramError};
 
 mod drum;
 mod mirror;
@@ -32,7 +32,7 @@ pub const PROGRAMS: [&str; 5] = [
 /// Makes the program called `name`, with its options as (key, value) pairs. Where an option is given
 /// twice, the last one counts.
 ///
-/// The name is one of [`PROGRAMS`], or the path of a [`Hosted`] program: then it has a `/` in it or ends
+/// The name is one of [`PROGRAMS`], or the path of a [`HostedProgram`] program: then it has a `/` in it or ends
 /// in `.so`, `.dll` or `.dylib`.
 ///
 /// # Errors
@@ -54,7 +54,9 @@ pub fn program_beside(
     options: &[(String, String)],
 ) -> Result<Box<dyn Program>, ProgramError> {
     match name {
-        _ if Hosted::is_path(name) => Ok(Box::new(Hosted::load(&folder.join(name), options)?)),
+        _ if HostedProgram::is_path(name) => {
+            Ok(Box::new(HostedProgram::load(&folder.join(name), options)?))
+        }
         Rig::NAME => Ok(Box::new(Rig::from_options(options)?)),
         Mirror::NAME => Ok(Box::new(Mirror::new(options)?)),
         Reaction::NAME => Ok(Box::new(Reaction::from_options(options)?)),
@@ -73,8 +75,8 @@ pub fn program_beside(
 ///
 /// As for [`program`].
 pub fn check(name: &str, options: &[(String, String)]) -> Result<(), ProgramError> {
-    if Hosted::is_path(name) {
-        Hosted::check_options(name, options)
+    if HostedProgram::is_path(name) {
+        HostedProgram::check_options(name, options)
     } else {
         program(name, options).map(drop)
     }

@@ -27,7 +27,7 @@ pub use columns::{Column, Columns, Tick, ValueKind};
 pub use options::{Format, Options, When, file_of};
 pub use places::FileClaim;
 pub use reading::{Recording, RecordingError};
-pub use recorder::{Recorder, RecorderError, Tally};
+pub use recorder::{Recorder, RecorderCounters, RecorderError};
 
 /// The version of the layout of these files; they state it at the beginning.
 const VERSION: u32 = 1;

@@ -48,7 +48,7 @@ impl Format {
 
 /// Counters of a recorder; readable from any thread.
 #[derive(Debug, Default)]
-pub struct Tally {
+pub struct RecorderCounters {
     file: PathBuf,
     /// Ticks that were written.
     ticks: AtomicU64,
@@ -62,7 +62,7 @@ pub struct Tally {
     error: Mutex<Option<String>>,
 }
 
-impl Tally {
+impl RecorderCounters {
     /// Why the recording ended before it was closed, if it did.
     pub fn error(&self) -> Option<String> {
         self.lock_error().clone()
@@ -129,7 +129,7 @@ pub struct Recorder {
     head: Vec<u64>,
     slots: usize,
     lossless: bool,
-    tally: Arc<Tally>,
+    tally: Arc<RecorderCounters>,
     bell: Arc<Bell>,
     pub(super) close_timeout: Duration,
     /// Disconnected when the thread ends.
@@ -243,9 +243,9 @@ impl Recorder {
         let slots = columns.columns.len();
         let (ring, reader) = tick_ring(ticks, head + slots);
         let bell = Arc::new(Bell::default());
-        let tally = Arc::new(Tally {
+        let tally = Arc::new(RecorderCounters {
             file: path,
-            ..Tally::default()
+            ..RecorderCounters::default()
         });
         let (end, ended) = mpsc::channel::<()>();
         let writing = Writing {
@@ -328,7 +328,7 @@ impl Recorder {
     }
 
     /// Its counters.
-    pub fn tally(&self) -> &Arc<Tally> {
+    pub fn tally(&self) -> &Arc<RecorderCounters> {
         &self.tally
     }
 }
@@ -370,7 +370,7 @@ struct Writing {
     out: Out,
     /// Number and time of the previous tick.
     before: Option<(u64, Nanos)>,
-    tally: Arc<Tally>,
+    tally: Arc<RecorderCounters>,
     bell: Arc<Bell>,
     _place: Option<FileClaim>,
 }
@@ -490,7 +490,7 @@ impl Writing {
 
 /// Reports on drop that the recording has ended.
 struct Ended {
-    tally: Arc<Tally>,
+    tally: Arc<RecorderCounters>,
     bell: Arc<Bell>,
 }
 

@@ -11,7 +11,7 @@ use super::test::TextPosition;
 
 /// A recording that fits a signal table.
 #[derive(Clone, Debug)]
-pub(super) struct Tape {
+pub(super) struct MachineRecording {
     file: PathBuf,
     /// Column and signal of each value that the machine sent.
     sent: Vec<(usize, usize)>,
@@ -24,7 +24,7 @@ pub(super) struct Tape {
 /// What is wrong with a recording, and what would be right.
 type Wrong = (String, String);
 
-impl Tape {
+impl MachineRecording {
     /// Opens the recording at `file`, which must contain signals of `table`; `own` is the area that the
     /// machine writes.
     pub(super) fn open(
@@ -122,7 +122,7 @@ pub(super) struct Difference {
 /// A recording that is being played.
 #[derive(Debug)]
 pub(super) struct Playback<'a> {
-    tape: &'a Tape,
+    tape: &'a MachineRecording,
     recording: Recording,
     next: Tick,
     more: bool,
@@ -133,7 +133,10 @@ pub(super) struct Playback<'a> {
 }
 
 impl<'a> Playback<'a> {
-    pub(super) fn start(tape: &'a Tape, table: &SignalTable) -> Result<Self, RecordingError> {
+    pub(super) fn start(
+        tape: &'a MachineRecording,
+        table: &SignalTable,
+    ) -> Result<Self, RecordingError> {
         let mut recording = Recording::open(&tape.file, Some(table))?;
         let mut next = Tick::new(recording.columns());
         let more = recording.next(&mut next)?;

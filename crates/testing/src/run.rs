@@ -9,7 +9,7 @@ use tickbus_record as record;
 
 use super::condition::{Bookmark, Condition};
 use super::machine::Stub;
-use super::playback::{Difference, Playback, Tape};
+use super::playback::{Difference, MachineRecording, Playback};
 use super::suite::Suite;
 use super::test::{Passage, Step, Test, TextPosition};
 use super::watch::{Watch, moment, real, span, text_of};
@@ -121,7 +121,7 @@ struct Stand<'a> {
     watches: Vec<Watch>,
     stub: Stub<'a>,
     playback: Option<Playback<'a>>,
-    tape: Option<&'a Tape>,
+    tape: Option<&'a MachineRecording>,
     step: Nanos,
     ticks: u64,
     forced: Vec<(usize, Slot)>,

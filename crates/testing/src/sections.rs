@@ -10,7 +10,7 @@ use tickbus_image::signal::section::slot_of;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::condition::{Condition, Demand};
-use super::playback::Tape;
+use super::playback::MachineRecording;
 use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition};
 
 /// The longest time that may pass in one step: ten minutes on a fast machine.
@@ -35,7 +35,7 @@ pub(super) struct Reader<'a> {
 pub(super) struct Machine {
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
-    pub(super) tape: Option<Tape>,
+    pub(super) tape: Option<MachineRecording>,
 }
 
 impl Reader<'_> {
@@ -69,10 +69,10 @@ impl Reader<'_> {
         }
     }
 
-    fn tape(&self, value: &Value<'_>, compare: Option<&Value<'_>>) -> Option<Tape> {
+    fn tape(&self, value: &Value<'_>, compare: Option<&Value<'_>>) -> Option<MachineRecording> {
         let file = value.text("write the path of a recording, as seen from this file")?;
         let wrong = |value: &Value<'_>, (what, right): (String, String)| value.wrong(what, right);
-        let opened = Tape::open(
+        let opened = MachineRecording::open(
             &self.folder.join(file),
             self.table,
             self.own(),

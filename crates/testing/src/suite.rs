@@ -12,7 +12,7 @@ use tickbus_fieldbus::Role;
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
 
-use super::playback::Tape;
+use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
 use super::test::{Rule, Test};
 
@@ -36,7 +36,7 @@ pub(super) struct Bench {
     pub(super) step: Nanos,
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
-    pub(super) tape: Option<Tape>,
+    pub(super) tape: Option<MachineRecording>,
 }
 
 impl Suite {
@@ -169,7 +169,7 @@ fn on_simulation_time(
     if let Some(mut peer) = peer {
         // A program's path is relative to this file, and not to the driver.cfg.
         if let Peer::Program { name, .. } = &mut peer
-            && plc::Hosted::is_path(name)
+            && plc::HostedProgram::is_path(name)
             && let Ok(file) = std::path::absolute(folder.join(&*name))
         {
             *name = file.to_string_lossy().into_owned();

@@ -62,7 +62,7 @@ pub const fn is_told(times: u64) -> bool {
 }
 
 /// Whether from the `times`-th message on some of the same kind are left out.
-pub const fn is_told_rarely(times: u64) -> bool {
+pub const fn is_rarely_logged(times: u64) -> bool {
     times >= TOLD
 }
 

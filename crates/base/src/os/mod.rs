@@ -11,7 +11,7 @@ mod serial;
 mod shared_memory;
 
 pub use library::{Library, one_line};
-pub use log::{dropped_log_lines, flush_log, is_told, is_told_rarely, log_to_stderr};
+pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::{Interest, Poller, Source};

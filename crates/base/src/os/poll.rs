@@ -104,7 +104,7 @@ impl Poller {
         let mut waited = Ok(());
         clock.wait_with(deadline, &self.stop, &mut |patience| {
             // The token may have been woken before the waker was set; no wake-up would follow.
-            let patience = if self.stop.is_roused() {
+            let patience = if self.stop.is_woken() {
                 Some(Duration::ZERO)
             } else {
                 patience

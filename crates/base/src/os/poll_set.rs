@@ -103,7 +103,7 @@ impl PollSet {
         let mut waited = Ok(());
         clock.wait_with(deadline, stop, &mut |patience| {
             // The token may have been woken before the waker was set; no wake-up would follow.
-            let patience = if stop.is_roused() {
+            let patience = if stop.is_woken() {
                 Some(Duration::ZERO)
             } else {
                 patience

@@ -5,15 +5,15 @@
 //! [`Manual`] in tests and wherever simulation time rules.
 
 mod clock;
+mod histogram;
 mod nanos;
 mod pace;
-mod spans;
 mod stop;
 mod wall;
 
 pub use clock::{Clock, Manual, Monotonic};
+pub use histogram::Histogram;
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
-pub use spans::Spans;
 pub use stop::{Stop, Waker};
 pub use wall::{WallClock, system_time};

@@ -69,7 +69,7 @@ impl Stop {
     }
 
     /// Whether the current wait is over: stopped, or woken. A wake counts once.
-    pub fn is_roused(&self) -> bool {
+    pub fn is_woken(&self) -> bool {
         let mut state = self.0.lock();
         state.stopped || std::mem::take(&mut state.wake)
     }

@@ -1,6 +1,6 @@
 //! The lines of `[fieldbus.at]`: signals with their own place in the device.
 
-use crate::Spot;
+use crate::TagAddress;
 use tickbus_fieldbus::At;
 use tickbus_fieldbus::both_ways;
 use tickbus_image::signal::{Signal, SignalTable};
@@ -16,10 +16,10 @@ impl ClientOptions {
         let mut placed = Vec::new();
         for line in lines {
             let signal = &table.signals[line.signal];
-            let spot: Spot = match line.text.parse() {
+            let spot: TagAddress = match line.text.parse() {
                 Ok(spot) => spot,
                 Err(error) => {
-                    let error: super::super::PlaceError = error;
+                    let error: super::super::ElementAddressError = error;
                     line.wrong(error.what, error.right);
                     continue;
                 }

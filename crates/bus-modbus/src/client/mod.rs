@@ -1,15 +1,15 @@
 //! The bus `modbus-client`: this end reads and writes a server's tables.
 
+mod area_mapping;
 mod at;
-mod lie;
 mod options;
 mod piece;
 mod plan;
-mod poll;
-mod query;
+mod request;
+mod session;
 
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::Guard;
+use tickbus_fieldbus::WriteGuard;
 #[cfg(unix)]
 use tickbus_fieldbus::tcp::Call;
 use tickbus_fieldbus::tcp::dial;
@@ -17,12 +17,12 @@ use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
 use tickbus_image::signal::SignalTable;
 
 use super::Line;
-pub use lie::Block;
+pub use area_mapping::Block;
 pub use options::ClientOptions;
 pub use piece::Piece;
-pub use plan::{Abilities, queries};
-use poll::{Framing, Poll, Station};
-pub use query::{Fault, Query, Region};
+pub use plan::{Capabilities, queries};
+pub use request::{AnswerError, Region, Request};
+use session::{ClientSession, Framing, Station};
 
 /// For how many times `max_age` a server may leave sent data unacknowledged.
 const PATIENCE: i64 = 4;
@@ -33,7 +33,7 @@ pub struct ModbusClient {
     options: ClientOptions,
     cycle: Nanos,
     stations: Vec<Station>,
-    guards: Vec<Guard>,
+    guards: Vec<WriteGuard>,
 }
 
 impl ModbusClient {
@@ -56,7 +56,7 @@ impl ModbusClient {
         });
         let stations: Vec<Station> = stations.collect();
         let guards = (0..stations.len())
-            .map(|station| Guard::new(options.stations.write_to(station)))
+            .map(|station| WriteGuard::new(options.stations.write_to(station)))
             .collect();
         Self {
             options: options.clone(),
@@ -66,9 +66,15 @@ impl ModbusClient {
         }
     }
 
-    fn poll(&mut self, framing: Framing, peer: String, port: &Port, now: Nanos) -> Poll<'_> {
+    fn poll(
+        &mut self,
+        framing: Framing,
+        peer: String,
+        port: &Port,
+        now: Nanos,
+    ) -> ClientSession<'_> {
         let timeout = self.options.patience(self.stations.len(), port.max_age());
-        Poll::new(
+        ClientSession::new(
             &mut self.stations,
             &mut self.guards,
             framing,

@@ -5,16 +5,16 @@ use std::collections::BTreeMap;
 use crate::line::Line;
 use crate::stations::{Stations, Units, read_write_to};
 use crate::table::Table as OfTable;
-use crate::{INPUTS, Place, Spot};
+use crate::{ElementAddress, INPUTS, TagAddress};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::Role;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
-use super::lie::Lie;
-use super::plan::{Abilities, queries};
-use super::{Block, Piece, Query};
+use super::area_mapping::AreaMapping;
+use super::plan::{Capabilities, queries};
+use super::{Block, Piece, Request};
 
 /// The default address: the one at which our own server listens.
 const ADDRESS: Address = Address::local(1502);
@@ -37,11 +37,11 @@ pub struct ClientOptions {
     /// The unit of each station, and the device that it may write to.
     pub stations: Stations,
     /// The place of `%I`.
-    pub inputs: Lie,
+    pub inputs: AreaMapping,
     /// The place of `%Q`.
-    pub outputs: Lie,
+    pub outputs: AreaMapping,
     /// Signals with their own place, by name: `[fieldbus.at]`.
-    pub at: BTreeMap<String, Spot>,
+    pub at: BTreeMap<String, TagAddress>,
     /// The time-out for an answer, if stated.
     pub timeout: Option<Nanos>,
     /// Whether a single request may write and read.
@@ -78,8 +78,8 @@ impl ClientOptions {
         let write_to = write_to.as_ref().map(read_write_to);
         let (input, output) = (default(role, Area::Input), default(role, Area::Output));
         let writes = |area| role.areas().0 == area;
-        let inputs = Lie::read(inputs.as_ref(), at, input, writes(Area::Input));
-        let outputs = Lie::read(outputs.as_ref(), at, output, writes(Area::Output));
+        let inputs = AreaMapping::read(inputs.as_ref(), at, input, writes(Area::Input));
+        let outputs = AreaMapping::read(outputs.as_ref(), at, output, writes(Area::Output));
         let timeout = timeout.map_or(Some(None), |value| value.duration().map(Some));
         let combine = combine.map_or(Some(true), |value| value.boolean());
         let events = events.map_or(Some(false), |value| value.boolean());
@@ -117,7 +117,7 @@ impl ClientOptions {
                 let fits = self.blocks(area, station.bytes(area));
                 let fits = fits.and_then(|blocks| {
                     if area == writes {
-                        Lie::check_apart(area, &blocks)
+                        AreaMapping::check_apart(area, &blocks)
                     } else {
                         Ok(())
                     }
@@ -130,7 +130,7 @@ impl ClientOptions {
         }
     }
 
-    fn lie(&self, area: Area) -> &Lie {
+    fn lie(&self, area: Area) -> &AreaMapping {
         match area {
             Area::Input => &self.inputs,
             Area::Output => &self.outputs,
@@ -144,7 +144,7 @@ impl ClientOptions {
     }
 
     /// The first elements of the parts of an area.
-    pub(crate) fn places(&self, area: Area) -> impl Iterator<Item = Place> {
+    pub(crate) fn places(&self, area: Area) -> impl Iterator<Item = ElementAddress> {
         self.lie(area).places()
     }
 
@@ -195,16 +195,16 @@ impl ClientOptions {
     }
 
     /// The abilities assumed of a device at the start of a connection.
-    pub(super) fn abilities(&self) -> Abilities {
+    pub(super) fn abilities(&self) -> Capabilities {
         let gap = match self.line {
             Line::Tcp(_) => usize::MAX,
             Line::Serial(_) => SERIAL_GAP,
         };
-        Abilities::new(self.combine, gap)
+        Capabilities::new(self.combine, gap)
     }
 
     /// The requests sent to a station in each cycle, unless its device refuses some of them.
-    pub fn requests(&self, table: &SignalTable, station: usize) -> Vec<Query> {
+    pub fn requests(&self, table: &SignalTable, station: usize) -> Vec<Request> {
         let (writes, reads) = self.role.areas();
         let pieces = |area| self.pieces(table, station, area);
         queries(&pieces(reads), &pieces(writes), &self.abilities())
@@ -212,11 +212,11 @@ impl ClientOptions {
 }
 
 /// The default place of an area.
-fn default(role: Role, area: Area) -> Place {
+fn default(role: Role, area: Area) -> ElementAddress {
     let (table, offset) = match (role, area) {
         (_, Area::Output) => (OfTable::HoldingRegisters, 0),
         (Role::Controller, Area::Input) => (OfTable::InputRegisters, 0),
         (Role::Device, Area::Input) => (OfTable::HoldingRegisters, INPUTS),
     };
-    Place { table, offset }
+    ElementAddress { table, offset }
 }

@@ -1,7 +1,7 @@
 //! The place of each signal in the tables, bit by bit.
 
 use crate::table::{ADDRESSES, Span, Table};
-use crate::{Place, Spot};
+use crate::{ElementAddress, TagAddress};
 use tickbus_image::signal::{DataType, Signal};
 
 use super::Block;
@@ -79,8 +79,8 @@ impl Piece {
     /// # Errors
     ///
     /// It does not fit there: what is wrong, and what would be right.
-    pub(super) fn of_spot(signal: &Signal, spot: Spot) -> Result<Self, (String, String)> {
-        let Place { table, offset } = spot.place;
+    pub(super) fn of_spot(signal: &Signal, spot: TagAddress) -> Result<Self, (String, String)> {
+        let ElementAddress { table, offset } = spot.place;
         let data_type = signal.data_type;
         if let Some(stated) = spot.data_type
             && stated != data_type

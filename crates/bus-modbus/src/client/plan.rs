@@ -8,11 +8,11 @@ use crate::function::{
 use crate::table::{Span, Table};
 
 use super::Piece;
-use super::query::{Query, Region};
+use super::request::{Region, Request};
 
 /// The abilities of a device, which decide how requests are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Abilities {
+pub struct Capabilities {
     /// One request can write and read holding registers: function 23.
     pub combine: bool,
     /// The widest gap in a table, in bits, that is read over to save a request.
@@ -23,7 +23,7 @@ pub struct Abilities {
     pub many_registers: bool,
 }
 
-impl Abilities {
+impl Capabilities {
     /// The abilities assumed of an unknown device.
     pub const fn new(combine: bool, gap: usize) -> Self {
         Self {
@@ -40,13 +40,13 @@ impl Abilities {
 /// Every piece is read or written once. A read may include gaps between pieces; a write never includes
 /// anything else. A piece is split only if it shares registers with others and they exceed the limit of a
 /// request.
-pub fn queries(reads: &[Piece], writes: &[Piece], able: &Abilities) -> Vec<Query> {
+pub fn queries(reads: &[Piece], writes: &[Piece], able: &Capabilities) -> Vec<Request> {
     let is_holding = |piece: &Piece| piece.table == Table::HoldingRegisters;
     let combine = able.combine
         && able.many_registers
         && reads.iter().any(is_holding)
         && writes.iter().any(is_holding);
-    let able = Abilities { combine, ..*able };
+    let able = Capabilities { combine, ..*able };
     let mut queries = Vec::new();
     let mut reads: Vec<Region> = by_table(reads)
         .flat_map(|(table, pieces)| readings(table, &pieces, able.gap))
@@ -55,20 +55,20 @@ pub fn queries(reads: &[Piece], writes: &[Piece], able: &Abilities) -> Vec<Query
         for query in writings(table, &pieces, &able) {
             let beside = |read: &Region| read.table == Table::HoldingRegisters;
             queries.push(match query {
-                Query::Write(write) if combine && beside(&write) => {
+                Request::Write(write) if combine && beside(&write) => {
                     match reads.iter().position(beside) {
-                        Some(read) => Query::Both {
+                        Some(read) => Request::Both {
                             write,
                             read: reads.remove(read),
                         },
-                        None => Query::Write(write),
+                        None => Request::Write(write),
                     }
                 }
                 query => query,
             });
         }
     }
-    queries.extend(reads.into_iter().map(Query::Read));
+    queries.extend(reads.into_iter().map(Request::Read));
     queries
 }
 
@@ -116,16 +116,16 @@ fn readings(table: Table, pieces: &[Piece], gap: usize) -> Vec<Region> {
 }
 
 /// The writes to one table, whose pieces are in order.
-fn writings(table: Table, pieces: &[Piece], able: &Abilities) -> Vec<Query> {
+fn writings(table: Table, pieces: &[Piece], able: &Capabilities) -> Vec<Request> {
     let (most, many) = match (table.is_bits(), able.combine) {
         (true, _) => (WRITE_BITS, able.many_coils),
         (false, true) => (READ_WRITE_REGISTERS, able.many_registers),
         (false, false) => (WRITE_REGISTERS, able.many_registers),
     };
     let (whole, partial) = elements(table, pieces);
-    let mut queries: Vec<Query> = partial
+    let mut queries: Vec<Request> = partial
         .into_iter()
-        .map(|first| Query::Mask(region(table, Span { first, count: 1 }, pieces)))
+        .map(|first| Request::Mask(region(table, Span { first, count: 1 }, pieces)))
         .collect();
     let mut rest = whole.into_iter().peekable();
     while let Some(first) = rest.next() {
@@ -141,9 +141,9 @@ fn writings(table: Table, pieces: &[Piece], able: &Abilities) -> Vec<Query> {
             };
             let region = region(table, part, pieces);
             queries.push(if many {
-                Query::Write(region)
+                Request::Write(region)
             } else {
-                Query::WriteOne(region)
+                Request::WriteOne(region)
             });
             run = Span {
                 first: part.end(),

@@ -13,13 +13,13 @@ use tickbus_image::signal::SignalTable;
 use super::Line;
 pub use options::ServerOptions;
 use tcp::TcpService;
-use units::UnitSet;
+use units::Units;
 
 /// The bus of kind `modbus-server`.
 #[derive(Debug)]
 pub struct ModbusServer {
     options: ServerOptions,
-    units: UnitSet,
+    units: Units,
 }
 
 impl ModbusServer {
@@ -27,7 +27,7 @@ impl ModbusServer {
     pub fn new(options: &ServerOptions, table: &SignalTable, role: Role, driver: &str) -> Self {
         Self {
             options: options.clone(),
-            units: UnitSet::new(options, table, role, driver),
+            units: Units::new(options, table, role, driver),
         }
     }
 }

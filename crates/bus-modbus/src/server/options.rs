@@ -2,14 +2,14 @@
 
 use crate::line::Line;
 use crate::stations::{Stations, Units};
-use crate::{INPUTS, Map, Place, Side, table};
+use crate::{ElementAddress, INPUTS, Map, Side, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
 use tickbus_fieldbus::read_events;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::SignalTable;
 
-use super::super::place::SHAPE;
+use super::super::element_address::SHAPE;
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1502);
@@ -112,7 +112,7 @@ impl ServerOptions {
 /// Reads the holding register at which `%I` is repeated.
 fn read_window(value: &Value<'_>) -> Option<usize> {
     let text = value.text(SHAPE)?;
-    let place = Place::parse(text, table::Table::HoldingRegisters)
+    let place = ElementAddress::parse(text, table::Table::HoldingRegisters)
         .map_err(|error| value.wrong(error.what, error.right))
         .ok()?;
     if place.table != table::Table::HoldingRegisters {

@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Carried, UnitSet};
+use super::units::{Receipt, Units};
 
 /// The most unconfirmed answers remembered per client.
 const REMEMBERED: usize = 64;
@@ -14,7 +14,7 @@ const REMEMBERED: usize = 64;
 /// Modbus TCP as a service for many clients.
 #[derive(Debug)]
 pub(super) struct TcpService<'a> {
-    pub(super) units: &'a mut UnitSet,
+    pub(super) units: &'a mut Units,
     pub(super) clients: usize,
     pub(super) patience: Nanos,
 }
@@ -23,7 +23,7 @@ pub(super) struct TcpService<'a> {
 #[derive(Debug)]
 pub(super) struct Client {
     /// What its unconfirmed answers carry.
-    carried: Vec<Carried>,
+    carried: Vec<Receipt>,
     /// The stations that it has written to.
     writes: Box<[bool]>,
 }

@@ -11,7 +11,7 @@ use crate::{Done, Exception, Function, Identification, Map, Tables, answer};
 
 /// The units of a server, and the values that clients have written to them.
 #[derive(Debug)]
-pub(super) struct UnitSet {
+pub(super) struct Units {
     identification: Identification,
     /// Whether a write is an event even if it changes nothing.
     every_write: bool,
@@ -36,13 +36,13 @@ struct Unit {
 
 /// The part of a station's frame that an answer carries; it counts as sent once the client has the answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Carried {
+pub(super) struct Receipt {
     station: usize,
     generation: u64,
     bits: Range<usize>,
 }
 
-impl UnitSet {
+impl Units {
     pub(super) fn new(
         options: &ServerOptions,
         table: &SignalTable,
@@ -93,7 +93,7 @@ impl UnitSet {
         writes: &mut [bool],
         reply: &mut Vec<u8>,
         port: &mut Port,
-    ) -> Option<Carried> {
+    ) -> Option<Receipt> {
         let unit = &mut self.units[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
@@ -144,7 +144,7 @@ impl UnitSet {
             (None, None) if writes[station] || !unit.has_writer => port.touch(station, now),
             (None, None) => {}
         }
-        read.filter(|_| !is_lost).map(|bits| Carried {
+        read.filter(|_| !is_lost).map(|bits| Receipt {
             station,
             generation: unit.generation,
             bits,
@@ -152,8 +152,8 @@ impl UnitSet {
     }
 
     /// A client has received an answer that carries this.
-    pub(super) fn carried(&self, carried: Carried, port: &mut Port) {
-        let Carried {
+    pub(super) fn carried(&self, carried: Receipt, port: &mut Port) {
+        let Receipt {
             station,
             generation,
             bits,

@@ -27,7 +27,7 @@ const LIFE: Nanos = Nanos::from_secs(30);
 
 /// What has arrived from the server.
 #[derive(Debug)]
-pub(super) enum News {
+pub(super) enum Notification {
     /// The values of one publish, in order, with the indices of their signals.
     Values(Vec<(usize, DataValue)>),
     /// A publish without values: none has changed.
@@ -50,7 +50,7 @@ pub(super) struct Rhythm {
 }
 
 /// Receives notifications, each as a whole.
-struct Feed(Inbox<News>);
+struct Feed(Inbox<Notification>);
 
 impl OnSubscriptionNotificationCore for Feed {
     fn on_subscription_notification(
@@ -63,11 +63,11 @@ impl OnSubscriptionNotificationCore for Feed {
             if let Some(ended) = data.inner_as::<StatusChangeNotification>() {
                 let why = meaning(ended.status);
                 let error = BusError::Left(format!("the server ended the subscription ({why})"));
-                self.0.push(News::Ended(error));
+                self.0.push(Notification::Ended(error));
             } else if let Some(data) = data.into_inner_as::<DataChangeNotification>() {
                 for item in data.monitored_items.into_iter().flatten() {
                     if item.client_handle == STATE {
-                        self.0.extend(state(&item.value).map(News::Plc));
+                        self.0.extend(state(&item.value).map(Notification::Plc));
                     } else {
                         values.push((signal(item.client_handle), item.value));
                     }
@@ -75,9 +75,9 @@ impl OnSubscriptionNotificationCore for Feed {
             }
         }
         self.0.push(if values.is_empty() {
-            News::Alive
+            Notification::Alive
         } else {
-            News::Values(values)
+            Notification::Values(values)
         });
     }
 }
@@ -117,7 +117,7 @@ pub(super) async fn subscribe(
     fields: &[Field],
     nodes: &[NodeId],
     rhythm: Rhythm,
-    inbox: Inbox<News>,
+    inbox: Inbox<Notification>,
 ) -> Result<Nanos, BusError> {
     let interval = rhythm.publishing;
     // Three signs of life within `max_age`.
@@ -191,7 +191,7 @@ async fn watch_state(
     session: &Session,
     id: u32,
     interval: Nanos,
-    inbox: &Inbox<News>,
+    inbox: &Inbox<Notification>,
 ) -> Result<(), BusError> {
     let request = MonitoredItemCreateRequest::new(
         NodeId::from(VariableId::Server_ServerStatus_State).into(),
@@ -210,7 +210,7 @@ async fn watch_state(
         .map_err(|error| no_subscription(&error))?;
     let refused = made.iter().map(|made| made.result.status_code);
     if let Some(status) = refused.into_iter().find(StatusCode::is_bad) {
-        inbox.push(News::Plc(PlcState::Run));
+        inbox.push(Notification::Plc(PlcState::Run));
         log::info!(
             "the server does not report its state ({}), so a PLC in STOP is not noticed by it",
             meaning(status)

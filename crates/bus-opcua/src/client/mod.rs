@@ -1,11 +1,11 @@
 //! The client: reads a PLC that is an OPC UA server through a subscription, and writes to it by Write.
 
+mod connect;
 mod dial;
 mod feed;
 mod nodes;
 mod readings;
 mod session;
-mod talk;
 mod writings;
 
 use std::net::TcpStream;
@@ -15,17 +15,17 @@ use opcua::types::EndpointDescription;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp;
-use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Guard, Port, Role};
+use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Port, Role, WriteGuard};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
 use super::pki::Pki;
 use super::reactor::{Driven, Reactor};
 use super::{ClientOptions, NodeName, Policy};
+use connect::Login;
 use dial::Dial;
 use feed::Rhythm;
 use readings::Readings;
-use session::Login;
-use talk::Talk;
+use session::ClientSession;
 use writings::Writings;
 
 /// How long a server may take to name its endpoints, and again to open a session and have it checked. Within
@@ -44,7 +44,7 @@ pub struct Client {
     table: SignalTable,
     role: Role,
     cycle: Nanos,
-    guard: Guard,
+    guard: WriteGuard,
 }
 
 /// What this bus needs to know about a signal.
@@ -73,7 +73,7 @@ impl Client {
             table: setup.table.clone(),
             role: setup.role,
             cycle: setup.cycle.unwrap_or(CYCLE),
-            guard: Guard::new(options.write_to.as_deref()),
+            guard: WriteGuard::new(options.write_to.as_deref()),
         })
     }
 
@@ -183,7 +183,7 @@ impl Free for Client {
             Driven::Done(Ok((nodes, publishing))) => {
                 port.tell("publishing_interval", &publishing.to_string());
                 let (tx, rx) = self.role.areas();
-                let talk = Talk {
+                let talk = ClientSession {
                     session: Arc::clone(&session),
                     reactor: &reactor,
                     inbox,
@@ -203,7 +203,7 @@ impl Free for Client {
             Driven::Late => Err(self.late("answered all questions about its nodes")),
             Driven::Stopped => Ok(()),
         };
-        reactor.farewell(session::FAREWELL, session::close(session));
+        reactor.farewell(connect::FAREWELL, session::close(session));
         ended
     }
 }

@@ -69,7 +69,7 @@ impl Visitor {
 }
 
 /// What clients have done.
-pub(super) enum News {
+pub(super) enum Visit {
     /// Values written in one request. A signal written twice in it starts a new list.
     Written(Visitor, Vec<Vec<(usize, Slot)>>),
     /// These signals are about to be read: their nodes must be updated first.
@@ -99,7 +99,7 @@ pub(super) struct Own {
     /// The area that clients write.
     pub(super) reads: Area,
     pub(super) watched: Watched,
-    pub(super) inbox: Inbox<News>,
+    pub(super) inbox: Inbox<Visit>,
     pub(super) wall: WallClock,
     /// Whether a client's certificate must belong to its application.
     pub(super) checks_applications: bool,
@@ -165,7 +165,7 @@ impl Signals {
         judged.push_back((context.session_id, checked.is_ok()));
         let is_good = checked.is_ok();
         if let Err(why) = checked {
-            self.own.inbox.push(News::Impostor(why));
+            self.own.inbox.push(Visit::Impostor(why));
         }
         verdict(is_good)
     }
@@ -244,7 +244,7 @@ impl InMemoryNodeManagerImpl for Signals {
         let (done, ready) = oneshot::channel();
         self.own
             .inbox
-            .push(News::Reads(Visitor::of(context), signals, done));
+            .push(Visit::Reads(Visitor::of(context), signals, done));
         // Fails if the bus has stopped; the nodes then keep their values.
         let _ = ready.await;
         let space = address_space.read();
@@ -362,7 +362,7 @@ impl InMemoryNodeManagerImpl for Signals {
         }
         if !lists[0].is_empty() {
             let inbox = &self.own.inbox;
-            inbox.push(News::Written(Visitor::of(context), lists));
+            inbox.push(Visit::Written(Visitor::of(context), lists));
         }
         Ok(())
     }

@@ -27,7 +27,7 @@ use super::reactor::{Inbox, Reactor};
 use super::rejects::Rejects;
 use super::{Policy, ServerOptions, Trust};
 use image::{Image, Show};
-use manager::{News, Own, Visitor};
+use manager::{Own, Visit, Visitor};
 use peers::{Peers, Seen};
 use watched::Watched;
 
@@ -91,7 +91,7 @@ impl Server {
         let bound = listener
             .local_addr()
             .map_err(|error| tcp::no_wait(&error))?;
-        let inbox: Inbox<News> = reactor.inbox();
+        let inbox: Inbox<Visit> = reactor.inbox();
         let (watched, tasks_alone) = (Watched::default(), Arc::default());
         let wall = self.pki.wall;
         let own = Own {
@@ -124,7 +124,7 @@ impl Server {
                     Ok(listener) => server.run_with(listener).await.err(),
                     Err(error) => Some(error.to_string()),
                 };
-                inbox.push(News::Ended(why.unwrap_or_default()));
+                inbox.push(Visit::Ended(why.unwrap_or_default()));
                 ended.notify_one();
             }
         });
@@ -139,7 +139,7 @@ impl Server {
 }
 
 /// Checks the folder of rejected certificates outside the bus thread, because file operations may be slow.
-async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
+async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<Visit>) {
     loop {
         tokio::time::sleep(LOOK).await;
         let rejects = Arc::clone(&rejects);
@@ -150,7 +150,7 @@ async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
         };
         match tokio::task::spawn_blocking(look).await {
             Ok(found) if found.count > 0 => {
-                inbox.push(News::Rejected(found.files, found.count));
+                inbox.push(Visit::Rejected(found.files, found.count));
             }
             Ok(_) => {}
             // The bus is closing.
@@ -161,7 +161,7 @@ async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<News>) {
 
 /// The crate's server, running.
 struct Started {
-    inbox: Inbox<News>,
+    inbox: Inbox<Visit>,
     handle: ServerHandle,
     /// Notified when it has ended.
     ended: Arc<Notify>,
@@ -282,9 +282,9 @@ impl Service<'_> {
         Ok(Served::Stopped)
     }
 
-    fn hear(&mut self, port: &mut Port, now: Nanos, news: News) -> Result<(), BusError> {
+    fn hear(&mut self, port: &mut Port, now: Nanos, news: Visit) -> Result<(), BusError> {
         match news {
-            News::Written(visitor, lists) => {
+            Visit::Written(visitor, lists) => {
                 for list in &lists {
                     self.image.received(port, now, list);
                 }
@@ -293,7 +293,7 @@ impl Service<'_> {
                 let stations = written.map(|(signal, _)| table.signals[*signal].station);
                 self.meet(port, visitor, stations);
             }
-            News::Reads(visitor, signals, done) => {
+            Visit::Reads(visitor, signals, done) => {
                 self.image.show_to_reader(port, now, &signals);
                 // If nothing can be written, clients that read are the peers.
                 let stations = signals.iter().map(|at| self.table.signals[*at].station);
@@ -306,7 +306,7 @@ impl Service<'_> {
                 // The reader may be gone.
                 let _ = done.send(());
             }
-            News::Impostor(why) => {
+            Visit::Impostor(why) => {
                 port.count("opcua.refused_applications");
                 if let Some(times) = self.turned_away.count(("opcua", "application")) {
                     log::warn!(
@@ -315,7 +315,7 @@ impl Service<'_> {
                     );
                 }
             }
-            News::Rejected(files, count) => {
+            Visit::Rejected(files, count) => {
                 let folder = self.pki.folder.display();
                 for file in files {
                     if let Some(times) = self.turned_away.count(("opcua", "certificate")) {
@@ -329,7 +329,7 @@ impl Service<'_> {
                     port.count("opcua.rejected_certificates");
                 }
             }
-            News::Ended(why) => {
+            Visit::Ended(why) => {
                 return Err(BusError::Link(format!(
                     "the server ended by itself ({why})"
                 )));

@@ -3,7 +3,7 @@
 use std::io;
 use std::net::SocketAddr;
 
-use super::{Dialog, News, Refusal, S7Client, Terms};
+use super::{ClientSession, ConnectionParameters, Refusal, S7Client, SessionEvent};
 use crate::szl::Identity;
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::tcp::Caller;
@@ -24,19 +24,19 @@ const RETRY: Nanos = Nanos::from_secs(1);
 pub(super) struct Connection<'a> {
     bus: &'a mut S7Client,
     peer: SocketAddr,
-    dialog: Dialog,
+    dialog: ClientSession,
     pace: Pace,
     has_identity: bool,
     /// When to ask the CPU for its operating state next; `None` if it does not report it.
     state: Option<Nanos>,
     /// A cycle became due while the question was pending.
     is_due: bool,
-    stations: Vec<Station>,
+    stations: Vec<StationCycle>,
 }
 
 /// The state of a station after the last cycles.
 #[derive(Clone, Debug, Default)]
-struct Station {
+struct StationCycle {
     /// Whether any of its data are written, and whether any are read.
     has: [bool; 2],
     /// The CPU refused some of its data; they are tried again at this time.
@@ -45,11 +45,16 @@ struct Station {
 }
 
 impl<'a> Connection<'a> {
-    pub(super) fn new(bus: &'a mut S7Client, peer: SocketAddr, terms: Terms, port: &Port) -> Self {
+    pub(super) fn new(
+        bus: &'a mut S7Client,
+        peer: SocketAddr,
+        terms: ConnectionParameters,
+        port: &Port,
+    ) -> Self {
         let now = port.clock().now();
-        let station = |station| Station {
+        let station = |station| StationCycle {
             has: bus.frames.has(station),
-            ..Station::default()
+            ..StationCycle::default()
         };
         Self {
             dialog: bus.frames.dialog(terms, now),
@@ -175,7 +180,7 @@ impl<'a> Connection<'a> {
             }
         }
         match self.dialog.begin(now) {
-            Some(News::Done) => self.done(now, port),
+            Some(SessionEvent::Done) => self.done(now, port),
             _ => Ok(()),
         }
     }
@@ -224,8 +229,8 @@ impl<'a> Connection<'a> {
     ///
     /// It refused something of every station.
     fn put_off(&mut self, port: &Port) -> Result<(), BusError> {
-        let is_used = |station: &&Station| station.has != [false, false];
-        let is_served = |station: &Station| station.resume.is_none();
+        let is_used = |station: &&StationCycle| station.has != [false, false];
+        let is_served = |station: &StationCycle| station.resume.is_none();
         let is_any_served = self.stations.iter().filter(is_used).any(is_served);
         for (index, station) in self.stations.iter_mut().enumerate() {
             let (Some(_), Some(refusal)) = (station.resume, &station.refusal) else {
@@ -258,9 +263,9 @@ impl Caller for Connection<'_> {
             bytes = &[];
             match news.map_err(|end| end.into_error(self.peer))? {
                 None => return Ok(()),
-                Some(News::Met(length, identity)) => self.meet(now, length, identity, port),
-                Some(News::Done) => self.done(now, port)?,
-                Some(News::State(state)) => self.learn(now, state, port)?,
+                Some(SessionEvent::Met(length, identity)) => self.meet(now, length, identity, port),
+                Some(SessionEvent::Done) => self.done(now, port)?,
+                Some(SessionEvent::State(state)) => self.learn(now, state, port)?,
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::ClientOptions;
-use super::plan::{self, Field, Job, Way};
+use super::plan::{self, Field, Job, JobDirection};
 use crate::item::Item;
 use crate::length::LEAST;
 use tickbus_fieldbus::Role;
@@ -75,7 +75,10 @@ impl Frames {
             }
             text
         };
-        [one(Way::Write, &self.written), one(Way::Read, &self.read)]
+        [
+            one(JobDirection::Write, &self.written),
+            one(JobDirection::Read, &self.read),
+        ]
     }
 }
 

@@ -1,26 +1,26 @@
 //! The bus of kind `s7-client`: reads and writes the memory of a CPU.
 
 mod connection;
-mod dialog;
 mod frames;
 mod options;
+mod parameters;
 mod plan;
 mod refusal;
-mod terms;
+mod session;
 mod traffic;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::Rarely;
 use tickbus_fieldbus::tcp;
-use tickbus_fieldbus::{BusError, CYCLE, Free, Guard, PlcState, Port, Role};
+use tickbus_fieldbus::{BusError, CYCLE, Free, PlcState, Port, Role, WriteGuard};
 use tickbus_image::signal::SignalTable;
 
 use connection::Connection;
-pub use dialog::Dialog;
 pub use frames::Frames;
 pub use options::ClientOptions;
+pub use parameters::{ConnectionParameters, End, SessionEvent};
 pub use refusal::Refusal;
-pub use terms::{End, News, Terms};
+pub use session::ClientSession;
 
 /// The shortest time-out of an answer; otherwise it is four times `max_age`.
 const PATIENCE: Nanos = Nanos::from_secs(2);
@@ -33,10 +33,10 @@ pub struct S7Client {
     frames: Frames,
     /// The stations' names, for messages.
     names: Vec<String>,
-    guard: Guard,
+    guard: WriteGuard,
     /// The requests for the CPU's identity and operating state.
-    identity: Question,
-    state: Question,
+    identity: ListRequest,
+    state: ListRequest,
     /// The last operating state that the CPU reported, and how often in a row it has not answered since.
     said: Option<PlcState>,
     untold: u8,
@@ -49,12 +49,12 @@ pub struct S7Client {
 
 /// A request to which some CPUs respond by closing the connection, or not at all.
 #[derive(Clone, Copy, Debug, Default)]
-struct Question {
+struct ListRequest {
     /// How many times in a row it was not answered.
     unanswered: u8,
 }
 
-impl Question {
+impl ListRequest {
     /// After this many times it is omitted for one connection.
     const LIMIT: u8 = 2;
 
@@ -78,10 +78,10 @@ impl S7Client {
         Self {
             frames: Frames::new(options, table, role),
             names: names.collect(),
-            guard: Guard::new(options.write_to.as_deref()),
+            guard: WriteGuard::new(options.write_to.as_deref()),
             cycle: cycle.unwrap_or(CYCLE),
-            identity: Question::default(),
-            state: Question::default(),
+            identity: ListRequest::default(),
+            state: ListRequest::default(),
             said: None,
             untold: 0,
             told_unknown: false,
@@ -101,7 +101,7 @@ impl Free for S7Client {
             return Ok(());
         };
         port.opening(&format!("connected with {peer}; waiting for its answer"));
-        let terms = Terms {
+        let terms = ConnectionParameters {
             calling: self.options.calling,
             called: self.options.called,
             pdu: self.options.pdu,

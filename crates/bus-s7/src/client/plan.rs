@@ -21,7 +21,7 @@ const GAPS: [usize; 4] = [item::DATA_HEADER, 16, 64, 128];
 
 /// The direction of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Way {
+pub(super) enum JobDirection {
     Write,
     Read,
 }
@@ -40,7 +40,7 @@ pub(super) struct Field {
 /// One job.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Job {
-    pub(super) way: Way,
+    pub(super) way: JobDirection,
     pub(super) pieces: Vec<Piece>,
 }
 
@@ -97,19 +97,19 @@ struct Cell {
 }
 
 /// The jobs that transfer `fields`; neither a job nor its answer is longer than `limit`.
-pub(super) fn jobs(way: Way, fields: &[Field], limit: usize) -> Vec<Job> {
+pub(super) fn jobs(way: JobDirection, fields: &[Field], limit: usize) -> Vec<Job> {
     let cells = cells(way, fields);
     let plan = |gap| pack(way, pieces(way, &cells, gap, limit), limit);
     match way {
-        Way::Write => plan(0),
-        Way::Read => {
+        JobDirection::Write => plan(0),
+        JobDirection::Read => {
             let plans = GAPS.map(plan).into_iter();
             plans.min_by_key(Vec::len).unwrap_or_default()
         }
     }
 }
 
-fn cells(way: Way, fields: &[Field]) -> Vec<Cell> {
+fn cells(way: JobDirection, fields: &[Field]) -> Vec<Cell> {
     let mut sorted = fields.to_vec();
     // Keeps the BOOLs of a byte adjacent, even if the byte is also part of a word.
     sorted.sort_by_key(|field| {
@@ -135,7 +135,7 @@ fn cells(way: Way, fields: &[Field]) -> Vec<Cell> {
         let covered = group
             .iter()
             .fold(0, |bits, field| bits | 1 << (field.first % 8));
-        if way == Way::Read || bits > 1 || covered == 0xFF_u32 {
+        if way == JobDirection::Read || bits > 1 || covered == 0xFF_u32 {
             cells.push(cell(group, None));
         } else {
             let one = |field: &Field| {
@@ -149,7 +149,7 @@ fn cells(way: Way, fields: &[Field]) -> Vec<Cell> {
 }
 
 /// Adjacent cells, or cells with a gap of at most `gap` bytes, become one item.
-fn pieces(way: Way, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
+fn pieces(way: JobDirection, cells: &[Cell], gap: usize, limit: usize) -> Vec<Piece> {
     let room = room(way, [JOB, ANSWER], limit);
     let mut pieces: Vec<Piece> = Vec::new();
     for cell in cells {
@@ -204,7 +204,7 @@ impl Run {
 }
 
 /// Puts each piece into the first job that has room for it.
-fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
+fn pack(way: JobDirection, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
     // Each with its length and the length of its answer.
     let mut jobs: Vec<(Job, [usize; 2])> = Vec::new();
     for piece in pieces {
@@ -223,8 +223,8 @@ fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
         let [job_length, answer] = lengths;
         *job_length += item::ADDRESS;
         match way {
-            Way::Write => (*job_length, *answer) = (*job_length + data, *answer + 1),
-            Way::Read => *answer += data,
+            JobDirection::Write => (*job_length, *answer) = (*job_length + data, *answer + 1),
+            JobDirection::Read => *answer += data,
         }
         job.pieces.push(piece);
     }
@@ -232,11 +232,11 @@ fn pack(way: Way, pieces: Vec<Piece>, limit: usize) -> Vec<Job> {
 }
 
 /// The most data bytes that one more item of a job can have.
-fn room(way: Way, [job, answer]: [usize; 2], limit: usize) -> usize {
+fn room(way: JobDirection, [job, answer]: [usize; 2], limit: usize) -> usize {
     let room = match way {
-        Way::Write => limit.saturating_sub(job + item::ADDRESS + item::DATA_HEADER),
-        Way::Read if job + item::ADDRESS > limit => 0,
-        Way::Read => limit.saturating_sub(answer + item::DATA_HEADER),
+        JobDirection::Write => limit.saturating_sub(job + item::ADDRESS + item::DATA_HEADER),
+        JobDirection::Read if job + item::ADDRESS > limit => 0,
+        JobDirection::Read => limit.saturating_sub(answer + item::DATA_HEADER),
     };
     // Data of odd length are padded.
     room / 2 * 2

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::plan::Way;
-use crate::item::{Code, Item, Object};
+use super::plan::JobDirection;
+use crate::item::{Item, Object, ReturnCode};
 use crate::pdu::error;
 use tickbus_fieldbus::BusError;
 
@@ -17,7 +17,7 @@ pub enum Refusal {
         /// The item.
         item: Item,
         /// Why.
-        code: Code,
+        code: ReturnCode,
     },
     /// A whole job, with error class and code.
     Job(u16),
@@ -26,8 +26,8 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    pub(super) fn item(way: Way, item: Item, code: Code) -> Self {
-        let written = way == Way::Write;
+    pub(super) fn item(way: JobDirection, item: Item, code: ReturnCode) -> Self {
+        let written = way == JobDirection::Write;
         Self::Item {
             written,
             item,
@@ -86,24 +86,24 @@ impl fmt::Display for Refusal {
 }
 
 /// The remedy for a refused item.
-const fn right(object: Object, code: Code) -> &'static str {
+const fn right(object: Object, code: ReturnCode) -> &'static str {
     match (object, code) {
-        (Object::Block(_), Code::ADDRESS) => {
+        (Object::Block(_), ReturnCode::ADDRESS) => {
             "the block is shorter than the image, or has optimized block access: in its properties, under \
              Attributes, clear that, compile and load the block"
         }
-        (Object::Block(_), Code::MISSING) => {
+        (Object::Block(_), ReturnCode::MISSING) => {
             "there is no such block in the CPU, or it has optimized block access: in its properties, under \
              Attributes, clear that, compile and load the block"
         }
-        (_, Code::ADDRESS | Code::MISSING) => {
+        (_, ReturnCode::ADDRESS | ReturnCode::MISSING) => {
             "the CPU has no such addresses; correct \"input\" and \"output\", or use a data block"
         }
-        (_, Code::ACCESS) => {
+        (_, ReturnCode::ACCESS) => {
             "in the properties of the CPU, under Protection & Security, allow full access and permit access \
              with PUT/GET communication; a block must not be write-protected"
         }
-        (_, Code::TYPE | Code::INCONSISTENT) => {
+        (_, ReturnCode::TYPE | ReturnCode::INCONSISTENT) => {
             "bytes are all that is asked for, so see what the peer is: it may be no CPU of the S7 family"
         }
         _ => "see the diagnostic buffer of the CPU",
@@ -119,7 +119,11 @@ mod tests {
         let item = |object| Item::bytes(object, 4..12);
         for (refusal, parts) in [
             (
-                Refusal::item(Way::Read, item(Object::Block(10)), Code::ADDRESS),
+                Refusal::item(
+                    JobDirection::Read,
+                    item(Object::Block(10)),
+                    ReturnCode::ADDRESS,
+                ),
                 &[
                     "reading DB10 bytes 4 to 11",
                     "out of range (code 0x05)",
@@ -127,11 +131,19 @@ mod tests {
                 ][..],
             ),
             (
-                Refusal::item(Way::Write, item(Object::Block(10)), Code::MISSING),
+                Refusal::item(
+                    JobDirection::Write,
+                    item(Object::Block(10)),
+                    ReturnCode::MISSING,
+                ),
                 &["writing DB10", "does not exist (code 0x0A)", "optimized"],
             ),
             (
-                Refusal::item(Way::Write, item(Object::Inputs), Code::ACCESS),
+                Refusal::item(
+                    JobDirection::Write,
+                    item(Object::Inputs),
+                    ReturnCode::ACCESS,
+                ),
                 &["writing %I bytes 4 to 11", "PUT/GET"],
             ),
             (Refusal::Job(error::NO_FUNCTION), &["0x8104", "PUT/GET"]),

@@ -1,8 +1,8 @@
 //! The frames of all stations, and the jobs that transfer them.
 
-use super::plan::{self, Field, Job, Piece, Way};
+use super::plan::{self, Field, Job, JobDirection, Piece};
 use super::{Frames, Refusal};
-use crate::item::{self, Code};
+use crate::item::{self, ReturnCode};
 use crate::pdu::function;
 
 /// The frames of all stations, and the jobs that transfer them.
@@ -47,29 +47,33 @@ impl Traffic {
         };
         let mut jobs = Vec::new();
         if self.may_write {
-            jobs = plan::jobs(Way::Write, &active(&self.fields.written), limit);
+            jobs = plan::jobs(JobDirection::Write, &active(&self.fields.written), limit);
         }
-        jobs.extend(plan::jobs(Way::Read, &active(&self.fields.read), limit));
+        jobs.extend(plan::jobs(
+            JobDirection::Read,
+            &active(&self.fields.read),
+            limit,
+        ));
         self.jobs = jobs;
     }
 
     /// Records the CPU's answer to a piece; returns whether it was accepted.
-    pub(super) fn judge(&mut self, job: usize, piece: usize, code: Code) -> bool {
+    pub(super) fn judge(&mut self, job: usize, piece: usize, code: ReturnCode) -> bool {
         let Job { way, pieces } = &self.jobs[job];
         let piece = &pieces[piece];
-        if code != Code::OK {
+        if code != ReturnCode::OK {
             let refusal = Refusal::item(*way, piece.item, code);
             self.refused[piece.station].get_or_insert(refusal);
         }
-        code == Code::OK
+        code == ReturnCode::OK
     }
 }
 
 /// The function of a job, and the number of its items.
-pub(super) fn function_of(way: Way, pieces: &[Piece]) -> [u8; 2] {
+pub(super) fn function_of(way: JobDirection, pieces: &[Piece]) -> [u8; 2] {
     let code = match way {
-        Way::Write => function::WRITE,
-        Way::Read => function::READ,
+        JobDirection::Write => function::WRITE,
+        JobDirection::Read => function::READ,
     };
     [code, u8::try_from(pieces.len()).expect("20 at most")]
 }
@@ -82,7 +86,7 @@ pub(super) fn write_data(pieces: &[Piece], frames: &[Box<[u8]>], out: &mut Vec<u
             out.push(0);
         }
         let length = piece.item.range().len();
-        item::write_header(Code(0), piece.item.element, length, out);
+        item::write_header(ReturnCode(0), piece.item.element, length, out);
         let data = out.len();
         out.resize(data + length, 0);
         piece.gather(&frames[piece.station], &mut out[data..]);

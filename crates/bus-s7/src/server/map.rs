@@ -4,11 +4,11 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use super::ServerOptions;
 use crate::Tsap;
-use crate::item::{Code, Object};
+use crate::item::{Object, ReturnCode};
 
 /// A range of a station's area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct AreaRange {
     pub(super) station: usize,
     pub(super) area: Area,
     pub(super) offset: usize,
@@ -19,7 +19,7 @@ pub(super) struct Place {
 #[derive(Debug)]
 pub(super) struct Map {
     /// The data blocks in order of their numbers, and their lengths for clients that ask.
-    blocks: Vec<(u16, Place)>,
+    blocks: Vec<(u16, AreaRange)>,
     lengths: Vec<(u16, usize)>,
     stations: Vec<Cpu>,
 }
@@ -48,7 +48,7 @@ impl Map {
         let blocks = options.blocks.iter().filter_map(|block| {
             let station = block.station_in(table)?;
             let size = table.stations[station].bytes(block.area);
-            let place = Place {
+            let place = AreaRange {
                 station,
                 area: block.area,
                 offset: block.offset,
@@ -78,23 +78,27 @@ impl Map {
     }
 
     /// The place of an object for a client connected to `station`.
-    pub(super) fn place(&self, object: Object, station: Option<usize>) -> Result<Place, Code> {
+    pub(super) fn place(
+        &self,
+        object: Object,
+        station: Option<usize>,
+    ) -> Result<AreaRange, ReturnCode> {
         let area = match object {
             Object::Inputs => Area::Input,
             Object::Outputs => Area::Output,
-            Object::Flags => return Err(Code::MISSING),
+            Object::Flags => return Err(ReturnCode::MISSING),
             Object::Block(number) => {
                 let found = self.blocks.binary_search_by_key(&number, |block| block.0);
                 return found
                     .map(|index| self.blocks[index].1)
-                    .map_err(|_| Code::MISSING);
+                    .map_err(|_| ReturnCode::MISSING);
             }
         };
-        let station = station.ok_or(Code::MISSING)?;
+        let station = station.ok_or(ReturnCode::MISSING)?;
         let Cpu {
             inputs, outputs, ..
         } = self.stations[station];
-        Ok(Place {
+        Ok(AreaRange {
             station,
             area,
             offset: 0,

@@ -10,11 +10,11 @@ use tickbus_fieldbus::tcp::{self, Address, Limits};
 use tickbus_fieldbus::{BusError, Free, Port, Role};
 use tickbus_image::signal::{SignalTable, fail_safe_frame};
 
-use super::item::{Code, Object};
+use super::item::{Object, ReturnCode};
 use super::szl::{Facts, Identity};
-use super::{Conversation, Fault, Memory, transport};
+use super::{Memory, ProtocolError, ServerSession, transport};
 
-use map::{Map, Place};
+use map::{AreaRange, Map};
 pub use options::{Block, ServerOptions};
 
 /// How long a client may take to complete a packet, or to read an answer.
@@ -31,7 +31,7 @@ impl S7Server {
     /// The bus that `options` describe, for the end with `role` of the driver called `name`.
     pub fn new(options: &ServerOptions, table: &SignalTable, role: Role, name: &str) -> Self {
         let (sends, receives) = role.areas();
-        let stations = (0..table.stations.len()).map(|station| Station {
+        let stations = (0..table.stations.len()).map(|station| StationMemory {
             written: fail_safe_frame(table, station, receives),
             outgoing: fail_safe_frame(table, station, sends),
             taken: false,
@@ -88,7 +88,7 @@ struct Service {
 struct Shared {
     map: Map,
     role: Role,
-    stations: Box<[Station]>,
+    stations: Box<[StationMemory]>,
     flags: Box<[u8]>,
     /// Whether a write is an event even if it changes nothing.
     every_write: bool,
@@ -98,7 +98,7 @@ struct Shared {
 }
 
 #[derive(Debug)]
-struct Station {
+struct StationMemory {
     /// The values written by clients, initially the fail-safe values.
     written: Box<[u8]>,
     /// The values of the other area that clients read in this batch.
@@ -115,7 +115,7 @@ struct Station {
 /// One client.
 #[derive(Debug)]
 struct Client {
-    conversation: Conversation,
+    conversation: ServerSession,
     number: u64,
     /// The stations that it has written to.
     writes: Box<[bool]>,
@@ -137,7 +137,7 @@ impl tcp::Service for Service {
     fn welcome(&mut self, _now: Nanos) -> Client {
         self.welcomed += 1;
         Client {
-            conversation: Conversation::default(),
+            conversation: ServerSession::default(),
             number: self.welcomed,
             writes: vec![false; self.memory.stations.len()].into(),
             carried: Vec::new(),
@@ -166,7 +166,7 @@ impl tcp::Service for Service {
         let taken = client
             .conversation
             .packet(now, bytes, &self.facts, &mut jobs, reply)
-            .map_err(Fault::into_error)?;
+            .map_err(ProtocolError::into_error)?;
         if jobs.lost {
             reply.truncate(begin);
         }
@@ -213,10 +213,10 @@ impl Jobs<'_> {
         &mut self,
         object: Object,
         range: &Range<usize>,
-    ) -> Result<(Place, Range<usize>), Code> {
+    ) -> Result<(AreaRange, Range<usize>), ReturnCode> {
         let place = self.shared.map.place(object, self.station)?;
         if range.end > place.length {
-            return Err(Code::ADDRESS);
+            return Err(ReturnCode::ADDRESS);
         }
         self.shared.stations[place.station].addressed = true;
         let begin = place.offset + range.start;
@@ -229,14 +229,14 @@ impl Jobs<'_> {
         object: Object,
         range: Range<usize>,
         bits: Range<usize>,
-    ) -> Result<&mut [u8], Code> {
+    ) -> Result<&mut [u8], ReturnCode> {
         if object == Object::Flags {
-            return self.shared.flags.get_mut(range).ok_or(Code::ADDRESS);
+            return self.shared.flags.get_mut(range).ok_or(ReturnCode::ADDRESS);
         }
         let (place, range) = self.place(object, &range)?;
         let (sends, _) = self.shared.role.areas();
         if place.area == sends {
-            return Err(Code::ACCESS);
+            return Err(ReturnCode::ACCESS);
         }
         let station = &mut self.shared.stations[place.station];
         let first = range.start * 8;
@@ -250,9 +250,9 @@ impl Jobs<'_> {
         object: Object,
         range: Range<usize>,
         bits: Range<usize>,
-    ) -> Result<&[u8], Code> {
+    ) -> Result<&[u8], ReturnCode> {
         if object == Object::Flags {
-            return self.shared.flags.get(range).ok_or(Code::ADDRESS);
+            return self.shared.flags.get(range).ok_or(ReturnCode::ADDRESS);
         }
         let (place, range) = self.place(object, &range)?;
         let (sends, _) = self.shared.role.areas();
@@ -275,23 +275,23 @@ impl Jobs<'_> {
 }
 
 impl Memory for Jobs<'_> {
-    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], Code> {
+    fn read(&mut self, object: Object, range: Range<usize>) -> Result<&[u8], ReturnCode> {
         let bits = 0..range.len() * 8;
         self.look(object, range, bits)
     }
 
-    fn read_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<u8, Code> {
+    fn read_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<u8, ReturnCode> {
         let bit = usize::from(bit);
         let bytes = self.look(object, byte..byte + 1, bit..bit + 1)?;
         Ok(bytes[0])
     }
 
-    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], Code> {
+    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], ReturnCode> {
         let bits = 0..range.len() * 8;
         self.change(object, range, bits)
     }
 
-    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, Code> {
+    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, ReturnCode> {
         let bit = usize::from(bit);
         let bytes = self.change(object, byte..byte + 1, bit..bit + 1)?;
         Ok(&mut bytes[0])

@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-const TERMS: Terms = Terms {
+const TERMS: SessionParameters = SessionParameters {
     sending: Sending::Cyclic,
     cycle: Nanos(10),
     min_interval: Nanos::ZERO,
@@ -11,7 +11,7 @@ const TERMS: Terms = Terms {
 };
 
 fn session(sending: Sending) -> Session {
-    Session::new(Terms { sending, ..TERMS }, Nanos::ZERO)
+    Session::new(SessionParameters { sending, ..TERMS }, Nanos::ZERO)
 }
 
 /// The owner of an imaginary socket; its image is one byte, sent twice.
@@ -121,7 +121,7 @@ fn on_change_sends_changes_at_the_next_look_and_signs_of_life() {
 
 #[test]
 fn on_change_keeps_the_least_interval_and_loses_no_change_by_it() {
-    let terms = Terms {
+    let terms = SessionParameters {
         sending: Sending::OnChange,
         min_interval: Nanos(25),
         ..TERMS
@@ -133,7 +133,7 @@ fn on_change_keeps_the_least_interval_and_loses_no_change_by_it() {
 
 #[test]
 fn a_look_longer_than_a_sign_of_life_does_not_delay_it() {
-    let terms = Terms {
+    let terms = SessionParameters {
         sending: Sending::OnChange,
         cycle: Nanos(250),
         ..TERMS
@@ -213,7 +213,7 @@ fn an_incomplete_record_is_a_fault_after_max_age_and_says_how_much_came() {
     let partial = Partial { have: 3, of: 4 };
     assert_eq!(
         session.check(Nanos(401)),
-        Err(Fault::Incomplete(partial, Nanos(300)))
+        Err(EndReason::Incomplete(partial, Nanos(300)))
     );
     assert_eq!(session.hear(401, &[0]).len(), 1);
     assert_eq!(session.check(Nanos(401)), Ok(()), "it had come after all");
@@ -237,7 +237,7 @@ fn a_peer_that_never_reads_is_a_fault_after_max_age() {
     let partial = Partial { have: 1, of: 2 };
     assert_eq!(
         session.check(Nanos(311)),
-        Err(Fault::NotReading(partial, Nanos(300)))
+        Err(EndReason::NotReading(partial, Nanos(300)))
     );
 }
 
@@ -266,7 +266,10 @@ fn a_silent_peer_is_stale_after_max_age_and_given_up_after_four() {
         assert_eq!(session.check(Nanos(301)), Ok(()));
         assert_eq!(session.deadline(), Nanos(1201));
         assert_eq!(session.check(Nanos(1200)), Ok(()));
-        assert_eq!(session.check(Nanos(1201)), Err(Fault::Silent(Nanos(1200))));
+        assert_eq!(
+            session.check(Nanos(1201)),
+            Err(EndReason::Silent(Nanos(1200)))
+        );
         assert_eq!(session.has_heard(), begins);
     }
 }
@@ -275,27 +278,30 @@ fn a_silent_peer_is_stale_after_max_age_and_given_up_after_four() {
 fn parts_of_a_record_break_no_silence() {
     let mut session = session(Sending::Reply);
     session.hear(1199, &[0; 3]);
-    assert_eq!(session.check(Nanos(1201)), Err(Fault::Silent(Nanos(1200))));
+    assert_eq!(
+        session.check(Nanos(1201)),
+        Err(EndReason::Silent(Nanos(1200)))
+    );
 }
 
 #[test]
 fn a_peer_that_has_nothing_to_say_is_never_silent_and_must_not_speak() {
-    let terms = Terms {
+    let terms = SessionParameters {
         receives: 0,
         ..TERMS
     };
     let mut session = Session::new(terms, Nanos::ZERO);
     assert!(session.has_heard() && !session.is_stale(Nanos(9_999)));
     assert_eq!(session.sends_until(5_000, |_| 0).len(), 501);
-    assert_eq!(session.left(), Fault::Left);
+    assert_eq!(session.left(), EndReason::Left);
     session.hear(5_000, &[1]);
-    assert_eq!(session.check(Nanos(5_000)), Err(Fault::Unasked));
-    assert_eq!(session.left(), Fault::Unasked);
+    assert_eq!(session.check(Nanos(5_000)), Err(EndReason::Unasked));
+    assert_eq!(session.left(), EndReason::Unasked);
 }
 
 #[test]
 fn an_end_that_only_listens_sends_nothing_and_waits_for_silence() {
-    let mut session = Session::new(Terms { sends: 0, ..TERMS }, Nanos::ZERO);
+    let mut session = Session::new(SessionParameters { sends: 0, ..TERMS }, Nanos::ZERO);
     assert_eq!(session.speak(0, 1, 99), (vec![], 0));
     assert_eq!(session.deadline(), Nanos(301));
     session.hear(7, &[0; 4]);
@@ -305,13 +311,13 @@ fn an_end_that_only_listens_sends_nothing_and_waits_for_silence() {
 #[test]
 fn how_a_peer_left_depends_on_what_it_had_sent() {
     let mut session = session(Sending::Cyclic);
-    assert_eq!(session.left(), Fault::LeftAtOnce);
+    assert_eq!(session.left(), EndReason::LeftAtOnce);
     session.hear(0, &[0; 4]);
-    assert_eq!(session.left(), Fault::Left);
+    assert_eq!(session.left(), EndReason::Left);
     session.hear(0, &[0; 3]);
     assert_eq!(
         session.left(),
-        Fault::LeftWithin(Partial { have: 3, of: 4 })
+        EndReason::LeftWithin(Partial { have: 3, of: 4 })
     );
 }
 
@@ -331,14 +337,14 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-fn terms() -> impl Strategy<Value = Terms> {
+fn terms() -> impl Strategy<Value = SessionParameters> {
     let sending = prop_oneof![
         Just(Sending::Cyclic),
         Just(Sending::OnChange),
         Just(Sending::Reply)
     ];
     (sending, 1..50_i64, 0..100_i64, 0..9_usize, 0..9_usize).prop_map(
-        |(sending, cycle, least, receives, sends)| Terms {
+        |(sending, cycle, least, receives, sends)| SessionParameters {
             sending,
             cycle: Nanos(cycle),
             min_interval: Nanos(least),

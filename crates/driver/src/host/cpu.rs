@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::Code;
 use crate::frames::{area_bytes, directions};
 use crate::heartbeat::FrameBeats;
-use crate::recording::Tape;
+use crate::recording::ScanRecorder;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
@@ -13,7 +13,7 @@ use tickbus_image::signal::Area;
 use tickbus_image::{BusEnd, Receiver, TickEnd, TickStation, image};
 use tickbus_plc::{Program, Scan};
 
-use super::Tally;
+use super::ScanCounters;
 use super::faults::FrameFaults;
 
 /// A program with the tick's end of its process image: a PLC without its bus.
@@ -26,10 +26,10 @@ pub(super) struct Cpu {
     max_age: Nanos,
     /// The areas that it writes and reads.
     pub(super) areas: (Area, Area),
-    pub(super) tally: Arc<Tally>,
+    pub(super) tally: Arc<ScanCounters>,
     /// The faults injected at this end.
     pub(super) faults: Option<FrameFaults>,
-    pub(super) tape: Option<Tape>,
+    pub(super) tape: Option<ScanRecorder>,
     beats: FrameBeats,
     /// The other stations, each with its own instance of the program.
     others: Vec<Other>,
@@ -64,7 +64,7 @@ impl Other {
         &mut self,
         (now, max_age): (Nanos, Nanos),
         image: &mut TickStation,
-        tally: &Tally,
+        tally: &ScanCounters,
         (writes, reads): (Area, Area),
     ) -> (Nanos, bool) {
         let Self {
@@ -119,7 +119,7 @@ impl Inputs {
 /// Takes over the inputs, and their edges if they are recorded.
 struct Taking<'a> {
     inputs: &'a mut Inputs,
-    tape: Option<&'a mut Tape>,
+    tape: Option<&'a mut ScanRecorder>,
 }
 
 impl Receiver for Taking<'_> {
@@ -210,7 +210,7 @@ impl Cpu {
 /// serve several stations serves all of them.
 pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
     let table = &config.table;
-    let tally = Arc::new(Tally::new(table));
+    let tally = Arc::new(ScanCounters::new(table));
     let (tick, bus) = image(directions(table, role));
     let (writes, reads) = role.areas();
     let (inputs, outputs) = (frame(config, 0, reads), frame(config, 0, writes));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::faults::{Board, Fault, Faults, Moment, Slots};
+use tickbus_fieldbus::faults::{Fault, FaultBoard, Faults, Slots, TickTime};
 use tickbus_image::signal::{Area, DataType, Plan, Signal, SignalTable, Slot};
 
 /// The faults of a program that works on frames, not on slots.
@@ -31,7 +31,7 @@ impl FrameFaults {
         table: &SignalTable,
         (writes, reads): (Area, Area),
         inputs: &[u8],
-        board: Arc<Board>,
+        board: Arc<FaultBoard>,
     ) -> Option<Self> {
         if list.is_empty() {
             return None;
@@ -70,7 +70,7 @@ impl FrameFaults {
     pub(super) fn begin_scan(&mut self, now: Nanos, inputs: &mut [u8], outputs: &[u8]) {
         inputs.copy_from_slice(&self.truth);
         self.scans += 1;
-        let moment = Moment {
+        let moment = TickTime {
             time: now - *self.begun.get_or_insert(now),
             tick: self.scans,
         };

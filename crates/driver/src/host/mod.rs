@@ -4,12 +4,12 @@ mod cpu;
 mod faults;
 mod fit;
 mod program;
+mod scan_counters;
 mod stepped;
-mod tally;
 mod thread;
 
 pub(super) use fit::{check_fit, program_error};
 pub(super) use program::{Program, ProgramTally};
+pub(super) use scan_counters::ScanCounters;
 pub(super) use stepped::SteppedHost;
-pub(super) use tally::Tally;
-pub(super) use thread::{HostTally, HostThread, Hosted};
+pub(super) use thread::{HostCounters, HostThread, ScanSetup};

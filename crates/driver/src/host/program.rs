@@ -4,21 +4,21 @@ use std::sync::Arc;
 
 use crate::replay::ReplayTally;
 
-use super::{HostTally, HostThread, Tally};
+use super::{HostCounters, HostThread, ScanCounters};
 
 /// What is at the other end, within this process: a PLC program or a recording.
 #[derive(Debug)]
 pub(crate) enum Program {
     Thread(Box<HostThread>),
-    Stepped(Arc<Tally>),
+    Stepped(Arc<ScanCounters>),
     Replay(Arc<ReplayTally>),
 }
 
 /// The counters of such a program, readable from any thread.
 #[derive(Clone, Debug)]
 pub(crate) enum ProgramTally {
-    Thread(HostTally),
-    Stepped(Arc<Tally>),
+    Thread(HostCounters),
+    Stepped(Arc<ScanCounters>),
     Replay(Arc<ReplayTally>),
 }
 

@@ -7,7 +7,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{BusError, LinkStatus, Port, Role, Stepped};
 use tickbus_plc::Program;
 
-use super::Tally;
+use super::ScanCounters;
 use super::cpu::{Cpu, half};
 
 /// The most scans that one exchange catches up on: 1,000 s of scans every 10 ms. A longer step is taken for a
@@ -22,7 +22,7 @@ pub(crate) struct SteppedHost {
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
     /// Whether the program was sent the machine's latest values.
-    carried: bool,
+    is_delivered: bool,
 }
 
 impl SteppedHost {
@@ -30,7 +30,7 @@ impl SteppedHost {
         program: Box<dyn Program>,
         config: &Config,
         interval: Nanos,
-    ) -> (Self, Arc<Tally>) {
+    ) -> (Self, Arc<ScanCounters>) {
         let max_age = config.timing.max_age;
         let (cpu, bus) = half(program, config, Role::Controller);
         let tally = Arc::clone(&cpu.tally);
@@ -46,7 +46,7 @@ impl SteppedHost {
                 port,
                 interval,
                 due: None,
-                carried: false,
+                is_delivered: false,
             },
             tally,
         )
@@ -68,7 +68,7 @@ fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
 impl Stepped for SteppedHost {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
-        self.carried = !port.is_down(now) && carry(port, &mut self.port, now);
+        self.is_delivered = !port.is_down(now) && carry(port, &mut self.port, now);
         Ok(())
     }
 
@@ -91,7 +91,7 @@ impl Stepped for SteppedHost {
             late.0 / self.interval.0 + 1
         };
         for _ in 0..scans {
-            if self.carried {
+            if self.is_delivered {
                 // Between two ticks only simulation time passes: the machine is there all along, however
                 // large the steps are.
                 (0..self.port.stations()).for_each(|station| self.port.touch(station, due));

@@ -7,16 +7,16 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use crate::recording::Tape;
+use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
 use tickbus_base::time::{Clock, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::faults::Board;
+use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Free, LinkStatus, Port, Role};
 use tickbus_plc::{Program, Report};
 use tickbus_record as record;
 
-use super::Tally;
+use super::ScanCounters;
 use super::cpu::{Cpu, half};
 use super::faults::FrameFaults;
 
@@ -45,32 +45,32 @@ impl Scanning {
 }
 
 /// A program, and how it is scanned.
-pub(crate) struct Hosted {
+pub(crate) struct ScanSetup {
     pub(crate) program: Box<dyn Program>,
     pub(crate) interval: Nanos,
     /// The recording of its scans.
-    pub(crate) tape: Option<Tape>,
+    pub(crate) tape: Option<ScanRecorder>,
 }
 
 /// What a program's thread publishes about itself.
 #[derive(Clone, Debug)]
-pub(crate) struct HostTally {
-    pub(crate) tally: Arc<Tally>,
+pub(crate) struct HostCounters {
+    pub(crate) tally: Arc<ScanCounters>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
     report: Option<Arc<dyn Report>>,
-    record: Option<Arc<record::Tally>>,
+    record: Option<Arc<record::ScanCounters>>,
     pub(crate) clock: Arc<dyn Clock>,
 }
 
 /// A program on its own thread, and the bus thread of its end of the line; dropping it stops both.
 #[derive(Debug)]
 pub(crate) struct HostThread {
-    pub(crate) told: HostTally,
+    pub(crate) told: HostCounters,
     /// Disconnected when the thread ends.
     ended: Receiver<()>,
     pub(crate) status: LinkStatus,
-    pub(crate) board: Arc<Board>,
+    pub(crate) board: Arc<FaultBoard>,
     stop: Stop,
     thread: Option<JoinHandle<()>>,
     #[expect(dead_code, reason = "kept for its drop")]
@@ -81,7 +81,7 @@ impl HostThread {
     /// Starts scanning the `hosted` program as the end with `role`, with `bus` between it and its peer. The
     /// thread is called `name`.
     pub(crate) fn start(
-        hosted: Hosted,
+        hosted: ScanSetup,
         name: String,
         config: &Config,
         role: Role,
@@ -93,13 +93,13 @@ impl HostThread {
         let report = hosted.program.report();
         let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
-        let record = cpu.tape.as_ref().map(Tape::tally);
+        let record = cpu.tape.as_ref().map(ScanRecorder::tally);
         let status = LinkStatus::new(&name, max_age);
         // A CPU whose program has died must not keep its last outputs on the bus.
         let watchdog = (interval + interval).max(max_age);
         let (now, limit) = (Arc::clone(&clock), Some(watchdog));
         let mut port = Port::new(bus_end, now, role, limit, status.clone());
-        let board = Arc::<Board>::default();
+        let board = Arc::<FaultBoard>::default();
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
         if role == config.role {
             let (faults, board) = (&config.faults, Arc::clone(&board));
@@ -132,7 +132,7 @@ impl HostThread {
             }
         })?;
         Ok(Self {
-            told: HostTally {
+            told: HostCounters {
                 tally,
                 fault,
                 scanning,
@@ -150,7 +150,7 @@ impl HostThread {
     }
 }
 
-impl HostTally {
+impl HostCounters {
     /// Appends the program's counters, and its fault.
     pub(crate) fn write(&self, text: &mut String) {
         self.tally.write(text);

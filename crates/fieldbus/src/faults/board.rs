@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::cell::Cell;
-use super::{Injected, LineFault, Moment, Phase};
+use super::{FaultStatus, LineFault, Phase, TickTime};
 
 /// What the tick, the bus and other threads share about a driver's faults.
 #[derive(Debug, Default)]
-pub struct Board {
+pub struct FaultBoard {
     /// Incremented by every change; zero as long as there has never been a fault.
     news: AtomicU64,
     cells: Mutex<Vec<Arc<Cell>>>,
@@ -22,7 +22,7 @@ pub struct Board {
     pub(super) hurried: AtomicU64,
 }
 
-impl Board {
+impl FaultBoard {
     /// A number that every change increments; zero as long as there has never been a fault.
     #[inline]
     pub fn news(&self) -> u64 {
@@ -45,7 +45,7 @@ impl Board {
         Some(cell.id())
     }
 
-    pub(super) fn enter(&self, cell: &Cell, phase: Phase, moment: Moment) {
+    pub(super) fn enter(&self, cell: &Cell, phase: Phase, moment: TickTime) {
         cell.enter(phase, moment);
         self.news.fetch_add(1, Ordering::Release);
     }
@@ -69,7 +69,7 @@ impl Board {
     }
 
     /// All faults in order of injection; those that ended long ago may be missing.
-    pub fn list(&self) -> Vec<Injected> {
+    pub fn list(&self) -> Vec<FaultStatus> {
         self.cells().iter().map(|cell| cell.seen()).collect()
     }
 

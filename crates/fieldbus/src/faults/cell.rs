@@ -3,8 +3,8 @@
 use std::fmt::{self, Write as _};
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU64, Ordering};
 
-use super::Moment;
-use tickbus_base::os::{is_told, is_told_rarely};
+use super::TickTime;
+use tickbus_base::os::{is_rarely_logged, is_told};
 use tickbus_base::time::Nanos;
 
 /// The state of a fault.
@@ -33,7 +33,7 @@ impl Phase {
 
 /// One fault as others see it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Injected {
+pub struct FaultStatus {
     /// Its number, from 1, in order of injection.
     pub id: u32,
     /// Its name.
@@ -109,7 +109,7 @@ impl Cell {
         self.name.len() + self.kind.len() + "\"\" ()".len()
     }
 
-    pub(super) fn enter(&self, phase: Phase, moment: Moment) {
+    pub(super) fn enter(&self, phase: Phase, moment: TickTime) {
         let before = self.phase();
         self.since.store(moment.time.0, Ordering::Relaxed);
         self.tick.store(moment.tick, Ordering::Relaxed);
@@ -122,8 +122,8 @@ impl Cell {
         }
     }
 
-    pub(super) fn seen(&self) -> Injected {
-        Injected {
+    pub(super) fn seen(&self) -> FaultStatus {
+        FaultStatus {
             id: self.id,
             name: self.name.clone(),
             kind: self.kind,
@@ -165,7 +165,7 @@ struct Often(u64);
 
 impl fmt::Display for Often {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !is_told_rarely(self.0) {
+        if !is_rarely_logged(self.0) {
             return Ok(());
         }
         write!(

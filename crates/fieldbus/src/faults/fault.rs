@@ -28,14 +28,14 @@ pub struct Fault {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effect {
     /// It changes the value of the signal with this index in the signal table.
-    Signal(usize, Change),
+    Signal(usize, SignalEffect),
     /// It disturbs the line.
-    Line(Trouble),
+    Line(LineEffect),
 }
 
 /// How the value of a signal is changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Change {
+pub enum SignalEffect {
     /// It is stuck at a value; `None`: at the value it has when the fault begins.
     Stuck(Option<Slot>),
     /// The inverse of a BOOL, or of each bit of a bit string.
@@ -50,7 +50,7 @@ pub enum Change {
 
 /// What a fault does to the frames of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Trouble {
+pub enum LineEffect {
     /// Incoming frames are held back for this long.
     Delay(Nanos),
     /// Outgoing frames are held back for this long.
@@ -119,16 +119,16 @@ impl Fault {
     /// Its kind, as a driver.cfg names it.
     pub const fn kind(&self) -> &'static str {
         match self.effect {
-            Effect::Signal(_, Change::Stuck(_)) => "stuck",
-            Effect::Signal(_, Change::Invert) => "invert",
-            Effect::Signal(_, Change::Offset(_)) => "offset",
-            Effect::Signal(_, Change::Noise(_) | Change::Flicker(_)) => "noise",
-            Effect::Line(Trouble::Delay(_)) => "delay",
-            Effect::Line(Trouble::SlowAnswers(_)) => "slow-answers",
-            Effect::Line(Trouble::Drop(..)) => "drop",
-            Effect::Line(Trouble::Duplicate(..)) => "duplicate",
-            Effect::Line(Trouble::LinkDown) => "link-down",
-            Effect::Line(Trouble::StationDown(_)) => "station-down",
+            Effect::Signal(_, SignalEffect::Stuck(_)) => "stuck",
+            Effect::Signal(_, SignalEffect::Invert) => "invert",
+            Effect::Signal(_, SignalEffect::Offset(_)) => "offset",
+            Effect::Signal(_, SignalEffect::Noise(_) | SignalEffect::Flicker(_)) => "noise",
+            Effect::Line(LineEffect::Delay(_)) => "delay",
+            Effect::Line(LineEffect::SlowAnswers(_)) => "slow-answers",
+            Effect::Line(LineEffect::Drop(..)) => "drop",
+            Effect::Line(LineEffect::Duplicate(..)) => "duplicate",
+            Effect::Line(LineEffect::LinkDown) => "link-down",
+            Effect::Line(LineEffect::StationDown(_)) => "station-down",
         }
     }
 
@@ -144,7 +144,7 @@ impl Fault {
     }
 }
 
-fn changed(change: Change, signal: &Signal) -> String {
+fn changed(change: SignalEffect, signal: &Signal) -> String {
     let unit = signal.unit.as_deref().unwrap_or_default();
     let measured = |number: f64| {
         format!("{} {unit}", short_number(number))
@@ -152,8 +152,8 @@ fn changed(change: Change, signal: &Signal) -> String {
             .to_owned()
     };
     match change {
-        Change::Stuck(None) => "is stuck where it is".to_owned(),
-        Change::Stuck(Some(slot)) if signal.is_integer_slot() => {
+        SignalEffect::Stuck(None) => "is stuck where it is".to_owned(),
+        SignalEffect::Stuck(Some(slot)) if signal.is_integer_slot() => {
             let signed = signal.data_type == DataType::Lint;
             let number = if signed {
                 slot.signed().to_string()
@@ -162,33 +162,37 @@ fn changed(change: Change, signal: &Signal) -> String {
             };
             format!("is stuck at {number} {unit}").trim_end().to_owned()
         }
-        Change::Stuck(Some(slot)) => format!("is stuck at {}", measured(slot.real())),
-        Change::Invert => "is inverted".to_owned(),
-        Change::Offset(by) => format!("is off by {}", measured(by)),
-        Change::Noise(amplitude) => format!("is off by up to {} at random", measured(amplitude)),
-        Change::Flicker(chance) => format!("flickers with a chance of {}", short_number(chance)),
+        SignalEffect::Stuck(Some(slot)) => format!("is stuck at {}", measured(slot.real())),
+        SignalEffect::Invert => "is inverted".to_owned(),
+        SignalEffect::Offset(by) => format!("is off by {}", measured(by)),
+        SignalEffect::Noise(amplitude) => {
+            format!("is off by up to {} at random", measured(amplitude))
+        }
+        SignalEffect::Flicker(chance) => {
+            format!("flickers with a chance of {}", short_number(chance))
+        }
     }
 }
 
-fn troubled(trouble: Trouble, table: &SignalTable) -> String {
+fn troubled(trouble: LineEffect, table: &SignalTable) -> String {
     let frames = |direction| match direction {
         Direction::In => "received frames",
         Direction::Out => "sent frames",
         Direction::Both => "frames",
     };
     match trouble {
-        Trouble::Delay(by) => format!("what comes in is {by} late"),
-        Trouble::SlowAnswers(by) => format!("what goes out is {by} late"),
-        Trouble::Drop(chance, direction) => {
+        LineEffect::Delay(by) => format!("what comes in is {by} late"),
+        LineEffect::SlowAnswers(by) => format!("what goes out is {by} late"),
+        LineEffect::Drop(chance, direction) => {
             let chance = short_number(chance);
             format!("{} are lost with a chance of {chance}", frames(direction))
         }
-        Trouble::Duplicate(chance, direction) => {
+        LineEffect::Duplicate(chance, direction) => {
             let chance = short_number(chance);
             format!("{} come twice with a chance of {chance}", frames(direction))
         }
-        Trouble::LinkDown => "the link is down".to_owned(),
-        Trouble::StationDown(station) => {
+        LineEffect::LinkDown => "the link is down".to_owned(),
+        LineEffect::StationDown(station) => {
             format!("the station \"{}\" is gone", table.stations[station].name)
         }
     }

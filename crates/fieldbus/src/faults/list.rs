@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::bend::Bend;
+use super::apply_to::SignalFault;
 use super::cell::Cell;
 use super::random::Random;
 use super::schedule::{Schedule, Step};
-use super::{Board, Effect, Fault, LIMIT, LineFault, Moment, Phase};
+use super::{Effect, Fault, FaultBoard, LIMIT, LineFault, Phase, TickTime};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
@@ -28,7 +28,7 @@ pub struct Slots<'a> {
 #[derive(Debug)]
 pub struct Faults {
     entries: Vec<Entry>,
-    board: Arc<Board>,
+    board: Arc<FaultBoard>,
     next: u32,
     time: Nanos,
 }
@@ -44,16 +44,16 @@ struct Entry {
 #[derive(Debug)]
 enum Kind {
     /// Bends a value that this end writes.
-    Written(Bend),
+    Written(SignalFault),
     /// Bends a value that this end reads.
-    Read(Bend),
+    Read(SignalFault),
     /// Has its effect in the bus, by way of the board.
     Line,
 }
 
 impl Faults {
     /// An empty list, which publishes its state on `board`.
-    pub fn new(board: Arc<Board>) -> Self {
+    pub fn new(board: Arc<FaultBoard>) -> Self {
         Self {
             entries: Vec::new(),
             board,
@@ -85,11 +85,11 @@ impl Faults {
             Effect::Signal(index, change) => {
                 let signal = &slots.table.signals[index];
                 let edges = slots.edges.get(index).copied().flatten();
-                let bend = Bend::new(signal, (index, edges), change, random);
+                let apply_to = SignalFault::new(signal, (index, edges), change, random);
                 if signal.area == slots.writes {
-                    (Kind::Written(bend), None)
+                    (Kind::Written(apply_to), None)
                 } else {
-                    (Kind::Read(bend), None)
+                    (Kind::Read(apply_to), None)
                 }
             }
             Effect::Line(trouble) => {
@@ -117,16 +117,16 @@ impl Faults {
     ///
     /// Conditions are judged on true values: what this end writes as of this tick (or the previous one, if
     /// the tick receives first), what it reads as of the previous tick.
-    pub fn begin_tick(&mut self, moment: Moment, slots: &mut [Slot]) {
+    pub fn begin_tick(&mut self, moment: TickTime, slots: &mut [Slot]) {
         // If time jumped back, no fault would begin or end until it has caught up.
         self.time = self.time.max(moment.time);
-        let moment = Moment {
+        let moment = TickTime {
             time: self.time,
             ..moment
         };
         for entry in self.entries.iter_mut().rev() {
-            if let Kind::Read(bend) = &mut entry.kind {
-                bend.straighten(slots);
+            if let Kind::Read(apply_to) = &mut entry.kind {
+                apply_to.restore(slots);
             }
         }
         for entry in &mut self.entries {
@@ -136,10 +136,10 @@ impl Faults {
                 Step::Pauses => Phase::Waiting,
                 Step::Ends => Phase::Over,
             };
-            if let (Phase::Active, Kind::Written(bend) | Kind::Read(bend)) =
+            if let (Phase::Active, Kind::Written(apply_to) | Kind::Read(apply_to)) =
                 (phase, &mut entry.kind)
             {
-                bend.begin(slots);
+                apply_to.begin(slots);
             }
             self.board.enter(&entry.cell, phase, moment);
         }
@@ -148,8 +148,8 @@ impl Faults {
     /// The slots are about to be sent: bends them.
     pub fn sending(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
-            if let (true, Kind::Written(bend)) = (entry.schedule.is_active(), &mut entry.kind) {
-                bend.bend(slots);
+            if let (true, Kind::Written(apply_to)) = (entry.schedule.is_active(), &mut entry.kind) {
+                apply_to.apply_to(slots);
             }
         }
     }
@@ -162,8 +162,8 @@ impl Faults {
             .iter()
             .filter(|entry| entry.schedule.is_active());
         active.filter_map(move |entry| match &entry.kind {
-            Kind::Written(bend) if written => Some(bend.signal()),
-            Kind::Read(bend) if !written => Some(bend.signal()),
+            Kind::Written(apply_to) if written => Some(apply_to.signal()),
+            Kind::Read(apply_to) if !written => Some(apply_to.signal()),
             _ => None,
         })
     }
@@ -171,8 +171,8 @@ impl Faults {
     /// Everything is sent: restores the simulation's own values.
     pub fn sent(&mut self, slots: &mut [Slot]) {
         for entry in self.entries.iter_mut().rev() {
-            if let Kind::Written(bend) = &mut entry.kind {
-                bend.straighten(slots);
+            if let Kind::Written(apply_to) = &mut entry.kind {
+                apply_to.restore(slots);
             }
         }
     }
@@ -180,8 +180,8 @@ impl Faults {
     /// The slots hold what was received: bends them.
     pub fn received(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
-            if let (true, Kind::Read(bend)) = (entry.schedule.is_active(), &mut entry.kind) {
-                bend.bend(slots);
+            if let (true, Kind::Read(apply_to)) = (entry.schedule.is_active(), &mut entry.kind) {
+                apply_to.apply_to(slots);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! When a fault begins and ends.
 
-use super::{Begin, Fault, Lasts, Moment};
+use super::{Begin, Fault, Lasts, TickTime};
 use tickbus_image::signal::Slot;
 
 /// The life of a fault, tick by tick.
@@ -21,7 +21,7 @@ enum State {
     Waiting {
         was: bool,
     },
-    Active(Moment),
+    Active(TickTime),
     Over,
 }
 
@@ -57,7 +57,7 @@ impl Schedule {
     }
 
     /// One tick, on the true values of the signals.
-    pub(super) fn step(&mut self, moment: Moment, slots: &[Slot]) -> Step {
+    pub(super) fn step(&mut self, moment: TickTime, slots: &[Slot]) -> Step {
         match self.state {
             State::Over => Step::Nothing,
             _ if self.told_to_end => {
@@ -88,7 +88,7 @@ impl Schedule {
         }
     }
 
-    fn begins(&mut self, moment: Moment, slots: &[Slot], was: bool) -> bool {
+    fn begins(&mut self, moment: TickTime, slots: &[Slot], was: bool) -> bool {
         match &self.begin {
             Begin::AtOnce => true,
             Begin::At(time) => moment.time >= *time,
@@ -103,7 +103,7 @@ impl Schedule {
     }
 
     /// Whether it is to end at this tick, and the value of its condition.
-    fn is_up(&self, since: Moment, moment: Moment, slots: &[Slot]) -> (bool, bool) {
+    fn is_up(&self, since: TickTime, moment: TickTime, slots: &[Slot]) -> (bool, bool) {
         let (ends, is) = match &self.begin {
             Begin::While(condition) => {
                 let is = condition.holds(slots);
@@ -124,7 +124,7 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::faults::{Change, Condition, Effect};
+    use crate::faults::{Condition, Effect, SignalEffect};
     use tickbus_base::time::Nanos;
     use tickbus_image::signal::{Area, ByteOrder, DataType, Signal, SignalTable, Station};
 
@@ -163,7 +163,7 @@ mod tests {
     fn run(begin: Begin, lasts: Lasts, times: u64, levels: &str) -> String {
         let fault = Fault {
             name: "x".to_owned(),
-            effect: Effect::Signal(0, Change::Invert),
+            effect: Effect::Signal(0, SignalEffect::Invert),
             begin,
             lasts,
             times,
@@ -172,7 +172,7 @@ mod tests {
         let mut schedule = Schedule::new(&fault);
         let mut seen = String::new();
         for (index, level) in levels.bytes().enumerate() {
-            let moment = Moment {
+            let moment = TickTime {
                 time: Nanos::from_millis(10 * i64::try_from(index).unwrap()),
                 tick: index as u64 + 1,
             };

@@ -58,7 +58,7 @@ const SIGNALS: usize = 5;
 struct End {
     table: SignalTable,
     faults: Faults,
-    board: Arc<Board>,
+    board: Arc<FaultBoard>,
     tick: u64,
     /// One per signal, and one for the edges of the latched signal.
     slots: [Slot; SIGNALS + 1],
@@ -66,7 +66,7 @@ struct End {
 
 impl End {
     fn new() -> Self {
-        let board = Arc::<Board>::default();
+        let board = Arc::<FaultBoard>::default();
         Self {
             table: table(),
             faults: Faults::new(Arc::clone(&board)),
@@ -92,7 +92,7 @@ impl End {
     /// values into the slots, if any arrive.
     fn tick(&mut self, arrives: impl FnOnce(&mut [Slot])) -> [f64; 2] {
         self.tick += 1;
-        let moment = Moment {
+        let moment = TickTime {
             time: Nanos::from_millis(10 * i64::try_from(self.tick - 1).expect("few")),
             tick: self.tick,
         };

@@ -7,10 +7,10 @@ use crate::{BusError, Port, Role};
 use tickbus_base::time::Nanos;
 
 /// The named links, as long as one of their ends exists.
-static LINKS: Mutex<Option<HashMap<String, Weak<Mutex<Line>>>>> = Mutex::new(None);
+static LINKS: Mutex<Option<HashMap<String, Weak<Mutex<SharedLanes>>>>> = Mutex::new(None);
 
 #[derive(Debug, Default)]
-struct Line {
+struct SharedLanes {
     /// One per role, in the order of [`lane`].
     lanes: [Lane; 2],
 }
@@ -44,7 +44,7 @@ fn other(role: Role) -> Role {
 /// One end of a link; dropping it frees its place.
 #[derive(Debug)]
 pub struct End {
-    line: Arc<Mutex<Line>>,
+    line: Arc<Mutex<SharedLanes>>,
     role: Role,
     /// Whether this end has sent anything that the other end may have taken.
     sent: bool,
@@ -88,7 +88,7 @@ impl End {
     }
 
     fn attach(
-        line: &Arc<Mutex<Line>>,
+        line: &Arc<Mutex<SharedLanes>>,
         role: Role,
         sizes: Vec<(usize, usize)>,
         name: &str,
@@ -198,7 +198,7 @@ impl Drop for End {
     }
 }
 
-fn lock(line: &Mutex<Line>) -> MutexGuard<'_, Line> {
+fn lock(line: &Mutex<SharedLanes>) -> MutexGuard<'_, SharedLanes> {
     // Frames are copied whole under the lock, so they are readable even after a panic of the other end.
     line.lock().unwrap_or_else(PoisonError::into_inner)
 }

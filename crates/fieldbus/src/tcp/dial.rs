@@ -11,7 +11,7 @@ use tickbus_base::os::SerialPort;
 use tickbus_base::os::{Interest, Poller, Source};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::{Address, bow_out, connect, is_for_later, no_wait};
+use super::{Address, close_gracefully, connect, is_for_later, no_wait};
 
 /// At most this many bytes are read at once.
 const BUFFER: usize = 16 * 1024;
@@ -78,7 +78,7 @@ pub trait Stream: Read + Write + AsFd {
 
 impl Stream for TcpStream {
     fn close(&mut self) {
-        bow_out(self);
+        close_gracefully(self);
     }
 }
 

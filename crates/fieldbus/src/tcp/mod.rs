@@ -17,7 +17,7 @@ pub use dial::{Call, Caller, Stream, dial};
 pub use listen::{is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};
-pub use stream::{bow_out, is_for_later, prepare};
+pub use stream::{close_gracefully, is_for_later, prepare};
 
 /// The system cannot wait on this thread, or for this socket.
 pub fn no_wait(error: &std::io::Error) -> BusError {

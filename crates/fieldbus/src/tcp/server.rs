@@ -8,7 +8,8 @@ use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::{
-    Address, bow_out, is_for_later, is_of_the_client, listen, no_wait, not_accepted, prepare,
+    Address, close_gracefully, is_for_later, is_of_the_client, listen, no_wait, not_accepted,
+    prepare,
 };
 
 /// The key of the listener in the poll set; a client's key is its place.
@@ -92,7 +93,7 @@ pub fn serve<S: Service>(
         buffer: vec![0; BUFFER].into(),
         reply: Vec::with_capacity(BUFFER),
         ready: Vec::new(),
-        deaf_until: None,
+        accept_paused_until: None,
         gone: None,
     };
     let limit = server.limits.telegram;
@@ -121,7 +122,7 @@ struct Server<'a, S: Service> {
     reply: Vec<u8>,
     ready: Vec<Ready>,
     /// Until when no client is accepted, after the system had no socket.
-    deaf_until: Option<Nanos>,
+    accept_paused_until: Option<Nanos>,
     /// When and why the last client that had spoken left, as long as it may come back: some clients connect
     /// anew for every request, which does not make the line broken.
     gone: Option<(Nanos, BusError)>,
@@ -201,7 +202,7 @@ impl<C> Clients<C> {
 impl<S: Service> Server<'_, S> {
     fn listen(&mut self, hears: bool) -> io::Result<()> {
         if hears {
-            self.deaf_until = None;
+            self.accept_paused_until = None;
             return self.set.add(LISTENER, &self.listener, Interest::Read);
         }
         self.set.remove(LISTENER, &self.listener);
@@ -221,12 +222,12 @@ impl<S: Service> Server<'_, S> {
             } = self.ready[index];
             if key == LISTENER {
                 self.accept(now, port);
-            } else if let Err(error) = self.attend(key, is_writable, now, port) {
+            } else if let Err(error) = self.serve_client(key, is_writable, now, port) {
                 self.drop_client(key, &error, port);
             }
         }
-        self.judge(now, port);
-        if self.deaf_until.is_some_and(|until| now >= until) {
+        self.check_timeouts(now, port);
+        if self.accept_paused_until.is_some_and(|until| now >= until) {
             self.listen(true).map_err(|error| no_wait(&error))?;
         }
         let max_age = port.max_age();
@@ -239,7 +240,9 @@ impl<S: Service> Server<'_, S> {
 
     /// The next time at which something is due even without traffic.
     fn deadline(&self, port: &Port) -> Nanos {
-        let mut deadline = port.due().min(self.deaf_until.unwrap_or(Nanos::MAX));
+        let mut deadline = port
+            .due()
+            .min(self.accept_paused_until.unwrap_or(Nanos::MAX));
         if self.clients.speakers > 0 {
             deadline = deadline.min(port.stale_at(port.clock().now()));
         }
@@ -255,7 +258,7 @@ impl<S: Service> Server<'_, S> {
     }
 
     /// Reads from a client and answers it, or continues an answer that had to wait.
-    fn attend(
+    fn serve_client(
         &mut self,
         place: usize,
         is_writable: bool,
@@ -356,7 +359,7 @@ impl<S: Service> Server<'_, S> {
     }
 
     /// Disconnects clients that have kept the server waiting too long.
-    fn judge(&mut self, now: Nanos, port: &mut Port) {
+    fn check_timeouts(&mut self, now: Nanos, port: &mut Port) {
         if self.clients.awaited == 0 {
             return;
         }
@@ -379,7 +382,7 @@ impl<S: Service> Server<'_, S> {
                 Err(error) if is_of_the_client(&error) => continue,
                 Err(error) => {
                     not_accepted(&error, port);
-                    self.deaf_until = Some(now + PAUSE);
+                    self.accept_paused_until = Some(now + PAUSE);
                     // Removing from the set cannot fail.
                     let _ = self.listen(false);
                     return;
@@ -460,7 +463,7 @@ impl<S: Service> Server<'_, S> {
             return;
         };
         self.set.remove(place, &client.stream);
-        bow_out(&client.stream);
+        close_gracefully(&client.stream);
         if !matches!(error, BusError::Left(_)) {
             port.count("clients.dropped");
         }

@@ -15,7 +15,7 @@ const LONGEST: Nanos = Nanos::from_secs(3600);
 
 /// Closes the sending direction before a connection is closed: with unread bytes the system would reset the
 /// connection, and the peer would lose what it has not read yet.
-pub fn bow_out(mut stream: &TcpStream) {
+pub fn close_gracefully(mut stream: &TcpStream) {
     // If this fails, the connection has failed already.
     let _ = stream.shutdown(Shutdown::Write);
     let mut unread = [0; 4096];

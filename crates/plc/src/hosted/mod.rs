@@ -2,7 +2,7 @@
 //! used by `OpenPLC` and Beremiz, and tickbus' glue (`plc/glue`).
 //!
 //! The program's clock is the scan's `now`; its inputs and outputs are the variables that it has located in
-//! `%I` and `%Q`. A compiled program keeps its state in global variables. Therefore each [`Hosted`] loads a
+//! `%I` and `%Q`. A compiled program keeps its state in global variables. Therefore each [`HostedProgram`] loads a
 //! private copy of the file, so that any number of instances can exist in one process.
 
 use std::fs::{self, OpenOptions};
@@ -32,7 +32,7 @@ const FILE_LIMIT: u64 = 256 << 20;
 /// no signal, `ABCD` (big-endian, the default) to `DCBA`. `alive` names a `%I` bit that is TRUE while the
 /// machine's data are not stale.
 #[derive(Debug)]
-pub struct Hosted {
+pub struct HostedProgram {
     name: String,
     compiled: Compiled,
     declared: Vec<Declared>,
@@ -43,7 +43,7 @@ pub struct Hosted {
     copy: PrivateCopy,
 }
 
-impl Hosted {
+impl HostedProgram {
     /// The program's options.
     const OPTIONS: [&'static str; 3] = ["addressing", "alive", "order"];
 
@@ -103,7 +103,7 @@ impl Hosted {
     }
 }
 
-impl Program for Hosted {
+impl Program for HostedProgram {
     fn name(&self) -> &str {
         &self.name
     }
@@ -143,7 +143,7 @@ impl Program for Hosted {
 }
 
 fn error(name: &str, (what, right): Refusal) -> ProgramError {
-    ProgramError::Hosted {
+    ProgramError::HostedProgram {
         program: name.to_owned(),
         what,
         right,
@@ -193,7 +193,7 @@ fn settings(options: &[(String, String)]) -> Result<Settings, Refusal> {
             _ => {
                 return Err((
                     format!("has no option \"{option}\""),
-                    format!("it takes {}", list(&Hosted::OPTIONS, "and")),
+                    format!("it takes {}", list(&HostedProgram::OPTIONS, "and")),
                 ));
             }
         }
@@ -331,7 +331,7 @@ mod tests {
             .iter()
             .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
             .collect();
-        let error = Hosted::load(Path::new(path), &options);
+        let error = HostedProgram::load(Path::new(path), &options);
         error.expect_err("refused").to_string()
     }
 
@@ -345,10 +345,10 @@ mod tests {
             "P.DLL",
             "p.dylib",
         ] {
-            assert!(Hosted::is_path(path), "{path}");
+            assert!(HostedProgram::is_path(path), "{path}");
         }
         for name in ["rig", "mirror", "my.program", "rig.cfg", ""] {
-            assert!(!Hosted::is_path(name), "{name}");
+            assert!(!HostedProgram::is_path(name), "{name}");
         }
     }
 

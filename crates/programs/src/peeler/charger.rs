@@ -13,7 +13,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use super::io::{Axis, Io, SignalIndex, tally};
 use super::options::Options;
-use super::report::Tally;
+use super::report::PeelerCounters;
 use tickbus_axis::{AxisKind, Mode, Motion};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, SignalTable};
@@ -155,7 +155,7 @@ pub struct Charger {
     options: Options,
     io: Option<Io>,
     places: Signals,
-    tally: Arc<Tally>,
+    tally: Arc<PeelerCounters>,
     time: SimulationTime,
     /// A fault has occurred, and no axis is enabled.
     failed: bool,

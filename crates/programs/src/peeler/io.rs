@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::report::Tally;
+use super::report::PeelerCounters;
 use tickbus_axis::{AxisKind, Field, Motion};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, Plan, SignalTable, Slot};
@@ -123,7 +123,7 @@ impl Io {
     }
 
     /// Calls the blocks of all axes and writes the outputs to the image.
-    pub(super) fn end(&mut self, scan: &mut Scan<'_>, enable: bool, tally: &Tally) {
+    pub(super) fn end(&mut self, scan: &mut Scan<'_>, enable: bool, tally: &PeelerCounters) {
         for (axis, tally) in self.axes.iter_mut().zip(tally.axes()) {
             let commands = axis.control.commands();
             axis.control.call(scan.now, &axis.inputs, enable);
@@ -248,6 +248,6 @@ fn missing(program: &str, signal: &str) -> ProgramError {
 }
 
 /// The report's counters for the axes with these names.
-pub(super) fn tally(axes: &[(&'static str, AxisKind)]) -> Arc<Tally> {
-    Arc::new(Tally::new(axes.iter().map(|(name, _)| *name)))
+pub(super) fn tally(axes: &[(&'static str, AxisKind)]) -> Arc<PeelerCounters> {
+    Arc::new(PeelerCounters::new(axes.iter().map(|(name, _)| *name)))
 }

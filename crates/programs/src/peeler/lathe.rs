@@ -21,7 +21,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use super::io::{Axis, Io, SignalIndex, tally};
 use super::options::Options;
-use super::report::Tally;
+use super::report::PeelerCounters;
 use tickbus_axis::{AxisKind, Mode, Motion};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, SignalTable};
@@ -121,7 +121,7 @@ pub struct Lathe {
     options: Options,
     io: Option<Io>,
     places: Signals,
-    tally: Arc<Tally>,
+    tally: Arc<PeelerCounters>,
     failed: bool,
     well: Ton,
     clamped: Ton,

@@ -10,7 +10,7 @@ const SECOND: i64 = 1_000_000_000;
 
 /// What a program has done so far. Written by its scans, which never wait; read by its host.
 #[derive(Debug)]
-pub(super) struct Tally {
+pub(super) struct PeelerCounters {
     axes: Box<[AxisTally]>,
     /// Blocks passed on.
     pub(super) blocks: AtomicU64,
@@ -90,7 +90,7 @@ impl Kept {
     }
 }
 
-impl Tally {
+impl PeelerCounters {
     pub(super) fn new(axes: impl Iterator<Item = &'static str>) -> Self {
         let axis = |name| AxisTally {
             name,
@@ -137,7 +137,7 @@ impl Tally {
     }
 }
 
-impl Report for Tally {
+impl Report for PeelerCounters {
     fn write(&self, text: &mut String) {
         // Writing to a string cannot fail.
         let _ = write!(

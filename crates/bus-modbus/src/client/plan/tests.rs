@@ -5,7 +5,7 @@ use crate::PDU_LIMIT;
 use proptest::prelude::*;
 
 const HOLDING: Table = Table::HoldingRegisters;
-const USUAL: Abilities = Abilities::new(true, usize::MAX);
+const USUAL: Capabilities = Capabilities::new(true, usize::MAX);
 
 fn piece(table: Table, wire: usize, bit: usize, bits: usize, fills: bool) -> Piece {
     Piece {
@@ -24,12 +24,12 @@ fn words(table: Table, first: usize, count: usize) -> Vec<Piece> {
 }
 
 /// The queries as messages show them.
-fn told(queries: &[Query]) -> Vec<String> {
-    queries.iter().map(Query::to_string).collect()
+fn told(queries: &[Request]) -> Vec<String> {
+    queries.iter().map(Request::to_string).collect()
 }
 
-fn spans(queries: &[Query]) -> Vec<(usize, usize)> {
-    let span = |query: &Query| {
+fn spans(queries: &[Request]) -> Vec<(usize, usize)> {
+    let span = |query: &Request| {
         let region = query.write().or(query.read()).expect("it does one of both");
         (region.span.first, region.span.count)
     };
@@ -63,7 +63,7 @@ fn one_request_writes_and_reads_where_both_are_holding_registers() {
              (function 23)"
         ]
     );
-    let apart = queries(&reads, &writes, &Abilities::new(false, 0));
+    let apart = queries(&reads, &writes, &Capabilities::new(false, 0));
     assert_eq!(
         told(&apart),
         [
@@ -95,7 +95,7 @@ fn gaps_are_read_and_never_written() {
         piece(HOLDING, 104 * 16, 64, 16, true),
     ];
     assert_eq!(spans(&queries(&two, &[], &USUAL)), [(100, 5)]);
-    let far = Abilities::new(true, 2 * 16);
+    let far = Capabilities::new(true, 2 * 16);
     assert_eq!(spans(&queries(&two, &[], &far)), [(100, 1), (104, 1)]);
     assert_eq!(spans(&queries(&[], &two, &USUAL)), [(100, 1), (104, 1)]);
     let coils = [
@@ -116,7 +116,7 @@ fn a_register_of_which_signals_have_some_bits_is_masked_and_one_of_which_they_ha
     );
     assert!(matches!(
         queries(&[], &some, &USUAL).as_slice(),
-        [Query::Mask(_)]
+        [Request::Mask(_)]
     ));
     let all: Vec<Piece> = (0..16).map(bit).collect();
     assert_eq!(
@@ -127,7 +127,7 @@ fn a_register_of_which_signals_have_some_bits_is_masked_and_one_of_which_they_ha
 
 #[test]
 fn a_device_without_the_functions_for_many_is_written_one_by_one() {
-    let able = Abilities {
+    let able = Capabilities {
         many_coils: false,
         many_registers: false,
         ..USUAL
@@ -206,7 +206,7 @@ proptest! {
     fn a_plan_carries_every_signal_once_and_touches_nothing_that_none_names(
         reads in pieces(false), writes in pieces(true), combine: bool, gap in 0_usize..600, many: bool,
     ) {
-        let able = Abilities { many_coils: many, many_registers: many, ..Abilities::new(combine, gap) };
+        let able = Capabilities { many_coils: many, many_registers: many, ..Capabilities::new(combine, gap) };
         let queries = queries(&reads, &writes, &able);
         let long = |pieces: &[Piece]| pieces.iter().map(|piece| piece.bit + piece.bits).max().unwrap_or(0);
         let sends: Vec<u8> = (0..long(&writes).div_ceil(8)).map(|byte| byte.to_le_bytes()[0] | 1).collect();
@@ -232,8 +232,8 @@ proptest! {
             }
             if let Some(region) = query.write() {
                 let most = match query {
-                    Query::Both { .. } => 121,
-                    Query::WriteOne(_) | Query::Mask(_) => 1,
+                    Request::Both { .. } => 121,
+                    Request::WriteOne(_) | Request::Mask(_) => 1,
                     _ if region.table.is_bits() => 1968,
                     _ => 123,
                 };
@@ -241,7 +241,7 @@ proptest! {
                 carry(region, &mut written);
                 let width = region.table.width();
                 let begin = region.span.first * width;
-                if matches!(query, Query::Mask(_)) {
+                if matches!(query, Request::Mask(_)) {
                     let of = |piece: &Piece| piece.wire..piece.wire + piece.bits;
                     touched.extend(region.pieces.iter().flat_map(of).map(|bit| (region.table.digit(), bit)));
                 } else {

@@ -37,15 +37,18 @@ fn a_gap_is_read_over_and_never_written_over() {
     let fields = [run(0, 0, 2), run(0, 8, 2)].concat();
     let block = Object::Block(10);
     assert_eq!(
-        items(&jobs(Way::Write, &fields, 240)),
+        items(&jobs(JobDirection::Write, &fields, 240)),
         [(block, 0..2, None), (block, 8..10, None)]
     );
     let near = [run(0, 0, 2), run(0, 6, 2)].concat();
-    assert_eq!(items(&jobs(Way::Read, &near, 240)), [(block, 0..8, None)]);
+    assert_eq!(
+        items(&jobs(JobDirection::Read, &near, 240)),
+        [(block, 0..8, None)]
+    );
     // A long gap costs more than an item of its own.
     let far = [run(0, 0, 2), run(0, 60, 2)].concat();
     assert_eq!(
-        items(&jobs(Way::Read, &far, 240)),
+        items(&jobs(JobDirection::Read, &far, 240)),
         [(block, 0..2, None), (block, 60..62, None)]
     );
 }
@@ -54,18 +57,18 @@ fn a_gap_is_read_over_and_never_written_over() {
 fn a_bool_is_written_as_a_bit_unless_all_of_its_byte_is_written() {
     let some = [bit(3, 40), bit(9, 47)];
     assert_eq!(
-        items(&jobs(Way::Write, &some, 240)),
+        items(&jobs(JobDirection::Write, &some, 240)),
         [
             (Object::Flags, 5..6, Some(0)),
             (Object::Flags, 5..6, Some(7))
         ]
     );
     assert_eq!(
-        items(&jobs(Way::Read, &some, 240)),
+        items(&jobs(JobDirection::Read, &some, 240)),
         [(Object::Flags, 5..6, None)]
     );
     let all: Vec<Field> = (0..8).map(|index| bit(index, 47 - index)).collect();
-    let jobs = jobs(Way::Write, &all, 240);
+    let jobs = jobs(JobDirection::Write, &all, 240);
     assert_eq!(items(&jobs), [(Object::Flags, 5..6, None)]);
     let mut data = [0];
     jobs[0].pieces[0].gather(&[0b0000_0011], &mut data);
@@ -74,10 +77,10 @@ fn a_bool_is_written_as_a_bit_unless_all_of_its_byte_is_written() {
 
 #[test]
 fn what_fits_into_one_job_is_one_job_and_long_runs_are_cut_between_values() {
-    assert_eq!(jobs(Way::Write, &run(0, 0, 360), 480).len(), 1);
+    assert_eq!(jobs(JobDirection::Write, &run(0, 0, 360), 480).len(), 1);
     let two = [run(0, 0, 134), run(1, 134, 130)].concat();
-    assert_eq!(jobs(Way::Read, &two, 480).len(), 1);
-    assert_eq!(jobs(Way::Read, &run(0, 0, 462), 480).len(), 1);
+    assert_eq!(jobs(JobDirection::Read, &two, 480).len(), 1);
+    assert_eq!(jobs(JobDirection::Read, &run(0, 0, 462), 480).len(), 1);
     // Values of 8 bytes from an odd byte on: 462 bytes would fit.
     let numbers = (0..58).map(|index| Field {
         bits: 64,
@@ -86,7 +89,7 @@ fn what_fits_into_one_job_is_one_job_and_long_runs_are_cut_between_values() {
         ..run(0, 0, 1)[0]
     });
     let fields: Vec<Field> = run(0, 0, 1).into_iter().chain(numbers).collect();
-    let jobs = jobs(Way::Read, &fields, 480);
+    let jobs = jobs(JobDirection::Read, &fields, 480);
     assert_eq!(
         items(&jobs),
         [
@@ -94,15 +97,15 @@ fn what_fits_into_one_job_is_one_job_and_long_runs_are_cut_between_values() {
             (Object::Block(10), 457..465, None)
         ]
     );
-    assert!(super::jobs(Way::Read, &[], 480).is_empty());
+    assert!(super::jobs(JobDirection::Read, &[], 480).is_empty());
 }
 
 #[test]
 fn sparse_values_are_read_in_fewer_jobs_where_gaps_are_read_over() {
     // 40 words, each 10 bytes after the previous one: 19 items fill a job of 240 bytes.
     let fields: Vec<Field> = (0..40).flat_map(|index| run(0, index * 10, 2)).collect();
-    assert_eq!(jobs(Way::Read, &fields, 240).len(), 2);
-    assert_eq!(jobs(Way::Read, &fields, 480).len(), 1);
+    assert_eq!(jobs(JobDirection::Read, &fields, 240).len(), 2);
+    assert_eq!(jobs(JobDirection::Read, &fields, 480).len(), 1);
 }
 
 /// Signals that do not overlap in the frames or in the CPU.
@@ -152,8 +155,8 @@ fn lengths(job: &Job) -> [usize; 2] {
     let data = |piece: &Piece| item::DATA_HEADER + piece.item.range().len().next_multiple_of(2);
     let data: usize = job.pieces.iter().map(data).sum();
     match job.way {
-        Way::Write => [JOB + items + data, ANSWER + job.pieces.len()],
-        Way::Read => [JOB + items, ANSWER + data],
+        JobDirection::Write => [JOB + items + data, ANSWER + job.pieces.len()],
+        JobDirection::Read => [JOB + items, ANSWER + data],
     }
 }
 
@@ -183,7 +186,7 @@ proptest! {
         limit in prop::sample::select(vec![64_usize, 112, 240, 480, 960]),
     ) {
         let frames: Vec<Vec<u8>> = (1..4).map(memory).collect();
-        for way in [Way::Write, Way::Read] {
+        for way in [JobDirection::Write, JobDirection::Read] {
             let jobs = jobs(way, &fields, limit);
             for job in &jobs {
                 prop_assert!(!job.pieces.is_empty() && job.pieces.len() <= ITEMS);
@@ -198,20 +201,20 @@ proptest! {
                 let begin = place(piece.item.object);
                 let range = begin + range.start..begin + range.end;
                 match (way, piece.item.bit()) {
-                    (Way::Write, None) => {
+                    (JobDirection::Write, None) => {
                         // A byte that is not filled would be found to be zero.
                         let mut data = vec![0; range.len()];
                         piece.gather(&frames[piece.station], &mut data);
                         cpu[range].copy_from_slice(&data);
                     }
-                    (Way::Write, Some(bit)) => {
+                    (JobDirection::Write, Some(bit)) => {
                         let mut data = [0];
                         piece.gather(&frames[piece.station], &mut data);
                         prop_assert!(data[0] <= 1);
                         let byte = &mut cpu[range.start];
                         *byte = *byte & !(1 << bit) | data[0] << bit;
                     }
-                    (Way::Read, bit) => {
+                    (JobDirection::Read, bit) => {
                         prop_assert_eq!(bit, None);
                         piece.scatter(&before[range], &mut read[piece.station]);
                     }
@@ -224,11 +227,11 @@ proptest! {
                     let here = field.frame + index;
                     named[there / 8] |= 1 << (there % 8);
                     match way {
-                        Way::Write => prop_assert_eq!(
+                        JobDirection::Write => prop_assert_eq!(
                             bit_at(&cpu, there),
                             bit_at(&frames[field.station], here)
                         ),
-                        Way::Read => prop_assert_eq!(
+                        JobDirection::Read => prop_assert_eq!(
                             bit_at(&before, there),
                             bit_at(&read[field.station], here)
                         ),
@@ -255,7 +258,7 @@ proptest! {
         }).collect();
         let cpu = memory(5);
         let mut read = vec![0; fields.len() * 8];
-        for piece in jobs(Way::Read, &fields, 240).iter().flat_map(|job| &job.pieces) {
+        for piece in jobs(JobDirection::Read, &fields, 240).iter().flat_map(|job| &job.pieces) {
             piece.scatter(&cpu[piece.item.range()], &mut read);
         }
         for field in &fields {

@@ -2,7 +2,7 @@
 
 use super::{Keys, SIGNAL};
 use crate::faults::condition::unknown;
-use crate::faults::{Change, Direction, Effect, Trouble, measure};
+use crate::faults::{Direction, Effect, LineEffect, SignalEffect, measure};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
 use tickbus_image::signal::section::{slot_of, value_limits, value_range};
@@ -21,18 +21,18 @@ pub(super) fn read_effect(
 ) -> Option<Effect> {
     let line = |trouble| Some(Effect::Line(trouble));
     match kind {
-        "delay" => line(Trouble::Delay(read_hold(keys)?)),
-        "slow-answers" => line(Trouble::SlowAnswers(read_hold(keys)?)),
+        "delay" => line(LineEffect::Delay(read_hold(keys)?)),
+        "slow-answers" => line(LineEffect::SlowAnswers(read_hold(keys)?)),
         "drop" => {
             let (chance, direction) = (read_chance(keys, None), read_direction(keys));
-            line(Trouble::Drop(chance?, direction?))
+            line(LineEffect::Drop(chance?, direction?))
         }
         "duplicate" => {
             let (chance, direction) = (read_chance(keys, Some(1.0)), read_direction(keys));
-            line(Trouble::Duplicate(chance?, direction?))
+            line(LineEffect::Duplicate(chance?, direction?))
         }
-        "link-down" => line(Trouble::LinkDown),
-        "station-down" => line(Trouble::StationDown(read_station(
+        "link-down" => line(LineEffect::LinkDown),
+        "station-down" => line(LineEffect::StationDown(read_station(
             keys.station.as_ref()?,
             table?,
         )?)),
@@ -114,7 +114,7 @@ fn read_change(
     };
     let signal = &table.signals[index];
     let change = match kind {
-        "stuck" => Change::Stuck(match &keys.value {
+        "stuck" => SignalEffect::Stuck(match &keys.value {
             None => None,
             Some(value) => Some(read_value(value, signal)?),
         }),
@@ -142,12 +142,12 @@ fn read_value(value: &Value<'_>, signal: &Signal) -> Option<Slot> {
     None
 }
 
-fn read_invert(value: &Value<'_>, signal: &Signal) -> Option<Change> {
+fn read_invert(value: &Value<'_>, signal: &Signal) -> Option<SignalEffect> {
     use DataType::{Bool, Byte, Dword, Lword, Word};
 
     let bits = matches!(signal.data_type, Bool | Byte | Word | Dword | Lword);
     if bits && signal.scale.is_none() {
-        return Some(Change::Invert);
+        return Some(SignalEffect::Invert);
     }
     value.wrong(
         format!(
@@ -160,7 +160,7 @@ fn read_invert(value: &Value<'_>, signal: &Signal) -> Option<Change> {
     None
 }
 
-fn read_offset(place: &Value<'_>, value: &Value<'_>, signal: &Signal) -> Option<Change> {
+fn read_offset(place: &Value<'_>, value: &Value<'_>, signal: &Signal) -> Option<SignalEffect> {
     if signal.data_type == DataType::Bool {
         place.wrong(
             format!("\"{}\" is a BOOL, and has no offset", shown(&signal.name)),
@@ -174,10 +174,15 @@ fn read_offset(place: &Value<'_>, value: &Value<'_>, signal: &Signal) -> Option<
         return None;
     }
     check_step(value, by, signal)?;
-    Some(Change::Offset(by))
+    Some(SignalEffect::Offset(by))
 }
 
-fn read_noise(place: &Value<'_>, keys: &Keys<'_>, signal: &Signal, whole: bool) -> Option<Change> {
+fn read_noise(
+    place: &Value<'_>,
+    keys: &Keys<'_>,
+    signal: &Signal,
+    whole: bool,
+) -> Option<SignalEffect> {
     let is_bool = signal.data_type == DataType::Bool;
     let (wanted, other, example) = if is_bool {
         (&keys.chance, &keys.amplitude, "chance = 0.05")
@@ -210,7 +215,7 @@ fn read_noise(place: &Value<'_>, keys: &Keys<'_>, signal: &Signal, whole: bool) 
         return None;
     };
     if is_bool {
-        return read_chance(keys, None).map(Change::Flicker);
+        return read_chance(keys, None).map(SignalEffect::Flicker);
     }
     let amplitude = measure::of_value(value, signal)?;
     if amplitude <= 0.0 {
@@ -221,7 +226,7 @@ fn read_noise(place: &Value<'_>, keys: &Keys<'_>, signal: &Signal, whole: bool) 
         return None;
     }
     check_step(value, amplitude, signal)?;
-    Some(Change::Noise(amplitude))
+    Some(SignalEffect::Noise(amplitude))
 }
 
 /// Rejects a step that is larger than the signal's whole range, or too small to have an effect.

@@ -6,7 +6,7 @@ use crate::rig::image::command::{
 };
 use crate::rig::{La1Code, Rig};
 use tickbus_base::time::Nanos;
-use tickbus_plc::{Hosted, Program, Scan};
+use tickbus_plc::{HostedProgram, Program, Scan};
 
 pub(super) const START: u8 = 1;
 pub(super) const STOP: u8 = 2;
@@ -101,10 +101,10 @@ impl Seen {
 const COMPILED: &str = "TICKBUS_RIG_PROGRAM";
 
 /// The compiled program, if one was named.
-fn twin(la1_code: La1Code) -> Option<Hosted> {
+fn twin(la1_code: La1Code) -> Option<HostedProgram> {
     let file = std::env::var_os(COMPILED).filter(|_| la1_code == La1Code::MsbFirst)?;
     let alive = ("alive".to_owned(), "%IX3.0".to_owned());
-    let twin = Hosted::load(file.as_ref(), &[alive]);
+    let twin = HostedProgram::load(file.as_ref(), &[alive]);
     Some(twin.unwrap_or_else(|error| panic!("{COMPILED}: {error}")))
 }
 
@@ -112,7 +112,7 @@ fn twin(la1_code: La1Code) -> Option<Hosted> {
 #[derive(Debug)]
 pub(super) struct Cell {
     pub(super) rig: Rig,
-    twin: Option<Hosted>,
+    twin: Option<HostedProgram>,
     pub(super) plant: Plant,
     pub(super) alive: bool,
     pub(super) buttons: u8,

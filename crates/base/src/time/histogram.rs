@@ -1,0 +1,257 @@
+//! Distributions of time spans.
+
+use std::fmt::Write as _;
+
+use hdrhistogram::Histogram;
+
+use super::Nanos;
+
+/// The resolution at the lower end, in nanoseconds: shorter spans are not told apart.
+const SHORTEST: u64 = 100;
+/// The longest span that is told apart: an hour. Longer ones count as this.
+const LONGEST: i64 = 3_600_000_000_000;
+/// Significant decimal digits of the figures.
+const DIGITS: u8 = 2;
+
+/// A histogram of time spans from 100 ns to an hour, accurate to 1 %; mean, standard deviation and the
+/// shortest span are exact.
+///
+/// Its size is fixed, some 15 kB; recording allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Histogram {
+    histogram: Histogram<u32>,
+    shortest: Nanos,
+    /// The sum of all spans, and that of their squares, in nanoseconds: 10^13 spans of an hour fit.
+    sum: u128,
+    squares: u128,
+}
+
+impl Histogram {
+    /// An empty histogram.
+    pub fn new() -> Self {
+        let histogram = Histogram::new_with_bounds(SHORTEST, LONGEST.unsigned_abs(), DIGITS);
+        Self {
+            histogram: histogram.expect("constant bounds that hdrhistogram takes"),
+            shortest: Nanos::MAX,
+            sum: 0,
+            squares: 0,
+        }
+    }
+
+    /// Counts one span; one below zero counts as zero.
+    pub fn record(&mut self, span: Nanos) {
+        let span = Nanos(span.0.clamp(0, LONGEST));
+        let nanos = span.0.unsigned_abs();
+        self.histogram.saturating_record(nanos);
+        self.shortest = self.shortest.min(span);
+        self.sum += u128::from(nanos);
+        self.squares += u128::from(nanos) * u128::from(nanos);
+    }
+
+    /// The number of spans.
+    pub fn count(&self) -> u64 {
+        self.histogram.len()
+    }
+
+    /// The span that the fraction `share` of all spans does not exceed: 0.5 gives the median. Zero without
+    /// spans.
+    pub fn quantile(&self, share: f64) -> Nanos {
+        Nanos(i64::try_from(self.histogram.value_at_quantile(share)).unwrap_or(i64::MAX))
+    }
+
+    /// The mean in nanoseconds; zero without spans.
+    pub fn mean(&self) -> f64 {
+        match u128::from(self.count()) {
+            0 => 0.0,
+            count => as_float(self.sum / count) + as_float(self.sum % count) / as_float(count),
+        }
+    }
+
+    /// The standard deviation in nanoseconds; zero without spans.
+    pub fn deviation(&self) -> f64 {
+        let count = u128::from(self.count());
+        if count == 0 {
+            return 0.0;
+        }
+        // Distances from the mean rounded down, and what that is off: whole numbers, of which nothing is lost where the
+        // spans are long and their scatter is small.
+        let mean = self.sum / count;
+        let squares = self.squares + count * mean * mean - 2 * mean * self.sum;
+        let off = as_float(self.sum % count) / as_float(count);
+        (as_float(squares) / as_float(count) - off * off)
+            .max(0.0)
+            .sqrt()
+    }
+
+    /// The shortest span; zero without spans.
+    pub fn shortest(&self) -> Nanos {
+        if self.count() == 0 {
+            return Nanos::ZERO;
+        }
+        self.shortest
+    }
+
+    /// The longest span.
+    pub fn longest(&self) -> Nanos {
+        Nanos(i64::try_from(self.histogram.max()).unwrap_or(i64::MAX))
+    }
+
+    /// The bins of the histogram that are not empty: the longest span of each, and its count.
+    pub fn steps(&self) -> impl Iterator<Item = (Nanos, u64)> + '_ {
+        self.histogram.iter_recorded().map(|step| {
+            let longest = i64::try_from(step.value_iterated_to()).unwrap_or(i64::MAX);
+            (Nanos(longest), step.count_since_last_iteration())
+        })
+    }
+
+    /// Appends `key.count` and, unless it is zero, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and
+    /// `stdev`, in microseconds, one `key=value` per line.
+    pub fn write(&self, key: &str, text: &mut String) {
+        self.write_in(key, Nanos::from_micros(1), "_us", text);
+    }
+
+    /// As [`write`](Self::write), in multiples of `unit`, which `suffix` names.
+    pub fn write_in(&self, key: &str, unit: Nanos, suffix: &str, text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{key}.count={}", self.count());
+        if self.count() == 0 {
+            return;
+        }
+        let units = |span: Nanos| span.as_micros() / unit.as_micros();
+        for (name, share) in [("p50", 0.5), ("p90", 0.9), ("p99", 0.99)] {
+            let span = units(self.quantile(share));
+            let _ = writeln!(text, "{key}.{name}{suffix}={span:.1}");
+        }
+        let _ = writeln!(text, "{key}.max{suffix}={:.1}", units(self.longest()));
+        let mean = self.mean() / 1e3 / unit.as_micros();
+        let _ = writeln!(text, "{key}.mean{suffix}={mean:.1}");
+        let _ = writeln!(text, "{key}.min{suffix}={:.1}", units(self.shortest()));
+        let deviation = self.deviation() / 1e3 / unit.as_micros();
+        let _ = writeln!(text, "{key}.stdev{suffix}={deviation:.1}");
+    }
+
+    /// The distribution as text: at most twelve rows, whose limits grow by a constant factor, each with a bar
+    /// for its share.
+    pub fn chart(&self) -> String {
+        const ROWS: usize = 12;
+        const WIDTH: u64 = 40;
+        let steps: Vec<(f64, u64)> = self
+            .steps()
+            .map(|(longest, count)| (longest.as_micros(), count))
+            .collect();
+        let (Some((first, _)), Some((last, _))) = (steps.first(), steps.last()) else {
+            return String::new();
+        };
+        // Rows narrower than the bins of the histogram would at times be empty.
+        let factor = (last / first).powf(1.0 / 11.0).max(1.03);
+        let mut rows = vec![(*first, 0_u64)];
+        for (longest, count) in &steps {
+            while rows.last().is_some_and(|(row, _)| *longest > row * 1.001) && rows.len() < ROWS {
+                let next = rows.last().expect("one at least").0 * factor;
+                rows.push((next, 0));
+            }
+            rows.last_mut().expect("one at least").1 += count;
+        }
+        let most = rows.iter().map(|(_, count)| *count).max().unwrap_or(1);
+        let mut text = String::new();
+        for (row, count) in rows {
+            let bar = (count * WIDTH).div_ceil(most.max(1));
+            let bar = "#".repeat(usize::try_from(bar).unwrap_or_default());
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "  up to {row:>10.1} us {count:>8}  {bar}");
+        }
+        text
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "good to 16 digits")]
+fn as_float(number: u128) -> f64 {
+    number as f64
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_good_to_one_percent() {
+        let mut spans = Histogram::new();
+        for micros in 1..=1000 {
+            spans.record(Nanos::from_micros(micros));
+        }
+        for (share, micros) in [(0.5, 500.0), (0.99, 990.0), (1.0, 1000.0)] {
+            let got = spans.quantile(share).as_micros();
+            assert!((got / micros - 1.0).abs() < 0.01, "{share}: {got}");
+        }
+        assert_eq!(spans.count(), 1000);
+        assert_eq!(spans.steps().map(|(_, count)| count).sum::<u64>(), 1000);
+    }
+
+    #[test]
+    fn mean_scatter_and_the_shortest_are_exact() {
+        let mut spans = Histogram::new();
+        assert_eq!(
+            (spans.shortest(), spans.mean(), spans.deviation()),
+            (Nanos::ZERO, 0.0, 0.0)
+        );
+        for micros in [9_999, 10_001, 10_000, 10_004] {
+            spans.record(Nanos::from_micros(micros));
+        }
+        assert_eq!(spans.shortest(), Nanos::from_micros(9_999));
+        assert!((spans.mean() - 10_001_000.0).abs() < 1e-3);
+        assert!(
+            (spans.deviation() - 3.5_f64.sqrt() * 1e3).abs() < 1e-3,
+            "{}",
+            spans.deviation()
+        );
+        let mut text = String::new();
+        spans.write("age", &mut text);
+        assert!(
+            text.contains("age.min_us=9999.0\nage.stdev_us=1.9\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn the_ends_of_the_range_take_what_is_beyond_them() {
+        let mut spans = Histogram::new();
+        spans.record(Nanos(-5));
+        spans.record(Nanos::MAX);
+        assert_eq!(spans.count(), 2);
+        assert!(spans.longest() >= Nanos::from_secs(3_590));
+    }
+
+    #[test]
+    fn the_chart_has_all_spans_in_a_few_rows() {
+        let mut spans = Histogram::new();
+        for micros in [10, 11, 12, 100, 1000, 5000] {
+            spans.record(Nanos::from_micros(micros));
+        }
+        let chart = spans.chart();
+        assert!(chart.lines().count() <= 12, "{chart}");
+        let counts = chart
+            .lines()
+            .filter_map(|line| line.split_whitespace().nth(4));
+        let counts: Vec<u64> = counts
+            .map(|count| count.parse().expect("a count"))
+            .collect();
+        assert_eq!(counts.iter().sum::<u64>(), 6, "{chart}");
+        spans = Histogram::new();
+        assert_eq!(spans.chart(), "");
+        spans.record(Nanos::from_micros(7));
+        assert_eq!(spans.chart().lines().count(), 1);
+    }
+
+    #[test]
+    fn an_empty_one_says_so() {
+        let mut text = String::new();
+        Histogram::new().write("age", &mut text);
+        assert_eq!(text, "age.count=0\n");
+    }
+}

@@ -1,0 +1,221 @@
+//! The place of a whole area of the image: `inputs` and `outputs` of a driver.cfg.
+
+use crate::ElementAddress;
+use crate::element_address::SHAPE;
+use crate::table::{ADDRESSES, Span, Table};
+use tickbus_base::toml_text::Value;
+use tickbus_image::signal::Area;
+
+/// The most parts that an area may have.
+const PARTS: usize = 100;
+
+/// The place of an area of the image in the tables of a unit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AreaMapping {
+    /// Consecutive parts of the area, from its first byte on.
+    parts: Vec<Part>,
+    /// The offset of the key in the driver.cfg.
+    pub(super) at: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Part {
+    place: ElementAddress,
+    /// The number of bytes; `None` for all remaining ones.
+    bytes: Option<usize>,
+}
+
+/// Consecutive bytes of an image in one table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// The table.
+    pub table: Table,
+    /// The wire offset of the first element.
+    pub first: usize,
+    /// The first byte of the image.
+    pub byte: usize,
+    /// How many bytes. If the number is odd, the last register carries one byte only, in its high half.
+    pub bytes: usize,
+}
+
+impl Block {
+    /// The elements that hold the bytes.
+    pub fn span(self) -> Span {
+        Span {
+            first: self.first,
+            count: self.table.elements(self.bytes),
+        }
+    }
+}
+
+impl AreaMapping {
+    /// Reads `value`; without one the whole area is at `default`. `writes` says that this end writes the
+    /// area, and `at` is the offset of the bus's table.
+    pub(super) fn read(
+        value: Option<&Value<'_>>,
+        at: usize,
+        default: ElementAddress,
+        writes: bool,
+    ) -> Option<Self> {
+        let Some(value) = value else {
+            let parts = vec![Part {
+                place: default,
+                bytes: None,
+            }];
+            return Some(Self { parts, at });
+        };
+        let at = value.at();
+        if value.as_text().is_some() {
+            let place = read_place(value, default.table, writes)?;
+            let parts = vec![Part { place, bytes: None }];
+            return Some(Self { parts, at });
+        }
+        let right = format!(
+            "{SHAPE}; or a list such as [{{ at = \"coil:1\", bytes = 2 }}, {{ at = \"offset:0\" }}]"
+        );
+        let list = value.list(&right)?;
+        if list.is_empty() || list.len() > PARTS {
+            value.wrong(
+                format!("it has {} parts", list.len()),
+                format!("write 1 to {PARTS}"),
+            );
+            return None;
+        }
+        let count = list.len();
+        let parts: Vec<Option<Part>> = list
+            .iter()
+            .enumerate()
+            .map(|(number, element)| {
+                let mut table = element.table("a part of the image", &right)?;
+                let place = table.require("at", SHAPE);
+                let bytes = if number + 1 < count {
+                    table.require("bytes", "write how many bytes of the image lie there")
+                } else {
+                    table.take("bytes")
+                };
+                table.finish();
+                let place = place.and_then(|value| read_place(&value, default.table, writes));
+                let bytes = match bytes {
+                    None => None,
+                    Some(value) => {
+                        let bytes = value.whole(1..=0x1_0000)?;
+                        Some(usize::try_from(bytes).ok()?)
+                    }
+                };
+                Some(Part {
+                    place: place?,
+                    bytes,
+                })
+            })
+            .collect();
+        let parts = parts.into_iter().collect::<Option<Vec<Part>>>()?;
+        Some(Self { parts, at })
+    }
+
+    /// The first elements of the parts.
+    pub(super) fn places(&self) -> impl Iterator<Item = ElementAddress> {
+        self.parts.iter().map(|part| part.place)
+    }
+
+    /// The blocks of `area`, which has `bytes` bytes.
+    ///
+    /// # Errors
+    ///
+    /// It does not fit: what is wrong, and what would be right.
+    pub(super) fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, (String, String)> {
+        let mut blocks = Vec::new();
+        let mut byte = 0;
+        for (number, part) in self.parts.iter().enumerate() {
+            let left = bytes - byte;
+            let is_last = number + 1 == self.parts.len();
+            let size = part.bytes.unwrap_or(left);
+            if size > left || (is_last && size < left) {
+                let all: usize = self.parts.iter().filter_map(|part| part.bytes).sum();
+                return Err((
+                    format!("the parts of {area} have {all} bytes, but {area} has {bytes}"),
+                    "let \"bytes\" out of the last part, which then has all that are left, or change the \
+                     size of the image"
+                        .to_owned(),
+                ));
+            }
+            let block = Block {
+                table: part.place.table,
+                first: part.place.offset,
+                byte,
+                bytes: size,
+            };
+            if block.span().end() > ADDRESSES {
+                return Err((
+                    format!(
+                        "{area} would lie at {} {} from {} on, and end at offset {}",
+                        block.span().count,
+                        block.table,
+                        part.place,
+                        block.span().end() - 1
+                    ),
+                    "begin further to the front; the last offset is 65535".to_owned(),
+                ));
+            }
+            byte += size;
+            if size > 0 {
+                blocks.push(block);
+            }
+        }
+        Ok(blocks)
+    }
+
+    /// Checks that the blocks of `area`, which this end writes, do not overlap.
+    ///
+    /// # Errors
+    ///
+    /// Two blocks overlap: what is wrong, and what would be right.
+    pub(super) fn check_apart(area: Area, blocks: &[Block]) -> Result<(), (String, String)> {
+        for (index, block) in blocks.iter().enumerate() {
+            let other = blocks[..index].iter().find(|other| {
+                let (own, others) = (block.span(), other.span());
+                other.table == block.table && own.first < others.end() && others.first < own.end()
+            });
+            let Some(other) = other else {
+                continue;
+            };
+            let place = |block: &Block| ElementAddress {
+                table: block.table,
+                offset: block.first,
+            };
+            return Err((
+                format!(
+                    "the parts of {area} at {} and at {} would be written over one another: the first has {} {}, the \
+                     second {}",
+                    place(other),
+                    place(block),
+                    other.span().count,
+                    block.table,
+                    block.span().count
+                ),
+                "begin the second one behind the first; a register has 2 bytes of the image, a coil 1 bit"
+                    .to_owned(),
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn read_place(value: &Value<'_>, table: Table, writes: bool) -> Option<ElementAddress> {
+    let place = ElementAddress::parse(value.text(SHAPE)?, table)
+        .map_err(|error| value.wrong(error.what, error.right))
+        .ok()?;
+    if writes && !place.table.is_writable() {
+        let (what, right) = nobody_writes(place.table);
+        value.wrong(what, right);
+        return None;
+    }
+    Some(place)
+}
+
+/// The error for writing to a read-only table: what is wrong, and what would be right.
+pub(super) fn nobody_writes(table: Table) -> (String, &'static str) {
+    (
+        format!("nobody can write {table}"),
+        "this end writes them: choose holding registers or coils, or check \"role\"",
+    )
+}

@@ -1,0 +1,458 @@
+//! Polling a server's units, without I/O: time and received bytes go in, bytes to send and the next deadline
+//! come out.
+
+mod identify;
+mod station;
+mod trouble;
+
+use std::io;
+use std::ops::Range;
+
+use crate::function::EXCEPTION_BIT;
+use crate::line::gone;
+use crate::mbap::{self, Telegram};
+use crate::rtu;
+use crate::{Function, Identification};
+use tickbus_base::time::{Nanos, Pace};
+use tickbus_fieldbus::WriteGuard;
+use tickbus_fieldbus::tcp::Caller;
+use tickbus_fieldbus::{BusError, Port};
+
+use super::plan::Capabilities;
+use super::request::{AnswerError, length};
+use identify::Identity;
+pub(super) use station::Station;
+
+/// How telegrams are delimited.
+#[derive(Debug)]
+pub(super) enum Framing {
+    /// By their header.
+    Tcp {
+        /// The last transaction number.
+        transaction: u16,
+        /// The received part of the next telegram.
+        inbox: Vec<u8>,
+    },
+    /// By their length, and by silence between them.
+    #[cfg_attr(
+        not(unix),
+        expect(dead_code, reason = "no serial ports are used there")
+    )]
+    Rtu {
+        /// The received part of an answer.
+        inbox: Vec<u8>,
+        /// Duration of one character.
+        character: Nanos,
+        silence: Nanos,
+        /// Nothing may be sent before this.
+        quiet_until: Nanos,
+        /// The line's echo of what is sent, if it has one.
+        echo: Option<rtu::Echo>,
+    },
+}
+
+/// What the server was asked.
+#[derive(Clone, Debug)]
+enum Asked {
+    /// Its identity.
+    Identity {
+        so_far: Identification,
+        requests: usize,
+    },
+    /// The station's query with this index.
+    Request(usize),
+}
+
+#[derive(Clone, Debug)]
+struct Asking {
+    station: usize,
+    what: Asked,
+    /// The function code.
+    code: u8,
+    /// When the time-out of the answer ends.
+    limit: Nanos,
+}
+
+/// Polls all stations over one connection.
+#[derive(Debug)]
+pub(super) struct ClientSession<'a> {
+    stations: &'a mut [Station],
+    guards: &'a mut [WriteGuard],
+    framing: Framing,
+    timeout: Nanos,
+    /// The server's name in messages.
+    peer: String,
+    cycle: Nanos,
+    pace: Pace,
+    /// When it last checked what is due.
+    looked: Nanos,
+    asking: Option<Asking>,
+    /// The request as sent over the line, the range of its PDU, and how much of it the system has accepted.
+    request: Vec<u8>,
+    pdu: Range<usize>,
+    written: usize,
+    /// Whether the line is reported as lost because no station works.
+    lost: bool,
+}
+
+impl<'a> ClientSession<'a> {
+    pub(super) fn new(
+        stations: &'a mut [Station],
+        guards: &'a mut [WriteGuard],
+        framing: Framing,
+        able: Capabilities,
+        (cycle, timeout): (Nanos, Nanos),
+        peer: String,
+        now: Nanos,
+    ) -> Self {
+        for (station, guard) in stations.iter_mut().zip(&mut *guards) {
+            guard.part();
+            station.connect(able);
+        }
+        Self {
+            stations,
+            guards,
+            framing,
+            timeout,
+            peer,
+            cycle,
+            pace: Pace::new(now, cycle),
+            looked: now,
+            asking: None,
+            request: Vec::new(),
+            pdu: 0..0,
+            written: 0,
+            lost: false,
+        }
+    }
+}
+
+impl Caller for ClientSession<'_> {
+    fn deadline(&self, _port: &Port) -> Nanos {
+        let Some(asking) = &self.asking else {
+            return self.pace.due();
+        };
+        // While an answer is slow, wake up every cycle to check the age of the data.
+        let deadline = asking.limit.min(self.looked + self.cycle);
+        match self.framing {
+            Framing::Rtu { quiet_until, .. } if self.written < self.request.len() => {
+                deadline.min(quiet_until)
+            }
+            _ => deadline,
+        }
+    }
+
+    fn to_write(&self, now: Nanos) -> &[u8] {
+        match self.framing {
+            Framing::Rtu { quiet_until, .. } if now < quiet_until => &[],
+            _ => &self.request[self.written..],
+        }
+    }
+
+    fn wrote(&mut self, now: Nanos, count: usize, _port: &mut Port) {
+        if let Framing::Rtu {
+            echo: Some(echo), ..
+        } = &mut self.framing
+        {
+            echo.sent(now, &self.request[self.written..][..count]);
+        }
+        self.written += count;
+    }
+
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        self.looked = now;
+        match &self.asking {
+            Some(asking) if now >= asking.limit => self.give_up(now, port),
+            None if self.pace.take(now) && port.sends(now) => self.begin(0, now, port),
+            _ => Ok(()),
+        }
+    }
+
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
+        match &mut self.framing {
+            Framing::Tcp { inbox, .. } => {
+                let mut all = std::mem::take(inbox);
+                all.extend_from_slice(bytes);
+                let rest = self.read_telegrams(&all, now, port)?;
+                all.drain(..rest);
+                if let Framing::Tcp { inbox, .. } = &mut self.framing {
+                    *inbox = all;
+                }
+                Ok(())
+            }
+            Framing::Rtu {
+                inbox,
+                silence,
+                quiet_until,
+                echo,
+                ..
+            } => {
+                *quiet_until = now + *silence;
+                let bytes = match echo {
+                    Some(echo) => &bytes[echo.strip(now, bytes)..],
+                    None => bytes,
+                };
+                if bytes.is_empty() {
+                    return Ok(());
+                }
+                let room = rtu::ADU_LIMIT - inbox.len();
+                inbox.extend_from_slice(&bytes[..bytes.len().min(room)]);
+                if self.asking.is_none() {
+                    port.count("modbus-client.unasked");
+                    self.clear();
+                    return Ok(());
+                }
+                // The beginning of an answer tells its length. So pauses within an answer, as some adapters
+                // make, do no harm, and there is no silence to wait for; nor does noise after it, when the
+                // transmitter is switched off.
+                let expected = inbox.get(1..).and_then(length);
+                match expected.map(|pdu| 1 + pdu + rtu::CHECKSUM) {
+                    Some(expected) if inbox.len() >= expected => {
+                        let telegram = inbox[..expected].to_vec();
+                        self.telegram(&telegram, now, port)
+                    }
+                    _ => Ok(()),
+                }
+            }
+        }
+    }
+
+    fn left(&mut self) -> BusError {
+        let asked_identity = self.hung_up();
+        let peer = &self.peer;
+        match self.framing {
+            Framing::Rtu { .. } => gone(peer, "it was closed"),
+            Framing::Tcp { .. } if asked_identity => BusError::Left(format!(
+                "{peer} closed the connection when it was asked who it is (function 43); if it does so again, it is \
+                 not asked any more"
+            )),
+            Framing::Tcp { .. } => BusError::Left(format!(
+                "{peer} closed the connection; if it serves one client at a time, end the other one"
+            )),
+        }
+    }
+
+    fn broke(&mut self, error: &io::Error) -> BusError {
+        // A device is not blamed for a question that it has not got.
+        if self.written == self.request.len() {
+            self.hung_up();
+        }
+        let peer = &self.peer;
+        match self.framing {
+            Framing::Rtu { .. } => gone(peer, error),
+            Framing::Tcp { .. } => BusError::Link(format!(
+                "the connection with {peer} broke ({error}); see whether the server still runs"
+            )),
+        }
+    }
+}
+
+impl ClientSession<'_> {
+    /// An RTU telegram arrived.
+    fn telegram(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let Some(asking) = &self.asking else {
+            return Ok(());
+        };
+        let (station, code) = (asking.station, asking.code);
+        let is_identity = matches!(asking.what, Asked::Identity { .. });
+        let unit = self.stations[station].unit;
+        self.clear();
+        match rtu::parse(telegram) {
+            Some((from, pdu)) if from == unit && pdu[0] & !EXCEPTION_BIT == code => {
+                self.answered(pdu, now, port)
+            }
+            // A late answer to an earlier request; the expected one may still arrive.
+            Some((from, pdu)) => {
+                port.count("modbus-client.unasked");
+                if from == unit && pdu[0] == Function::DeviceIdentification.code() {
+                    self.doubt(station);
+                }
+                Ok(())
+            }
+            None => {
+                port.count("modbus-client.damaged");
+                let what = "gave a damaged answer";
+                if is_identity {
+                    self.is_unclear(station, what, port);
+                }
+                self.miss(what, now, port)
+            }
+        }
+    }
+
+    fn clear(&mut self) {
+        if let Framing::Rtu { inbox, .. } = &mut self.framing {
+            inbox.clear();
+        }
+    }
+
+    /// Takes all complete TCP telegrams; returns their number of bytes.
+    fn read_telegrams(
+        &mut self,
+        bytes: &[u8],
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<usize, BusError> {
+        let mut taken = 0;
+        loop {
+            let (telegram, length) = match Telegram::parse(&bytes[taken..]) {
+                Ok(Some(parsed)) => parsed,
+                Ok(None) => return Ok(taken),
+                Err(error) => {
+                    // This end closes the connection now; if it was asking for the identity, that counts as
+                    // if the device had closed it.
+                    self.hung_up();
+                    return Err(BusError::Protocol(format!("of {}: {error}", self.peer)));
+                }
+            };
+            taken += length;
+            let Framing::Tcp { transaction, .. } = &self.framing else {
+                return Ok(taken);
+            };
+            if self.asking.is_none() || telegram.transaction != *transaction {
+                // Too late, or never requested.
+                port.count("modbus-client.unasked");
+                continue;
+            }
+            self.answered(telegram.pdu, now, port)?;
+        }
+    }
+
+    /// The answer to the current request arrived.
+    fn answered(&mut self, pdu: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let Some(Asking { station, what, .. }) = self.asking.take() else {
+            return Ok(());
+        };
+        match what {
+            Asked::Identity { so_far, requests } => {
+                self.identified(station, so_far, requests, pdu, now, port)
+            }
+            Asked::Data(index) => {
+                let asked = &self.request[self.pdu.clone()];
+                let polled = &mut self.stations[station];
+                let taken = polled.queries[index].take(asked, pdu, &mut polled.receives);
+                match taken {
+                    Ok(()) => self.go_on(station, index + 1, now, port),
+                    Err(AnswerError::Malformed(what)) => {
+                        let query = &self.stations[station].queries[index];
+                        let error = BusError::Protocol(format!(
+                            "{} was asked to {query}; {what}; check that it is a Modbus server",
+                            self.named(station)
+                        ));
+                        self.declined(station, error, now, port)
+                    }
+                    Err(AnswerError::Refused(exception)) => {
+                        self.refused(station, index, exception, now, port)
+                    }
+                }
+            }
+        }
+    }
+
+    /// The unit's name in messages.
+    fn named(&self, station: usize) -> String {
+        format!("unit {} of {}", self.stations[station].unit, self.peer)
+    }
+
+    /// Begins with the first station, from this one on, that is not resting in this cycle, or ends the cycle.
+    fn begin(&mut self, station: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let mut rest = station..self.stations.len();
+        let Some(next) = rest.find(|station| !self.stations[*station].rests(now)) else {
+            return Ok(());
+        };
+        let polled = &mut self.stations[next];
+        polled.prepare(self.guards[next].may_write());
+        polled.sends.clear();
+        polled.sends.extend_from_slice(port.outgoing(next, now));
+        self.go_on(next, 0, now, port)
+    }
+
+    /// Sends the request with this index, or ends the station's part of the cycle after the last one.
+    fn go_on(
+        &mut self,
+        station: usize,
+        index: usize,
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let polled = &self.stations[station];
+        if let Some(query) = polled.queries.get(index) {
+            if polled.is_to_be_prepared() {
+                // The identity of the device has become doubtful in the meantime: nothing more is written.
+                return self.begin(station + 1, now, port);
+            }
+            let (code, answer) = (query.function().code(), query.answer_length());
+            self.ask(
+                station,
+                Asked::Data(index),
+                code,
+                answer,
+                now,
+                |polled, pdu| polled.queries[index].append(&polled.sends, pdu),
+            );
+            return Ok(());
+        }
+        if polled.receives.is_empty() {
+            port.touch(station, now);
+        } else {
+            port.received(station, now, &polled.receives);
+        }
+        if self.guards[station].may_write() {
+            port.sent(station);
+        }
+        self.recovered(station);
+        port.running(&format!("polling {}", self.peer));
+        if self.stations[station].wants_identity(now) && self.may_ask(station, port) {
+            self.ask_identity(station, Identification::default(), 0, 0, now);
+            return Ok(());
+        }
+        self.begin(station + 1, now, port)
+    }
+
+    /// Sends a request with this function code, whose PDU `write` appends; an answer of `answer` bytes is
+    /// expected.
+    fn ask(
+        &mut self,
+        station: usize,
+        what: Asked,
+        code: u8,
+        answer: usize,
+        now: Nanos,
+        write: impl FnOnce(&Station, &mut Vec<u8>),
+    ) {
+        let polled = &self.stations[station];
+        let request = &mut self.request;
+        request.clear();
+        self.written = 0;
+        let mut limit = now + self.timeout;
+        match &mut self.framing {
+            Framing::Tcp { transaction, .. } => {
+                *transaction = transaction.wrapping_add(1);
+                mbap::append(*transaction, polled.unit, request, |pdu| write(polled, pdu));
+                self.pdu = mbap::HEADER..request.len();
+            }
+            Framing::Rtu {
+                inbox,
+                character,
+                quiet_until,
+                ..
+            } => {
+                inbox.clear();
+                rtu::append(polled.unit, request, |pdu| write(polled, pdu));
+                self.pdu = 1..request.len() - rtu::CHECKSUM;
+                // Request and answer need their time on the line, with unit and checksum.
+                let characters = i64::try_from(request.len() + answer + 3).unwrap_or(i64::MAX);
+                limit = limit.max(*quiet_until + self.timeout) + character.times(characters);
+            }
+        }
+        self.asking = Some(Asking {
+            station,
+            what,
+            code,
+            limit,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,499 @@
+//! Frames that are lost, repeated or held back on the line.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::ring::Ring;
+use super::{FaultBoard, LineEffect, LineFault, Phase};
+use tickbus_base::time::Nanos;
+
+/// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
+/// often than that.
+const PATIENCE: Nanos = Nanos::from_secs(1);
+
+/// The combined effect of the active faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Sum {
+    /// Nothing is sent or received.
+    down: bool,
+    /// How long incoming frames are held back.
+    delay: Nanos,
+    /// How long outgoing frames are held back.
+    slow: Nanos,
+}
+
+/// What happens to an incoming frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It is lost.
+    Lost,
+    /// It is delivered this many times.
+    Passes(u32),
+    /// It has to wait; see [`LineFaults::release`].
+    Held,
+}
+
+/// The line between an image and its bus, with its injected faults.
+#[derive(Debug)]
+pub struct LineFaults {
+    board: Arc<FaultBoard>,
+    faults: Vec<LineFault>,
+    stations: Vec<Wire>,
+    sum: Sum,
+    /// What was decided at random for the frames of the current incoming cycle.
+    fate: Fate,
+    /// Whether the frames of the current outgoing cycle repeat those of the previous one.
+    repeats: bool,
+    /// The active faults, as text.
+    active: String,
+}
+
+/// The part of the line that belongs to one station.
+#[derive(Debug)]
+struct Wire {
+    dead: bool,
+    /// Whether the station has had its turn in the current incoming, and in the current outgoing cycle. When
+    /// it comes again, the next cycle has begun, whichever station is its first.
+    came: bool,
+    went: bool,
+    out: Outgoing,
+    /// Received frames that are held back.
+    waiting: Option<Ring>,
+    rx_len: usize,
+}
+
+/// Outgoing frames.
+#[derive(Debug)]
+struct Outgoing {
+    /// The mask of latched bits: the peer has to see each of their changes.
+    latched: Box<[u8]>,
+    /// The newest bytes of the image.
+    newest: Box<[u8]>,
+    /// The bytes that the bus sends.
+    current: Box<[u8]>,
+    /// The bytes that the peer received last.
+    sent: Box<[u8]>,
+    /// The mask of bits that the peer reads: all, until it has not read one for [`PATIENCE`].
+    read: Box<[u8]>,
+    /// Whether the peer has read anything since `current` was set, and since when a pulse in it has held up
+    /// the frames behind it nevertheless.
+    reads: bool,
+    held_up: Option<Nanos>,
+    /// Changes that are held back.
+    waiting: Option<Ring>,
+    /// The origin of the bytes that the bus was given: decides who is told that they were sent.
+    given: Given,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Given {
+    /// The image: it keeps its pulses until they were sent.
+    Image,
+    /// The ring: the image has released these bytes long ago.
+    Held,
+    /// Neither: old bytes, so that the bus has something to send.
+    Nothing,
+}
+
+/// The shape of one station's frames.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// What it sent last.
+    pub last_sent: Box<[u8]>,
+    /// The mask of the bits of which the peer has to see each change.
+    pub latched: Box<[u8]>,
+    /// Size of the frames that come in, in bytes.
+    pub rx_len: usize,
+}
+
+impl LineFaults {
+    /// The line to stations of these shapes, without any fault.
+    pub fn new(board: Arc<FaultBoard>, stations: impl Iterator<Item = Shape>) -> Self {
+        let wire = |shape: Shape| Wire {
+            dead: false,
+            came: true,
+            went: true,
+            out: Outgoing {
+                latched: shape.latched,
+                newest: shape.last_sent.clone(),
+                current: shape.last_sent.clone(),
+                read: vec![0xFF; shape.last_sent.len()].into(),
+                sent: shape.last_sent,
+                reads: false,
+                held_up: None,
+                waiting: None,
+                given: Given::Image,
+            },
+            waiting: None,
+            rx_len: shape.rx_len,
+        };
+        Self {
+            board,
+            faults: Vec::new(),
+            stations: stations.map(wire).collect(),
+            sum: Sum::default(),
+            fate: Fate::Passes(1),
+            repeats: false,
+            active: String::new(),
+        }
+    }
+
+    /// Adopts a fault, and allocates everything that it will need.
+    pub fn adopt(&mut self, fault: LineFault) {
+        for wire in &mut self.stations {
+            match fault.trouble {
+                LineEffect::Delay(_) => {
+                    wire.waiting.get_or_insert_with(|| Ring::new(wire.rx_len));
+                }
+                LineEffect::SlowAnswers(_) => {
+                    let size = wire.out.current.len();
+                    wire.out.waiting.get_or_insert_with(|| Ring::new(size));
+                }
+                _ => {}
+            }
+        }
+        // Reserved for all of them now, so that a tick at which one begins need not allocate.
+        let titles = self.faults.iter().chain([&fault]);
+        let room = titles.map(|fault| fault.cell.title_len() + 2).sum();
+        self.active.clear();
+        self.active.reserve(room);
+        self.faults.push(fault);
+    }
+
+    /// Looks up which faults are active.
+    pub fn look(&mut self) {
+        let mut sum = Sum::default();
+        // Decided anew: a fault that is over must not leave anything behind.
+        (self.fate, self.repeats) = (Fate::Passes(1), false);
+        for wire in &mut self.stations {
+            (wire.dead, wire.came, wire.went) = (false, true, true);
+        }
+        self.faults.retain(|fault| {
+            let phase = fault.cell.phase();
+            if phase == Phase::Active {
+                match fault.trouble {
+                    LineEffect::Delay(by) => sum.delay += by,
+                    LineEffect::SlowAnswers(by) => sum.slow += by,
+                    LineEffect::LinkDown => sum.down = true,
+                    LineEffect::StationDown(station) => {
+                        if let Some(wire) = self.stations.get_mut(station) {
+                            wire.dead = true;
+                        }
+                    }
+                    LineEffect::Drop(..) | LineEffect::Duplicate(..) => {}
+                }
+            }
+            phase != Phase::Over
+        });
+        self.sum = sum;
+        self.active.clear();
+        for fault in &self.faults {
+            if fault.cell.phase() == Phase::Active {
+                if !self.active.is_empty() {
+                    self.active.push_str(", ");
+                }
+                fault.cell.write_title(&mut self.active);
+            }
+        }
+    }
+
+    /// Whether nothing goes out and nothing comes in.
+    pub fn is_down(&self) -> bool {
+        self.sum.down
+    }
+
+    /// Draws for each active fault for which `is_meant` gives a probability; tells whether any of them hits.
+    fn draw(faults: &mut [LineFault], is_meant: impl Fn(LineEffect) -> Option<f64>) -> bool {
+        let mut happens = false;
+        for fault in faults {
+            if fault.cell.phase() == Phase::Active
+                && let Some(chance) = is_meant(fault.trouble)
+            {
+                // Every fault draws, whether or not another one hit: its sequence of numbers must not depend
+                // on the others.
+                happens |= fault.random.happens(chance);
+            }
+        }
+        happens
+    }
+
+    /// Whether the frames of the cycle that is about to go out get lost.
+    pub fn loses_cycle(&mut self) -> bool {
+        let lost = Self::draw(&mut self.faults, |trouble| match trouble {
+            LineEffect::Drop(chance, direction) if direction.goes_out() => Some(chance),
+            _ => None,
+        });
+        if lost {
+            self.board.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        lost
+    }
+
+    /// Whether the previous frames are sent again instead of new ones. Decided once for all stations of a
+    /// cycle.
+    pub fn repeats(&mut self, station: usize) -> bool {
+        if std::mem::replace(&mut self.stations[station].went, true) {
+            for (index, wire) in self.stations.iter_mut().enumerate() {
+                wire.went = index == station;
+            }
+            self.repeats = Self::draw(&mut self.faults, |trouble| match trouble {
+                LineEffect::Duplicate(chance, direction) if direction.goes_out() => Some(chance),
+                _ => None,
+            });
+            if self.repeats {
+                self.board.duplicated.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        self.repeats
+    }
+
+    /// Whether nothing gets through to or from the station.
+    pub fn is_cut(&self, station: usize) -> bool {
+        self.sum.down || self.stations[station].dead
+    }
+
+    /// What the bus sends while the station is cut off: the bytes that it sent before.
+    pub fn frozen(&mut self, station: usize) -> &[u8] {
+        let out = &mut self.stations[station].out;
+        out.given = Given::Nothing;
+        &out.current
+    }
+
+    /// Takes the image's outgoing bytes; true if the image may regard them as sent.
+    pub fn takes(&mut self, station: usize, now: Nanos, image: &[u8]) -> bool {
+        let slow = self.sum.slow;
+        let out = &mut self.stations[station].out;
+        if out.is_through(slow) {
+            out.newest.copy_from_slice(image);
+            out.current.copy_from_slice(image);
+            out.given = Given::Image;
+            return false;
+        }
+        if out.hold(now, slow, image) {
+            self.board.hurried.fetch_add(1, Ordering::Relaxed);
+        }
+        true
+    }
+
+    /// The bytes to send: the same as last time, or those chosen by [`takes`](Self::takes).
+    pub fn outgoing(&self, station: usize) -> &[u8] {
+        &self.stations[station].out.current
+    }
+
+    /// The peer has received what the bus was given last; true if the image must be told.
+    pub fn sent(&mut self, station: usize) -> bool {
+        let out = &mut self.stations[station].out;
+        if out.given != Given::Nothing {
+            out.sent.copy_from_slice(&out.current);
+            out.read.fill(0xFF);
+        }
+        out.given == Given::Image
+    }
+
+    /// As [`sent`](Self::sent), for a peer that received only these bits (bit n of byte k is 8k + n).
+    pub fn sent_bits(&mut self, station: usize, bits: &Range<usize>) -> bool {
+        let out = &mut self.stations[station].out;
+        if out.given != Given::Nothing {
+            for bit in bits.start..bits.end.min(8 * out.sent.len()) {
+                let (byte, mask) = (bit / 8, 1 << (bit % 8));
+                out.sent[byte] = out.sent[byte] & !mask | out.current[byte] & mask;
+                out.read[byte] |= mask;
+            }
+            out.reads = true;
+        }
+        out.given == Given::Image
+    }
+
+    /// Decides what happens to a frame that arrived at `now`, and stores it if it has to wait.
+    pub fn arrives(&mut self, station: usize, now: Nanos, bytes: &[u8]) -> Fate {
+        if !self.sum.down && std::mem::replace(&mut self.stations[station].came, true) {
+            for (index, wire) in self.stations.iter_mut().enumerate() {
+                wire.came = index == station;
+            }
+            self.fate = self.decide();
+        }
+        if self.is_cut(station) {
+            return Fate::Lost;
+        }
+        let Fate::Passes(times) = self.fate else {
+            return self.fate;
+        };
+        let Some(ring) = &mut self.stations[station].waiting else {
+            return self.fate;
+        };
+        if self.sum.delay == Nanos::ZERO && ring.is_empty() {
+            return self.fate;
+        }
+        for _ in 0..times {
+            // Callers release before they hand in, so the ring has room; if it is full even so, order is kept
+            // and the frame lost.
+            if !ring.is_full() {
+                ring.push(now, bytes);
+            }
+        }
+        Fate::Held
+    }
+
+    fn decide(&mut self) -> Fate {
+        let lost = Self::draw(&mut self.faults, |trouble| match trouble {
+            LineEffect::Drop(chance, direction) if direction.comes_in() => Some(chance),
+            _ => None,
+        });
+        let twice = Self::draw(&mut self.faults, |trouble| match trouble {
+            LineEffect::Duplicate(chance, direction) if direction.comes_in() => Some(chance),
+            _ => None,
+        });
+        if lost {
+            self.board.dropped.fetch_add(1, Ordering::Relaxed);
+            Fate::Lost
+        } else if twice {
+            self.board.duplicated.fetch_add(1, Ordering::Relaxed);
+            Fate::Passes(2)
+        } else {
+            Fate::Passes(1)
+        }
+    }
+
+    /// The next held frame that is due by `now`. When the ring is nearly full, the oldest frame is released
+    /// early: the order is kept, and every edge is counted.
+    pub fn release(&mut self, station: usize, now: Nanos, into: &mut [u8]) -> bool {
+        let delay = self.sum.delay;
+        let Some(ring) = &mut self.stations[station].waiting else {
+            return false;
+        };
+        let Some((taken, bytes)) = ring.front() else {
+            return false;
+        };
+        let due = delay == Nanos::ZERO || taken + delay <= now;
+        let early = !due && ring.is_nearly_full();
+        if !due && !early {
+            return false;
+        }
+        into.copy_from_slice(bytes);
+        ring.pop();
+        if early {
+            self.board.hurried.fetch_add(1, Ordering::Relaxed);
+        }
+        true
+    }
+
+    /// Whether received frames of the station are held back.
+    pub fn holds_back(&self, station: usize) -> bool {
+        let ring = self.stations[station].waiting.as_ref();
+        ring.is_some_and(|ring| !ring.is_empty())
+    }
+
+    /// When the next received frame is due; [`Nanos::MAX`] if none is held back.
+    pub fn due(&self) -> Nanos {
+        let rings = self
+            .stations
+            .iter()
+            .filter_map(|wire| wire.waiting.as_ref());
+        let fronts = rings.filter_map(|ring| ring.front());
+        let dues = fronts.map(|(taken, _)| taken + self.sum.delay);
+        dues.min().unwrap_or(Nanos::MAX)
+    }
+
+    /// The active faults, as text: `"cable" (link-down)`.
+    pub fn active(&self) -> &str {
+        &self.active
+    }
+}
+
+impl Outgoing {
+    /// Whether the image's bytes go to the bus directly.
+    fn is_through(&self, slow: Nanos) -> bool {
+        slow == Nanos::ZERO
+            && self.waiting.as_ref().is_none_or(Ring::is_empty)
+            && !(self.given == Given::Held && self.has_unseen(&self.current))
+    }
+
+    /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
+    fn loses(&self, next: &[u8]) -> bool {
+        let bytes = self.current.iter().zip(&self.sent).zip(next);
+        let mut bits = bytes.zip(self.watched());
+        bits.any(|(((current, sent), next), watched)| {
+            (current ^ sent) & (current ^ next) & watched != 0
+        })
+    }
+
+    /// The latched bits that the peer reads.
+    fn watched(&self) -> impl Iterator<Item = u8> {
+        let bytes = self.latched.iter().zip(&self.read);
+        bytes.map(|(latched, read)| latched & read)
+    }
+
+    /// Whether the peer has polled for [`PATIENCE`] without reading the pulse in `current`: it does not read
+    /// that bit, and the bits that it does read must not wait forever.
+    fn is_left_out(&mut self, now: Nanos) -> bool {
+        if !self.reads {
+            return false;
+        }
+        if now < *self.held_up.get_or_insert(now) + PATIENCE {
+            return false;
+        }
+        let bytes = self.current.iter().zip(&self.sent);
+        for (read, (current, sent)) in self.read.iter_mut().zip(bytes) {
+            *read &= !(current ^ sent);
+        }
+        true
+    }
+
+    /// Whether a latched bit of `bytes` differs from what the peer has seen.
+    fn has_unseen(&self, bytes: &[u8]) -> bool {
+        let mut bits = bytes.iter().zip(&self.sent).zip(self.watched());
+        bits.any(|((bytes, sent), watched)| (bytes ^ sent) & watched != 0)
+    }
+
+    /// Holds the image's bytes back and finds what is due by `now`; true if something was sent early.
+    fn hold(&mut self, now: Nanos, slow: Nanos, image: &[u8]) -> bool {
+        let mut hurried = false;
+        self.given = Given::Held;
+        if *image != *self.newest {
+            self.newest.copy_from_slice(image);
+            if self.waiting.as_ref().is_some_and(Ring::is_full) {
+                hurried = true;
+                self.advance();
+            }
+            if let Some(ring) = &mut self.waiting {
+                ring.push(now, image);
+            }
+        }
+        while let Some((taken, next)) = self.waiting.as_ref().and_then(Ring::front) {
+            let due = slow == Nanos::ZERO || taken + slow <= now;
+            if !due {
+                break;
+            }
+            if self.loses(next) {
+                if !self.is_left_out(now) {
+                    break;
+                }
+                hurried = true;
+            }
+            self.advance();
+        }
+        if slow == Nanos::ZERO {
+            // The fault is over: values are current at once, edges are shown one at a time.
+            let bytes = self.current.iter_mut().zip(&self.newest);
+            for ((current, newest), latched) in bytes.zip(&self.latched) {
+                *current = (*current & latched) | (newest & !latched);
+            }
+        }
+        hurried
+    }
+
+    /// Makes the oldest held change the bytes that the bus sends.
+    fn advance(&mut self) {
+        if let Some(ring) = &mut self.waiting
+            && let Some((_, next)) = ring.front()
+        {
+            self.current.copy_from_slice(next);
+            ring.pop();
+            (self.reads, self.held_up) = (false, None);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,154 @@
+//! Values of signals, made wrong.
+
+use super::SignalEffect;
+use super::random::Random;
+use tickbus_image::signal::{DataType, Latch, Signal, Slot};
+
+/// One fault of a signal's value.
+#[derive(Debug)]
+pub(super) struct SignalFault {
+    slot: usize,
+    /// The slot that counts the signal's edges, if this end reads it and it is latched.
+    edges: Option<(usize, Latch)>,
+    kind: Kind,
+    change: SignalEffect,
+    random: Random,
+    /// The value at which it is stuck.
+    held: Slot,
+    /// The level shown last, which new edges are compared with.
+    level: bool,
+    /// The true value and the true edge count, while the bent ones are in their slots.
+    truth: Option<(Slot, Slot)>,
+}
+
+/// The type of value in the slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Bit,
+    /// A bit string as a number; this is the number with all bits set.
+    Bits(u32),
+    Real,
+    Signed,
+    Unsigned,
+}
+
+impl Kind {
+    fn of(signal: &Signal) -> Self {
+        match signal.data_type {
+            DataType::Bool => Self::Bit,
+            DataType::Lint if signal.is_integer_slot() => Self::Signed,
+            _ if signal.is_integer_slot() => Self::Unsigned,
+            DataType::Byte if signal.scale.is_none() => Self::Bits(0xFF),
+            DataType::Word if signal.scale.is_none() => Self::Bits(0xFFFF),
+            DataType::Dword if signal.scale.is_none() => Self::Bits(u32::MAX),
+            _ => Self::Real,
+        }
+    }
+}
+
+impl SignalFault {
+    /// `slot` holds the signal; `edges` counts its edges, if this end reads it and it is latched.
+    pub(super) fn new(
+        signal: &Signal,
+        (slot, edges): (usize, Option<usize>),
+        change: SignalEffect,
+        random: Random,
+    ) -> Self {
+        Self {
+            slot,
+            edges: edges.zip(signal.latch),
+            kind: Kind::of(signal),
+            change,
+            random,
+            held: Slot::default(),
+            level: false,
+            truth: None,
+        }
+    }
+
+    /// Index of the signal.
+    pub(super) fn signal(&self) -> usize {
+        self.slot
+    }
+
+    /// The fault begins; the slots hold the true values.
+    pub(super) fn begin(&mut self, slots: &[Slot]) {
+        let slot = slots[self.slot];
+        self.level = slot.real() != 0.0;
+        self.held = match self.change {
+            SignalEffect::Stuck(Some(value)) => value,
+            _ => slot,
+        };
+    }
+
+    /// Replaces the value in its slot by the bent one.
+    pub(super) fn apply_to(&mut self, slots: &mut [Slot]) {
+        let truth = slots[self.slot];
+        let bent = self.bent(truth);
+        slots[self.slot] = bent;
+        let mut counted = Slot::default();
+        if let Some((edges, latch)) = self.edges {
+            // An edge that the simulation is not shown must not be counted either.
+            let level = bent.real() != 0.0;
+            let is_edge = level != self.level
+                && match latch {
+                    Latch::Rising => level,
+                    Latch::Falling => !level,
+                    Latch::Both => true,
+                };
+            self.level = level;
+            counted = std::mem::replace(
+                &mut slots[edges],
+                Slot::from_real(f64::from(u8::from(is_edge))),
+            );
+        }
+        self.truth = Some((truth, counted));
+    }
+
+    /// Puts the true value back, if the bent one is in its slot.
+    pub(super) fn restore(&mut self, slots: &mut [Slot]) {
+        if let Some((truth, counted)) = self.truth.take() {
+            slots[self.slot] = truth;
+            if let Some((edges, _)) = self.edges {
+                slots[edges] = counted;
+            }
+        }
+    }
+
+    fn bent(&mut self, truth: Slot) -> Slot {
+        match self.change {
+            SignalEffect::Stuck(_) => self.held,
+            SignalEffect::Invert => self.inverted(truth),
+            SignalEffect::Offset(by) => self.moved(truth, by),
+            SignalEffect::Noise(amplitude) => {
+                let by = amplitude * self.random.around_zero();
+                self.moved(truth, by)
+            }
+            SignalEffect::Flicker(chance) if self.random.happens(chance) => self.inverted(truth),
+            SignalEffect::Flicker(_) => truth,
+        }
+    }
+
+    fn inverted(&self, truth: Slot) -> Slot {
+        match self.kind {
+            Kind::Bit => Slot::from_real(f64::from(u8::from(truth.real() == 0.0))),
+            Kind::Bits(all) => {
+                let all = f64::from(all);
+                // Rounded and saturated as by the codec.
+                Slot::from_real(all - truth.real().round().clamp(0.0, all))
+            }
+            Kind::Signed | Kind::Unsigned => Slot::from_unsigned(!truth.unsigned()),
+            Kind::Real => Slot::from_real(-truth.real()),
+        }
+    }
+
+    fn moved(&self, truth: Slot, by: f64) -> Slot {
+        #[expect(clippy::cast_possible_truncation, reason = "saturates, as is meant")]
+        let whole = by.round() as i64;
+        match self.kind {
+            Kind::Signed => Slot::from_signed(truth.signed().saturating_add(whole)),
+            Kind::Unsigned => Slot::from_unsigned(truth.unsigned().saturating_add_signed(whole)),
+            Kind::Bit | Kind::Bits(_) | Kind::Real => Slot::from_real(truth.real() + by),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The guard in front of a PLC's memory: only a PLC that was named is written to.
+
+use super::Port;
+use tickbus_base::os::one_line;
+
+/// Keeps a bus that connects to a PLC from writing to the wrong one.
+///
+/// A driver.cfg names the PLC by the identity that it reports, as `write_to`. Until that identity was
+/// [met](Self::meet), the bus only reads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WriteGuard {
+    write_to: Option<String>,
+    may_write: bool,
+    /// The identity last logged as the wrong one.
+    told: Option<String>,
+}
+
+impl WriteGuard {
+    /// A guard that permits writes to the PLC that `write_to` names, or to none.
+    pub fn new(write_to: Option<&str>) -> Self {
+        Self {
+            write_to: write_to.map(str::to_owned),
+            may_write: false,
+            told: None,
+        }
+    }
+
+    /// Whether the current PLC may be written to.
+    pub const fn may_write(&self) -> bool {
+        self.may_write
+    }
+
+    /// The PLC reports `identity`, or the bus identifies it by that. Returns whether it may be written to; if
+    /// not, statistics and log say so, and what would permit it.
+    pub fn meet(&mut self, port: &Port, identity: &str) -> bool {
+        let identity = &*one_line(identity);
+        self.may_write = self.write_to.as_deref() == Some(identity);
+        port.tell("identity", identity);
+        port.tell("writes", if self.may_write { "allowed" } else { "blocked" });
+        if !self.may_write && self.told.as_deref() != Some(identity) {
+            self.told = Some(identity.to_owned());
+            let why = match &self.write_to {
+                None => "no \"write_to\" names it".to_owned(),
+                Some(other) => format!("\"write_to\" names \"{other}\""),
+            };
+            port.log(
+                log::Level::Warn,
+                "write_to",
+                format_args!(
+                    "nothing is written into the PLC \"{identity}\", because {why}; if its outputs may be moved \
+                     from here, write into [fieldbus]: write_to = {}",
+                    quoted(identity)
+                ),
+            );
+        }
+        self.may_write
+    }
+
+    /// The PLC is gone; the next one must be identified first.
+    pub fn part(&mut self) {
+        self.may_write = false;
+    }
+}
+
+/// The text as a TOML string.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{LinkStatus, Role};
+    use tickbus_base::time::{Manual, Nanos};
+    use tickbus_image::image;
+    use tickbus_test_log as logged;
+
+    fn port() -> (Port, LinkStatus, logged::Watch) {
+        let logged = logged::Watch::over("tickbus_fieldbus");
+        let status = LinkStatus::new("test", Nanos::from_millis(100));
+        let clock: Arc<Manual> = Manual::new();
+        let (_, end) = image(Vec::new());
+        let port = Port::new(end, clock, Role::Device, None, status.clone());
+        (port, status, logged)
+    }
+
+    fn statistics(status: &LinkStatus) -> String {
+        let mut text = String::new();
+        status.write(Nanos::ZERO, &mut text);
+        text
+    }
+
+    #[test]
+    fn only_the_plc_that_was_named_is_written_to() {
+        logged::expect("nothing is written into the PLC \"ACME ");
+        let (port, status, _logged) = port();
+        let mut guard = WriteGuard::new(Some("ACME 7"));
+        assert!(!guard.may_write(), "nobody was met");
+        assert!(!guard.meet(&port, "ACME 8"));
+        let text = statistics(&status);
+        assert!(
+            text.contains("\nidentity=ACME 8\nwrites=blocked\n"),
+            "{text}"
+        );
+        assert!(guard.meet(&port, "ACME 7") && guard.may_write());
+        assert!(statistics(&status).contains("\nidentity=ACME 7\nwrites=allowed\n"));
+        guard.part();
+        assert!(!guard.may_write(), "it is gone");
+        assert!(
+            !WriteGuard::new(None).meet(&port, "ACME 7"),
+            "none was named"
+        );
+    }
+
+    #[test]
+    fn an_identity_is_quoted_as_a_driver_cfg_wants_it() {
+        assert_eq!(quoted(r#"6ES7 "x" C:\y"#), r#""6ES7 \"x\" C:\\y""#);
+    }
+}

@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
-use tickbus::time::{Histogram, Monotonic, Nanos};
+use tickbus::time::{Monotonic, Nanos, TimeHistogram};
 
 /// Registers written and read in one request.
 const REGISTERS: u8 = 64;
@@ -260,7 +260,7 @@ fn crowd(extent: &Extent) {
         clients.push(stream);
     }
     let memory = (resident() - before) / f64::from(u32::try_from(count).expect("some"));
-    let mut spans = Histogram::new();
+    let mut spans = TimeHistogram::new();
     let begin = Instant::now();
     let gap = INTERVAL / u32::try_from(count).expect("some");
     let mut due = begin;

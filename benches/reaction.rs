@@ -16,11 +16,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use tickbus::driver::{Driver, Host};
-use tickbus::driver_cfg::{Asked, Config};
+use tickbus::driver_cfg::{CommandLineEnd, Config};
 use tickbus::fieldbus::Role;
 use tickbus::plc::Program;
 use tickbus::programs::{Mirror, Reaction};
-use tickbus::time::{Clock, Histogram, Monotonic, Nanos, Pace, Stop};
+use tickbus::time::{Clock, Monotonic, Nanos, Pace, Stop, TimeHistogram};
 
 /// Bytes from the PLC and to it: %Q and %I.
 const REQUEST: usize = 360;
@@ -114,7 +114,7 @@ fn ping_pong(exchanges: usize) -> f64 {
         }
     });
     let (request, mut answer) = ([0; REQUEST], [0; ANSWER]);
-    let mut spans = Histogram::new();
+    let mut spans = TimeHistogram::new();
     for _ in 0..exchanges {
         let begin = Instant::now();
         client.write_all(&request).expect("the server reads");
@@ -233,7 +233,7 @@ fn controller_config(device: &str, controller: Option<&str>, machine: &Running) 
         let text = device.replacen("[fieldbus]\n", "[fieldbus]\nrole = \"controller\"\n", 1);
         return Config::parse("controller.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
     };
-    let asked = Asked {
+    let asked = CommandLineEnd {
         role: Role::Controller,
         moved: true,
     };

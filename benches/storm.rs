@@ -30,7 +30,7 @@ mod storm {
 
     use tickbus::driver::Driver;
     use tickbus::driver_cfg::Config;
-    use tickbus::time::{Clock, Histogram, Monotonic, Nanos, Pace, Stop};
+    use tickbus::time::{Clock, Monotonic, Nanos, Pace, Stop, TimeHistogram};
 
     use super::full_pipe::full_pipe;
 
@@ -163,12 +163,12 @@ mod storm {
     }
 
     /// Ticks at a fixed interval for `span`; returns how long each exchange took.
-    fn tick(driver: &mut Driver, span: Duration) -> Histogram {
+    fn tick(driver: &mut Driver, span: Duration) -> TimeHistogram {
         let clock = Monotonic::shared();
         let mut slots = driver.initial_slots();
         let (begin, stop) = (Instant::now(), Stop::new());
         let mut pace = Pace::new(clock.now(), TICK);
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         while begin.elapsed() < span {
             if pace.take(clock.now()) {
                 let begin = Instant::now();

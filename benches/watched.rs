@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
-use tickbus::time::{Clock, Histogram, Monotonic, Nanos, Pace, Stop};
+use tickbus::time::{Clock, Monotonic, Nanos, Pace, Stop, TimeHistogram};
 
 /// The time between two ticks.
 const TICK: Nanos = Nanos::from_micros(100);
@@ -104,11 +104,11 @@ fn watch(driver: &Mutex<Driver>, texts: &AtomicU64, over: &AtomicBool) {
 
 /// Ticks at a fixed interval for `span`; returns how long each exchange took, including the wait for the
 /// driver.
-fn tick(driver: &Mutex<Driver>, slots: &mut [Slot], span: Duration) -> Histogram {
+fn tick(driver: &Mutex<Driver>, slots: &mut [Slot], span: Duration) -> TimeHistogram {
     let clock = Monotonic::shared();
     let (begin, stop) = (Instant::now(), Stop::new());
     let mut pace = Pace::new(clock.now(), TICK);
-    let mut spans = Histogram::new();
+    let mut spans = TimeHistogram::new();
     while begin.elapsed() < span {
         if pace.take(clock.now()) {
             let begin = clock.now();

@@ -518,7 +518,7 @@ fn a_hosted_program_gets_wrong_inputs_and_its_outputs_arrive_wrong() {
 
 #[test]
 fn a_file_for_both_ends_has_the_faults_of_the_machine() {
-    use tickbus::driver_cfg::Asked;
+    use tickbus::driver_cfg::CommandLineEnd;
     use tickbus::fieldbus::Role;
 
     let directory = tempfile::tempdir().expect("a directory");
@@ -532,7 +532,7 @@ fn a_file_for_both_ends_has_the_faults_of_the_machine() {
     )
     .expect("written");
     let load = |role: Option<Role>| {
-        let asked = role.map(|role| Asked { role, moved: false });
+        let asked = role.map(|role| CommandLineEnd { role, moved: false });
         Config::load_as(&path, asked).map(|config| config.faults.len())
     };
     let missing = load(None).expect_err("no such file").to_string();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::Outcome;
 use super::host::{self, Job, span};
 use tickbus_base::time::Nanos;
-use tickbus_driver_cfg::{Asked, Config};
+use tickbus_driver_cfg::{CommandLineEnd, Config};
 use tickbus_fieldbus::Role;
 use tickbus_plc::Axes;
 
@@ -25,7 +25,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
     let role = Role::Device;
-    let asked = Asked { role, moved: true };
+    let asked = CommandLineEnd { role, moved: true };
     // The host reads the file again, and reports what is wrong with it.
     let config = Config::load_as(&arguments.file, Some(asked));
     let axes = config.map(|config| config.axes).unwrap_or_default();

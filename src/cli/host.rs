@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::Outcome;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::Host;
-use tickbus_driver_cfg::{Asked, Config};
+use tickbus_driver_cfg::{CommandLineEnd, Config};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_plc::Program;
@@ -78,7 +78,7 @@ pub(super) struct Job<'a> {
 /// Reads the driver.cfg, hosts the program, and reports on stdout.
 pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let title = job.title;
-    let asked = Asked {
+    let asked = CommandLineEnd {
         role: job.role,
         moved: arguments.address.is_some(),
     };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Plan, Slot};
-use tickbus_record::{Columns, Recorder, ScanCounters, When};
+use tickbus_record::{Columns, Recorder, RecorderCounters, When};
 
 use super::{Code, DriverError, SlotMap};
 use tickbus_driver_cfg::Config;
@@ -78,7 +78,7 @@ impl ScanRecorder {
     }
 
     /// The recorder's counters.
-    pub(super) fn tally(&self) -> Arc<ScanCounters> {
+    pub(super) fn tally(&self) -> Arc<RecorderCounters> {
         Arc::clone(self.recorder.tally())
     }
 }

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use super::Code;
 use super::host::ProgramTally;
 use tickbus_base::os::dropped_log_lines;
-use tickbus_base::time::{Histogram, Nanos};
+use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkStatus;
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_record::ScanCounters;
+use tickbus_record::RecorderCounters;
 
 /// Counters of the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -74,9 +74,9 @@ const SAMPLED: u64 = 32;
 #[derive(Clone, Debug, Default)]
 pub(super) struct TickTimes {
     /// Duration of an exchange.
-    exchange: Histogram,
+    exchange: TimeHistogram,
     /// Age of the data that it delivers.
-    age: Histogram,
+    age: TimeHistogram,
 }
 
 impl TickTimes {
@@ -118,7 +118,7 @@ pub struct Snapshot {
     pub(super) status: LinkStatus,
     pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<ProgramTally>,
-    pub(super) record: Option<Arc<ScanCounters>>,
+    pub(super) record: Option<Arc<RecorderCounters>>,
 }
 
 impl Snapshot {

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::os::one_line;
-use tickbus_base::time::{Histogram, Nanos};
+use tickbus_base::time::{Nanos, TimeHistogram};
 
 use super::BusError;
 use super::rarely::Rarely;
@@ -182,7 +182,7 @@ struct Record {
     counts: BTreeMap<&'static str, u64>,
     /// What was logged.
     log: Rarely,
-    cycle: Histogram,
+    cycle: TimeHistogram,
 }
 
 /// A library call in progress.
@@ -236,7 +236,7 @@ impl LinkStatus {
                 facts: BTreeMap::new(),
                 counts: BTreeMap::new(),
                 log: Rarely::default(),
-                cycle: Histogram::new(),
+                cycle: TimeHistogram::new(),
             }),
         }))
     }

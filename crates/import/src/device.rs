@@ -77,9 +77,11 @@ pub(super) fn only(text: &str) -> Option<Client> {
 pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String)> {
     match client {
         Client::Modbus => {
-            let spot: TagAddress = text
-                .parse()
-                .map_err(|error: tickbus_bus_modbus::PlaceError| (error.what, error.right))?;
+            let spot: TagAddress =
+                text.parse()
+                    .map_err(|error: tickbus_bus_modbus::ElementAddressError| {
+                        (error.what, error.right)
+                    })?;
             let table = spot.place.table;
             let is_bit = table.is_bits() || spot.bit.is_some();
             Ok(Spots {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tickbus_base::time::{Histogram, Nanos};
+use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_image::signal::{Address, Addressing, Area, Width};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
 
@@ -52,9 +52,9 @@ struct Result {
 
 #[derive(Debug, Default)]
 struct Measured {
-    spans: Histogram,
+    spans: TimeHistogram,
     /// Bus cycles from edge to response; each counts as a microsecond.
-    cycles: Histogram,
+    cycles: TimeHistogram,
     /// Edges without a response in time.
     lost: u64,
     /// Edges lost in a row.

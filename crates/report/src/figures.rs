@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::html::{count, counted, span};
 use super::statistics::Distribution;
-use tickbus_base::time::{Histogram, Nanos};
+use tickbus_base::time::{Nanos, TimeHistogram};
 
 /// The width of a distribution's figure, in SVG units.
 const WIDTH: f64 = 260.0;
@@ -51,7 +51,7 @@ fn log(value: f64) -> f64 {
 pub(super) fn histogram(
     out: &mut String,
     what: &str,
-    spans: &Histogram,
+    spans: &TimeHistogram,
     shortest: Nanos,
     longest: Nanos,
 ) {
@@ -74,7 +74,7 @@ pub(super) fn histogram(
     let x = |edge: usize| wide * axis.place(edge);
     let _ = write!(
         out,
-        "<figure><svg class=\"histogram\" viewBox=\"0 0 {wide} {}\" role=\"img\" aria-label=\"Histogram of {what}s\">\
+        "<figure><svg class=\"histogram\" viewBox=\"0 0 {wide} {}\" role=\"img\" aria-label=\"TimeHistogram of {what}s\">\
          <path class=\"rail\" d=\"M0 {high}H{wide}\"/>",
         high + 24.0
     );
@@ -167,7 +167,7 @@ impl Axis {
     }
 
     /// The number of spans in each bar.
-    fn bars(self, spans: &Histogram) -> Vec<u64> {
+    fn bars(self, spans: &TimeHistogram) -> Vec<u64> {
         let mut bars = vec![0; self.bars];
         for (length, count) in spans.steps() {
             let beyond = (1..self.bars).find(|edge| length < self.edge(*edge));
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_histogram_of_one_value_is_a_sentence() {
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         let tick = Nanos::from_millis(1);
         (0..1500).for_each(|_| spans.record(tick));
         let mut out = String::new();
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_bars_have_all_spans() {
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         (1..5000).for_each(|micros| spans.record(Nanos::from_micros(micros)));
         for shortest in [1, 1000, 4990] {
             let axis = Axis::new(Nanos::from_micros(shortest), Nanos::from_micros(4999));

@@ -1,6 +1,6 @@
 //! What a report knows about a run.
 
-use tickbus_base::time::{Histogram, Nanos};
+use tickbus_base::time::{Nanos, TimeHistogram};
 
 /// The default number of changes that a report holds, over all signals. A page of that size opens within
 /// seconds.
@@ -190,7 +190,7 @@ pub struct Run {
     ticks: u64,
     extent: Option<(Nanos, Nanos)>,
     last_tick: Option<Nanos>,
-    intervals: Histogram,
+    intervals: TimeHistogram,
     shortest: Nanos,
     longest: Nanos,
     changes: usize,
@@ -207,7 +207,7 @@ impl Run {
             ticks: 0,
             extent: None,
             last_tick: None,
-            intervals: Histogram::new(),
+            intervals: TimeHistogram::new(),
             shortest: Nanos::MAX,
             longest: Nanos::ZERO,
             changes: 0,
@@ -345,7 +345,7 @@ impl Run {
 
     /// The times between successive ticks: their distribution, the shortest and the longest; `None` for fewer
     /// than two ticks.
-    pub fn intervals(&self) -> Option<(&Histogram, Nanos, Nanos)> {
+    pub fn intervals(&self) -> Option<(&TimeHistogram, Nanos, Nanos)> {
         (self.intervals.count() > 0).then_some((&self.intervals, self.shortest, self.longest))
     }
 }

@@ -18,7 +18,7 @@ const DIGITS: u8 = 2;
 ///
 /// Its size is fixed, some 15 kB; recording allocates nothing.
 #[derive(Clone, Debug)]
-pub struct Histogram {
+pub struct TimeHistogram {
     histogram: Histogram<u32>,
     shortest: Nanos,
     /// The sum of all spans, and that of their squares, in nanoseconds: 10^13 spans of an hour fit.
@@ -26,7 +26,7 @@ pub struct Histogram {
     squares: u128,
 }
 
-impl Histogram {
+impl TimeHistogram {
     /// An empty histogram.
     pub fn new() -> Self {
         let histogram = Histogram::new_with_bounds(SHORTEST, LONGEST.unsigned_abs(), DIGITS);
@@ -169,7 +169,7 @@ fn as_float(number: u128) -> f64 {
     number as f64
 }
 
-impl Default for Histogram {
+impl Default for TimeHistogram {
     fn default() -> Self {
         Self::new()
     }
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn quantiles_are_good_to_one_percent() {
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         for micros in 1..=1000 {
             spans.record(Nanos::from_micros(micros));
         }
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn mean_scatter_and_the_shortest_are_exact() {
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         assert_eq!(
             (spans.shortest(), spans.mean(), spans.deviation()),
             (Nanos::ZERO, 0.0, 0.0)
@@ -220,7 +220,7 @@ mod tests {
 
     #[test]
     fn the_ends_of_the_range_take_what_is_beyond_them() {
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         spans.record(Nanos(-5));
         spans.record(Nanos::MAX);
         assert_eq!(spans.count(), 2);
@@ -229,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_chart_has_all_spans_in_a_few_rows() {
-        let mut spans = Histogram::new();
+        let mut spans = TimeHistogram::new();
         for micros in [10, 11, 12, 100, 1000, 5000] {
             spans.record(Nanos::from_micros(micros));
         }
@@ -242,7 +242,7 @@ mod tests {
             .map(|count| count.parse().expect("a count"))
             .collect();
         assert_eq!(counts.iter().sum::<u64>(), 6, "{chart}");
-        spans = Histogram::new();
+        spans = TimeHistogram::new();
         assert_eq!(spans.chart(), "");
         spans.record(Nanos::from_micros(7));
         assert_eq!(spans.chart().lines().count(), 1);
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn an_empty_one_says_so() {
         let mut text = String::new();
-        Histogram::new().write("age", &mut text);
+        TimeHistogram::new().write("age", &mut text);
         assert_eq!(text, "age.count=0\n");
     }
 }

@@ -12,7 +12,7 @@ mod stop;
 mod wall;
 
 pub use clock::{Clock, Manual, Monotonic};
-pub use histogram::Histogram;
+pub use histogram::TimeHistogram;
 pub use nanos::{Nanos, ParseDurationError};
 pub use pace::Pace;
 pub use stop::{Stop, Waker};

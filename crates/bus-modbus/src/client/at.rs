@@ -5,7 +5,7 @@ use tickbus_fieldbus::At;
 use tickbus_fieldbus::both_ways;
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::lie::nobody_writes;
+use super::area_mapping::nobody_writes;
 use super::{ClientOptions, Piece};
 
 impl ClientOptions {

@@ -60,7 +60,7 @@ enum Asked {
         requests: usize,
     },
     /// The station's query with this index.
-    Request(usize),
+    Data(usize),
 }
 
 #[derive(Clone, Debug)]

@@ -102,7 +102,7 @@ impl Client {
         };
         port.opening(&format!("asking {} for its endpoints", self.options.url));
         let reactor = Reactor::new(stop)?;
-        let asked = session::endpoint(client, dial, &self.options, login);
+        let asked = connect::endpoint(client, dial, &self.options, login);
         let deadline = port.clock().now() + PATIENCE;
         let endpoint = match reactor.drive(&**port.clock(), deadline, asked) {
             Driven::Done(endpoint) => endpoint?,
@@ -139,7 +139,7 @@ impl Free for Client {
                 self.options.url
             );
         }
-        let client = session::client(&self.options, &self.pki, port.max_age());
+        let client = connect::client(&self.options, &self.pki, port.max_age());
         let Some(endpoint) = self.endpoint(&client, &login, port, stop)? else {
             return Ok(());
         };
@@ -155,7 +155,7 @@ impl Free for Client {
             let (pki, login) = (&self.pki, login.clone());
             let dialled = (endpoint.clone(), dial);
             let session =
-                session::open(&client, dialled.0, dialled.1, login, pki, inbox.clone()).await?;
+                connect::open(&client, dialled.0, dialled.1, login, pki, inbox.clone()).await?;
             let server = nodes::ask(&session).await?;
             Ok((session, server))
         };
@@ -166,7 +166,7 @@ impl Free for Client {
         };
         let writes = self
             .guard
-            .meet(port, &session::identity(&endpoint, &server.product));
+            .meet(port, &connect::identity(&endpoint, &server.product));
         let publishing = self.options.publishing_interval.unwrap_or(self.cycle);
         let rhythm = Rhythm {
             publishing: publishing.max(Nanos::from_millis(1)),
@@ -203,7 +203,7 @@ impl Free for Client {
             Driven::Late => Err(self.late("answered all questions about its nodes")),
             Driven::Stopped => Ok(()),
         };
-        reactor.farewell(connect::FAREWELL, session::close(session));
+        reactor.farewell(connect::FAREWELL, connect::close(session));
         ended
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tickbus_base::time::{Histogram, Nanos};
+use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_image::signal::{Area, DataType, SignalTable};
 
 /// What the hosted program has seen and sent, to be compared with the other end.
@@ -14,7 +14,7 @@ pub(crate) struct ScanCounters {
     /// Scans with stale data.
     stale: AtomicU64,
     /// Age of the data in the scans.
-    age: Mutex<Histogram>,
+    age: Mutex<TimeHistogram>,
     /// In the order of the signal table.
     bits: Box<[Bit]>,
     frames: Box<[Frame]>,
@@ -89,7 +89,7 @@ impl ScanCounters {
         Self {
             scans: AtomicU64::new(0),
             stale: AtomicU64::new(0),
-            age: Mutex::new(Histogram::new()),
+            age: Mutex::new(TimeHistogram::new()),
             bits: bits.into(),
             frames: frames.into(),
         }
@@ -138,7 +138,7 @@ impl ScanCounters {
         }
     }
 
-    fn lock_age(&self) -> MutexGuard<'_, Histogram> {
+    fn lock_age(&self) -> MutexGuard<'_, TimeHistogram> {
         // A histogram is consistent after every change, so a poisoned lock is safe to use.
         self.age.lock().unwrap_or_else(PoisonError::into_inner)
     }

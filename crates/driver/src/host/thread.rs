@@ -59,7 +59,7 @@ pub(crate) struct HostCounters {
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
     report: Option<Arc<dyn Report>>,
-    record: Option<Arc<record::ScanCounters>>,
+    record: Option<Arc<record::RecorderCounters>>,
     pub(crate) clock: Arc<dyn Clock>,
 }
 

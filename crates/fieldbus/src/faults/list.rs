@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::apply_to::SignalFault;
 use super::cell::Cell;
 use super::random::Random;
 use super::schedule::{Schedule, Step};
+use super::signal_fault::SignalFault;
 use super::{Effect, Fault, FaultBoard, LIMIT, LineFault, Phase, TickTime};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, SignalTable, Slot};
@@ -85,11 +85,11 @@ impl Faults {
             Effect::Signal(index, change) => {
                 let signal = &slots.table.signals[index];
                 let edges = slots.edges.get(index).copied().flatten();
-                let apply_to = SignalFault::new(signal, (index, edges), change, random);
+                let fault = SignalFault::new(signal, (index, edges), change, random);
                 if signal.area == slots.writes {
-                    (Kind::Written(apply_to), None)
+                    (Kind::Written(fault), None)
                 } else {
-                    (Kind::Read(apply_to), None)
+                    (Kind::Read(fault), None)
                 }
             }
             Effect::Line(trouble) => {
@@ -125,8 +125,8 @@ impl Faults {
             ..moment
         };
         for entry in self.entries.iter_mut().rev() {
-            if let Kind::Read(apply_to) = &mut entry.kind {
-                apply_to.restore(slots);
+            if let Kind::Read(fault) = &mut entry.kind {
+                fault.restore(slots);
             }
         }
         for entry in &mut self.entries {
@@ -136,10 +136,10 @@ impl Faults {
                 Step::Pauses => Phase::Waiting,
                 Step::Ends => Phase::Over,
             };
-            if let (Phase::Active, Kind::Written(apply_to) | Kind::Read(apply_to)) =
+            if let (Phase::Active, Kind::Written(fault) | Kind::Read(fault)) =
                 (phase, &mut entry.kind)
             {
-                apply_to.begin(slots);
+                fault.begin(slots);
             }
             self.board.enter(&entry.cell, phase, moment);
         }
@@ -148,8 +148,8 @@ impl Faults {
     /// The slots are about to be sent: bends them.
     pub fn sending(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
-            if let (true, Kind::Written(apply_to)) = (entry.schedule.is_active(), &mut entry.kind) {
-                apply_to.apply_to(slots);
+            if let (true, Kind::Written(fault)) = (entry.schedule.is_active(), &mut entry.kind) {
+                fault.apply_to(slots);
             }
         }
     }
@@ -162,8 +162,8 @@ impl Faults {
             .iter()
             .filter(|entry| entry.schedule.is_active());
         active.filter_map(move |entry| match &entry.kind {
-            Kind::Written(apply_to) if written => Some(apply_to.signal()),
-            Kind::Read(apply_to) if !written => Some(apply_to.signal()),
+            Kind::Written(fault) if written => Some(fault.signal()),
+            Kind::Read(fault) if !written => Some(fault.signal()),
             _ => None,
         })
     }
@@ -171,8 +171,8 @@ impl Faults {
     /// Everything is sent: restores the simulation's own values.
     pub fn sent(&mut self, slots: &mut [Slot]) {
         for entry in self.entries.iter_mut().rev() {
-            if let Kind::Written(apply_to) = &mut entry.kind {
-                apply_to.restore(slots);
+            if let Kind::Written(fault) = &mut entry.kind {
+                fault.restore(slots);
             }
         }
     }
@@ -180,8 +180,8 @@ impl Faults {
     /// The slots hold what was received: bends them.
     pub fn received(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
-            if let (true, Kind::Read(apply_to)) = (entry.schedule.is_active(), &mut entry.kind) {
-                apply_to.apply_to(slots);
+            if let (true, Kind::Read(fault)) = (entry.schedule.is_active(), &mut entry.kind) {
+                fault.apply_to(slots);
             }
         }
     }

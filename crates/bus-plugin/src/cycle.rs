@@ -3,7 +3,7 @@
 use super::outcome::Outcome;
 use super::setup::Setup;
 use tickbus_base::time::{Nanos, Pace, Stop};
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Port, Receipt};
 
 /// A call that returns later than this after its time-out counts as slow: a busy system delays any thread by
 /// as much.
@@ -34,8 +34,10 @@ pub(super) fn serve(
     while !stop.is_stopped() {
         let now = port.clock().now();
         // A call sends and receives at once: if sending is suppressed, there is no call.
-        if pace.take(now) && port.sends(now) {
-            match cycle(line, setup, now, port, stop) {
+        if pace.take(now)
+            && let Some(receipt) = fill(line.input(), now, port)
+        {
+            match cycle(line, setup, &receipt, port, stop) {
                 Ok(Some(outcome)) if outcome.is_alive() && !is_running => {
                     is_running = true;
                     port.running("the peer is there");
@@ -51,27 +53,33 @@ pub(super) fn serve(
         } else {
             port.observe(now);
         }
-        port.clock().wait_until(pace.due().min(port.due()), stop);
+        port.wait_until(pace.due(), stop);
     }
     Ok(())
 }
 
+/// Fills in the frames to send at `now`; `None` if nothing goes out.
+fn fill(mut space: &mut [u8], now: Nanos, port: &mut Port) -> Option<Receipt> {
+    let mut frames = port.take_all(now)?;
+    for station in frames.stations() {
+        let bytes = frames.frame(station);
+        let (frame, after) = space.split_at_mut(bytes.len());
+        frame.copy_from_slice(bytes);
+        space = after;
+    }
+    frames.send()
+}
+
+/// Makes the exchange for which the frames of `receipt` were filled in.
 fn cycle(
     line: &mut impl Exchange,
     setup: &Setup,
-    now: Nanos,
+    receipt: &Receipt,
     port: &mut Port,
     stop: &Stop,
 ) -> Result<Option<Outcome>, BusError> {
-    let mut rest = line.input();
-    for station in 0..port.stations() {
-        let bytes = port.outgoing(station, now);
-        let (frame, after) = rest.split_at_mut(bytes.len());
-        frame.copy_from_slice(bytes);
-        rest = after;
-    }
+    let begun = port.clock().now();
     let outcome = line.exchange(port, stop)?;
-    let begun = now;
     let now = port.clock().now();
     if now - begun > setup.timeout() + LATENESS {
         port.count("plugin.slow_calls");
@@ -79,12 +87,12 @@ fn cycle(
     let Some(outcome) = outcome else {
         return Ok(None);
     };
+    if outcome.is_taken() {
+        port.sent(receipt);
+    }
     let mut rest = line.output();
     for station in 0..port.stations() {
         let (frame, after) = rest.split_at(port.sizes(station).1);
-        if outcome.is_taken() {
-            port.sent(station);
-        }
         if outcome.is_fresh() {
             port.received(station, now, frame);
         } else if outcome.is_alive() {

@@ -6,7 +6,7 @@ use tickbus_fieldbus::{BusError, Port};
 
 use super::connection::{Connection, Transfer};
 use super::connection_states::ConnectionStates;
-use super::{Frames, Session, SessionParameters};
+use super::{ConnectionFrames, Session, SessionParameters};
 
 /// Connects, and serves the connection until it ends or `stop` comes.
 ///
@@ -16,7 +16,7 @@ use super::{Frames, Session, SessionParameters};
 pub(super) fn connect(
     address: &Address,
     terms: SessionParameters,
-    frames: &mut Frames,
+    frames: &mut ConnectionFrames,
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {

@@ -5,16 +5,18 @@ use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::Caller;
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Frames, Port, Receipt};
 
 use super::connection_states::ConnectionStates;
-use super::{Frames, Session, SessionParameters};
+use super::{ConnectionFrames, Session, SessionParameters};
 
 /// One connection.
 #[derive(Debug)]
 pub(super) struct Connection {
     peer: SocketAddr,
     session: Session,
+    /// For the record on its way.
+    receipt: Option<Receipt>,
     /// Whether the peer's presence was reported.
     announced: bool,
     /// How many skipped cycles were reported to the port.
@@ -28,6 +30,7 @@ impl Connection {
         Self {
             peer,
             session: Session::new(terms, port.clock().now()),
+            receipt: None,
             announced: false,
             skipped: 0,
         }
@@ -54,7 +57,7 @@ impl Connection {
 /// A connection with the frames that it transfers, and the line whose state it reports.
 pub(super) struct Transfer<'a> {
     pub(super) connection: &'a mut Connection,
-    pub(super) frames: &'a mut Frames,
+    pub(super) frames: &'a mut ConnectionFrames,
     pub(super) line: usize,
     pub(super) lines: &'a mut ConnectionStates,
 }
@@ -64,11 +67,16 @@ impl Transfer<'_> {
     fn make(&mut self, now: Nanos, port: &mut Port) {
         let session = &mut self.connection.session;
         if let Some(space) = session.due(now) {
-            self.frames.fill(now, space, port);
-            let goes = session.made(now, |before, now| self.frames.differ(before, now));
+            let mut frames = port.take(self.frames.stations(), now);
+            if let Some(frames) = &mut frames {
+                self.frames.fill(space, frames);
+            }
             // A check that sends nothing cannot be lost.
-            if goes && !port.sends_of(self.frames.stations(), now) {
-                session.lost();
+            if session.made(now, |before, now| self.frames.differ(before, now)) {
+                self.connection.receipt = frames.and_then(Frames::send);
+                if self.connection.receipt.is_none() {
+                    session.lost();
+                }
             }
         }
     }
@@ -80,6 +88,7 @@ impl Transfer<'_> {
             session,
             announced,
             skipped,
+            ..
         } = &mut *self.connection;
         for station in self.frames.stations() {
             // A peer with nothing to send counts as alive as long as the connection is up.
@@ -129,7 +138,9 @@ impl Caller for Transfer<'_> {
 
     fn wrote(&mut self, now: Nanos, count: usize, port: &mut Port) {
         if self.connection.session.wrote(count) {
-            self.frames.sent(port);
+            if let Some(receipt) = self.connection.receipt.take() {
+                self.frames.sent(&receipt, port);
+            }
             self.make(now, port);
         }
     }

@@ -3,14 +3,14 @@
 use std::ops::Range;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::{DeadBands, Port, Role};
+use tickbus_fieldbus::{DeadBands, Frames, Port, Receipt, Role};
 use tickbus_image::signal::SignalTable;
 
 use super::parts::{Messages, Parts};
 
 /// The frames of the stations that one connection serves.
 #[derive(Debug)]
-pub(super) struct Frames {
+pub(super) struct ConnectionFrames {
     stations: Range<usize>,
     /// Sizes of outgoing frames, and how each is compared.
     sent: Box<[(usize, DeadBands)]>,
@@ -18,7 +18,7 @@ pub(super) struct Frames {
     messages: Option<Messages>,
 }
 
-impl Frames {
+impl ConnectionFrames {
     /// Whole images of `stations`, one after another.
     pub(super) fn new(table: &SignalTable, role: Role, stations: Range<usize>) -> Self {
         let (area, _) = role.areas();
@@ -86,14 +86,14 @@ impl Frames {
         Ok(())
     }
 
-    /// Fills in the record for `now`.
-    pub(super) fn fill(&mut self, now: Nanos, mut space: &mut [u8], port: &mut Port) {
+    /// Fills in the record from the stations' frames.
+    pub(super) fn fill(&mut self, mut space: &mut [u8], frames: &mut Frames<'_>) {
         if let Some(messages) = &mut self.messages {
-            messages.fill(port.outgoing(self.stations.start, now), space);
+            messages.fill(frames.frame(self.stations.start), space);
             return;
         }
         for station in self.stations() {
-            let frame = port.outgoing(station, now);
+            let frame = frames.frame(station);
             let (place, rest) = space.split_at_mut(frame.len());
             place.copy_from_slice(frame);
             space = rest;
@@ -116,13 +116,14 @@ impl Frames {
     }
 
     /// The peer has the record, or will have it.
-    pub(super) fn sent(&mut self, port: &mut Port) {
-        if let Some(messages) = &mut self.messages {
-            for bytes in messages.sent() {
-                port.sent_part(self.stations.start, bytes.clone());
-            }
+    pub(super) fn sent(&mut self, receipt: &Receipt, port: &mut Port) {
+        let Some(messages) = &mut self.messages else {
+            port.sent(receipt);
             return;
+        };
+        for bytes in messages.sent() {
+            let bits = bytes.start * 8..bytes.end * 8;
+            port.sent(&receipt.bits(self.stations.start, bits));
         }
-        self.stations().for_each(|station| port.sent(station));
     }
 }

@@ -26,7 +26,7 @@ use tickbus_image::signal::{Area, SignalTable};
 use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
 
 pub use end_reason::EndReason;
-use frames::Frames;
+use frames::ConnectionFrames;
 pub use options::{Message, Options, TcpRole};
 pub use parts::Parts;
 pub use record::{Partial, Records};
@@ -39,7 +39,7 @@ pub struct Socket {
     options: Options,
     cycle: Nanos,
     /// The frames of each connection, and the name of its station if it has its own.
-    lines: Vec<(String, Frames)>,
+    lines: Vec<(String, ConnectionFrames)>,
 }
 
 impl Socket {
@@ -54,7 +54,7 @@ impl Socket {
     ) -> Self {
         let stations = table.stations.len();
         let lines = if options.stations.is_empty() {
-            let frames = Frames::new(table, role, 0..stations);
+            let frames = ConnectionFrames::new(table, role, 0..stations);
             let frames = match options.message {
                 Message::Image => frames,
                 Message::Axis { .. } => {
@@ -67,7 +67,10 @@ impl Socket {
         } else {
             let line = |station: usize| {
                 let name = table.stations[station].name.clone();
-                (name, Frames::new(table, role, station..station + 1))
+                (
+                    name,
+                    ConnectionFrames::new(table, role, station..station + 1),
+                )
             };
             (0..stations).map(line).collect()
         };

@@ -12,7 +12,7 @@ use tickbus_fieldbus::{BusError, Port};
 
 use super::connection::{Connection, Transfer};
 use super::connection_states::ConnectionStates;
-use super::{Frames, Session, SessionParameters};
+use super::{ConnectionFrames, Session, SessionParameters};
 
 /// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
@@ -24,7 +24,7 @@ pub(super) struct Endpoint<'a> {
     /// The name of its station; empty if one address serves all.
     pub(super) name: String,
     pub(super) terms: SessionParameters,
-    pub(super) frames: &'a mut Frames,
+    pub(super) frames: &'a mut ConnectionFrames,
 }
 
 /// Serves one client after another at each of the `places` until `stop`. The listeners stay open while
@@ -113,7 +113,7 @@ struct Server<'a> {
     bound: SocketAddr,
     waiting: String,
     terms: SessionParameters,
-    frames: &'a mut Frames,
+    frames: &'a mut ConnectionFrames,
     served: Option<(Call<TcpStream>, Connection)>,
     /// What the set waits for on the connection, if there is one; and whether it waits for the listener.
     watched: Option<Interest>,

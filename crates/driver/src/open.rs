@@ -44,21 +44,21 @@ impl Driver {
             Bus::Stepped(_) => Arc::clone(&simulation_time) as _,
         };
         let watchdog = config.timing.watchdog;
+        let board = Arc::<FaultBoard>::default();
+        let (signs, max_age) = (&config.life_signs, config.timing.max_age);
         let mut port = Port::new(
             bus_end,
             Arc::clone(&clock),
             config.role,
             watchdog,
             status.clone(),
-        );
-        let board = Arc::<FaultBoard>::default();
-        port.suffer_from(Arc::clone(&board));
-        let (signs, max_age) = (&config.life_signs, config.timing.max_age);
-        port.watch_life(signs.watches(&config.table, config.role, max_age));
-        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
+        )
+        .with_faults(Arc::clone(&board))
+        .with_life_signs(signs.watches(&config.table, config.role, max_age))
+        .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
         if config.bus.events() {
             let stations = 0..config.table.stations.len();
-            port.watch_changes(
+            port = port.with_changes(
                 stations
                     .map(|station| ChangeEvents::new(&config.table, station, rx))
                     .collect(),

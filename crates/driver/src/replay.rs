@@ -237,9 +237,13 @@ const STALE: i32 = 2;
 
 impl Stepped for Replay {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        for (index, station) in self.stations.iter_mut().enumerate() {
-            station.sees(port.outgoing(index, now));
-            port.sent(index);
+        if let Some(mut frames) = port.take_all(now) {
+            for (index, station) in self.stations.iter_mut().enumerate() {
+                station.sees(frames.frame(index));
+            }
+            if let Some(receipt) = frames.send() {
+                port.sent(&receipt);
+            }
         }
         self.sent = Some(now);
         self.compare(now);

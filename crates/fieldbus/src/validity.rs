@@ -118,7 +118,7 @@ impl Validity {
     }
 
     /// Records the state that a station's PLC reports; returns whether it is new.
-    pub(super) fn plc_says(&mut self, station: usize, state: PlcState) -> bool {
+    pub(super) fn plc_state(&mut self, station: usize, state: PlcState) -> bool {
         let station = &mut self.stations[station];
         let is_news = station.plc.replace(state) != Some(state);
         station.is_stopped |= state == PlcState::Stop;
@@ -254,8 +254,8 @@ mod tests {
         };
         let (tick, bus) = image(names.iter().map(|_| station()).collect());
         let status = LinkStatus::new("test", MAX_AGE);
-        let mut port = Port::new(bus, Manual::new(), Role::Device, None, status.clone());
-        port.name_stations(names.iter().copied());
+        let port = Port::new(bus, Manual::new(), Role::Device, None, status.clone())
+            .with_names(names.iter().copied());
         (tick, port, status)
     }
 
@@ -377,7 +377,7 @@ mod tests {
         for within in [30, 200] {
             let (_tick, mut port, status) = line(&[""]);
             port.running("the peer is there");
-            watch_within(&mut port, 0, at(within));
+            port = watch_within(port, 0, at(within));
             let cause = |port: &mut Port, now| {
                 port.observe(at(now));
                 status.link().cause
@@ -401,25 +401,25 @@ mod tests {
         }
     }
 
-    fn watch(port: &mut Port, station: usize) {
-        watch_within(port, station, at(10));
+    fn watch(port: Port, station: usize) -> Port {
+        watch_within(port, station, at(10))
     }
 
-    fn watch_within(port: &mut Port, station: usize, within: Nanos) {
-        port.watch_life(vec![Watch {
+    fn watch_within(port: Port, station: usize, within: Nanos) -> Port {
+        port.with_life_signs(vec![Watch {
             name: "Life".to_owned(),
             station,
             bytes: 0..1,
             mask: 1,
             within,
-        }]);
+        }])
     }
 
     #[test]
     fn a_signal_that_stands_still_makes_its_station_stale_by_the_clock_alone_until_it_changes() {
         let (tick, mut port, status) = line(&["charger", "lathe"]);
         port.running("both are there");
-        watch(&mut port, 1);
+        port = watch(port, 1);
         assert_eq!(port.due(), Nanos::MAX, "nothing has come yet");
         port.received(0, at(0), &[0]);
         port.received(1, at(0), &[0]);
@@ -450,7 +450,7 @@ mod tests {
     #[test]
     fn a_frame_that_comes_late_and_unchanged_is_stale_at_once() {
         let (tick, mut port, _status) = line(&[""]);
-        watch(&mut port, 0);
+        port = watch(port, 0);
         port.received(0, at(0), &[1]);
         port.received(0, at(50), &[1]);
         assert!(!tick.stations[0].is_valid());
@@ -460,7 +460,7 @@ mod tests {
     fn a_plc_in_stop_is_told_before_a_signal_that_stands_still_and_both_have_to_be_over() {
         let (tick, mut port, status) = line(&[""]);
         port.running("the peer is there");
-        watch(&mut port, 0);
+        port = watch(port, 0);
         port.received(0, at(0), &[1]);
         port.observe(at(11));
         assert_eq!(status.link().cause, Cause::Frozen);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use tickbus_base::time::{Nanos, Pace, Stop};
-use tickbus_fieldbus::{BusError, Free, Port, Role};
+use tickbus_fieldbus::{BusError, Free, Port, Receipt, Role};
 
 pub use frame::{Frame, NoFrame};
 pub use options::Options;
@@ -71,42 +71,58 @@ impl Mailbox {
             sequence: self.left_behind(sends),
             ..Frame::default()
         };
+        // For the frames that the peer has not confirmed.
+        let mut receipt = None;
         let mut pace = Pace::new(port.clock().now(), self.cycle);
         while !stop.is_stopped() {
             let now = port.clock().now();
             if !pace.take(now) {
                 port.observe(now);
-            } else if !port.is_down(now) {
+            } else if port.is_up(now) {
                 match self.read()? {
                     Some(bytes) => {
                         let peers = Frame::parse(&bytes, receives)
                             .map_err(|error| BusError::Protocol(error.to_string()))?;
-                        take(port, now, &peers, &mut own, &sizes);
+                        take(port, now, &peers, &mut own, &mut receipt, &sizes);
                     }
                     // The next one counts from 1 again.
                     None => own.seen = 0,
                 }
-                if own.confirmed && port.sends(now) {
+                if own.confirmed
+                    && let Some(mut frames) = port.take_all(now)
+                {
                     own.image.clear();
-                    for station in 0..sizes.len() {
-                        own.image.extend_from_slice(port.outgoing(station, now));
+                    for station in frames.stations() {
+                        own.image.extend_from_slice(frames.frame(station));
                     }
-                    own.sequence += 1;
-                    own.confirmed = false;
+                    receipt = frames.send();
+                    if receipt.is_some() {
+                        own.sequence += 1;
+                        own.confirmed = false;
+                    }
                 }
                 self.write(&own)?;
             }
-            port.clock().wait_until(pace.due().min(port.due()), stop);
+            port.wait_until(pace.due(), stop);
         }
         Ok(())
     }
 }
 
 /// Takes over the peer's frame, if it is another one than the last, and what it says of ours.
-fn take(port: &mut Port, now: Nanos, peers: &Frame, own: &mut Frame, sizes: &[(usize, usize)]) {
+fn take(
+    port: &mut Port,
+    now: Nanos,
+    peers: &Frame,
+    own: &mut Frame,
+    receipt: &mut Option<Receipt>,
+    sizes: &[(usize, usize)],
+) {
     if peers.seen == own.sequence && !own.confirmed {
         own.confirmed = true;
-        (0..sizes.len()).for_each(|station| port.sent(station));
+        if let Some(receipt) = receipt.take() {
+            port.sent(&receipt);
+        }
     }
     if peers.image.is_empty() {
         own.seen = 0;

@@ -11,7 +11,7 @@ use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Receipt, Units};
+use super::units::{Carried, Units};
 
 /// The unit number that addresses all units.
 const BROADCAST: u8 = 0;
@@ -61,7 +61,7 @@ struct Server<'a> {
     /// The answer being sent, and how much of it the system has accepted.
     reply: Vec<u8>,
     written: usize,
-    carried: Option<Receipt>,
+    carried: Option<Carried>,
 }
 
 impl Server<'_> {
@@ -83,7 +83,7 @@ impl Server<'_> {
                 port.count("modbus-server.damaged");
                 return;
             };
-            if port.is_down(now) {
+            if !port.is_up(now) {
                 return;
             }
             // Requests never have this bit: it is another unit's answer, or an echo of one.
@@ -156,19 +156,12 @@ impl Caller for Server<'_> {
         if self.written == self.reply.len()
             && let Some(carried) = self.carried.take()
         {
-            self.units.carried(carried, port);
+            self.units.carried(&carried, port);
         }
     }
 
     fn deadline(&self, port: &Port) -> Nanos {
-        let now = port.clock().now();
-        // Data are stale when older than the limit, not when equal.
-        let age = port.silence(now);
-        let stale = if age <= port.max_age() {
-            now + (port.max_age() - age) + Nanos(1)
-        } else {
-            Nanos::MAX
-        };
+        let stale = port.stale_at(port.clock().now());
         self.framer.deadline().min(stale)
     }
 

@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Receipt, Units};
+use super::units::{Carried, Units};
 
 /// The most unconfirmed answers remembered per client.
 const REMEMBERED: usize = 64;
@@ -23,7 +23,7 @@ pub(super) struct TcpService<'a> {
 #[derive(Debug)]
 pub(super) struct Client {
     /// What its unconfirmed answers carry.
-    carried: Vec<Receipt>,
+    carried: Vec<Carried>,
     /// The stations that it has written to.
     writes: Box<[bool]>,
 }
@@ -83,7 +83,7 @@ impl Service for TcpService<'_> {
 
     fn replied(&mut self, client: &mut Client, port: &mut Port) {
         for carried in client.carried.drain(..) {
-            self.units.carried(carried, port);
+            self.units.carried(&carried, port);
         }
     }
 }

@@ -1,9 +1,7 @@
 //! The units of a server: each a station of the driver.
 
-use std::ops::Range;
-
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::{Port, Role};
+use tickbus_fieldbus::{Port, Receipt, Role};
 use tickbus_image::signal::{SignalTable, fail_safe_frame};
 
 use super::ServerOptions;
@@ -15,7 +13,7 @@ pub(super) struct Units {
     identification: Identification,
     /// Whether a write is an event even if it changes nothing.
     every_write: bool,
-    units: Box<[Unit]>,
+    all: Box<[Unit]>,
 }
 
 #[derive(Debug)]
@@ -28,18 +26,18 @@ struct Unit {
     holds: Box<[u8]>,
     holds_len: usize,
     /// The frame used for the last answer, and how many different frames there were before it.
-    shown: Vec<u8>,
+    shown: Box<[u8]>,
     generation: u64,
     /// Whether any client has ever written.
     has_writer: bool,
 }
 
-/// The part of a station's frame that an answer carries; it counts as sent once the client has the answer.
+/// What an answer carries of a station's frame: it counts as sent once the client has the answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Receipt {
+pub(super) struct Carried {
     station: usize,
     generation: u64,
-    bits: Range<usize>,
+    receipt: Receipt,
 }
 
 impl Units {
@@ -49,7 +47,7 @@ impl Units {
         role: Role,
         driver: &str,
     ) -> Self {
-        let (_, held) = role.areas();
+        let (sent, held) = role.areas();
         let unit = |station: usize| {
             let mut holds = fail_safe_frame(table, station, held).into_vec();
             let holds_len = holds.len();
@@ -59,7 +57,7 @@ impl Units {
                 map: options.map(table.stations[station].output_bytes),
                 holds: holds.into(),
                 holds_len,
-                shown: Vec::new(),
+                shown: vec![0; table.stations[station].bytes(sent)].into(),
                 generation: 0,
                 has_writer: false,
             }
@@ -67,18 +65,18 @@ impl Units {
         Self {
             identification: Identification::of_driver(driver),
             every_write: options.every_write,
-            units: (0..table.stations.len()).map(unit).collect(),
+            all: (0..table.stations.len()).map(unit).collect(),
         }
     }
 
     /// The number of units.
     pub(super) fn len(&self) -> usize {
-        self.units.len()
+        self.all.len()
     }
 
     /// The station of the unit with this number.
     pub(super) fn station(&self, number: u8) -> Option<usize> {
-        self.units
+        self.all
             .iter()
             .position(|unit| unit.number.is_none_or(|own| own == number))
     }
@@ -93,27 +91,28 @@ impl Units {
         writes: &mut [bool],
         reply: &mut Vec<u8>,
         port: &mut Port,
-    ) -> Option<Receipt> {
-        let unit = &mut self.units[station];
+    ) -> Option<Carried> {
+        let unit = &mut self.all[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
-        // If an injected fault loses outgoing frames, the request takes effect but its answer is lost.
-        let is_lost = !writes_only && !port.sends_of(station..station + 1, now);
-        let before = reply.len();
-        let sends = if writes_only {
-            &unit.shown
+        // If nothing goes out, the request takes effect, and its answer is lost.
+        let receipt = if writes_only {
+            None
         } else {
-            let frame = port.outgoing(station, now);
-            if frame != unit.shown {
-                unit.generation += 1;
-                unit.shown.clear();
-                unit.shown.extend_from_slice(frame);
-            }
-            frame
+            port.take(station..station + 1, now).and_then(|mut frames| {
+                let frame = frames.frame(station);
+                if *frame != *unit.shown {
+                    unit.generation += 1;
+                    unit.shown.copy_from_slice(frame);
+                }
+                frames.send()
+            })
         };
+        let is_lost = !writes_only && receipt.is_none();
+        let before = reply.len();
         let mut tables = Tables {
             map: unit.map,
-            sends,
+            sends: &unit.shown,
             holds: &mut unit.holds,
             holds_len: unit.holds_len,
         };
@@ -135,7 +134,7 @@ impl Units {
                 writes[station] = true;
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
-                    port.received_part(station, now, frame, bits);
+                    port.received_parts(station, now, frame, [bits]);
                 } else {
                     port.received(station, now, frame);
                 }
@@ -144,24 +143,19 @@ impl Units {
             (None, None) if writes[station] || !unit.has_writer => port.touch(station, now),
             (None, None) => {}
         }
-        read.filter(|_| !is_lost).map(|bits| Receipt {
+        Some(Carried {
             station,
             generation: unit.generation,
-            bits,
+            receipt: receipt?.bits(station, read?),
         })
     }
 
     /// A client has received an answer that carries this.
-    pub(super) fn carried(&self, carried: Receipt, port: &mut Port) {
-        let Receipt {
-            station,
-            generation,
-            bits,
-        } = carried;
+    pub(super) fn carried(&self, carried: &Carried, port: &mut Port) {
         // If another frame has been answered since, it is unknown which bits of this one were new; they are
         // sent again.
-        if self.units[station].generation == generation {
-            port.sent_bits(station, bits);
+        if self.all[carried.station].generation == carried.generation {
+            port.sent(&carried.receipt);
         }
     }
 }

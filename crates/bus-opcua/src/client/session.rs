@@ -102,7 +102,7 @@ impl ClientSession<'_> {
         let Some(writings) = &mut self.writings else {
             return;
         };
-        if writings.is_under_way() || !port.sends(now) {
+        if writings.is_under_way() {
             return;
         }
         let values = writings.due(port, now, self.fields, &self.nodes);

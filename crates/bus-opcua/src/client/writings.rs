@@ -5,7 +5,7 @@ use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, Wri
 use crate::pki::meaning;
 use crate::values::{self, Values};
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::Port;
+use tickbus_fieldbus::{Port, Receipt};
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::Field;
@@ -16,8 +16,8 @@ pub(super) struct Writings {
     values: Values,
     /// The bits that the server has accepted; `None` for none yet.
     known: Vec<Option<Slot>>,
-    /// The pending Write: indices of signals, and their bits.
-    flight: Option<Vec<(usize, Slot)>>,
+    /// The pending Write: indices of signals, and their bits, with the receipt for the frames that they are from.
+    flight: Option<(Vec<(usize, Slot)>, Receipt)>,
     /// The signals that the server refuses, as last logged.
     refused: Vec<Option<StatusCode>>,
 }
@@ -47,9 +47,12 @@ impl Writings {
         fields: &[Field],
         nodes: &[NodeId],
     ) -> Vec<WriteValue> {
+        let Some(mut frames) = port.take_all(now) else {
+            return Vec::new();
+        };
         let mut flight = Vec::new();
-        for station in 0..port.stations() {
-            self.values.take(station, port.outgoing(station, now));
+        for station in frames.stations() {
+            self.values.take(station, frames.frame(station));
             for &signal in self.values.signals(station) {
                 let bits = self.values.bits(signal);
                 if self.known[signal] != Some(bits) {
@@ -57,8 +60,11 @@ impl Writings {
                 }
             }
         }
+        let Some(receipt) = frames.send() else {
+            return Vec::new();
+        };
         if flight.is_empty() {
-            (0..port.stations()).for_each(|station| port.sent(station));
+            port.sent(&receipt);
             return Vec::new();
         }
         let write = |&(signal, bits): &(usize, Slot)| WriteValue {
@@ -69,7 +75,7 @@ impl Writings {
             value: DataValue::value_only(values::variant(fields[signal].data_type, bits)),
         };
         let list = flight.iter().map(write).collect();
-        self.flight = Some(flight);
+        self.flight = Some((flight, receipt));
         list
     }
 
@@ -80,7 +86,9 @@ impl Writings {
         table: &SignalTable,
         statuses: &[StatusCode],
     ) {
-        let flight = self.flight.take().unwrap_or_default();
+        let Some((flight, receipt)) = self.flight.take() else {
+            return;
+        };
         let mut whole = true;
         for (at, (signal, bits)) in flight.into_iter().enumerate() {
             let status = statuses
@@ -107,15 +115,15 @@ impl Writings {
                 }
             }
         }
-        for station in 0..port.stations() {
-            if whole {
-                port.sent(station);
-                continue;
-            }
-            for &signal in self.values.signals(station) {
-                if self.known[signal].is_some() {
-                    let signal = &table.signals[signal];
-                    port.sent_bits(station, signal.address().bits());
+        if whole {
+            port.sent(&receipt);
+        } else {
+            for station in 0..port.stations() {
+                for &signal in self.values.signals(station) {
+                    if self.known[signal].is_some() {
+                        let bits = table.signals[signal].address().bits();
+                        port.sent(&receipt.bits(station, bits));
+                    }
                 }
             }
         }

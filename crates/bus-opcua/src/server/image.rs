@@ -9,7 +9,7 @@ use opcua::types::{DataValue, NodeId, StatusCode, Variant};
 use crate::pki::date;
 use crate::values::{self, Values};
 use tickbus_base::time::{Nanos, WallClock};
-use tickbus_fieldbus::{Port, Role};
+use tickbus_fieldbus::{Port, Receipt, Role};
 use tickbus_image::Event;
 use tickbus_image::signal::{Plan, Scale, Signal, SignalTable, Slot};
 
@@ -181,15 +181,14 @@ impl Image {
 
     /// Updates all nodes. Pulses that every subscriber has had time to see count as sent.
     pub(super) fn show(&mut self, port: &mut Port, now: Nanos) {
-        if port.sends(now) {
-            self.show_what_is_sent(port, now);
+        if let Some(receipt) = self.show_what_is_sent(port, now) {
             for (index, signal) in self.table.signals.iter().enumerate() {
                 let is_sent = signal.area == self.role.areas().0;
                 if is_sent
                     && let Some(span) = self.show.watched.span(index)
                     && now - self.places[index].since >= span
                 {
-                    port.sent_bits(signal.station, signal.address().bits());
+                    port.sent(&receipt.bits(signal.station, signal.address().bits()));
                 }
             }
         }
@@ -210,27 +209,31 @@ impl Image {
 
     /// Updates the nodes of these signals for a client that is reading them: their pulses count as sent.
     pub(super) fn show_to_reader(&mut self, port: &mut Port, now: Nanos, signals: &[usize]) {
-        if port.is_down(now) {
+        let Some(receipt) = self.show_what_is_sent(port, now) else {
             return;
-        }
-        self.show_what_is_sent(port, now);
+        };
         for &index in signals {
             let signal = &self.table.signals[index];
             if signal.area == self.role.areas().0 {
-                port.sent_bits(signal.station, signal.address().bits());
+                port.sent(&receipt.bits(signal.station, signal.address().bits()));
             }
         }
     }
 
-    fn show_what_is_sent(&mut self, port: &mut Port, now: Nanos) {
+    fn show_what_is_sent(&mut self, port: &mut Port, now: Nanos) -> Option<Receipt> {
+        let mut frames = port.take_all(now)?;
+        for station in frames.stations() {
+            self.sends.take(station, frames.frame(station));
+        }
+        let receipt = frames.send()?;
         for station in 0..self.frames.len() {
-            self.sends.take(station, port.outgoing(station, now));
             let status = quality(port, station, now);
             for at in 0..self.sends.signals(station).len() {
                 let index = self.sends.signals(station)[at];
                 self.put(now, index, self.sends.bits(index), status);
             }
         }
+        Some(receipt)
     }
 
     /// Sets the nodes of a signal if the value is new, and reports it to subscribers.

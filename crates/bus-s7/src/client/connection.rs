@@ -7,7 +7,7 @@ use super::{ClientSession, ConnectionParameters, Refusal, S7Client, SessionEvent
 use crate::szl::Identity;
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::tcp::Caller;
-use tickbus_fieldbus::{BusError, PlcState, Port};
+use tickbus_fieldbus::{BusError, PlcState, Port, Receipt};
 
 /// How often a CPU is asked for its operating state.
 const STATE: Nanos = Nanos::from_millis(200);
@@ -31,6 +31,8 @@ pub(super) struct Connection<'a> {
     state: Option<Nanos>,
     /// A cycle became due while the question was pending.
     is_due: bool,
+    /// For the frames of the cycle under way.
+    receipt: Option<Receipt>,
     stations: Vec<StationCycle>,
 }
 
@@ -62,6 +64,7 @@ impl<'a> Connection<'a> {
             has_identity: false,
             state: None,
             is_due: false,
+            receipt: None,
             stations: (0..port.stations()).map(station).collect(),
             peer,
             bus,
@@ -166,18 +169,22 @@ impl<'a> Connection<'a> {
             port.count("s7.skipped");
             return Ok(());
         }
-        if !port.sends(now) {
+        let Some(mut frames) = port.take_all(now) else {
             return Ok(());
-        }
+        };
         for (index, station) in self.stations.iter_mut().enumerate() {
             if station.resume.is_some_and(|resume| resume <= now) {
                 station.resume = None;
                 self.dialog.suspend(index, false);
             }
             if self.bus.guard.may_write() && station.has[0] && station.resume.is_none() {
-                let frame = port.outgoing(index, now);
+                let frame = frames.frame(index);
                 self.dialog.frame_to_write(index).copy_from_slice(frame);
             }
+        }
+        self.receipt = frames.send();
+        if self.receipt.is_none() {
+            return Ok(());
         }
         match self.dialog.begin(now) {
             Some(SessionEvent::Done) => self.done(now, port),
@@ -209,8 +216,11 @@ impl<'a> Connection<'a> {
             } else if is_heard {
                 port.touch(index, now);
             }
-            if is_written && may_write {
-                port.sent(index);
+            if is_written
+                && may_write
+                && let Some(receipt) = &self.receipt
+            {
+                port.sent(&receipt.of(index));
             }
             station.refusal = None;
             // It may have been reported during an earlier connection.

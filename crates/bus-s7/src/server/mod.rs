@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{self, Address, Limits};
-use tickbus_fieldbus::{BusError, Free, Port, Role};
+use tickbus_fieldbus::{BusError, Free, Port, Receipt, Role};
 use tickbus_image::signal::{SignalTable, fail_safe_frame};
 
 use super::item::{Object, ReturnCode};
@@ -34,7 +34,8 @@ impl S7Server {
         let stations = (0..table.stations.len()).map(|station| StationMemory {
             written: fail_safe_frame(table, station, receives),
             outgoing: fail_safe_frame(table, station, sends),
-            taken: false,
+            is_taken: false,
+            receipt: None,
             changed: Vec::new(),
             addressed: false,
             has_writer: false,
@@ -101,9 +102,11 @@ struct Shared {
 struct StationMemory {
     /// The values written by clients, initially the fail-safe values.
     written: Box<[u8]>,
-    /// The values of the other area that clients read in this batch.
+    /// The values of the other area that clients read in this batch, once they are taken.
     outgoing: Box<[u8]>,
-    taken: bool,
+    is_taken: bool,
+    /// For them; `None` if nothing goes out.
+    receipt: Option<Receipt>,
     /// The bits written by the current job.
     changed: Vec<Range<usize>>,
     /// Whether the current job reads or writes anything of this station.
@@ -119,8 +122,8 @@ struct Client {
     number: u64,
     /// The stations that it has written to.
     writes: Box<[bool]>,
-    /// What answers to it carry: station and bits.
-    carried: Vec<(usize, Range<usize>)>,
+    /// For what answers to it carry.
+    receipts: Vec<Receipt>,
 }
 
 impl tcp::Service for Service {
@@ -140,7 +143,7 @@ impl tcp::Service for Service {
             conversation: ServerSession::default(),
             number: self.welcomed,
             writes: vec![false; self.memory.stations.len()].into(),
-            carried: Vec::new(),
+            receipts: Vec::new(),
         }
     }
 
@@ -158,7 +161,7 @@ impl tcp::Service for Service {
             station: self.memory.map.station_of(client.conversation.called()),
             shared: &mut self.memory,
             writes: &mut client.writes,
-            carried: &mut client.carried,
+            receipts: &mut client.receipts,
             port,
             now,
             lost: false,
@@ -174,8 +177,8 @@ impl tcp::Service for Service {
     }
 
     fn replied(&mut self, client: &mut Client, port: &mut Port) {
-        for (station, bits) in client.carried.drain(..) {
-            port.sent_bits(station, bits);
+        for receipt in client.receipts.drain(..) {
+            port.sent(&receipt);
         }
         self.memory.batch = None;
     }
@@ -189,8 +192,8 @@ impl Shared {
             self.batch = batch;
             self.stations
                 .iter_mut()
-                .for_each(|station| station.taken = false);
-            client.carried.clear();
+                .for_each(|station| station.is_taken = false);
+            client.receipts.clear();
         }
     }
 }
@@ -201,10 +204,10 @@ struct Jobs<'a> {
     /// The station whose inputs and outputs the client is connected to.
     station: Option<usize>,
     writes: &'a mut [bool],
-    carried: &'a mut Vec<(usize, Range<usize>)>,
+    receipts: &'a mut Vec<Receipt>,
     port: &'a mut Port,
     now: Nanos,
-    /// An injected fault loses the answer.
+    /// The answer is lost.
     lost: bool,
 }
 
@@ -260,16 +263,25 @@ impl Jobs<'_> {
         if place.area != sends {
             return Ok(&station.written[range]);
         }
-        if !station.taken {
-            station.taken = true;
+        if !station.is_taken {
+            station.is_taken = true;
             let only = place.station..place.station + 1;
-            self.lost |= !self.port.sends_of(only, self.now);
-            let frame = self.port.outgoing(place.station, self.now);
-            station.outgoing.copy_from_slice(frame);
+            let frames = self.port.take(only, self.now);
+            station.receipt = frames.and_then(|mut frames| {
+                station
+                    .outgoing
+                    .copy_from_slice(frames.frame(place.station));
+                frames.send()
+            });
         }
-        let first = range.start * 8;
-        let carried = first + bits.start..first + bits.end;
-        self.carried.push((place.station, carried));
+        match &station.receipt {
+            None => self.lost = true,
+            Some(receipt) => {
+                let first = range.start * 8;
+                let bits = first + bits.start..first + bits.end;
+                self.receipts.push(receipt.bits(place.station, bits));
+            }
+        }
         Ok(&station.outgoing[range])
     }
 }

@@ -21,6 +21,9 @@ pub(crate) struct SteppedHost {
     interval: Nanos,
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
+    /// The frames from and to the machine, on their way.
+    inputs: Vec<Box<[u8]>>,
+    outputs: Vec<Box<[u8]>>,
     /// Whether the program was sent the machine's latest values.
     is_delivered: bool,
 }
@@ -35,17 +38,24 @@ impl SteppedHost {
         let (cpu, bus) = half(program, config, Role::Controller);
         let tally = Arc::clone(&cpu.tally);
         let status = LinkStatus::new(cpu.program.name(), max_age);
-        let mut port = Port::new(bus, Manual::new(), Role::Controller, None, status);
         let watches = config
             .life_signs
             .watches(&config.table, Role::Controller, max_age);
-        port.watch_life(watches);
+        let port =
+            Port::new(bus, Manual::new(), Role::Controller, None, status).with_life_signs(watches);
+        let frames = |sizes: fn((usize, usize)) -> usize| {
+            let sizes = (0..port.stations()).map(|station| sizes(port.sizes(station)));
+            sizes.map(|size| vec![0; size].into()).collect()
+        };
+        let (inputs, outputs) = (frames(|sizes| sizes.1), frames(|sizes| sizes.0));
         (
             Self {
                 cpu,
                 port,
                 interval,
                 due: None,
+                inputs,
+                outputs,
                 is_delivered: false,
             },
             tally,
@@ -54,21 +64,27 @@ impl SteppedHost {
 }
 
 /// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
-fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
-    if !from.sends(now) {
+fn carry(from: &mut Port, to: &mut Port, on_the_way: &mut [Box<[u8]>], now: Nanos) -> bool {
+    let Some(mut frames) = from.take_all(now) else {
         return false;
+    };
+    for (station, space) in on_the_way.iter_mut().enumerate() {
+        space.copy_from_slice(frames.frame(station));
     }
-    for station in 0..from.stations() {
-        to.received(station, now, from.outgoing(station, now));
-        from.sent(station);
+    let Some(receipt) = frames.send() else {
+        return false;
+    };
+    for (station, frame) in on_the_way.iter().enumerate() {
+        to.received(station, now, frame);
     }
+    from.sent(&receipt);
     true
 }
 
 impl Stepped for SteppedHost {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
-        self.is_delivered = !port.is_down(now) && carry(port, &mut self.port, now);
+        self.is_delivered = carry(port, &mut self.port, &mut self.inputs, now);
         Ok(())
     }
 
@@ -100,8 +116,8 @@ impl Stepped for SteppedHost {
             due += self.interval;
         }
         self.due = Some(due);
-        if !port.is_down(now) {
-            carry(&mut self.port, port, now);
+        if port.is_up(now) {
+            carry(&mut self.port, port, &mut self.outputs, now);
         }
         Ok(due)
     }

@@ -98,7 +98,6 @@ impl HostThread {
         // A CPU whose program has died must not keep its last outputs on the bus.
         let watchdog = (interval + interval).max(max_age);
         let (now, limit) = (Arc::clone(&clock), Some(watchdog));
-        let mut port = Port::new(bus_end, now, role, limit, status.clone());
         let board = Arc::<FaultBoard>::default();
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
         if role == config.role {
@@ -106,9 +105,10 @@ impl HostThread {
             let inputs = &cpu.inputs.bytes;
             cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
         }
-        port.suffer_from(Arc::clone(&board));
-        port.watch_life(config.life_signs.watches(&config.table, role, max_age));
-        port.name_stations(config.table.stations.iter().map(|s| s.name.as_str()));
+        let port = Port::new(bus_end, now, role, limit, status.clone())
+            .with_faults(Arc::clone(&board))
+            .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
+            .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
         let reconnect = config.timing.reconnect.clone();
         let bus = BusThread::start(bus, port, reconnect, status.clone(), &name)?;
         let (tally, stop) = (Arc::clone(&cpu.tally), Stop::new());

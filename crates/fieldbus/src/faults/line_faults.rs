@@ -281,26 +281,24 @@ impl LineFaults {
         &self.stations[station].out.current
     }
 
-    /// The peer has received what the bus was given last; true if the image must be told.
-    pub fn sent(&mut self, station: usize) -> bool {
+    /// The peer has these bits (bit n of byte k is 8k + n) of what the bus was given last, `None` for all; true if
+    /// the image must be told.
+    pub fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) -> bool {
         let out = &mut self.stations[station].out;
-        if out.given != Given::Nothing {
-            out.sent.copy_from_slice(&out.current);
-            out.read.fill(0xFF);
-        }
-        out.given == Given::Image
-    }
-
-    /// As [`sent`](Self::sent), for a peer that received only these bits (bit n of byte k is 8k + n).
-    pub fn sent_bits(&mut self, station: usize, bits: &Range<usize>) -> bool {
-        let out = &mut self.stations[station].out;
-        if out.given != Given::Nothing {
-            for bit in bits.start..bits.end.min(8 * out.sent.len()) {
-                let (byte, mask) = (bit / 8, 1 << (bit % 8));
-                out.sent[byte] = out.sent[byte] & !mask | out.current[byte] & mask;
-                out.read[byte] |= mask;
+        match bits {
+            _ if out.given == Given::Nothing => {}
+            None => {
+                out.sent.copy_from_slice(&out.current);
+                out.read.fill(0xFF);
             }
-            out.reads = true;
+            Some(bits) => {
+                for bit in bits.start..bits.end.min(8 * out.sent.len()) {
+                    let (byte, mask) = (bit / 8, 1 << (bit % 8));
+                    out.sent[byte] = out.sent[byte] & !mask | out.current[byte] & mask;
+                    out.read[byte] |= mask;
+                }
+                out.reads = true;
+            }
         }
         out.given == Given::Image
     }

@@ -60,6 +60,6 @@ fn serve(end: &mut End, cycle: Nanos, port: &mut Port, stop: &Stop) {
         } else {
             port.observe(now);
         }
-        port.clock().wait_until(pace.due().min(port.due()), stop);
+        port.wait_until(pace.due(), stop);
     }
 }

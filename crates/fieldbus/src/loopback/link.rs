@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-use crate::{BusError, Port, Role};
+use crate::{BusError, Port, Receipt, Role};
 use tickbus_base::time::Nanos;
 
 /// The named links, as long as one of their ends exists.
@@ -46,8 +46,10 @@ fn other(role: Role) -> Role {
 pub struct End {
     line: Arc<Mutex<SharedLanes>>,
     role: Role,
-    /// Whether this end has sent anything that the other end may have taken.
-    sent: bool,
+    /// The frames to offer next, while they are filled in.
+    next: Vec<Vec<u8>>,
+    /// The receipt for the frames that the other end may have taken.
+    offered: Option<Receipt>,
     /// Whether the other end has been present.
     met: bool,
 }
@@ -109,7 +111,8 @@ impl End {
                 role.name(),
             )));
         }
-        let frames = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
+        let frames: Vec<Vec<u8>> = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
+        let next = frames.clone();
         locked.lanes[lane(role)] = Lane {
             attached: true,
             sizes,
@@ -120,7 +123,8 @@ impl End {
         Ok(Self {
             line: Arc::clone(line),
             role,
-            sent: false,
+            next,
+            offered: None,
             met: false,
         })
     }
@@ -157,22 +161,26 @@ impl End {
         }
         let mut line = lock(&self.line);
         let mine = &mut line.lanes[lane(self.role)];
-        if self.sent && !mine.waiting {
-            (0..mine.frames.len()).for_each(|station| port.sent(station));
-            self.sent = false;
+        if !mine.waiting
+            && let Some(receipt) = self.offered.take()
+        {
+            port.sent(&receipt);
         }
-        if port.sends(now) {
-            for (station, frame) in mine.frames.iter_mut().enumerate() {
-                frame.copy_from_slice(port.outgoing(station, now));
+        if let Some(mut frames) = port.take_all(now) {
+            for (station, frame) in self.next.iter_mut().enumerate() {
+                frame.copy_from_slice(frames.frame(station));
             }
-            mine.waiting = true;
-            self.sent = true;
+            if let Some(receipt) = frames.send() {
+                std::mem::swap(&mut mine.frames, &mut self.next);
+                mine.waiting = true;
+                self.offered = Some(receipt);
+            }
         }
     }
 
     /// Whether the line is up and the other end is there.
     fn meets(&mut self, now: Nanos, port: &mut Port) -> bool {
-        if port.is_down(now) {
+        if !port.is_up(now) {
             return false;
         }
         let mut line = lock(&self.line);
@@ -182,7 +190,7 @@ impl End {
         }
         // Frames that the previous other end did not take are outdated for the next one.
         line.lanes[lane(self.role)].waiting = false;
-        self.sent = false;
+        self.offered = None;
         drop(line);
         if std::mem::take(&mut self.met) {
             let left = BusError::Left("the other end of the link was closed".to_owned());

@@ -286,7 +286,7 @@ impl<S: Service> Server<'_, S> {
             Err(error) if is_for_later(&error) => return Ok(()),
             Err(error) => return Err(client.broke(&error)),
         };
-        if port.is_down(now) {
+        if !port.is_up(now) {
             // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();
             self.clients.awaited -= usize::from(client.waits_since.take().is_some());

@@ -2,6 +2,7 @@
 
 use crate::table::Span;
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::Receipt;
 
 use super::super::Piece;
 use super::super::plan::{Capabilities, queries};
@@ -20,6 +21,8 @@ pub(in super::super) struct Station {
     prepared: Option<bool>,
     pub(super) queries: Vec<Request>,
     pub(super) sends: Vec<u8>,
+    /// For the frame in `sends`.
+    pub(super) receipt: Option<Receipt>,
     pub(super) receives: Vec<u8>,
     pub(super) identity: Identity,
     /// How many connections in a row ended while the device was asked for its identity.
@@ -43,6 +46,7 @@ impl Station {
             prepared: None,
             queries: Vec::new(),
             sends: Vec::new(),
+            receipt: None,
             receives: vec![0; receives],
             identity: Identity::default(),
             hang_ups: 0,

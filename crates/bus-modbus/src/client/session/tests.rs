@@ -367,7 +367,7 @@ fn a_station_that_refuses_rests_alone_and_is_asked_again_every_second() {
         }
         assert!(asked[0] > 150, "{asked:?}");
         assert!(asked[1] == 3, "{asked:?}");
-        assert!(line.port.silence(line.now) > Nanos::from_secs(2));
+        assert!(line.port.peer_age(1, line.now) > Nanos::from_secs(2));
     }
 }
 

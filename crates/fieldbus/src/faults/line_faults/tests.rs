@@ -76,7 +76,7 @@ impl Rig {
         let mut confirmed = !repeats && self.wires.takes(0, Nanos(now), &image);
         let out = self.wires.outgoing(0).try_into().expect("two bytes");
         if taken {
-            confirmed |= self.wires.sent(0);
+            confirmed |= self.wires.sent(0, None);
         }
         (out, confirmed)
     }
@@ -197,10 +197,10 @@ fn a_pulse_waits_for_the_peer_that_reads_other_bits_only() {
     rig.send(1, [0, 6], false);
     for bits in [8..16, 1..8] {
         assert_eq!(rig.send(20, [0, 6], false).0, [1, 5], "{bits:?}");
-        rig.wires.sent_bits(0, &bits);
+        rig.wires.sent(0, Some(&bits));
     }
     assert_eq!(rig.send(21, [0, 6], false).0, [1, 5]);
-    rig.wires.sent_bits(0, &(0..1));
+    rig.wires.sent(0, Some(&(0..1)));
     assert_eq!(rig.send(22, [0, 6], false).0, [0, 6]);
 }
 
@@ -214,7 +214,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     let long = PATIENCE.0 * 5;
     assert_eq!(rig.send(20, [0, 6], false).0, [1, 5]);
     assert_eq!(rig.send(long, [0, 6], false).0, [1, 5]);
-    rig.wires.sent_bits(0, &(8..16));
+    rig.wires.sent(0, Some(&(8..16)));
     assert_eq!(rig.send(long + 1, [0, 6], false).0, [1, 5]);
     let after = long + 1 + PATIENCE.0;
     assert_eq!(rig.send(after, [1, 7], false).0, [0, 6]);
@@ -224,7 +224,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     rig.end(slow);
     assert_eq!(rig.send(after + 21, [1, 9], false), ([1, 9], false));
     // Once it has been read, it waits for the peer again.
-    rig.wires.sent_bits(0, &(0..1));
+    rig.wires.sent(0, Some(&(0..1)));
     rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
     rig.send(after + 30, [0, 0], false);
     rig.send(after + 31, [1, 0], false);
@@ -239,7 +239,7 @@ fn a_link_that_is_down_takes_nothing_and_gives_nothing_back() {
     assert!(rig.wires.is_down() && rig.wires.is_cut(0));
     assert_eq!(rig.receive(1, Some(1)), Vec::<u8>::new());
     assert_eq!(rig.wires.frozen(0), [1, 2]);
-    assert!(!rig.wires.sent(0), "nothing counts as sent");
+    assert!(!rig.wires.sent(0, None), "nothing counts as sent");
     rig.end(down);
     assert!(!rig.wires.is_down());
     assert_eq!(rig.receive(2, Some(2)), [2]);

@@ -1,0 +1,260 @@
+//! The layer of injected line faults, around the port to the image.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use tickbus_base::time::Nanos;
+use tickbus_image::{BusStation, Event};
+
+use super::image::{ImagePort, Report};
+use crate::faults::{Fate, FaultBoard, LineFaults, Shape};
+use crate::{Cause, LinkState, LinkStatus};
+
+/// Passes everything on to an [`ImagePort`], and distorts it while line faults are active. Until the first one is
+/// injected, it allocates nothing and costs one comparison.
+#[derive(Debug, Default)]
+pub(super) struct FaultLayer {
+    board: Arc<FaultBoard>,
+    /// The board's change counter when it was last read.
+    seen: u64,
+    line: Option<Box<LineFaults>>,
+    /// A frame per station, for handing in what was held back.
+    frames: Vec<Box<[u8]>>,
+    /// While a fault holds the line down: the bus's own report of the line.
+    beneath: Option<Beneath>,
+}
+
+/// The report of a bus that a fault hides.
+#[derive(Debug)]
+struct Beneath {
+    state: LinkState,
+    cause: Cause,
+    reason: String,
+}
+
+impl FaultLayer {
+    /// The faults on `board`.
+    pub(super) fn of(board: Arc<FaultBoard>) -> Self {
+        Self {
+            board,
+            ..Self::default()
+        }
+    }
+
+    /// Whether there is anything to do.
+    #[inline]
+    pub(super) fn any(&self) -> bool {
+        self.line.is_some() || self.board.news() != self.seen
+    }
+
+    /// Adopts new faults, and hands in frames that were held back long enough.
+    #[inline]
+    pub(super) fn attend(&mut self, now: Nanos, port: &mut ImagePort) {
+        if self.any() {
+            self.attend_to_faults(now, port);
+        }
+    }
+
+    #[cold]
+    fn attend_to_faults(&mut self, now: Nanos, port: &mut ImagePort) {
+        self.look(now, port);
+        let Some(line) = &mut self.line else {
+            return;
+        };
+        for (station, frame) in self.frames.iter_mut().enumerate() {
+            while line.release(station, now, frame) {
+                port.received(station, now, frame);
+            }
+        }
+    }
+
+    /// Reads the board: adopts new faults, logs, and updates the state of the line.
+    fn look(&mut self, now: Nanos, port: &mut ImagePort) {
+        let news = self.board.news();
+        if news == self.seen {
+            return;
+        }
+        self.seen = news;
+        let (image, status) = (&port.image, &port.status);
+        self.board.tell(status.driver());
+        for fault in self.board.take_line_faults() {
+            let line = self.line.get_or_insert_with(|| {
+                let shapes = image.stations.iter().map(shape);
+                Box::new(LineFaults::new(Arc::clone(&self.board), shapes))
+            });
+            line.adopt(fault);
+            let sizes = image.stations.iter().map(BusStation::rx_len);
+            self.frames = sizes.map(|size| vec![0; size].into()).collect();
+        }
+        let Some(line) = &mut self.line else {
+            return;
+        };
+        line.look();
+        status.injected(line.active());
+        if line.is_down() {
+            self.beneath.get_or_insert_with(|| Beneath::of(status));
+            say_down(now, line.active(), status);
+        } else if let Some(beneath) = self.beneath.take() {
+            port.enter(now, beneath.report());
+        }
+    }
+
+    /// Whether nothing goes out and nothing comes in.
+    pub(super) fn is_down(&self) -> bool {
+        self.line.as_ref().is_some_and(|line| line.is_down())
+    }
+
+    /// Decides at random whether the next outgoing frames are lost.
+    pub(super) fn loses_cycle(&mut self) -> bool {
+        let line = self.line.as_mut();
+        line.is_some_and(|line| line.loses_cycle())
+    }
+
+    /// The bytes that a station sends at `now`.
+    pub(super) fn outgoing<'a>(
+        &'a mut self,
+        station: usize,
+        now: Nanos,
+        port: &'a mut ImagePort,
+    ) -> &'a [u8] {
+        let Some(line) = &mut self.line else {
+            return port.outgoing(station, now);
+        };
+        let repeats = line.repeats(station);
+        if line.is_cut(station) {
+            return line.frozen(station);
+        }
+        if !repeats && line.takes(station, now, port.outgoing(station, now)) {
+            port.sent(station, None);
+        }
+        line.outgoing(station)
+    }
+
+    /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
+    pub(super) fn sent(
+        &mut self,
+        station: usize,
+        bits: Option<&Range<usize>>,
+        port: &mut ImagePort,
+    ) {
+        let line = self.line.as_mut();
+        if line.is_none_or(|line| line.sent(station, bits)) {
+            port.sent(station, bits);
+        }
+    }
+
+    /// A whole frame arrived.
+    pub(super) fn received(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        bytes: &[u8],
+        port: &mut ImagePort,
+    ) {
+        let fate = match &mut self.line {
+            None => Fate::Passes(1),
+            Some(line) => line.arrives(station, now, bytes),
+        };
+        match fate {
+            Fate::Passes(times) => {
+                for _ in 0..times {
+                    port.received(station, now, bytes);
+                }
+            }
+            // If the frame is held back, its changes become events when it is released.
+            Fate::Lost | Fate::Held => {
+                if let Some(changes) = port.changes.get_mut(station) {
+                    changes.forget();
+                }
+            }
+        }
+    }
+
+    /// The peer of a station was alive.
+    pub(super) fn touch(&mut self, station: usize, now: Nanos, port: &mut ImagePort) {
+        // While frames are held back, the peer must not seem more alive than the data that have arrived.
+        let is_hidden = |line: &LineFaults| line.is_cut(station) || line.holds_back(station);
+        if !self.line.as_deref().is_some_and(is_hidden) {
+            port.touch(station, now);
+        }
+    }
+
+    /// The peer wrote, on a bus on which every write matters.
+    pub(super) fn event(&mut self, event: Event, port: &mut ImagePort) {
+        if !self.is_down() {
+            port.event(event);
+        }
+    }
+
+    /// The bus reports this of its line: kept while a fault hides it.
+    pub(super) fn enter(&mut self, now: Nanos, report: Report<'_>, port: &mut ImagePort) {
+        let (Some(beneath), Some(line)) = (&mut self.beneath, &self.line) else {
+            port.enter(now, report);
+            return;
+        };
+        if !beneath.equals(report) {
+            *beneath = Beneath {
+                state: report.state,
+                cause: report.cause,
+                reason: report.reason.to_owned(),
+            };
+            // The supervisor may have reported a failure in the meantime.
+            say_down(now, line.active(), &port.status);
+        }
+    }
+
+    /// When the next held frame is due.
+    pub(super) fn due(&self) -> Nanos {
+        let line = self.line.as_ref();
+        line.map_or(Nanos::MAX, |line| line.due())
+    }
+}
+
+impl Beneath {
+    /// The line as its bus reported it last.
+    fn of(status: &LinkStatus) -> Self {
+        let link = status.link();
+        if link.state == LinkState::Stale {
+            // Staleness is decided by the clock, not by the bus.
+            return Self {
+                state: LinkState::Running,
+                cause: Cause::Running,
+                reason: status.running_reason(),
+            };
+        }
+        Self {
+            state: link.state,
+            cause: link.cause,
+            reason: link.reason,
+        }
+    }
+
+    fn report(&self) -> Report<'_> {
+        Report {
+            state: self.state,
+            cause: self.cause,
+            reason: &self.reason,
+        }
+    }
+
+    fn equals(&self, report: Report<'_>) -> bool {
+        (self.state, self.cause) == (report.state, report.cause) && self.reason == report.reason
+    }
+}
+
+fn say_down(now: Nanos, active: &str, status: &LinkStatus) {
+    let reason = format!("the link is down by injected fault: {active}");
+    status.enter(now, LinkState::Failed, Cause::Injected, &reason);
+}
+
+fn shape(station: &BusStation) -> Shape {
+    let mut latched = vec![0; station.tx_len()];
+    for bit in station.tx_latched() {
+        latched[bit.byte] |= bit.mask;
+    }
+    Shape {
+        last_sent: station.last_outgoing().into(),
+        latched: latched.into(),
+        rx_len: station.rx_len(),
+    }
+}

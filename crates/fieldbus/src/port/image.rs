@@ -1,0 +1,125 @@
+//! The layer beneath the faults: the image, the validity of its data, and the state of the line.
+
+use std::ops::Range;
+
+use tickbus_base::time::Nanos;
+use tickbus_image::{BusEnd, Event};
+
+use crate::validity::Validity;
+use crate::{Cause, ChangeEvents, LinkState, LinkStatus, PlcState};
+
+/// A bus's access to the image and to the state of its line, without injected faults.
+#[derive(Debug)]
+pub(super) struct ImagePort {
+    pub(super) image: BusEnd,
+    pub(super) watchdog: Option<Nanos>,
+    /// One watcher per station, if changes are reported as events.
+    pub(super) changes: Vec<ChangeEvents>,
+    pub(super) status: LinkStatus,
+    pub(super) validity: Validity,
+    /// When the first station's last frame arrived while the line was running.
+    pub(super) last_cycle: Option<Nanos>,
+}
+
+impl ImagePort {
+    pub(super) fn stations(&self) -> usize {
+        self.image.stations.len()
+    }
+
+    /// The bytes that a station sends at `now`.
+    pub(super) fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
+        self.image.stations[station].outgoing(now, self.watchdog)
+    }
+
+    /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
+    pub(super) fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) {
+        let station = &mut self.image.stations[station];
+        match bits {
+            None => station.sent(),
+            Some(bits) => station.sent_bits(bits),
+        }
+    }
+
+    /// A whole frame arrived.
+    pub(super) fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
+        if station == 0
+            && let Some(last) = self.last_cycle.replace(now)
+        {
+            self.status.cycle(now - last);
+        }
+        self.image.stations[station].received(now, bytes);
+        if self.validity.arrived(station, now, bytes) {
+            self.update_validity(station, now);
+        }
+        if let Some(changes) = self.changes.get_mut(station) {
+            changes.observe(now, bytes, &mut self.image.events);
+        }
+    }
+
+    /// The next frame of the station was written in these ranges of bits.
+    pub(super) fn written(&mut self, station: usize, bits: impl IntoIterator<Item = Range<usize>>) {
+        if let Some(changes) = self.changes.get_mut(station) {
+            bits.into_iter().for_each(|bits| changes.written(bits));
+        }
+    }
+
+    /// The peer of a station was alive.
+    pub(super) fn touch(&mut self, station: usize, now: Nanos) {
+        self.image.stations[station].touch(now);
+        if self.validity.heard(station) {
+            self.update_validity(station, now);
+        }
+    }
+
+    pub(super) fn plc_state(&mut self, station: usize, now: Nanos, state: PlcState) {
+        if !self.validity.plc_state(station, state) {
+            return;
+        }
+        for (key, fact) in self.validity.facts() {
+            self.status.tell(key, fact);
+        }
+        if state == PlcState::Stop {
+            self.update_validity(station, now);
+        }
+    }
+
+    pub(super) fn event(&mut self, event: Event) {
+        self.image.events.push(event);
+    }
+
+    /// Checks whether data have become stale, or are no longer stale.
+    pub(super) fn observe(&mut self, now: Nanos) {
+        while let Some(station) = self.validity.look(now) {
+            self.update_validity(station, now);
+        }
+        let stations = self.image.stations.iter();
+        let ages = stations.map(|station| station.peer_age(now));
+        self.status.observe(now, ages);
+    }
+
+    /// Passes the validity of `station`'s data on to image and line.
+    fn update_validity(&mut self, station: usize, now: Nanos) {
+        let is_valid = self.validity.is_valid(station);
+        self.image.stations[station].set_valid(is_valid);
+        let stations = self.image.stations.iter();
+        let ages = stations.map(|station| station.peer_age(now));
+        self.status.doubt(now, self.validity.doubt(), ages);
+    }
+
+    /// The bus reports this of its line.
+    pub(super) fn enter(&mut self, now: Nanos, line: Report<'_>) {
+        if line.state == LinkState::Running {
+            self.status.running(now, line.reason);
+        } else {
+            self.status.enter(now, line.state, line.cause, line.reason);
+        }
+    }
+}
+
+/// What a bus reports of its line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Report<'a> {
+    pub(super) state: LinkState,
+    pub(super) cause: Cause,
+    pub(super) reason: &'a str,
+}

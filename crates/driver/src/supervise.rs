@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::thread::JoinHandle;
 
+use tickbus_base::os::wake_on_time;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::{BusError, Cause, Free, LinkState, LinkStatus, Port};
 
@@ -47,6 +48,7 @@ impl BusThread {
                     // time, and closing waits for `_end` with a limit.
                     let (mut bus, mut port) = (bus, port);
                     let clock = Arc::clone(port.clock());
+                    wake_on_time();
                     serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
                 }
             })?;

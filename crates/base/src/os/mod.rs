@@ -9,6 +9,7 @@ mod poll_set;
 mod serial;
 #[cfg(unix)]
 mod shared_memory;
+mod timer_slack;
 
 pub use library::{Library, one_line};
 pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
@@ -21,3 +22,4 @@ pub use serial::SerialPort;
 pub use serial::{Parity, SerialSettings};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;
+pub use timer_slack::wake_on_time;

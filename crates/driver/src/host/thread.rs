@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
+use tickbus_base::os::wake_on_time;
 use tickbus_base::time::{Clock, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
@@ -121,6 +122,7 @@ impl HostThread {
             move || {
                 let _end: Sender<()> = end;
                 let times = (interval, watchdog);
+                wake_on_time();
                 let scans = || scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
                 let result = catch_unwind(AssertUnwindSafe(scans));
                 scanning.set(None);

@@ -15,6 +15,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The program at the other end is not installed; the text says which one, and how to get it.
 #[derive(Debug)]
@@ -23,7 +24,10 @@ pub struct Absent(pub String);
 /// A test panics when it fails.
 pub type Test = fn() -> Result<(), Absent>;
 
-/// Runs the tests selected on the command line, one after another.
+/// How many tests run at once: they mostly wait for their peers.
+const AT_ONCE: usize = 3;
+
+/// Runs the tests selected on the command line.
 pub fn main(tests: &[(&str, Test)]) -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.iter().any(|argument| argument == "--list") {
@@ -42,23 +46,25 @@ pub fn main(tests: &[(&str, Test)]) -> ExitCode {
     };
     let asked: Vec<_> = tests.iter().filter(|(name, _)| is_asked(name)).collect();
     println!("\nrunning {} tests", asked.len());
-    let (mut passed, mut failed, mut ignored) = (0, 0, 0);
-    for (name, test) in &asked {
-        match catch_unwind(AssertUnwindSafe(test)) {
-            Ok(Ok(())) => {
-                passed += 1;
-                println!("test {name} ... ok");
-            }
-            Ok(Err(Absent(why))) => {
-                ignored += 1;
-                println!("test {name} ... ignored, {why}");
-            }
-            Err(panic) => {
-                failed += 1;
-                println!("test {name} ... FAILED\n{}", words(&*panic));
-            }
+    let counts = [const { AtomicUsize::new(0) }; 3];
+    let next = AtomicUsize::new(0);
+    let work = || {
+        while let Some((name, test)) = asked.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let (count, verdict) = match catch_unwind(AssertUnwindSafe(test)) {
+                Ok(Ok(())) => (0, "ok".to_owned()),
+                Ok(Err(Absent(why))) => (2, format!("ignored, {why}")),
+                Err(panic) => (1, format!("FAILED\n{}", words(&*panic))),
+            };
+            counts[count].fetch_add(1, Ordering::Relaxed);
+            println!("test {name} ... {verdict}");
         }
-    }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..AT_ONCE {
+            scope.spawn(work);
+        }
+    });
+    let [passed, failed, ignored] = counts.map(AtomicUsize::into_inner);
     let verdict = if failed == 0 { "ok" } else { "FAILED" };
     println!(
         "\ntest result: {verdict}. {passed} passed; {failed} failed; {ignored} ignored; 0 measured; {} \

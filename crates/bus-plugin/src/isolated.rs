@@ -21,7 +21,7 @@ use super::request::Request;
 use super::setup::Setup;
 use super::wire::Inbox;
 use super::{Limits, VERSION};
-use tickbus_base::os::{Interest, Poller, SharedMemory, Source};
+use tickbus_base::os::{Interest, PollSet, SharedMemory};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::{BusError, Free, Port};
 
@@ -137,10 +137,12 @@ enum Waiting {
 #[derive(Debug)]
 struct Helper {
     child: Child,
+    /// Waits for `line`, and is dropped before it.
+    set: PollSet,
+    interest: Interest,
     line: UnixStream,
     inbox: Inbox,
     memory: SharedMemory,
-    poller: Poller,
     /// The system's time, in which the helper runs whatever clock the driver has.
     clock: Arc<Monotonic>,
     program: PathBuf,
@@ -160,15 +162,18 @@ impl Helper {
         let (memory, file) = SharedMemory::create(memory_bytes(&bus.setup)).map_err(cannot)?;
         let (line, theirs) = UnixStream::pair().map_err(cannot)?;
         line.set_nonblocking(true).map_err(cannot)?;
-        let poller = Poller::new(stop).map_err(cannot)?;
+        let mut set = PollSet::new(stop).map_err(cannot)?;
+        let interest = Interest::Read;
+        set.add(0, &line, interest).map_err(cannot)?;
         let clock = Monotonic::shared();
         let child = spawn(&bus.program, theirs.into(), file).map_err(cannot)?;
         Ok(Self {
             child,
+            set,
+            interest,
             line,
             inbox: Inbox::new(),
             memory,
-            poller,
             clock,
             program: bus.program.clone(),
             library: bus.name.clone(),
@@ -241,15 +246,22 @@ impl Helper {
             } else {
                 Interest::ReadWrite
             };
-            let mut sources = [Source::new(&self.line, interest)];
             // A little past the limit, so that the wait does not end just before it.
             let deadline = begun + limit + Nanos(1);
-            let ready = self.poller.wait(&*self.clock, deadline, &mut sources);
-            ready.map_err(|error| BusError::Link(format!("waiting for the helper: {error}")))?;
-            if sources[0].is_readable() {
+            let waited = self.wait(interest, deadline);
+            waited.map_err(|error| BusError::Link(format!("waiting for the helper: {error}")))?;
+            if self.set.ready().iter().any(|ready| ready.is_readable) {
                 self.read(what)?;
             }
         }
+    }
+
+    fn wait(&mut self, interest: Interest, deadline: Nanos) -> io::Result<()> {
+        if interest != self.interest {
+            self.set.change(0, &self.line, interest)?;
+            self.interest = interest;
+        }
+        self.set.wait(&*self.clock, deadline)
     }
 
     /// Sends as much as the socket accepts at once; returns the rest.

@@ -15,7 +15,7 @@ pub use library::{Library, one_line};
 pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
 #[cfg(unix)]
 pub use own_file::own_file;
-pub use poll::{Interest, Poller, Source};
+pub use poll::Interest;
 pub use poll_set::{PollSet, Ready};
 #[cfg(unix)]
 pub use serial::SerialPort;

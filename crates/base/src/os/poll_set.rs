@@ -1,4 +1,4 @@
-//! Waiting for many sockets at once.
+//! Waiting for sockets, a deadline and a stop, all at once.
 
 use std::fmt;
 use std::io;
@@ -7,11 +7,10 @@ use std::time::Duration;
 
 use rustix::fd::AsFd;
 
-use super::Interest;
-use super::poll::wake;
+use super::poll::{Interest, wake};
 use crate::time::{Clock, Nanos, Stop};
 
-/// Lets one thread wait for many sockets, for a deadline, and for its [`Stop`], whichever is first.
+/// Lets one thread wait for sockets, for a deadline, and for its [`Stop`], whichever is first.
 ///
 /// A socket is identified by the key that it was added with. While the set exists it is the waker of its
 /// token.
@@ -250,13 +249,26 @@ mod watch {
 /// Other systems look at every socket, through the set's own handles.
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 mod watch {
-    use rustix::event::PollFd;
+    use rustix::event::{PollFd, PollFlags};
 
     use super::{AsFd, Duration, Interest, Ready, io};
-    use crate::os::poll::{Source, flags, own, poll_once};
+    use crate::os::poll::poll_once;
+
+    #[cfg(unix)]
+    type Owned = std::os::fd::OwnedFd;
+    #[cfg(not(unix))]
+    type Owned = std::os::windows::io::OwnedSocket;
 
     pub(super) struct Watch {
-        sockets: Vec<(usize, own::Owned, Interest)>,
+        sockets: Vec<(usize, Owned, Interest)>,
+    }
+
+    const fn flags(interest: Interest) -> PollFlags {
+        match interest {
+            Interest::Read => PollFlags::IN,
+            Interest::Write => PollFlags::OUT,
+            Interest::ReadWrite => PollFlags::IN.union(PollFlags::OUT),
+        }
     }
 
     impl Watch {
@@ -274,7 +286,7 @@ mod watch {
             interest: Interest,
         ) -> io::Result<()> {
             self.sockets
-                .push((key, own::duplicate(socket.as_fd())?, interest));
+                .push((key, socket.as_fd().try_clone_to_owned()?, interest));
             Ok(())
         }
 
@@ -308,12 +320,12 @@ mod watch {
                 .map(|(_, socket, interest)| PollFd::new(socket, flags(*interest)))
                 .collect();
             poll_once(&mut all, patience)?;
+            let broken = PollFlags::HUP | PollFlags::ERR;
             for ((key, ..), fd) in self.sockets.iter().zip(&all) {
-                let source = Source::looked_at(fd.clone());
                 let found = Ready {
                     key: *key,
-                    is_readable: source.is_readable(),
-                    is_writable: source.is_writable(),
+                    is_readable: fd.revents().intersects(PollFlags::IN | broken),
+                    is_writable: fd.revents().intersects(PollFlags::OUT | broken),
                 };
                 if found.is_readable || found.is_writable {
                     ready.push(found);
@@ -330,6 +342,7 @@ mod tests {
     use crate::time::{Manual, Monotonic};
     use std::io::Write as _;
     use std::net::{TcpListener, TcpStream};
+    use std::thread;
 
     fn pairs(count: usize) -> Vec<(TcpStream, TcpStream)> {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
@@ -375,16 +388,52 @@ mod tests {
     }
 
     #[test]
-    fn a_stop_and_a_deadline_end_a_wait() {
+    fn bytes_end_a_wait_on_a_clock_that_stands_still() {
+        let mut pairs = pairs(1);
+        let (client, server) = &mut pairs[0];
+        let (clock, stop) = (Manual::new(), Stop::new());
+        let mut set = PollSet::new(&stop).expect("sockets");
+        set.add(0, server, Interest::Read).expect("it is open");
+        client.write_all(&[1]).expect("the server is there");
+        set.wait(&*clock, Nanos::MAX).expect("it waits");
+        let readable = Ready {
+            key: 0,
+            is_readable: true,
+            is_writable: false,
+        };
+        assert_eq!(set.ready(), [readable]);
+    }
+
+    #[test]
+    fn the_manual_clock_ends_a_wait_at_its_deadline() {
+        let pairs = pairs(1);
+        let (clock, stop) = (Manual::new(), Stop::new());
+        thread::scope(|scope| {
+            let waiting = scope.spawn(|| {
+                let mut set = PollSet::new(&stop).expect("sockets");
+                set.add(0, &pairs[0].1, Interest::Read).expect("it is open");
+                while clock.now() < Nanos(10) {
+                    set.wait(&*clock, Nanos(10)).expect("it waits");
+                }
+                set.ready().len()
+            });
+            while !clock.is_settled(1) {
+                thread::yield_now();
+            }
+            clock.advance(Nanos(10));
+            assert_eq!(waiting.join().expect("no panic"), 0);
+        });
+    }
+
+    #[test]
+    fn stop_and_wake_end_a_wait_even_when_they_come_first() {
         let clock = Monotonic::shared();
         let stop = Stop::new();
+        stop.wake();
         let mut set = PollSet::new(&stop).expect("sockets");
-        let deadline = clock.now() + Nanos::from_millis(2);
-        while clock.now() < deadline {
-            set.wait(&*clock, deadline).expect("it waits");
-        }
+        set.wait(&*clock, Nanos::MAX).expect("woken before");
         drop(set);
-        let waiting = std::thread::spawn({
+        let waiting = thread::spawn({
             let clock = Arc::clone(&clock);
             let stop = stop.clone();
             move || {
@@ -395,5 +444,15 @@ mod tests {
         });
         stop.stop();
         waiting.join().expect("no panic").expect("stopped");
+    }
+
+    #[test]
+    fn a_deadline_ends_a_wait() {
+        let clock = Monotonic::shared();
+        let mut set = PollSet::new(&Stop::new()).expect("sockets");
+        let deadline = clock.now() + Nanos::from_millis(2);
+        while clock.now() < deadline {
+            set.wait(&*clock, deadline).expect("it waits");
+        }
     }
 }

@@ -57,7 +57,7 @@ mod unix {
 
     use super::{Parity, SerialSettings};
 
-    /// An open serial port. Reading and writing never block; a [`Poller`](crate::os::Poller) can wait for it.
+    /// An open serial port. Reading and writing never block; a [`PollSet`](crate::os::PollSet) can wait for it.
     #[derive(Debug)]
     pub struct SerialPort(File);
 

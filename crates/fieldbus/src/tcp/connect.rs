@@ -7,7 +7,7 @@ use rustix::io::Errno;
 use socket2::{Domain, Protocol, Socket, Type};
 
 use crate::{BusError, Port};
-use tickbus_base::os::{Interest, Poller, Source};
+use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::resolve::resolve;
@@ -29,12 +29,12 @@ pub fn connect(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<Option<(TcpStream, SocketAddr)>, BusError> {
-    let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
+    let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
     port.opening(&format!("connecting to {address}"));
     let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
         return Ok(None);
     };
-    let Some(stream) = reach_any(&addresses, &mut poller, port, stop)? else {
+    let Some(stream) = reach_any(&addresses, &mut set, port, stop)? else {
         return Ok(None);
     };
     let peer = stream.peer_addr().map_err(|error| no_wait(&error))?;
@@ -48,13 +48,13 @@ pub fn connect(
 /// Tries the addresses of a host one after another; `None` if `stop` came first.
 fn reach_any(
     addresses: &[SocketAddr],
-    poller: &mut Poller,
+    set: &mut PollSet,
     port: &Port,
     stop: &Stop,
 ) -> Result<Option<TcpStream>, BusError> {
     let mut failed = None;
     for address in addresses {
-        match reach(*address, poller, port, stop) {
+        match reach(*address, set, port, stop) {
             Ok(reached) => return Ok(reached),
             Err(error) => failed = Some((address, error)),
         }
@@ -74,16 +74,23 @@ fn reach_any(
 
 fn reach(
     address: SocketAddr,
-    poller: &mut Poller,
+    set: &mut PollSet,
     port: &Port,
     stop: &Stop,
 ) -> io::Result<Option<TcpStream>> {
     let stream = begin(address)?;
+    set.add(0, &stream, Interest::Write)?;
+    let connected = wait(&stream, set, port, stop);
+    set.remove(0, &stream);
+    Ok(connected?.then_some(stream))
+}
+
+/// Waits until the only socket of `set` is connected; false if `stop` came first.
+fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::Result<bool> {
     let limit = port.clock().now() + PATIENCE;
     while !stop.is_stopped() {
-        let mut sources = [Source::new(&stream, Interest::Write)];
-        poller.wait(&**port.clock(), limit, &mut sources)?;
-        if sources[0].is_writable() {
+        set.wait(&**port.clock(), limit)?;
+        if !set.ready().is_empty() {
             if let Some(error) = stream.take_error()? {
                 return Err(error);
             }
@@ -92,13 +99,13 @@ fn reach(
             if stream.local_addr()? == stream.peer_addr()? {
                 return Err(ErrorKind::ConnectionRefused.into());
             }
-            return Ok(Some(stream));
+            return Ok(true);
         }
         if port.clock().now() >= limit {
             return Err(ErrorKind::TimedOut.into());
         }
     }
-    Ok(None)
+    Ok(false)
 }
 
 /// Starts to connect, without waiting.

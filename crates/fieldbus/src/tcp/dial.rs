@@ -8,7 +8,7 @@ use rustix::fd::AsFd;
 use crate::{BusError, Port};
 #[cfg(unix)]
 use tickbus_base::os::SerialPort;
-use tickbus_base::os::{Interest, Poller, Source};
+use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::{Address, close_gracefully, connect, is_for_later, no_wait};
@@ -132,15 +132,22 @@ impl<S: Stream> Call<S> {
         port: &mut Port,
         stop: &Stop,
     ) -> Result<(), BusError> {
-        let mut poller = Poller::new(stop).map_err(|error| no_wait(&error))?;
+        let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+        let mut interest = self.interest();
+        let added = set.add(0, &self.stream, interest);
+        added.map_err(|error| no_wait(&error))?;
         let mut readable = false;
         while !stop.is_stopped() {
             self.turn(readable, caller, port)?;
             let deadline = caller.deadline(port).min(port.due());
-            let mut sources = [Source::new(&self.stream, self.interest())];
-            let waited = poller.wait(&**port.clock(), deadline, &mut sources);
+            if interest != self.interest() {
+                interest = self.interest();
+                let changed = set.change(0, &self.stream, interest);
+                changed.map_err(|error| no_wait(&error))?;
+            }
+            let waited = set.wait(&**port.clock(), deadline);
             waited.map_err(|error| no_wait(&error))?;
-            readable = sources[0].is_readable();
+            readable = set.ready().iter().any(|ready| ready.is_readable);
         }
         Ok(())
     }

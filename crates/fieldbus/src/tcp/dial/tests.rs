@@ -210,10 +210,10 @@ fn what_has_arrived_in_the_meantime_counts_before_the_time_is_checked() {
     peer.write_all(&[7]).expect("room");
     clock.advance(SECOND);
     let stop = Stop::new();
-    let mut poller = Poller::new(&stop).expect("a poller");
-    let mut sources = [Source::new(call.stream(), Interest::Read)];
-    let waited = poller.wait(&*clock, Nanos::MAX, &mut sources);
-    waited.expect("it can wait");
+    let mut set = PollSet::new(&stop).expect("a set");
+    let added = set.add(0, call.stream(), Interest::Read);
+    added.expect("it is open");
+    set.wait(&*clock, Nanos::MAX).expect("it can wait");
     let turned = call.turn(true, &mut speaker, &mut port);
     turned.expect("it goes on");
     assert_eq!(speaker.calls, ["hear", "turn", "wrote", "wrote", "check"]);

@@ -15,18 +15,18 @@
 //! is the other way round.
 
 mod edges;
-mod ring;
+mod event_ring;
+mod row_ring;
 mod station;
 mod sync;
-mod tick_ring;
 mod triple;
 
 pub mod signal;
 
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
-pub use ring::{Consumer, Event, Producer, event_ring};
+pub use event_ring::{Consumer, Event, Producer, event_ring};
+pub use row_ring::{RowReader, RowWriter, row_ring};
 pub use station::{Arrival, BusStation, Receiver, StationStreams, TickStation, station};
-pub use tick_ring::{TickReader, TickWriter, tick_ring};
 pub use triple::{Reader, Writer, triple_buffer};
 
 /// One frame of the process image: its bytes and what belongs to them.

@@ -18,7 +18,7 @@ use super::vcd::VcdSink;
 use super::{Format, Options};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
-use tickbus_image::{TickReader, TickWriter, tick_ring};
+use tickbus_image::{RowReader, RowWriter, row_ring};
 
 /// How often the thread polls the ring. The tick makes no system calls, so that it cannot wake the thread.
 const LOOK: Duration = Duration::from_millis(5);
@@ -124,7 +124,7 @@ impl Bell {
 /// makes no system call either.
 #[derive(Debug)]
 pub struct Recorder {
-    ring: TickWriter,
+    ring: RowWriter,
     /// Allocated once, refilled at every tick.
     head: Vec<u64>,
     slots: usize,
@@ -241,7 +241,7 @@ impl Recorder {
     ) -> std::io::Result<Self> {
         let head = HEAD + columns.stations.len();
         let slots = columns.columns.len();
-        let (ring, reader) = tick_ring(ticks, head + slots);
+        let (ring, reader) = row_ring(ticks, head + slots);
         let bell = Arc::new(Bell::default());
         let tally = Arc::new(RecorderCounters {
             file: path,
@@ -362,7 +362,7 @@ impl Drop for Recorder {
 
 /// The thread's half of a recorder.
 struct Writing {
-    ring: TickReader,
+    ring: RowReader,
     words: Box<[u64]>,
     tick: Tick,
     kinds: Box<[super::ValueKind]>,

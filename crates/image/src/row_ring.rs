@@ -1,70 +1,70 @@
-//! The ring between the tick and the recording thread: whole ticks, lock-free and wait-free.
+//! A ring of rows between two threads, lock-free and wait-free: ticks to be recorded, events of a bus.
 
 use crate::signal::Slot;
 use crate::sync::{Arc, AtomicU64, AtomicUsize, Ordering};
 
 #[derive(Debug)]
 struct Shared {
-    /// The ticks, one after another. Atomic words, written relaxed and ordered by the indices, keep this free
+    /// The rows, one after another. Atomic words, written relaxed and ordered by the indices, keep this free
     /// of unsafe code.
     words: Box<[AtomicU64]>,
-    /// Capacity in ticks, a power of two.
-    ticks: usize,
-    /// Words of one tick.
+    /// Capacity in rows, a power of two.
+    rows: usize,
+    /// Words of one row.
     size: usize,
-    /// Ticks ever pushed; the place of tick n is n modulo the capacity.
+    /// Rows ever pushed; the place of row n is n modulo the capacity.
     pushed: AtomicUsize,
-    /// Ticks ever taken.
+    /// Rows ever taken.
     taken: AtomicUsize,
 }
 
 impl Shared {
-    fn place(&self, tick: usize) -> &[AtomicU64] {
-        let start = (tick & (self.ticks - 1)) * self.size;
+    fn place(&self, row: usize) -> &[AtomicU64] {
+        let start = (row & (self.rows - 1)) * self.size;
         &self.words[start..start + self.size]
     }
 }
 
-/// The tick's side of the ring.
+/// The side that appends rows.
 #[derive(Debug)]
-pub struct TickWriter {
+pub struct RowWriter {
     shared: Arc<Shared>,
     pushed: usize,
     /// The last known value of `taken`: reading it again costs a transfer of the other thread's cache line.
     taken: usize,
 }
 
-/// The recording thread's side of the ring.
+/// The side that takes rows.
 #[derive(Debug)]
-pub struct TickReader {
+pub struct RowReader {
     shared: Arc<Shared>,
 }
 
-/// Creates a ring for `ticks` ticks (rounded up to a power of two) of `size` words each.
-pub fn tick_ring(ticks: usize, size: usize) -> (TickWriter, TickReader) {
-    let ticks = ticks.max(1).next_power_of_two();
+/// Creates a ring for `rows` rows (rounded up to a power of two) of `size` words each.
+pub fn row_ring(rows: usize, size: usize) -> (RowWriter, RowReader) {
+    let rows = rows.max(1).next_power_of_two();
     let shared = Arc::new(Shared {
-        words: (0..ticks * size).map(|_| AtomicU64::new(0)).collect(),
-        ticks,
+        words: (0..rows * size).map(|_| AtomicU64::new(0)).collect(),
+        rows,
         size,
         pushed: AtomicUsize::new(0),
         taken: AtomicUsize::new(0),
     });
-    let writer = TickWriter {
+    let writer = RowWriter {
         shared: Arc::clone(&shared),
         pushed: 0,
         taken: 0,
     };
-    (writer, TickReader { shared })
+    (writer, RowReader { shared })
 }
 
-impl TickWriter {
-    /// Appends a tick, `head` followed by `slots`, together `size` words. Takes no lock, makes no system
+impl RowWriter {
+    /// Appends a row, `head` followed by `slots`, together `size` words. Takes no lock, makes no system
     /// call, allocates nothing. Returns false, and appends nothing, if the ring is full.
     ///
     /// # Panics
     ///
-    /// When `head` is longer than a tick.
+    /// When `head` is longer than a row.
     #[inline]
     pub fn push(&mut self, head: &[u64], slots: &[Slot]) -> bool {
         if self.is_full() {
@@ -83,20 +83,20 @@ impl TickWriter {
         true
     }
 
-    /// Whether there is no room for another tick.
+    /// Whether there is no room for another row.
     #[inline]
     pub fn is_full(&mut self) -> bool {
-        let ticks = self.shared.ticks;
-        if self.pushed.wrapping_sub(self.taken) == ticks {
+        let rows = self.shared.rows;
+        if self.pushed.wrapping_sub(self.taken) == rows {
             self.taken = self.shared.taken.load(Ordering::Acquire);
         }
-        self.pushed.wrapping_sub(self.taken) == ticks
+        self.pushed.wrapping_sub(self.taken) == rows
     }
 
     /// Whether more than half of the ring is in use.
     #[inline]
     pub fn is_half_full(&mut self) -> bool {
-        let half = self.shared.ticks / 2;
+        let half = self.shared.rows / 2;
         if self.pushed.wrapping_sub(self.taken) > half {
             self.taken = self.shared.taken.load(Ordering::Acquire);
         }
@@ -104,8 +104,8 @@ impl TickWriter {
     }
 }
 
-impl TickReader {
-    /// Copies the oldest tick into `words`, which must be one tick long, and frees its place; false if there
+impl RowReader {
+    /// Copies the oldest row into `words`, which must be one row long, and frees its place; false if there
     /// is none.
     pub fn take(&mut self, words: &mut [u64]) -> bool {
         let shared = &*self.shared;
@@ -126,8 +126,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_come_out_in_order_and_a_full_ring_takes_none() {
-        let (mut writer, mut reader) = tick_ring(4, 3);
+    fn rows_come_out_in_order_and_a_full_ring_takes_none() {
+        let (mut writer, mut reader) = row_ring(4, 3);
         for n in 0..4 {
             assert!(writer.push(&[n], &[Slot(n + 1), Slot(n + 2)]));
         }
@@ -142,9 +142,9 @@ mod tests {
     }
 
     #[test]
-    fn threads_never_tear_a_tick() {
+    fn threads_never_tear_a_row() {
         const SENT: u64 = if cfg!(miri) { 300 } else { 100_000 };
-        let (mut writer, mut reader) = tick_ring(8, 5);
+        let (mut writer, mut reader) = row_ring(8, 5);
         let pushing = std::thread::spawn(move || {
             (0..SENT)
                 .filter(|n| writer.push(&[*n], &[Slot(*n); 4]))
@@ -172,9 +172,9 @@ mod loom_tests {
     use super::*;
 
     #[test]
-    fn loom_ticks_arrive_whole_and_in_order() {
+    fn loom_rows_arrive_whole_and_in_order() {
         loom::model(|| {
-            let (mut writer, mut reader) = tick_ring(2, 2);
+            let (mut writer, mut reader) = row_ring(2, 2);
             let pushing = loom::thread::spawn(move || {
                 for n in 1..=3 {
                     writer.push(&[n], &[Slot(n)]);

@@ -1,6 +1,7 @@
 //! The event ring: every write of a peer, in order; the image itself would only show the last one.
 
-use super::sync::{Arc, AtomicU64, AtomicUsize, Ordering};
+use super::row_ring::{RowReader, RowWriter, row_ring};
+use super::sync::{Arc, AtomicU64, Ordering};
 use crate::signal::Slot;
 use tickbus_base::time::Nanos;
 
@@ -18,101 +19,60 @@ pub struct Event {
 /// Words per event in the ring.
 const WORDS: usize = 3;
 
-#[derive(Debug)]
-struct Shared {
-    /// Capacity × [`WORDS`]. Atomic words, written relaxed and ordered by the indices, keep this
-    /// free of unsafe code; on today's processors they cost what plain words cost.
-    words: Box<[AtomicU64]>,
-    /// Events ever pushed; the slot of event n is n modulo the capacity.
-    pushed: AtomicUsize,
-    /// Events ever popped.
-    popped: AtomicUsize,
-    /// Events that found the ring full.
-    lost: AtomicU64,
-}
-
 /// The bus's side of the ring.
 #[derive(Debug)]
 pub struct Producer {
-    shared: Arc<Shared>,
+    rows: RowWriter,
+    lost: Arc<AtomicU64>,
 }
 
 /// The application's side of the ring.
 #[derive(Debug)]
 pub struct Consumer {
-    shared: Arc<Shared>,
+    rows: RowReader,
+    /// Events that found the ring full.
+    lost: Arc<AtomicU64>,
 }
 
 /// Creates a ring for `capacity` events, rounded up to a power of two.
 pub fn event_ring(capacity: usize) -> (Producer, Consumer) {
-    let capacity = capacity.next_power_of_two();
-    let shared = Arc::new(Shared {
-        words: (0..capacity * WORDS).map(|_| AtomicU64::new(0)).collect(),
-        pushed: AtomicUsize::new(0),
-        popped: AtomicUsize::new(0),
-        lost: AtomicU64::new(0),
-    });
-    (
-        Producer {
-            shared: Arc::clone(&shared),
-        },
-        Consumer { shared },
-    )
-}
-
-impl Shared {
-    fn slot(&self, event: usize) -> &[AtomicU64] {
-        let capacity = self.words.len() / WORDS;
-        let start = (event & (capacity - 1)) * WORDS;
-        &self.words[start..start + WORDS]
-    }
+    let (writer, rows) = row_ring(capacity, WORDS);
+    let lost = Arc::new(AtomicU64::new(0));
+    let producer = Producer {
+        rows: writer,
+        lost: Arc::clone(&lost),
+    };
+    (producer, Consumer { rows, lost })
 }
 
 impl Producer {
     /// Appends an event; if the ring is full, the event is lost and counted.
     pub fn push(&mut self, event: Event) {
-        let shared = &*self.shared;
-        let pushed = shared.pushed.load(Ordering::Relaxed);
-        let capacity = shared.words.len() / WORDS;
-        if pushed.wrapping_sub(shared.popped.load(Ordering::Acquire)) == capacity {
-            shared.lost.fetch_add(1, Ordering::Relaxed);
-            return;
+        let time = event.time.0.cast_unsigned();
+        let head = [event.signal.into(), time];
+        if !self.rows.push(&head, &[event.value]) {
+            self.lost.fetch_add(1, Ordering::Relaxed);
         }
-        let slot = shared.slot(pushed);
-        slot[0].store(u64::from(event.signal), Ordering::Relaxed);
-        slot[1].store(event.value.0, Ordering::Relaxed);
-        slot[2].store(event.time.0.cast_unsigned(), Ordering::Relaxed);
-        shared
-            .pushed
-            .store(pushed.wrapping_add(1), Ordering::Release);
     }
 }
 
 impl Consumer {
     /// Takes the oldest event.
     pub fn pop(&mut self) -> Option<Event> {
-        let shared = &*self.shared;
-        let popped = shared.popped.load(Ordering::Relaxed);
-        if popped == shared.pushed.load(Ordering::Acquire) {
-            return None;
-        }
-        let slot = shared.slot(popped);
-        let event = Event {
+        let mut words = [0; WORDS];
+        let [signal, time, value] = self.rows.take(&mut words).then_some(words)?;
+        Some(Event {
             // Only `push` writes this word, from a u32.
             #[allow(clippy::cast_possible_truncation)]
-            signal: slot[0].load(Ordering::Relaxed) as u32,
-            value: Slot(slot[1].load(Ordering::Relaxed)),
-            time: Nanos(slot[2].load(Ordering::Relaxed).cast_signed()),
-        };
-        shared
-            .popped
-            .store(popped.wrapping_add(1), Ordering::Release);
-        Some(event)
+            signal: signal as u32,
+            value: Slot(value),
+            time: Nanos(time.cast_signed()),
+        })
     }
 
     /// Events lost so far because the ring was full.
     pub fn lost(&self) -> u64 {
-        self.shared.lost.load(Ordering::Relaxed)
+        self.lost.load(Ordering::Relaxed)
     }
 }
 

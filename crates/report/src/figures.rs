@@ -1,6 +1,6 @@
 //! Small figures without a script: SVG within the page.
 
-use std::fmt::Write as _;
+use maud::{Markup, html};
 
 use super::html::{count, counted, span};
 use super::statistics::Distribution;
@@ -14,7 +14,7 @@ const MOST_BARS: f64 = 48.0;
 
 /// From the median to the maximum, on a logarithmic scale shared by all `alike`: a box from p50 to p90, a
 /// line to p99, a dot at the maximum.
-pub(super) fn distribution(of: &Distribution, alike: &[&Distribution]) -> String {
+pub(super) fn distribution(of: &Distribution, alike: &[&Distribution]) -> Markup {
     let all = || {
         alike
             .iter()
@@ -33,13 +33,21 @@ pub(super) fn distribution(of: &Distribution, alike: &[&Distribution]) -> String
     };
     let [p50, p90, p99, max, _] = of.values.map(x);
     let width = (p90 - p50).max(2.0);
-    format!(
-        "<svg class=\"box\" viewBox=\"0 0 {WIDTH} 16\" width=\"{WIDTH}\" height=\"16\" aria-hidden=\"true\">\
-         <path class=\"rail\" d=\"M0 8H{WIDTH}\"/><path class=\"line\" d=\"M{p50:.1} 8H{p99:.1}\"/>\
-         <path class=\"thin\" d=\"M{p99:.1} 8H{max:.1}\"/>\
-         <rect class=\"bar\" x=\"{p50:.1}\" y=\"3\" width=\"{width:.1}\" height=\"10\"/>\
-         <circle class=\"dot\" cx=\"{max:.1}\" cy=\"8\" r=\"3.5\"/></svg>"
-    )
+    let line = |from: f64, to: f64| format!("M{from:.1} 8H{to:.1}");
+    html! {
+        svg class="box" viewBox={ "0 0 " (WIDTH) " 16" } width=(WIDTH) height="16" aria-hidden="true" {
+            path class="rail" d={ "M0 8H" (WIDTH) } {}
+            path class="line" d=(line(p50, p99)) {}
+            path class="thin" d=(line(p99, max)) {}
+            rect class="bar" x=(tenths(p50)) y="3" width=(tenths(width)) height="10" {}
+            circle class="dot" cx=(tenths(max)) cy="8" r="3.5" {}
+        }
+    }
+}
+
+/// A coordinate in SVG units.
+fn tenths(number: f64) -> String {
+    format!("{number:.1}")
 }
 
 /// The logarithm, limited below at one thousandth.
@@ -49,69 +57,51 @@ fn log(value: f64) -> f64 {
 
 /// A histogram of spans as bars, or a sentence if all spans are equal.
 pub(super) fn histogram(
-    out: &mut String,
     what: &str,
     spans: &TimeHistogram,
     shortest: Nanos,
     longest: Nanos,
-) {
+) -> Markup {
     let total = counted(spans.count(), what, &format!("{what}s"));
     if shortest == longest {
-        let _ = writeln!(out, "<p>{total}, each {} long.</p>", span(shortest));
-        return;
+        return html! { p { (total) ", each " (span(shortest)) " long." } };
     }
     let [p50, p99] = [0.5, 0.99].map(|share| span(spans.quantile(share)));
-    let _ = writeln!(
-        out,
-        "<p>{total}: shortest {}, median {p50}, 99 % at most {p99}, longest {}.</p>",
-        span(shortest),
-        span(longest)
-    );
     let axis = Axis::new(shortest, longest);
     let bars = axis.bars(spans);
     let most = bars.iter().copied().max().unwrap_or(1).max(1);
     let (wide, high) = (720.0, 160.0);
     let x = |edge: usize| wide * axis.place(edge);
-    let _ = write!(
-        out,
-        "<figure><svg class=\"histogram\" viewBox=\"0 0 {wide} {}\" role=\"img\" aria-label=\"TimeHistogram of {what}s\">\
-         <path class=\"rail\" d=\"M0 {high}H{wide}\"/>",
-        high + 24.0
-    );
-    for (place, bar) in bars.iter().enumerate().filter(|(_, bar)| **bar > 0) {
-        #[expect(clippy::cast_precision_loss, reason = "places in a figure")]
-        // A bar that is not empty must be visible, however rare its spans.
-        let height = (*bar as f64 / most as f64 * (high - 12.0)).max(2.0);
-        let _ = write!(
-            out,
-            "<rect class=\"bar\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{height:.1}\">\
-             <title>{} to {}: {}</title></rect>",
-            x(place) + 0.5,
-            high - height,
-            (x(place + 1) - x(place) - 1.0).max(1.0),
-            span(axis.edge(place)),
-            span(axis.edge(place + 1)),
-            count(*bar)
-        );
+    // A bar that is not empty must be visible, however rare its spans.
+    #[expect(clippy::cast_precision_loss, reason = "places in a figure")]
+    let height = |bar: u64| (bar as f64 / most as f64 * (high - 12.0)).max(2.0);
+    let edges = [(0, "start"), (axis.bars / 2, "middle"), (axis.bars, "end")];
+    html! {
+        p {
+            (total) ": shortest " (span(shortest)) ", median " (p50) ", 99 % at most " (p99) ", longest "
+            (span(longest)) "."
+        }
+        figure {
+            svg class="histogram" viewBox={ "0 0 " (wide) " " (high + 24.0) } role="img"
+                aria-label={ "Histogram of " (what) "s" } {
+                path class="rail" d={ "M0 " (high) "H" (wide) } {}
+                @for (place, bar) in bars.iter().enumerate().filter(|(_, bar)| **bar > 0) {
+                    rect class="bar" x=(tenths(x(place) + 0.5)) y=(tenths(high - height(*bar)))
+                        width=(tenths((x(place + 1) - x(place) - 1.0).max(1.0))) height=(tenths(height(*bar))) {
+                        title { (span(axis.edge(place))) " to " (span(axis.edge(place + 1))) ": " (count(*bar)) }
+                    }
+                }
+                @for (edge, anchor) in edges {
+                    text x=(tenths(x(edge))) y=(high + 16.0) text-anchor=(anchor) { (span(axis.edge(edge))) }
+                }
+            }
+            figcaption {
+                "How many " (what) "s are how long"
+                @if axis.is_logarithmic { ", on a logarithmic scale" }
+                "; the highest bar has " (count(most)) "."
+            }
+        }
     }
-    for (edge, anchor) in [(0, "start"), (axis.bars / 2, "middle"), (axis.bars, "end")] {
-        let (x, y) = (x(edge), high + 16.0);
-        let _ = write!(
-            out,
-            "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
-            span(axis.edge(edge))
-        );
-    }
-    let scale = if axis.is_logarithmic {
-        ", on a logarithmic scale"
-    } else {
-        ""
-    };
-    let _ = writeln!(
-        out,
-        "</svg><figcaption>How many {what}s are how long{scale}; the highest bar has {}.</figcaption></figure>",
-        count(most)
-    );
 }
 
 /// The axis of a histogram, divided into bars no narrower than the resolution of the spans.
@@ -186,9 +176,8 @@ mod tests {
         let mut spans = TimeHistogram::new();
         let tick = Nanos::from_millis(1);
         (0..1500).for_each(|_| spans.record(tick));
-        let mut out = String::new();
-        histogram(&mut out, "interval", &spans, tick, tick);
-        assert_eq!(out, "<p>1,500 intervals, each 1 ms long.</p>\n");
+        let text = histogram("interval", &spans, tick, tick).into_string();
+        assert_eq!(text, "<p>1,500 intervals, each 1 ms long.</p>");
     }
 
     #[test]
@@ -216,7 +205,7 @@ mod tests {
             [1.0, 1.0, 1.0, 1.0, 1.0],
             [0.1, 2.0, 1e9, 1e9, 5.0],
         ] {
-            let figure = distribution(&one(values), &[&one(values)]);
+            let figure = distribution(&one(values), &[&one(values)]).into_string();
             assert!(
                 !figure.contains("NaN") && !figure.contains("inf"),
                 "{figure}"

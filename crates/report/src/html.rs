@@ -1,37 +1,14 @@
-//! Text escaped for HTML, and numbers formatted for people.
+//! Text for HTML and JSON, and numbers formatted for people.
 
 use std::fmt;
 
+use maud::Markup;
 use tickbus_base::time::Nanos;
 
-/// Writes a text escaped for use between tags and within double quotes.
-pub(super) struct Text<'a>(pub(super) &'a str);
-
-impl fmt::Display for Text<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut rest = self.0;
-        while let Some(at) =
-            rest.find(|c: char| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_control(c))
-        {
-            f.write_str(&rest[..at])?;
-            let special = rest[at..].chars().next().expect("one was found there");
-            match special {
-                '&' => f.write_str("&amp;")?,
-                '<' => f.write_str("&lt;")?,
-                '>' => f.write_str("&gt;")?,
-                '"' => f.write_str("&quot;")?,
-                '\'' => f.write_str("&#39;")?,
-                // Not permitted in HTML, not even escaped.
-                _ => f.write_str("\u{fffd}")?,
-            }
-            rest = &rest[at + special.len_utf8()..];
-        }
-        f.write_str(rest)
-    }
-}
-
-fn is_control(c: char) -> bool {
-    c.is_control() && !matches!(c, '\n' | '\t')
+/// The text of `markup`. Control characters are not permitted in HTML, not even escaped.
+pub(super) fn printable(markup: Markup) -> String {
+    let is_control = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    markup.into_string().replace(is_control, "\u{fffd}")
 }
 
 /// Writes a text as JSON that is safe within a script element.
@@ -118,13 +95,14 @@ pub(super) fn digits(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use maud::html;
 
     #[test]
     fn texts_stand_for_themselves() {
         let text = "<b> & \"x\" 'y' \u{7}é\n";
         assert_eq!(
-            Text(text).to_string(),
-            "&lt;b&gt; &amp; &quot;x&quot; &#39;y&#39; \u{fffd}é\n"
+            printable(html! { (text) }),
+            "&lt;b&gt; &amp; &quot;x&quot; 'y' \u{fffd}é\n"
         );
         let script = "</script><!-- \"\\ \u{1}\u{2028}é";
         assert_eq!(

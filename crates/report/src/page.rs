@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::html::{Json, Text, count, counted, digits, span};
+use maud::{Markup, html};
+
+use super::html::{Json, count, counted, digits, printable, span};
 use super::spans::{self, Span};
 use super::tables::{self, Scale};
 use super::{MarkKind, Run, SignalKind, Statistics, code, figures};
@@ -74,13 +76,13 @@ pub fn write(contents: &Contents<'_>, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(before.as_bytes())?;
         rest = after;
         match name {
-            "title" => write!(out, "{}", Text(contents.title))?,
-            "source" => write!(out, "{}", Text(contents.source))?,
+            "title" => write_markup(html! { (contents.title) }, out)?,
+            "source" => write_markup(html! { (contents.source) }, out)?,
             "version" => out.write_all(env!("CARGO_PKG_VERSION").as_bytes())?,
             "style" => out.write_all(STYLE.as_bytes())?,
-            "facts" => out.write_all(facts(contents, &bands).as_bytes())?,
+            "facts" => write_markup(facts(contents, &bands), out)?,
             "chart" => out.write_all(CHART.as_bytes())?,
-            "sections" => out.write_all(sections(contents, &bands, scale).as_bytes())?,
+            "sections" => write_markup(sections(contents, &bands, scale), out)?,
             "data" => data(contents, &bands, scale, out)?,
             "script" => SCRIPT
                 .iter()
@@ -89,6 +91,10 @@ pub fn write(contents: &Contents<'_>, out: &mut dyn Write) -> io::Result<()> {
         }
     }
     out.write_all(rest.as_bytes())
+}
+
+fn write_markup(markup: Markup, out: &mut dyn Write) -> io::Result<()> {
+    out.write_all(printable(markup).as_bytes())
 }
 
 fn bands(contents: &Contents<'_>) -> Vec<Band> {
@@ -151,7 +157,7 @@ fn of_kind<'b>(bands: &'b [Band], kind: &'b str) -> impl Iterator<Item = &'b Spa
         .flat_map(|band| &band.spans)
 }
 
-fn facts(contents: &Contents<'_>, bands: &[Band]) -> String {
+fn facts(contents: &Contents<'_>, bands: &[Band]) -> Markup {
     let run = contents.run;
     let (begin, end) = run.extent();
     let changes: u64 = run
@@ -159,45 +165,24 @@ fn facts(contents: &Contents<'_>, bands: &[Band]) -> String {
         .iter()
         .map(|signal| signal.seen().saturating_sub(1))
         .sum();
-    let mut out = String::new();
-    let mut fact = |name: &str, value: &str, class: &str| {
-        let _ = writeln!(
-            out,
-            "<div class=\"{class}\"><dt>{name}</dt><dd>{}</dd></div>",
-            Text(value)
-        );
-    };
-    fact("Simulated", &span(end - begin), "");
-    fact("Ticks", &count(run.ticks()), "");
-    fact("Signals", &count(run.signals().len() as u64), "");
-    fact("Changes", &count(changes), "");
+    let fact = |name: &str, value: &str, class: &str| html! { div class=(class) { dt { (name) } dd { (value) } } };
     let steps = of_kind(bands, "step").count();
-    if steps > 0 {
-        fact("Steps", &count(steps as u64), "");
-    }
-    if let Some(share) = share_good(bands) {
-        let text = format!("{} %", digits((share * 1000.0).floor() / 10.0));
-        fact(
-            "Data live",
-            &text,
-            if share < 1.0 { "warn" } else { "good" },
-        );
-    }
     let faults = of_kind(bands, "fault").count() as u64;
-    let (text, class) = if faults == 0 {
-        ("none".to_owned(), "good")
-    } else {
-        (count(faults), "bad")
-    };
-    fact("Faults", &text, class);
     let gaps = of_kind(bands, "gap").count() as u64;
-    let (text, class) = if gaps == 0 {
-        ("complete".to_owned(), "good")
-    } else {
-        (counted(gaps, "gap", "gaps"), "warn")
-    };
-    fact("Recording", &text, class);
-    out
+    html! {
+        (fact("Simulated", &span(end - begin), ""))
+        (fact("Ticks", &count(run.ticks()), ""))
+        (fact("Signals", &count(run.signals().len() as u64), ""))
+        (fact("Changes", &count(changes), ""))
+        @if steps > 0 { (fact("Steps", &count(steps as u64), "")) }
+        @if let Some(share) = share_good(bands) {
+            @let text = format!("{} %", digits((share * 1000.0).floor() / 10.0));
+            (fact("Data live", &text, if share < 1.0 { "warn" } else { "good" }))
+        }
+        @if faults == 0 { (fact("Faults", "none", "good")) } @else { (fact("Faults", &count(faults), "bad")) }
+        @if gaps == 0 { (fact("Recording", "complete", "good")) }
+        @else { (fact("Recording", &counted(gaps, "gap", "gaps"), "warn")) }
+    }
 }
 
 /// The share of the time for which all lines were live; `None` if nothing is known about them.
@@ -215,141 +200,95 @@ fn share_good(bands: &[Band]) -> Option<f64> {
     (all > 0).then(|| good as f64 / all as f64)
 }
 
-fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> String {
+fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> Markup {
     let run = contents.run;
-    let mut out = String::new();
-    let section = |out: &mut String, id: &str, heading: &str, inner: String| {
-        if !inner.is_empty() {
-            let heading = Text(heading);
-            let _ = write!(
-                out,
-                "<section id=\"{id}\">\n<h2>{heading}</h2>\n{inner}</section>\n"
-            );
-        }
-    };
-    let mut inner = String::new();
     let of = |kind| of_kind(bands, kind).cloned().collect::<Vec<_>>();
     let steps = of("step");
-    if !steps.is_empty() {
-        tables::steps(&mut inner, &steps, scale);
-    }
-    section(&mut out, "steps", "Steps", std::mem::take(&mut inner));
-
     let named = |kind, name| of(kind).into_iter().map(move |span| (name, span));
     let mut events: Vec<_> = named("fault", "Fault")
         .chain(named("gap", "Gap"))
         .chain(named("note", "Note"))
         .collect();
     events.sort_by_key(|(_, event)| event.from);
-    if events.is_empty() {
-        inner.push_str("<p>No faults and no gaps were recorded.</p>\n");
-    } else {
-        tables::events(&mut inner, &events, scale);
-    }
-    if run.marks_left_out() > 0 {
-        let more = counted(run.marks_left_out(), "more was", "more were");
-        let _ = writeln!(
-            inner,
-            "<p class=\"note\">{more} recorded, and not taken into this report.</p>"
-        );
-    }
-    section(
-        &mut out,
-        "faults",
-        "Faults and gaps",
-        std::mem::take(&mut inner),
-    );
-
     let states = of("link");
-    if let Some(statistics) = contents.statistics {
-        line(&mut inner, statistics);
+    let distributions = contents.statistics.map(Statistics::distributions);
+    let distributions = distributions.filter(|distributions| !distributions.is_empty());
+    html! {
+        @if !steps.is_empty() { (section("steps", "Steps", &tables::steps(&steps, scale))) }
+        (section("faults", "Faults and gaps", &html! {
+            @if events.is_empty() { p { "No faults and no gaps were recorded." } }
+            @else { (tables::events(&events, scale)) }
+            @if run.marks_left_out() > 0 {
+                p.note {
+                    (counted(run.marks_left_out(), "more was", "more were"))
+                    " recorded, and not taken into this report."
+                }
+            }
+        }))
+        (section("link", "State of the line", &html! {
+            @if let Some(statistics) = contents.statistics { (line(statistics)) }
+            @if !states.is_empty() { (tables::states(&states, scale)) }
+        }))
+        (section("timing", "Timing", &html! {
+            @if let Some((intervals, shortest, longest)) = run.intervals() {
+                h3 { "From one tick to the next, in simulation time" }
+                (figures::histogram("interval", intervals, shortest, longest))
+            }
+            @if let Some(distributions) = &distributions {
+                h3 { "Distributions from the statistics" }
+                (tables::distributions(distributions))
+            }
+        }))
+        @for (place, (heading, text)) in contents.texts.iter().enumerate() {
+            (section(&format!("text{place}"), heading, &html! { pre tabindex="0" { (text.trim_end()) } }))
+        }
+        (section("figures", "In figures", &figures_of_signals(contents)))
     }
-    if !states.is_empty() {
-        tables::states(&mut inner, &states, scale);
-    }
-    section(
-        &mut out,
-        "link",
-        "State of the line",
-        std::mem::take(&mut inner),
-    );
+}
 
-    if let Some((intervals, shortest, longest)) = run.intervals() {
-        inner.push_str("<h3>From one tick to the next, in simulation time</h3>\n");
-        figures::histogram(&mut inner, "interval", intervals, shortest, longest);
+/// A section, if there is anything in it.
+fn section(id: &str, heading: &str, inner: &Markup) -> Markup {
+    html! {
+        @if !inner.0.is_empty() { section id=(id) { h2 { (heading) } (inner) } }
     }
-    if let Some(statistics) = contents
-        .statistics
-        .filter(|statistics| !statistics.distributions().is_empty())
-    {
-        inner.push_str("<h3>Distributions from the statistics</h3>\n");
-        tables::distributions(&mut inner, &statistics.distributions());
-    }
-    section(&mut out, "timing", "Timing", std::mem::take(&mut inner));
-
-    for (place, (heading, text)) in contents.texts.iter().enumerate() {
-        let _ = writeln!(inner, "<pre tabindex=\"0\">{}</pre>", Text(text.trim_end()));
-        section(
-            &mut out,
-            &format!("text{place}"),
-            heading,
-            std::mem::take(&mut inner),
-        );
-    }
-    figures_of_signals(&mut inner, contents);
-    section(&mut out, "figures", "In figures", inner);
-    out
 }
 
 /// The final state of the line according to the statistics.
-fn line(out: &mut String, statistics: &Statistics) {
+fn line(statistics: &Statistics) -> Markup {
     let Some(state) = statistics.get("state") else {
-        return;
+        return Markup::default();
     };
-    let class = spans::state_class(state);
-    let _ = write!(
-        out,
-        "<p>At the end: <span class=\"tag {class}\">{}</span>",
-        Text(state)
-    );
-    if let Some(reason) = statistics.get("reason") {
-        let _ = write!(out, " {}", Text(reason));
-    }
-    if let Some(address) = statistics.get("address") {
-        let _ = write!(out, " ({})", Text(address));
-    }
-    out.push_str("</p>\n");
     let entered = statistics.all().iter().filter_map(|(key, value)| {
         let state = key.strip_prefix("link.")?;
-        (value != "0").then(|| format!("{} {}", Text(state), Text(value)))
+        (value != "0").then(|| format!("{state} {value}"))
     });
     let entered: Vec<String> = entered.collect();
-    if !entered.is_empty() {
-        let _ = writeln!(
-            out,
-            "<p>How often each state was entered: {}.</p>",
-            entered.join(", ")
-        );
+    html! {
+        p {
+            "At the end: " (tables::tag(state))
+            @if let Some(reason) = statistics.get("reason") { " " (reason) }
+            @if let Some(address) = statistics.get("address") { " (" (address) ")" }
+        }
+        @if !entered.is_empty() { p { "How often each state was entered: " (entered.join(", ")) "." } }
     }
 }
 
-fn figures_of_signals(out: &mut String, contents: &Contents<'_>) {
+fn figures_of_signals(contents: &Contents<'_>) -> Markup {
     let run = contents.run;
-    let signals = counted(run.signals().len() as u64, "signal", "signals");
-    let _ = writeln!(
-        out,
-        "<details><summary>{signals}: changes, least, greatest, last value</summary>"
-    );
-    tables::signals(out, run);
-    out.push_str("</details>\n");
-    if let Some(statistics) = contents
-        .statistics
-        .filter(|statistics| !statistics.is_empty())
-    {
-        let all = counted(statistics.all().len() as u64, "line", "lines");
-        let _ = writeln!(out, "<details><summary>All statistics: {all}</summary>");
-        tables::statistics(out, statistics);
-        out.push_str("</details>\n");
+    html! {
+        details {
+            summary {
+                (counted(run.signals().len() as u64, "signal", "signals"))
+                ": changes, least, greatest, last value"
+            }
+            (tables::signals(run))
+        }
+        @if let Some(statistics) = contents.statistics.filter(|statistics| !statistics.is_empty()) {
+            details {
+                summary { "All statistics: " (counted(statistics.all().len() as u64, "line", "lines")) }
+                (tables::statistics(statistics))
+            }
+        }
     }
 }
 

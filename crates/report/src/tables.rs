@@ -1,9 +1,10 @@
 //! The tables of the page.
 
 use std::collections::BTreeMap;
-use std::fmt::{self, Write as _};
 
-use super::html::{Text, count, counted, digits, seconds, span};
+use maud::{Markup, html};
+
+use super::html::{count, counted, digits, seconds, span};
 use super::spans::{Span, state_class};
 use super::statistics::Distribution;
 use super::{Run, Signal, SignalKind, Statistics, figures};
@@ -28,53 +29,44 @@ impl Scale {
     }
 
     /// A link that shows a span in the chart.
-    fn link(self, from: Nanos, until: Nanos) -> String {
+    fn link(self, from: Nanos, until: Nanos) -> Markup {
         let (begin, end) = (self.units(from), self.units(until));
-        let at = seconds(from);
-        format!("<a href=\"#signals\" data-from=\"{begin}\" data-to=\"{end}\">{at}</a>")
+        html! { a href="#signals" data-from=(begin) data-to=(end) { (seconds(from)) } }
     }
 }
 
-/// Heading cells; those that begin with ">" head columns of numbers.
-fn head(out: &mut String, caption: &str, cells: &[&str]) {
-    begin(out, "wide", caption, cells);
-}
-
-/// As [`head`], with a class; "list" is for narrow rows, which are set in several columns if there is room.
-fn begin(out: &mut String, class: &str, caption: &str, cells: &[&str]) {
-    let _ = write!(
-        out,
-        "<div class=\"{class}\"><table><caption>{caption}</caption><thead><tr>"
-    );
-    for cell in cells {
-        let _ = match cell.strip_prefix('>') {
-            Some(cell) => write!(out, "<th scope=\"col\" class=\"n\">{cell}</th>"),
-            None => write!(out, "<th scope=\"col\">{cell}</th>"),
-        };
+/// A table. Headings that begin with ">" head columns of numbers; the class "list" is for narrow rows, which
+/// are set in several columns if there is room.
+fn table(class: &str, caption: &str, headings: &[&str], rows: &Markup) -> Markup {
+    html! {
+        div class=(class) { table {
+            caption { (caption) }
+            thead { tr {
+                @for heading in headings {
+                    @match heading.strip_prefix('>') {
+                        Some(heading) => th scope="col" class="n" { (heading) },
+                        None => th scope="col" { (heading) },
+                    }
+                }
+            } }
+            tbody { (rows) }
+        } }
     }
-    out.push_str("</tr></thead><tbody>\n");
 }
 
-fn end(out: &mut String) {
-    out.push_str("</tbody></table></div>\n");
-}
-
-fn number(out: &mut String, value: &dyn fmt::Display) {
-    let _ = write!(out, "<td class=\"n\">{value}</td>");
-}
-
-fn left_out(out: &mut String, total: usize) {
-    if total > MOST_ROWS {
-        let more = counted((total - MOST_ROWS) as u64, "more is", "more are");
-        let _ = writeln!(
-            out,
-            "<p class=\"note\">{more} not listed; the chart has all that the recording has.</p>"
-        );
+fn left_out(total: usize) -> Markup {
+    html! {
+        @if total > MOST_ROWS {
+            p.note {
+                (counted((total - MOST_ROWS) as u64, "more is", "more are"))
+                " not listed; the chart has all that the recording has."
+            }
+        }
     }
 }
 
 /// Steps: the number and length of each, then their sequence.
-pub(super) fn steps(out: &mut String, steps: &[Span], scale: Scale) {
+pub(super) fn steps(steps: &[Span], scale: Scale) -> Markup {
     let mut by_text: BTreeMap<(u64, &str), Vec<Nanos>> = BTreeMap::new();
     for step in steps {
         // In numerical order if they are numbers.
@@ -85,116 +77,111 @@ pub(super) fn steps(out: &mut String, steps: &[Span], scale: Scale) {
             lengths.push(step.until - step.from);
         }
     }
-    head(
-        out,
-        "How long each step took",
-        &["Step", ">Times", ">Shortest", ">Mean", ">Longest"],
-    );
-    for ((_, text), lengths) in &by_text {
-        let _ = write!(out, "<tr><th scope=\"row\">{}</th>", Text(text));
-        number(out, &count(lengths.len() as u64));
-        let sum = lengths
-            .iter()
-            .map(|length| i128::from(length.0))
-            .sum::<i128>();
-        let mean = sum
-            .checked_div(lengths.len() as i128)
-            .and_then(|mean| i64::try_from(mean).ok());
-        for length in [
-            lengths.iter().min().copied(),
-            mean.map(Nanos),
-            lengths.iter().max().copied(),
-        ] {
-            number(out, &length.map_or_else(|| "–".to_owned(), span));
+    let mean = |lengths: &[Nanos]| {
+        let sum: i128 = lengths.iter().map(|length| i128::from(length.0)).sum();
+        let mean = sum.checked_div(lengths.len() as i128)?;
+        i64::try_from(mean).ok().map(Nanos)
+    };
+    let each = html! {
+        @for ((_, text), lengths) in &by_text {
+            tr {
+                th scope="row" { (text) }
+                td.n { (count(lengths.len() as u64)) }
+                @for length in [lengths.iter().min().copied(), mean(lengths), lengths.iter().max().copied()] {
+                    td.n { (length.map_or_else(|| "–".to_owned(), span)) }
+                }
+            }
         }
-        out.push_str("</tr>\n");
+    };
+    let all = html! {
+        @for step in steps.iter().take(MOST_ROWS) {
+            tr { th scope="row" { (step.text) } (begin_and_length(step, scale)) }
+        }
+    };
+    let headings = ["Step", ">Times", ">Shortest", ">Mean", ">Longest"];
+    html! {
+        (table("wide", "How long each step took", &headings, &each))
+        details open[steps.len() <= 100] {
+            summary { (counted(steps.len() as u64, "step", "steps")) ", one after another" }
+            (table("list", "Steps in the order of time", &["Step", ">Begin", ">Duration"], &all))
+            (left_out(steps.len()))
+        }
     }
-    end(out);
-    let _ = writeln!(
-        out,
-        "<details{}><summary>{}, one after another</summary>",
-        if steps.len() <= 100 { " open" } else { "" },
-        counted(steps.len() as u64, "step", "steps")
-    );
-    begin(
-        out,
-        "list",
-        "Steps in the order of time",
-        &["Step", ">Begin", ">Duration"],
-    );
-    for step in steps.iter().take(MOST_ROWS) {
-        let _ = write!(out, "<tr><th scope=\"row\">{}</th>", Text(&step.text));
-        begin_and_length(out, step, scale);
-        out.push_str("</tr>\n");
-    }
-    end(out);
-    left_out(out, steps.len());
-    out.push_str("</details>\n");
 }
 
-fn begin_and_length(out: &mut String, step: &Span, scale: Scale) {
-    number(out, &scale.link(step.from, step.until));
-    let length = span(step.until - step.from);
-    let open = if step.is_open {
-        "<span class=\"note\"> until the end</span>"
-    } else {
-        ""
-    };
-    let _ = write!(out, "<td class=\"n\">{length}{open}</td>");
+fn begin_and_length(step: &Span, scale: Scale) -> Markup {
+    html! {
+        td.n { (scale.link(step.from, step.until)) }
+        td.n {
+            (span(step.until - step.from))
+            @if step.is_open { span.note { " until the end" } }
+        }
+    }
 }
 
 /// Faults, gaps, notes: each with kind, beginning and duration.
-pub(super) fn events(out: &mut String, events: &[(&str, Span)], scale: Scale) {
-    head(
-        out,
-        "In the order of time",
-        &["What", ">Begin", ">Duration", "Text"],
-    );
-    for (kind, event) in events.iter().take(MOST_ROWS) {
-        let class = kind.to_lowercase();
-        let _ = write!(
-            out,
-            "<tr><th scope=\"row\"><span class=\"tag {class}\">{kind}</span></th>"
-        );
-        begin_and_length(out, event, scale);
-        let _ = writeln!(out, "<td>{}</td></tr>", Text(&event.text));
+pub(super) fn events(events: &[(&str, Span)], scale: Scale) -> Markup {
+    let rows = html! {
+        @for (kind, event) in events.iter().take(MOST_ROWS) {
+            tr {
+                th scope="row" { span class={ "tag " (kind.to_lowercase()) } { (kind) } }
+                (begin_and_length(event, scale))
+                td { (event.text) }
+            }
+        }
+    };
+    let headings = ["What", ">Begin", ">Duration", "Text"];
+    html! {
+        (table("wide", "In the order of time", &headings, &rows))
+        (left_out(events.len()))
     }
-    end(out);
-    left_out(out, events.len());
 }
 
 /// States of lines over time.
-pub(super) fn states(out: &mut String, states: &[Span], scale: Scale) {
+pub(super) fn states(states: &[Span], scale: Scale) -> Markup {
     let has_names = states.iter().any(|state| !state.of.is_empty());
-    let cells: &[&str] = if has_names {
-        &["Station", "State", ">Begin", ">Duration"]
-    } else {
-        &["State", ">Begin", ">Duration"]
-    };
-    head(out, "States in the order of time", cells);
-    for state in states.iter().take(MOST_ROWS) {
-        out.push_str("<tr>");
-        if has_names {
-            let _ = write!(out, "<td>{}</td>", Text(&state.of));
+    let headings = ["Station", "State", ">Begin", ">Duration"];
+    let rows = html! {
+        @for state in states.iter().take(MOST_ROWS) {
+            @let (word, reason) = state.text.split_once(": ").unwrap_or((&state.text, ""));
+            tr {
+                @if has_names { td { (state.of) } }
+                td { (tag(word)) " " (reason) }
+                (begin_and_length(state, scale))
+            }
         }
-        let (word, reason) = state.text.split_once(": ").unwrap_or((&state.text, ""));
-        let class = state_class(word);
-        let _ = write!(
-            out,
-            "<td><span class=\"tag {class}\">{}</span> {}</td>",
-            Text(word),
-            Text(reason)
-        );
-        begin_and_length(out, state, scale);
-        out.push_str("</tr>\n");
+    };
+    let headings = &headings[usize::from(!has_names)..];
+    html! {
+        (table("wide", "States in the order of time", headings, &rows))
+        (left_out(states.len()))
     }
-    end(out);
-    left_out(out, states.len());
+}
+
+/// The state of a line.
+pub(super) fn tag(state: &str) -> Markup {
+    html! { span class={ "tag " (state_class(state)) } { (state) } }
 }
 
 /// The distributions of the statistics, each with a figure.
-pub(super) fn distributions(out: &mut String, distributions: &[Distribution]) {
-    let cells = [
+pub(super) fn distributions(distributions: &[Distribution]) -> Markup {
+    let alike = |unit: &str| -> Vec<&Distribution> {
+        let all = distributions.iter();
+        all.filter(|other| other.unit == unit).collect()
+    };
+    let rows = html! {
+        @for distribution in distributions {
+            tr {
+                th scope="row" class="name" { (distribution.name) }
+                td.n { (count(distribution.count)) }
+                @for value in distribution.values { td.n { (digits(value)) } }
+                td { (distribution.unit) }
+                td.figure { (figures::distribution(distribution, &alike(distribution.unit))) }
+            }
+        }
+    };
+    let caption = "Percentiles; in the figure, the box is p50 to p90, the line goes on to p99, the dot is the maximum";
+    let headings = [
         "Distribution",
         ">Count",
         ">p50",
@@ -205,51 +192,42 @@ pub(super) fn distributions(out: &mut String, distributions: &[Distribution]) {
         "Unit",
         "p50 to max",
     ];
-    head(
-        out,
-        "Percentiles; in the figure, the box is p50 to p90, the line goes on to p99, the dot is the maximum",
-        &cells,
-    );
-    for distribution in distributions {
-        let _ = write!(
-            out,
-            "<tr><th scope=\"row\" class=\"name\">{}</th>",
-            Text(&distribution.name)
-        );
-        number(out, &count(distribution.count));
-        for value in distribution.values {
-            number(out, &digits(value));
-        }
-        let alike = distributions
-            .iter()
-            .filter(|other| other.unit == distribution.unit);
-        let figure = figures::distribution(distribution, &alike.collect::<Vec<_>>());
-        let _ = writeln!(
-            out,
-            "<td>{}</td><td class=\"figure\">{figure}</td></tr>",
-            distribution.unit
-        );
-    }
-    end(out);
+    table("wide", caption, &headings, &rows)
 }
 
 /// All keys and values.
-pub(super) fn statistics(out: &mut String, statistics: &Statistics) {
-    head(out, "All statistics", &["Key", "Value"]);
-    for (key, value) in statistics.all() {
-        let _ = writeln!(
-            out,
-            "<tr><th scope=\"row\" class=\"name\">{}</th><td>{}</td></tr>",
-            Text(key),
-            Text(value)
-        );
-    }
-    end(out);
+pub(super) fn statistics(statistics: &Statistics) -> Markup {
+    let rows = html! {
+        @for (key, value) in statistics.all() {
+            tr { th scope="row" class="name" { (key) } td { (value) } }
+        }
+    };
+    table("wide", "All statistics", &["Key", "Value"], &rows)
 }
 
 /// A summary of each signal.
-pub(super) fn signals(out: &mut String, run: &Run) {
-    let cells = [
+pub(super) fn signals(run: &Run) -> Markup {
+    let number = |value: Option<f64>| {
+        let known = value.filter(|value| !value.is_nan());
+        known.map_or_else(|| "–".to_owned(), short_number)
+    };
+    let percent = |share: f64| format!("{} %", digits(share * 100.0));
+    let rows = html! {
+        @for signal in run.signals() {
+            @let range = signal.range();
+            tr {
+                th scope="row" class="name" { (signal.name) }
+                td { (signal.unit) }
+                td.n { (count(signal.seen().saturating_sub(1))) }
+                td.n { (signal.edges().map(count).unwrap_or_default()) }
+                td.n { (number(range.map(|(low, _)| low))) }
+                td.n { (number(range.map(|(_, high)| high))) }
+                td.n { (number(signal.changes().last().map(|change| change.value))) }
+                td.n { (share_on(signal, run).map(percent).unwrap_or_default()) }
+            }
+        }
+    };
+    let headings = [
         "Signal",
         "Unit",
         ">Changes",
@@ -259,39 +237,7 @@ pub(super) fn signals(out: &mut String, run: &Run) {
         ">Last",
         ">On",
     ];
-    head(out, "What each signal did", &cells);
-    for signal in run.signals() {
-        let (name, unit) = (Text(&signal.name), Text(&signal.unit));
-        let _ = write!(
-            out,
-            "<tr><th scope=\"row\" class=\"name\">{name}</th><td>{unit}</td>"
-        );
-        number(out, &count(signal.seen().saturating_sub(1)));
-        number(out, &signal.edges().map(count).unwrap_or_default());
-        let (low, high) = signal.range().unwrap_or((f64::NAN, f64::NAN));
-        let last = signal
-            .changes()
-            .last()
-            .map_or(f64::NAN, |change| change.value);
-        for value in [low, high, last] {
-            number(
-                out,
-                &if value.is_nan() {
-                    "–".to_owned()
-                } else {
-                    short_number(value)
-                },
-            );
-        }
-        number(
-            out,
-            &share_on(signal, run)
-                .map(|share| format!("{} %", digits(share * 100.0)))
-                .unwrap_or_default(),
-        );
-        out.push_str("</tr>\n");
-    }
-    end(out);
+    table("wide", "What each signal did", &headings, &rows)
 }
 
 /// The share of the run during which a bool was on.

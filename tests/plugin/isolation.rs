@@ -136,7 +136,7 @@ fn a_helper_that_is_not_this_tickbus_is_told_so() {
         reason.contains("ended with exit code 5 before it said hello"),
         "{reason}"
     );
-    let hello = r"printf '\012\000\000\000\001\005\000\000\0009.9.9' >&0; read line";
+    let hello = r"printf '\007\000\000\000\000\0059.9.9' >&0; read line";
     let reason = reason_with_helper(hello, "refused");
     assert!(
         reason.contains("is tickbus 9.9.9, and this is tickbus "),
@@ -148,7 +148,7 @@ fn a_helper_that_is_not_this_tickbus_is_told_so() {
         reason.contains("answered with a message of 1734439765 bytes, expected at most"),
         "{reason}"
     );
-    let done = r"printf '\002\000\000\000\003\000' >&0; read line";
+    let done = r"printf '\002\000\000\000\002\000' >&0; read line";
     let reason = reason_with_helper(done, "protocol");
     assert!(
         reason.contains("answered with \"done\" out of turn"),

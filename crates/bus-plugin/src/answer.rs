@@ -1,16 +1,19 @@
 //! Messages from a helper to its host.
 
+use serde::{Deserialize, Serialize, Serializer};
+
 use super::Outcome;
-use super::wire::{Fields, Letter, Message, WireError};
+use super::wire::Message;
 use tickbus_fieldbus::BusError;
 
 /// The longest text in an answer, in bytes.
 const TEXT_LIMIT: usize = 8000;
 
 /// A message from a helper to its host.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Answer {
-    /// It is there. Sent first, without a request.
+    /// It is there. Sent first, without a request. The first variant in every version, so that other versions are
+    /// told apart.
     Hello {
         /// The version of its tickbus; both ends must have the same.
         version: String,
@@ -20,29 +23,20 @@ pub enum Answer {
     /// The exchange is complete; what was received is in the shared memory.
     Done(Outcome),
     /// The last request failed in the library.
-    Failed(BusError),
+    Failed(#[serde(with = "Failure")] BusError),
+}
+
+/// [`BusError`] as it is sent.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "BusError")]
+enum Failure {
+    Link(#[serde(serialize_with = "shortened")] String),
+    Left(#[serde(serialize_with = "shortened")] String),
+    Protocol(#[serde(serialize_with = "shortened")] String),
+    Refused(#[serde(serialize_with = "shortened")] String),
 }
 
 impl Answer {
-    /// The bytes to send.
-    pub fn write(&self) -> Vec<u8> {
-        match self {
-            Self::Hello { version } => Letter::new(1).text(version),
-            Self::Opened => Letter::new(2),
-            Self::Done(outcome) => Letter::new(3).byte(outcome.code()),
-            Self::Failed(error) => {
-                let (fault, text) = match error {
-                    BusError::Link(text) => (1, text),
-                    BusError::Protocol(text) => (2, text),
-                    BusError::Refused(text) => (3, text),
-                    BusError::Left(text) => (4, text),
-                };
-                Letter::new(4).byte(fault).text(shortened(text))
-            }
-        }
-        .seal()
-    }
-
     /// Its name in messages.
     pub(super) const fn name(&self) -> &'static str {
         match self {
@@ -55,46 +49,21 @@ impl Answer {
 }
 
 /// As much of a text as an answer can hold, in whole characters.
-fn shortened(text: &str) -> &str {
+fn shortened<S: Serializer>(text: &str, into: S) -> Result<S::Ok, S::Error> {
     let mut end = text.len().min(TEXT_LIMIT);
     while !text.is_char_boundary(end) {
         end -= 1;
     }
-    &text[..end]
+    into.serialize_str(&text[..end])
 }
 
 impl Message for Answer {
-    const MOST: usize = TEXT_LIMIT + 6;
-
-    fn read(kind: u8, fields: &mut Fields<'_>) -> Result<Self, WireError> {
-        Ok(match kind {
-            1 => Self::Hello {
-                version: fields.text()?,
-            },
-            2 => Self::Opened,
-            3 => {
-                let code = fields.byte()?;
-                let outcome = Outcome::from_code(code.into());
-                Self::Done(outcome.ok_or_else(|| fields.wrong("unknown flags"))?)
-            }
-            4 => {
-                let kind = match fields.byte()? {
-                    1 => BusError::Link,
-                    2 => BusError::Protocol,
-                    3 => BusError::Refused,
-                    4 => BusError::Left,
-                    _ => return Err(fields.wrong("an unknown fault")),
-                };
-                Self::Failed(kind(fields.text()?))
-            }
-            other => return Err(WireError::Kind(other)),
-        })
-    }
+    const MOST: usize = TEXT_LIMIT + 4;
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::wire::Inbox;
+    use super::super::wire::{Inbox, WireError};
     use super::*;
     use proptest::prelude::*;
 
@@ -133,7 +102,7 @@ mod tests {
         fn answers_arrive_as_they_were_sent_in_pieces_of_any_size(
             sent in prop::collection::vec(answers(), 0..6), piece in 1..50_usize,
         ) {
-            let bytes: Vec<u8> = sent.iter().flat_map(Answer::write).collect();
+            let bytes: Vec<u8> = sent.iter().flat_map(Message::write).collect();
             prop_assert_eq!(read(&bytes, piece), Ok(sent));
         }
 
@@ -170,26 +139,23 @@ mod tests {
         let error = |bytes: &[u8]| read(bytes, 100).expect_err("no answer").to_string();
         assert_eq!(
             error(&[0xFF, 0xFF, 0, 0]),
-            "a message of 65535 bytes, expected at most 8006"
+            "a message of 65535 bytes, expected at most 8004"
         );
-        assert_eq!(error(&[0, 0, 0, 0]), "a message of the unknown kind 0");
-        assert_eq!(error(&[1, 0, 0, 0, 9]), "a message of the unknown kind 9");
-        assert_eq!(
-            error(&[1, 0, 0, 0, 3]),
-            "a message of kind 3 with fields missing"
-        );
-        assert_eq!(
-            error(&[2, 0, 0, 0, 3, 8]),
-            "a message of kind 3 with unknown flags"
-        );
-        assert_eq!(
-            error(&[2, 0, 0, 0, 2, 0]),
-            "a message of kind 2 with bytes left over"
-        );
-        assert_eq!(
-            error(&[6, 0, 0, 0, 1, 1, 0, 0, 0, 0xFF]),
-            "a message of kind 1 with a text that is no UTF-8"
-        );
+        let unreadable: [&[u8]; 5] = [
+            &[0, 0, 0, 0],
+            &[1, 0, 0, 0, 9],
+            &[1, 0, 0, 0, 2],
+            &[2, 0, 0, 0, 2, 8],
+            &[3, 0, 0, 0, 0, 1, 0xFF],
+        ];
+        for bytes in unreadable {
+            let text = error(bytes);
+            assert!(
+                text.starts_with("a message that cannot be read ("),
+                "{text}"
+            );
+        }
+        assert_eq!(error(&[2, 0, 0, 0, 1, 0]), "a message with bytes left over");
     }
 
     #[test]

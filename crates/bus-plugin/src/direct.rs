@@ -98,7 +98,9 @@ impl Direct {
             Some(library) => library,
             None => self
                 .library
-                .insert(port.calling(&calls.load, limits.open, || Library::load(&setup.library))?),
+                .insert(port.calling(&calls.load, limits.open, || {
+                    Library::load(setup.library.as_ref())
+                })?),
         };
         let bus = port.calling(&calls.open, limits.open, || library.open(setup))?;
         let mut line = OpenBus {

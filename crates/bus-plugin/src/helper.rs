@@ -38,7 +38,7 @@ pub fn serve() -> io::Result<()> {
     };
     let _guardian = guard(&host.line, Duration::from_millis(grace_ms))?;
     let memory = SharedMemory::open(&memory, memory_bytes(&setup))?;
-    let library = match Library::load(&setup.library) {
+    let library = match Library::load(setup.library.as_ref()) {
         Ok(library) => library,
         Err(error) => return host.refuse(error),
     };

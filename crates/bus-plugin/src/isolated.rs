@@ -19,7 +19,7 @@ use super::helper::{memory_bytes, out_word};
 use super::outcome::Outcome;
 use super::request::Request;
 use super::setup::Setup;
-use super::wire::Inbox;
+use super::wire::{Inbox, Message as _};
 use super::{Limits, VERSION};
 use tickbus_base::os::{Interest, PollSet, SharedMemory};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};

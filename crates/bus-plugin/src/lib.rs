@@ -35,7 +35,7 @@ pub use options::Options;
 pub use outcome::Outcome;
 pub use setup::{Setup, Station};
 #[cfg(unix)]
-pub use wire::{Fields, Inbox, Message, WireError};
+pub use wire::{Inbox, Message, WireError};
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{BusSetup, Free, OpenError};

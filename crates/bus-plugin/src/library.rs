@@ -362,7 +362,7 @@ mod tests {
         fn setup(&self, options: &[(&str, &str)]) -> Setup {
             let options = options.iter();
             Setup {
-                library: self.path(),
+                library: self.path().into(),
                 name: "Cell".to_owned(),
                 directory: "/opt".to_owned(),
                 role: Role::Controller,

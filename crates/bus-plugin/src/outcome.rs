@@ -1,10 +1,13 @@
 //! The meaning of the numbers that a library returns.
 
+use serde::{Deserialize, Serialize};
+
 use super::abi::{error, flag};
 use tickbus_fieldbus::BusError;
 
 /// The result of an exchange.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "u8")]
 pub struct Outcome(u8);
 
 impl Outcome {
@@ -17,11 +20,6 @@ impl Outcome {
         known
             .contains(&code)
             .then(|| Self(u8::try_from(code).expect("below 8")))
-    }
-
-    /// The combination of flags.
-    pub fn code(self) -> u8 {
-        self.0
     }
 
     /// The peer has the bytes of this exchange.
@@ -37,6 +35,14 @@ impl Outcome {
     /// The peer gave any sign of life.
     pub fn is_alive(self) -> bool {
         self != Self::NOTHING
+    }
+}
+
+impl TryFrom<u8> for Outcome {
+    type Error = &'static str;
+
+    fn try_from(code: u8) -> Result<Self, Self::Error> {
+        Self::from_code(code.into()).ok_or("unknown flags")
     }
 }
 
@@ -107,7 +113,7 @@ mod tests {
     fn each_sum_of_flags_is_an_outcome_and_nothing_else_is() {
         for code in 0..8 {
             let outcome = Outcome::from_code(code).expect("a sum of flags");
-            assert_eq!(i32::from(outcome.code()), code);
+            assert_eq!(i32::from(outcome.0), code);
             assert_eq!(outcome.is_alive(), code != 0);
         }
         for code in [i32::MIN, -7, -1, 8, 64, i32::MAX] {

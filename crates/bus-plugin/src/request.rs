@@ -1,17 +1,12 @@
 //! Messages from a host to its helper.
 
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt as _;
+use serde::{Deserialize, Serialize};
 
-use super::setup::{Setup, Station};
-use super::wire::{Fields, Letter, Message, WireError};
-use tickbus_fieldbus::Role;
-
-/// The most options or stations of a setup.
-const LIST_LIMIT: u32 = 10_000;
+use super::setup::Setup;
+use super::wire::Message;
 
 /// A request from a host to its helper. The end of the stream asks it to close and end.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Request {
     /// Load the library and open its bus. Sent first.
     Open {
@@ -23,80 +18,18 @@ pub(super) enum Request {
     Exchange,
 }
 
-impl Request {
-    /// The bytes to send.
-    pub(super) fn write(&self) -> Vec<u8> {
-        match self {
-            Self::Open { setup, grace_ms } => write_setup(Letter::new(1).long(*grace_ms), setup),
-            Self::Exchange => Letter::new(2),
-        }
-        .seal()
-    }
-}
-
-fn write_setup(letter: Letter, setup: &Setup) -> Letter {
-    letter
-        .bytes(setup.library.as_os_str().as_bytes())
-        .text(&setup.name)
-        .text(&setup.directory)
-        .byte(match setup.role {
-            Role::Device => 0,
-            Role::Controller => 1,
-        })
-        .list(&setup.options, |letter, (key, value)| {
-            letter.text(key).text(value)
-        })
-        .list(&setup.stations, |letter, station| {
-            letter.text(&station.name).word(station.tx).word(station.rx)
-        })
-        .word(setup.timeout_ms)
-        .long(setup.cycle_ns)
-        .long(setup.max_age_ns)
-}
-
-fn read_setup(fields: &mut Fields<'_>) -> Result<Setup, WireError> {
-    Ok(Setup {
-        library: OsStr::from_bytes(fields.bytes()?).into(),
-        name: fields.text()?,
-        directory: fields.text()?,
-        role: match fields.byte()? {
-            0 => Role::Device,
-            1 => Role::Controller,
-            _ => return Err(fields.wrong("an unknown role")),
-        },
-        options: fields.list(LIST_LIMIT, |fields| Ok((fields.text()?, fields.text()?)))?,
-        stations: fields.list(LIST_LIMIT, |fields| {
-            Ok(Station {
-                name: fields.text()?,
-                tx: fields.word()?,
-                rx: fields.word()?,
-            })
-        })?,
-        timeout_ms: fields.word()?,
-        cycle_ns: fields.long()?,
-        max_age_ns: fields.long()?,
-    })
-}
-
 impl Message for Request {
     const MOST: usize = 4 << 20;
-
-    fn read(kind: u8, fields: &mut Fields<'_>) -> Result<Self, WireError> {
-        Ok(match kind {
-            1 => Self::Open {
-                grace_ms: fields.long()?,
-                setup: read_setup(fields)?,
-            },
-            2 => Self::Exchange,
-            other => return Err(WireError::Kind(other)),
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::wire::Inbox;
     use super::*;
+    use crate::setup::Station;
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt as _;
+    use tickbus_fieldbus::Role;
 
     #[test]
     fn requests_arrive_as_they_were_sent() {

@@ -1,6 +1,9 @@
 //! What a library needs to open its bus.
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 use super::Options;
 use tickbus_base::time::Nanos;
@@ -11,7 +14,7 @@ use tickbus_image::signal::Area;
 const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);
 
 /// One station's frames.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Station {
     /// Its name; empty when it is the only one.
     pub name: String,
@@ -22,15 +25,16 @@ pub struct Station {
 }
 
 /// What a library needs to open its bus, and the library's file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setup {
-    /// The library's file, absolute.
-    pub library: PathBuf,
+    /// The library's file, absolute. It need not be UTF-8, as a path would have to be to be sent.
+    pub library: OsString,
     /// The driver's name.
     pub name: String,
     /// The folder of the driver.cfg.
     pub directory: String,
     /// Which end of the bus this is.
+    #[serde(with = "Sent")]
     pub role: Role,
     /// The library's own options, as key-value pairs without NUL.
     pub options: Vec<(String, String)>,
@@ -42,6 +46,14 @@ pub struct Setup {
     pub cycle_ns: u64,
     /// The age at which data are stale, in nanoseconds.
     pub max_age_ns: u64,
+}
+
+/// [`Role`] as it is sent.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Role")]
+enum Sent {
+    Device,
+    Controller,
 }
 
 impl Setup {
@@ -62,7 +74,7 @@ impl Setup {
         let millis = u32::try_from((timeout.0 + 999_999) / 1_000_000);
         let nanos = |span: Nanos| u64::try_from(span.0).unwrap_or(0);
         Self {
-            library,
+            library: library.into(),
             name: line.name.to_owned(),
             directory: line.folder.to_string_lossy().into_owned(),
             role: line.role,
@@ -96,7 +108,8 @@ impl Setup {
 
     /// The library's file name, for messages.
     pub(super) fn library_name(&self) -> String {
-        let name = self.library.file_name().unwrap_or(self.library.as_os_str());
+        let file = Path::new(&self.library);
+        let name = file.file_name().unwrap_or(&self.library);
         name.to_string_lossy().into_owned()
     }
 }

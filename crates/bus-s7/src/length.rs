@@ -3,13 +3,13 @@
 use tickbus_base::toml_text::Value;
 
 /// The longest PDU that our server agrees to, as of the largest CPUs.
-pub const LONGEST: u16 = 960;
+pub(super) const LONGEST: u16 = 960;
 
 /// The PDU length of the smallest CPUs.
-pub const LEAST: u16 = 240;
+pub(super) const LEAST: u16 = 240;
 
 /// The shortest PDU with room for an item.
-pub const SHORTEST: u16 = 64;
+pub(super) const SHORTEST: u16 = 64;
 
 /// Reads the longest PDU length to agree to.
 pub(crate) fn read_length(value: &Value<'_>) -> Option<u16> {

@@ -1,7 +1,6 @@
 //! The protocol data units of S7 communication: a header, parameters, data.
 
 use super::ProtocolError;
-pub use super::length::{LEAST, LONGEST, SHORTEST};
 
 const PROTOCOL: u8 = 0x32;
 /// `S7CommPlus`, the protocol of TIA Portal and newer panels.

@@ -37,7 +37,7 @@ macro_rules! kinds {
         }
 
         /// The bus kinds in this version.
-        pub const BUILT: &[&str] = &[
+        const BUILT: &[&str] = &[
             $(<$own_options as BusKind>::NAME,)+
             $($(#[cfg($cfg)])? <$hand_options as BusKind>::NAME,)+
         ];
@@ -59,7 +59,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Reads the keys of a kind in [`BUILT`].
+            /// Reads the keys of a kind in `BUILT`.
             fn read_kind(kind: &str, role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
                 $(if kind == <$own_options as BusKind>::NAME {
                     return <$own_options as BusKind>::read(role, moved, table).map(Self::$own);

@@ -10,5 +10,5 @@ mod overlay;
 mod timing;
 
 pub use config::{CommandLineEnd, Config};
-pub use kinds::{BUILT, Exported, Options};
+pub use kinds::{Exported, Options};
 pub use timing::Timing;

@@ -8,13 +8,6 @@ impl Code {
         self as i32
     }
 
-    /// The code with this number.
-    pub fn from_code(code: i32) -> Option<Self> {
-        Self::ALL.into_iter().find(|known| known.code() == code)
-    }
-}
-
-impl Code {
     /// The worse of two: an error over stale, stale over unchanged, unchanged over fresh.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {
@@ -45,15 +38,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_are_found_by_number() {
+    fn codes_have_a_text_and_a_remedy() {
         for code in Code::ALL {
-            assert_eq!(Code::from_code(code.code()), Some(code));
             assert!(
                 !code.text().is_empty() && !code.remedy().is_empty(),
                 "{code}"
             );
         }
-        assert_eq!(Code::from_code(i32::MIN), None);
     }
 
     #[test]

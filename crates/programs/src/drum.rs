@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
-/// The unit of dwell times and fault time-outs: 0.1 s.
+/// The unit of fault time-outs: 0.1 s.
 const TENTH: i64 = 100_000_000;
 
 /// A drum with `STEPS` steps, each a pattern of 16 outputs.
@@ -29,13 +29,9 @@ pub struct Drum<const STEPS: usize> {
     pub ff: [bool; STEPS],
     /// The drum coil, `DRC`: the block is enabled and the active step is not the preset one.
     pub drum_coil: bool,
-    /// The dwell time-out, `DTO`: the active step has lasted its dwell time. It is off in the first
-    /// call in a step, even if the dwell time is 0, and always if no dwell times are given.
-    pub dwell_timeout: bool,
     /// The time-out fault, `TFT`: the active step has lasted its fault time-out.
     pub timeout_fault: bool,
     patterns: [u16; STEPS],
-    dwell: Option<[u16; STEPS]>,
     fault: Option<[u16; STEPS]>,
     /// The value of `step` in the last call; `None` if that call was not enabled.
     step_before: Option<bool>,
@@ -53,23 +49,12 @@ impl<const STEPS: usize> Drum<STEPS> {
             q: 0,
             ff: [false; STEPS],
             drum_coil: false,
-            dwell_timeout: false,
             timeout_fault: false,
             patterns,
-            dwell: None,
             fault: None,
             step_before: None,
             timed: 0,
             entered: Nanos::ZERO,
-        }
-    }
-
-    /// The same drum with dwell times `DT`, in 0.1 s.
-    #[must_use]
-    pub const fn with_dwell(self, tenths: [u16; STEPS]) -> Self {
-        Self {
-            dwell: Some(tenths),
-            ..self
         }
     }
 
@@ -114,11 +99,9 @@ impl<const STEPS: usize> Drum<STEPS> {
         if reset || self.timed != self.active {
             self.timed = self.active;
             self.entered = now;
-            self.dwell_timeout = false;
             self.timeout_fault = false;
         } else {
             let lasted = |tenths: u16| now - self.entered >= Nanos(TENTH * i64::from(tenths));
-            self.dwell_timeout = self.dwell.is_some_and(|dwell| lasted(dwell[index]));
             self.timeout_fault = self
                 .fault
                 .is_some_and(|fault| fault[index] > 0 && lasted(fault[index]));
@@ -196,10 +179,8 @@ mod tests {
     }
 
     #[test]
-    fn dwell_and_fault_times_count_from_entering_the_step() {
-        let mut drum = Drum::new(PATTERNS)
-            .with_dwell([1, 0, 0])
-            .with_fault([3, 0, 1]);
+    fn fault_times_count_from_entering_the_step() {
+        let mut drum = Drum::new(PATTERNS).with_fault([3, 0, 1]);
         let mut times = Vec::new();
         for (now, reset, step) in [
             (0, true, false),
@@ -212,31 +193,22 @@ mod tests {
             (999, false, false),
         ] {
             drum.call(ms(now), true, reset, step);
-            times.push((drum.dwell_timeout, drum.timeout_fault));
+            times.push(drum.timeout_fault);
         }
         assert_eq!(
             times,
-            [
-                (false, false),
-                (false, false),
-                (false, false),
-                (true, false),
-                (true, true),
-                (false, false),
-                (true, false),
-                (true, false),
-            ]
+            [false, false, false, false, true, false, false, false]
         );
     }
 
     #[test]
     fn a_step_that_the_program_writes_is_a_new_step() {
-        let mut drum = Drum::new(PATTERNS).with_dwell([0; 3]);
+        let mut drum = Drum::new(PATTERNS).with_fault([1; 3]);
         drum.call(ms(0), true, false, false);
-        drum.call(ms(10), true, false, false);
-        assert!(drum.dwell_timeout);
+        drum.call(ms(100), true, false, false);
+        assert!(drum.timeout_fault);
         drum.active = 3;
-        drum.call(ms(20), true, false, false);
-        assert_eq!((drum.q, drum.dwell_timeout), (0x00F0, false));
+        drum.call(ms(200), true, false, false);
+        assert_eq!((drum.q, drum.timeout_fault), (0x00F0, false));
     }
 }

@@ -69,7 +69,6 @@ pub struct AxisControl {
     /// The machine has accepted the last command.
     taken: bool,
     commands: u64,
-    retries: u64,
 }
 
 impl AxisControl {
@@ -84,7 +83,6 @@ impl AxisControl {
             given: None,
             taken: false,
             commands: 0,
-            retries: 0,
         }
     }
 
@@ -115,19 +113,9 @@ impl AxisControl {
         self.is_taken() && inputs.in_position
     }
 
-    /// The last command sent.
-    pub fn last(&self) -> Option<&AxisCommand> {
-        self.given.as_ref()
-    }
-
     /// The number of commands sent, repetitions included.
     pub fn commands(&self) -> u64 {
         self.commands
-    }
-
-    /// The number of commands repeated because they were not acknowledged within a second.
-    pub fn retries(&self) -> u64 {
-        self.retries
     }
 
     /// Evaluates the block: one scan at `now`. Without `enable` the axis stops, and all commands are
@@ -183,7 +171,6 @@ impl AxisControl {
             // The machine was restarted, or does not acknowledge at all: repeat the edge.
             self.demand.execute = false;
             self.phase = Phase::Falling;
-            self.retries += 1;
             self.waiting = self.waiting.or(self.given);
         }
     }
@@ -300,7 +287,7 @@ mod tests {
             control.call(now, &AxisInputs::default(), true);
             now += SCAN;
         }
-        assert_eq!((control.commands(), control.retries()), (4, 3));
+        assert_eq!(control.commands(), 4);
         control.call(now, &AxisInputs::default(), false);
         assert!(!control.demand.execute);
         control.call(now + SCAN, &AxisInputs::default(), true);

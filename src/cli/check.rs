@@ -12,10 +12,8 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::{Config, Timing};
-use tickbus_fieldbus::Role;
-use tickbus_image::signal::{
-    Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width,
-};
+use tickbus_fieldbus::{Events, Role};
+use tickbus_image::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
 use tickbus_record as record;
 
 /// Read a driver.cfg; print its signal table, or every mistake in it.
@@ -55,7 +53,7 @@ fn report(config: &Config) -> String {
     };
     line("driver", &format!("{} \"{}\"", config.id, config.name));
     line("role", role(config));
-    line("bus", &bus(&config.bus, config.role, &config.table));
+    line("bus", &bus(config));
     for request in config.bus.requests(&config.table) {
         line("request", &request);
     }
@@ -147,10 +145,14 @@ fn role(config: &Config) -> &'static str {
     }
 }
 
-fn bus(options: &Options, role: Role, table: &SignalTable) -> String {
-    let mut parts = vec![options.kind().to_owned()];
-    parts.extend(options.summary(role, table));
-    if options.events() {
+fn bus(config: &Config) -> String {
+    let mut parts = vec![config.bus.kind().to_owned()];
+    parts.extend(config.bus.summary(config.role, &config.table));
+    // Of the buses that learn of single writes, only this one says so here.
+    if config.events == Events::Writes && matches!(config.bus, Options::ModbusServer(_)) {
+        parts.push("every write".to_owned());
+    }
+    if config.events != Events::None {
         parts.push("with events".to_owned());
     }
     parts.join(", ")

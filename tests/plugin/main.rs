@@ -21,7 +21,7 @@ use fixture::{HELPER, Misbehaving, Udp, build, misbehaving, until, until_by, unt
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
 use tickbus::driver_cfg::Options;
-use tickbus::fieldbus::plugin;
+use tickbus::fieldbus::{Events, plugin};
 use tickbus::time::{Manual, Nanos};
 
 conformance!(plain, crate::Udp::new(false));
@@ -303,7 +303,7 @@ fn the_table_reads_whole_and_has_defaults() {
         let Options::Plugin(options) = config.bus else {
             panic!("{:?}", config.bus)
         };
-        options
+        (options, config.events)
     };
     let (millis, seconds) = (Nanos::from_millis, Nanos::from_secs);
     let mut expected = plugin::Options {
@@ -315,9 +315,8 @@ fn the_table_reads_whole_and_has_defaults() {
         close_timeout: seconds(2),
         isolated: false,
         helper: None,
-        events: false,
     };
-    assert_eq!(parse(""), expected);
+    assert_eq!(parse(""), (expected.clone(), Events::None));
     let lines = "options = { sync = true, card = 1_000, mask = 0x1F, baud = 1.5e6, \"a b\" = \"ä\" }\n\
                  timeout = \"5ms\"\nopen_timeout = \"6ms\"\ncall_timeout = \"7ms\"\n\
                  close_timeout = \"8ms\"\nisolated = true\nhelper = \"bin/tickbus\"\nevents = true";
@@ -337,8 +336,7 @@ fn the_table_reads_whole_and_has_defaults() {
     expected.close_timeout = millis(8);
     expected.isolated = true;
     expected.helper = Some("bin/tickbus".into());
-    expected.events = true;
-    assert_eq!(parse(lines), expected);
+    assert_eq!(parse(lines), (expected, Events::Changes));
 }
 
 #[test]

@@ -11,23 +11,20 @@ use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "modbus-server";
+    const LEARNS_OF_WRITES: bool = true;
 
-    fn read(role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, table)
     }
 }
 
 impl BusOptions for ServerOptions {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, table: &SignalTable) -> Vec<String> {
         self.shown(table)
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let server = ModbusServer::new(self, setup.table, setup.role, setup.name);
+        let server = ModbusServer::new(self, setup);
         Ok(Bus::Free(Box::new(server)))
     }
 
@@ -51,16 +48,12 @@ impl BusOptions for ServerOptions {
 impl BusKind for ClientOptions {
     const NAME: &'static str = "modbus-client";
 
-    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)
     }
 }
 
 impl BusOptions for ClientOptions {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
         self.shown(role, table)
     }

@@ -35,9 +35,6 @@ impl ServerOptions {
                 table.elements(outputs) - 1
             ));
         }
-        if self.every_write {
-            parts.push("every write".to_owned());
-        }
         parts
     }
 

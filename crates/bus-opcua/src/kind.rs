@@ -10,16 +10,12 @@ use super::{ClientOptions, ServerOptions};
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
 
-    fn read(_role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(_role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(moved, table)
     }
 }
 
 impl BusOptions for ClientOptions {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         self.summary()
     }
@@ -58,17 +54,14 @@ impl BusOptions for ClientOptions {
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "opcua-server";
+    const LEARNS_OF_WRITES: bool = true;
 
-    fn read(_role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)
     }
 }
 
 impl BusOptions for ServerOptions {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         self.summary()
     }

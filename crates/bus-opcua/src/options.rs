@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, HashMap};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::At;
-use tickbus_fieldbus::read_events;
 use tickbus_fieldbus::tcp::{Address, AddressError, Host};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 
@@ -40,8 +39,6 @@ pub struct ClientOptions {
     pub node_pattern: Pattern,
     /// The identity of the only server that may be written to.
     pub write_to: Option<String>,
-    /// Whether every change reported by the server is an event, in addition to the image.
-    pub events: bool,
     /// The offset of the table in the text.
     at: usize,
 }
@@ -68,10 +65,6 @@ pub struct ServerOptions {
     pub credentials: Credentials,
     /// Whether anonymous logins are permitted.
     pub anonymous: bool,
-    /// Whether every change by a client is reported as an event, in addition to the image.
-    pub events: bool,
-    /// Whether every write is reported, changed or not.
-    pub every_write: bool,
 }
 
 impl ClientOptions {
@@ -96,7 +89,7 @@ impl ClientOptions {
     }
 
     /// Reads the keys of a client. `moved` says that [`set_address`](Self::set_address) follows.
-    pub fn read(moved: bool, mut table: Table<'_>) -> Option<Self> {
+    pub fn read(moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let right = "write where the server is, such as url = \"opc.tcp://192.168.0.1:4840\"";
         let url = if moved {
             table.take("url")
@@ -104,13 +97,11 @@ impl ClientOptions {
             table.require("url", right)
         };
         let at = table.at();
-        let keys = Keys::take(&mut table);
+        let keys = Keys::take(table);
         let intervals = ["publishing_interval", "sampling_interval"].map(|key| table.take(key));
         let nodes = table.take("nodes");
         let pattern = table.take("node_pattern");
         let write_to = table.take("write_to");
-        let events = table.take("events");
-        table.finish();
 
         let url = match &url {
             None => moved.then(|| Url {
@@ -144,7 +135,6 @@ impl ClientOptions {
                 text.map(|text| Some(text.to_owned()))
             }
         };
-        let events = events.map_or(Some(false), |value| value.boolean());
         Some(Self {
             url: url?,
             security: security?,
@@ -154,7 +144,6 @@ impl ClientOptions {
             nodes: nodes?,
             node_pattern: node_pattern?,
             write_to: write_to?,
-            events: events?,
             at,
         })
     }
@@ -292,12 +281,11 @@ impl ServerOptions {
     }
 
     /// Reads the keys of a server.
-    pub fn read(mut table: Table<'_>) -> Option<Self> {
+    pub fn read(table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let host = table.take("host");
-        let keys = Keys::take(&mut table);
+        let keys = Keys::take(table);
         let anonymous = table.take("anonymous");
-        let events = table.take("events");
         if !keys.has_user() && anonymous.is_none() {
             table.require_one_of(
                 &["user", "anonymous"],
@@ -306,7 +294,6 @@ impl ServerOptions {
             );
         }
         let whole = table.is_whole();
-        table.finish();
 
         let read = address.as_ref().map_or(Some(ADDRESS), Address::read);
         let host = host.map_or(Some(None), |value| read_host(&value).map(Some));
@@ -325,15 +312,12 @@ impl ServerOptions {
                 "name a user with password_file or password_env, or write anonymous = true",
             );
         }
-        let events = events.as_ref().map_or(Some((false, false)), read_events);
         Some(Self {
             address: read?,
             host: host?,
             security: security?,
             credentials: credentials?,
             anonymous: allowed?,
-            events: events?.0,
-            every_write: events?.1,
         })
     }
 }

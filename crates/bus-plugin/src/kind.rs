@@ -10,16 +10,12 @@ use super::Options;
 impl BusKind for Options {
     const NAME: &'static str = "plugin";
 
-    fn read(_role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)
     }
 }
 
 impl BusOptions for Options {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("library {}", self.library.display())];
         if self.isolated {

@@ -34,13 +34,11 @@ pub struct Options {
     /// The tickbus command for starting that process; `None` searches for it. Relative to the folder of the
     /// driver.cfg.
     pub helper: Option<PathBuf>,
-    /// Whether every change by the peer is reported as an event, in addition to the image.
-    pub events: bool,
 }
 
 impl Options {
-    /// Reads `library`, `options`, the time-outs, `isolated` with `helper`, and `events`.
-    pub fn read(mut table: Table<'_>) -> Option<Self> {
+    /// Reads `library`, `options`, the time-outs, and `isolated` with `helper`.
+    pub fn read(table: &mut Table<'_>) -> Option<Self> {
         let library = table.require(
             "library",
             "name the shared library, such as library = \"libmybus.so\"",
@@ -52,9 +50,7 @@ impl Options {
         let close_timeout = table.take("close_timeout");
         let isolated = table.take("isolated");
         let helper = table.take("helper");
-        let events = table.take("events");
         let whole = table.is_whole();
-        table.finish();
 
         let library = library.and_then(|value| path(&value, "name the shared library's file"));
         let options = options.map_or(Some(Vec::new()), |value| read_options(&value));
@@ -82,7 +78,6 @@ impl Options {
                 path(&value, "name the tickbus command's file").map(Some)
             }
         };
-        let events = events.map_or(Some(false), |value| value.boolean());
         Some(Self {
             library: library?,
             options: options?,
@@ -92,7 +87,6 @@ impl Options {
             close_timeout: close_timeout?,
             isolated: isolated?,
             helper: helper?,
-            events: events?,
         })
     }
 }

@@ -10,17 +10,14 @@ use super::{ClientOptions, S7Client, S7Server, ServerOptions};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "s7-server";
+    const LEARNS_OF_WRITES: bool = true;
 
-    fn read(_role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)
     }
 }
 
 impl BusOptions for ServerOptions {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.address)];
         for block in &self.blocks {
@@ -37,7 +34,7 @@ impl BusOptions for ServerOptions {
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let server = S7Server::new(self, setup.table, setup.role, setup.name);
+        let server = S7Server::new(self, setup);
         Ok(Bus::Free(Box::new(server)))
     }
 
@@ -57,16 +54,12 @@ impl BusOptions for ServerOptions {
 impl BusKind for ClientOptions {
     const NAME: &'static str = "s7-client";
 
-    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)
     }
 }
 
 impl BusOptions for ClientOptions {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mut parts = vec![
             format!("connects to {}", self.address),

@@ -11,16 +11,12 @@ use super::{Message, Options, Sending, Socket, TcpRole};
 impl BusKind for Options {
     const NAME: &'static str = "socket";
 
-    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)
     }
 }
 
 impl BusOptions for Options {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let address = &self.address;
         let each: Vec<String> = self.stations.iter().map(ToString::to_string).collect();

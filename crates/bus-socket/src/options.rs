@@ -51,8 +51,6 @@ pub struct Options {
     pub sending: Sending,
     /// On change: the shortest time between two records; zero for no limit.
     pub min_interval: Nanos,
-    /// Whether every change by the peer is reported as an event, in addition to the image.
-    pub events: bool,
 }
 
 impl Options {
@@ -75,17 +73,15 @@ impl Options {
         Ok(())
     }
 
-    /// Reads `address`, `role_tcp`, `send`, `min_interval`, `events` and `message`. `moved` says that
+    /// Reads `address`, `role_tcp`, `send`, `min_interval` and `message`. `moved` says that
     /// [`set_address`](Self::set_address) follows.
-    pub fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
+    pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let tcp = table.take("role_tcp");
         let send = table.take("send");
         let min_interval = table.take("min_interval");
-        let events = table.take("events");
         let message = table.take("message");
         let whole = table.is_whole();
-        table.finish();
 
         let read = address
             .as_ref()
@@ -120,7 +116,6 @@ impl Options {
                 "add that, or remove it; the other ways to send have their own interval",
             );
         }
-        let events = events.map_or(Some(false), |value| value.boolean());
         let message = message.map_or(Some(Message::Image), |value| {
             let axis = Message::Axis { at: value.at() };
             value.choice("messages", &[("image", Message::Image), ("axis", axis)])
@@ -133,7 +128,6 @@ impl Options {
             tcp: tcp?,
             sending: sending?,
             min_interval: least?,
-            events: events?,
         })
     }
 }

@@ -9,7 +9,7 @@ use tickbus_axis as axis;
 use tickbus_axis::Axis;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
 use tickbus_fieldbus::faults::{self, Fault};
-use tickbus_fieldbus::{At, LifeSigns, Role, Written};
+use tickbus_fieldbus::{At, Events, LifeSigns, Role, Written};
 use tickbus_image::signal::{Addressing, SignalTable, Station};
 use tickbus_record as record;
 
@@ -40,6 +40,8 @@ pub struct Config {
     pub timing: Timing,
     /// The options of the bus.
     pub bus: Options,
+    /// What is reported as events.
+    pub events: Events,
     /// The signals by which each end knows that the other one is alive.
     pub life_signs: LifeSigns,
     /// Faults to inject at this end.
@@ -254,6 +256,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
         axes,
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
+        events: fieldbus.events,
         life_signs,
         faults,
         fault_file,
@@ -312,6 +315,7 @@ struct FieldbusTable<'a> {
     /// `[fieldbus.at]`, which can only be read after the signals.
     at: Option<Value<'a>>,
     bus: Option<Options>,
+    events: Events,
 }
 
 impl FieldbusTable<'_> {
@@ -345,10 +349,10 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
         );
     }
     let role = stated.or(asked.map(|asked| asked.role)).unwrap_or_default();
-    let bus = if let Some(kind) = kind {
+    let read = if let Some(kind) = kind {
         let moved = asked.is_some_and(|asked| asked.moved);
-        let bus = Options::read(&kind, role, moved, table);
-        if let (Some(bus), Some(_)) = (&bus, asked)
+        let read = Options::read(&kind, role, moved, table);
+        if let (Some((bus, _)), Some(_)) = (&read, asked)
             && bus.is_in_process()
         {
             kind.wrong(
@@ -359,12 +363,13 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
                 "use a bus between processes, such as kind = \"socket\"",
             );
         }
-        bus
+        read
     } else {
         // Without the bus kind it is unknown which keys are valid.
         table.finish_open();
         None
     };
+    let (bus, events) = read.unzip();
     FieldbusTable {
         role,
         is_for_both: stated.is_none(),
@@ -374,6 +379,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
         sizes,
         at,
         bus,
+        events: events.unwrap_or_default(),
     }
 }
 
@@ -623,6 +629,30 @@ mod tests {
             timing("cycle = \"50ms\"\nmax_age = \"60ms\"").max_age,
             Nanos::from_millis(60)
         );
+    }
+
+    #[test]
+    fn single_writes_are_events_where_the_bus_learns_of_them() {
+        for (kind, may) in [
+            ("modbus-server", true),
+            ("s7-server", true),
+            ("opcua-server\"\nanonymous = true\nhost = \"a", true),
+            ("loopback\"\nlink = \"cell", false),
+            ("socket", false),
+        ] {
+            let read = |events: &str| {
+                let text = format!(
+                    "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"{kind}\"\n{events}\n\
+                     [[signal]]\nname = \"A\"\naddress = \"%QW0\"\n"
+                );
+                Config::parse("test.cfg", &text).map(|config| config.events)
+            };
+            assert_eq!(read(""), Ok(Events::None), "{kind}");
+            assert_eq!(read("events = false"), Ok(Events::None), "{kind}");
+            assert_eq!(read("events = true"), Ok(Events::Changes), "{kind}");
+            let writes = read("events = \"writes\"");
+            assert_eq!(writes.ok(), may.then_some(Events::Writes), "{kind}");
+        }
     }
 
     #[test]

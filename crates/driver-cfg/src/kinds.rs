@@ -9,7 +9,7 @@ use tickbus_bus_opcua as opcua;
 use tickbus_bus_plugin as plugin;
 use tickbus_bus_s7 as s7;
 use tickbus_bus_socket as socket;
-use tickbus_fieldbus::{At, BusKind, BusOptions, Role};
+use tickbus_fieldbus::{At, BusKind, BusOptions, Events, Role};
 use tickbus_image::signal::SignalTable;
 
 use crate::loopback;
@@ -60,12 +60,12 @@ macro_rules! kinds {
             }
 
             /// Reads the keys of a kind in `BUILT`.
-            fn read_kind(kind: &str, role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+            fn read_kind(kind: &str, role: Role, moved: bool, table: Table<'_>) -> Option<(Self, Events)> {
                 $(if kind == <$own_options as BusKind>::NAME {
-                    return <$own_options as BusKind>::read(role, moved, table).map(Self::$own);
+                    return read_keys(role, moved, table).map(|(options, events)| (Self::$own(options), events));
                 })+
                 $($(#[cfg($cfg)])? if kind == <$hand_options as BusKind>::NAME {
-                    return <$hand_options as BusKind>::read(role, moved, table).map(Self::$hand);
+                    return read_keys(role, moved, table).map(|(options, events)| (Self::$hand(options), events));
                 })+
                 unreachable!("{kind} is a kind of this version")
             }
@@ -169,11 +169,16 @@ impl Options {
         }
     }
 
-    /// Reads the keys of the bus kind `kind`, and reports their mistakes. `moved` says that another address will
-    /// replace the one that is read.
+    /// Reads `events` and the keys of the bus kind `kind`, and reports their mistakes. `moved` says that another
+    /// address will replace the one that is read.
     ///
     /// The table is finished: keys that are left in it are unknown, unless the bus kind itself is unknown.
-    pub fn read(kind: &Value<'_>, role: Role, moved: bool, table: Table<'_>) -> Option<Self> {
+    pub fn read(
+        kind: &Value<'_>,
+        role: Role,
+        moved: bool,
+        table: Table<'_>,
+    ) -> Option<(Self, Events)> {
         let first = BUILT[0];
         let name = kind.text(&format!(
             "write the kind of bus in quotes, such as \"{first}\""
@@ -187,6 +192,35 @@ impl Options {
             }
         }
     }
+}
+
+/// Reads the keys of one kind, and `events`, which all kinds have.
+fn read_keys<K: BusKind>(role: Role, moved: bool, mut table: Table<'_>) -> Option<(K, Events)> {
+    let options = K::read(role, moved, &mut table);
+    let events = table.take("events");
+    table.finish();
+    let events = events.map_or(Some(Events::None), |value| {
+        read_events(&value, K::LEARNS_OF_WRITES)
+    });
+    Some((options?, events?))
+}
+
+fn read_events(value: &Value<'_>, has_writes: bool) -> Option<Events> {
+    if value.is_boolean() || !has_writes {
+        let changes = value.boolean()?;
+        return Some(if changes {
+            Events::Changes
+        } else {
+            Events::None
+        });
+    }
+    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
+    let text = value.text(right)?;
+    if text != "writes" {
+        value.wrong(format!("\"{}\" is no kind of events", shown(text)), right);
+        return None;
+    }
+    Some(Events::Writes)
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {

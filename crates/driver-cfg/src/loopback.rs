@@ -55,15 +55,14 @@ pub struct Options {
     pub mode: Mode,
     /// What is at the other end.
     pub peer: Peer,
-    /// Whether every change by the peer is reported as an event, in addition to the image.
-    pub events: bool,
 }
 
 impl Options {
-    /// Reads `mode`, `events`, and `link`, `replay`, or `program` with `program_options` and `scan`.
-    pub fn read(role: Role, mut table: Table<'_>) -> Option<Self> {
+    /// Reads `mode`, and `link`, `replay`, or `program` with `program_options` and `scan`.
+    pub fn read(role: Role, table: &mut Table<'_>) -> Option<Self> {
         let mode = table.take("mode");
-        let events = table.take("events");
+        // `[fieldbus]` reads it; among the keys that a message lists, it stands here.
+        table.take("events");
         let link = table.take("link");
         let program = table.take("program");
         let replay = table.take("replay");
@@ -75,7 +74,6 @@ impl Options {
              meet the driver that names the same link, or replay = \"run.vcd\" to replay a recording",
         );
         let whole = table.is_whole();
-        table.finish();
 
         let stated = mode
             .as_ref()
@@ -92,7 +90,6 @@ impl Options {
         } else {
             Mode::Free
         }));
-        let events = events.map_or(Some(false), |value| value.boolean());
         if program.is_none() {
             for (key, value) in [("program_options", &program_options), ("scan", &scan)] {
                 if let (Some(value), true) = (value, whole) {
@@ -130,7 +127,6 @@ impl Options {
         Some(Self {
             mode: mode?,
             peer: peer?,
-            events: events?,
         })
     }
 }
@@ -138,16 +134,12 @@ impl Options {
 impl BusKind for Options {
     const NAME: &'static str = "loopback";
 
-    fn read(role: Role, _moved: bool, table: Table<'_>) -> Option<Self> {
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, table)
     }
 }
 
 impl BusOptions for Options {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mode = match self.mode {
             Mode::Free => "free-running",

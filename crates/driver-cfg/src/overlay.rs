@@ -66,7 +66,7 @@ fn read_fieldbus(
             None => config.role,
             Some(value) => value.choice("roles", &roles)?,
         };
-        let mut bus = Options::read(&kind, role, false, table)?;
+        let (mut bus, events) = Options::read(&kind, role, false, table)?;
         read_stations(&mut bus, &config.table, stations, &kind, collector);
         if let Some(at) = &at {
             bus.place_signals(&At::read(at, &config.table), &config.table);
@@ -76,6 +76,7 @@ fn read_fieldbus(
             config.record = None;
         }
         config.bus = bus;
+        config.events = events;
         config.role = role;
         return Some(());
     }

@@ -45,6 +45,7 @@ pub(super) fn open(
         axes: &config.axes,
         cycle: config.timing.cycle,
         max_age: config.timing.max_age,
+        events: config.events,
     };
     let bus = config.bus.open(&setup).map_err(|error| {
         let named = |what| format!("{}: {what}", config.path.display());

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_axis::Reflexes;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Bus, Cause, ChangeEvents, LinkState, LinkStatus, Port, Role};
+use tickbus_fieldbus::{Bus, Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
 use tickbus_image::image;
 
 use super::bus;
@@ -56,7 +56,7 @@ impl Driver {
         .with_faults(Arc::clone(&board))
         .with_life_signs(signs.watches(&config.table, config.role, max_age))
         .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
-        if config.bus.events() {
+        if config.events != Events::None {
             let stations = 0..config.table.stations.len();
             port = port.with_changes(
                 stations

@@ -1,18 +1,13 @@
-//! The key `events` of a bus that knows what was written.
+//! Which changes by the peer are reported one by one.
 
-use tickbus_base::toml_text::{Value, shown};
-
-/// Reads `events` of a bus that knows what was written: whether changes are reported as events, and whether every
-/// write is.
-pub fn read_events(value: &Value<'_>) -> Option<(bool, bool)> {
-    if value.is_boolean() {
-        return value.boolean().map(|events| (events, false));
-    }
-    let right = "write true for every change, \"writes\" for every write, changed or not, or false";
-    let text = value.text(right)?;
-    if text != "writes" {
-        value.wrong(format!("\"{}\" is no kind of events", shown(text)), right);
-        return None;
-    }
-    Some((true, true))
+/// What `events` in `[fieldbus]` asks for, in addition to the image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Events {
+    /// Nothing.
+    #[default]
+    None,
+    /// Every change of a signal that is received.
+    Changes,
+    /// Every write of such a signal, changed or not; for buses that [learn of writes](crate::BusKind::LEARNS_OF_WRITES).
+    Writes,
 }

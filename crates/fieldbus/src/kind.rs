@@ -8,7 +8,7 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 
-use super::{At, Bus, Role};
+use super::{At, Bus, Events, Role};
 
 /// What a bus is told about its driver when it opens.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +29,8 @@ pub struct BusSetup<'a> {
     pub cycle: Option<Nanos>,
     /// Data older than this are stale.
     pub max_age: Nanos,
+    /// What is reported as events.
+    pub events: Events,
 }
 
 /// Why a bus does not open.
@@ -44,9 +46,6 @@ pub enum OpenError {
 ///
 /// Methods with a body are for buses that have something to say there.
 pub trait BusOptions {
-    /// Whether every change by the peer is reported as an event, in addition to the image.
-    fn events(&self) -> bool;
-
     /// What the line is and does, for `tickbus check`: parts of a sentence, to be joined with commas.
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String>;
 
@@ -119,9 +118,12 @@ pub trait BusKind: BusOptions + Sized {
     /// Its name, as in `kind = "modbus-server"`.
     const NAME: &'static str;
 
+    /// Whether it learns of each write of its peer, so that a driver.cfg may ask for [these](Events::Writes).
+    const LEARNS_OF_WRITES: bool = false;
+
     /// Reads its keys in `[fieldbus]`, for the end with `role`, and reports their mistakes. `moved` says that
     /// [another address](BusOptions::set_address) will follow.
     ///
-    /// The table is finished: keys that are left in it are unknown.
-    fn read(role: Role, moved: bool, table: Table<'_>) -> Option<Self>;
+    /// Keys that no reader has taken are reported afterwards.
+    fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self>;
 }

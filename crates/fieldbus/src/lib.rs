@@ -25,7 +25,7 @@ pub use bus::{Bus, CYCLE, Free, Stepped};
 pub use changes::ChangeEvents;
 pub use dead_band::DeadBands;
 pub use error::BusError;
-pub use events::read_events;
+pub use events::Events;
 pub use kind::{BusKind, BusOptions, BusSetup, OpenError};
 pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use port::{CallWatch, Frames, Port, Receipt};

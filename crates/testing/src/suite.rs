@@ -8,7 +8,7 @@ use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read
 use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::loopback::{self, Mode, Peer};
-use tickbus_fieldbus::Role;
+use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
 
@@ -178,8 +178,8 @@ fn on_simulation_time(
         config.bus = Options::Loopback(loopback::Options {
             mode: Mode::Stepped,
             peer,
-            events: false,
         });
+        config.events = Events::None;
         return Some(config);
     }
     if let Options::Loopback(options) = &mut config.bus

@@ -17,33 +17,22 @@ const PATH_LIMIT: usize = 1000;
 pub struct Options {
     /// The folder with the two files, which begins at that of the driver.cfg.
     pub folder: PathBuf,
-    /// Whether every change by the peer is an event, too.
-    pub events: bool,
 }
 
 impl BusKind for Options {
     const NAME: &'static str = "mailbox";
 
-    fn read(_role: Role, _moved: bool, mut table: Table<'_>) -> Option<Self> {
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let hint = "name the folder of the two files, such as folder = \"mailbox\"";
         let folder = table.require("folder", hint);
-        let events = table.take("events");
-        table.finish();
-        // All mistakes are reported, so nothing returns before each value was read.
-        let folder = folder.and_then(|value| value.label(PATH_LIMIT, hint));
-        let events = events.map_or(Some(false), |value| value.boolean());
+        let folder = folder.and_then(|value| value.label(PATH_LIMIT, hint))?;
         Some(Self {
-            folder: folder?.into(),
-            events: events?,
+            folder: folder.into(),
         })
     }
 }
 
 impl BusOptions for Options {
-    fn events(&self) -> bool {
-        self.events
-    }
-
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         vec![format!("files in {}", self.folder.display())]
     }

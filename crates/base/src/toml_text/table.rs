@@ -62,7 +62,9 @@ impl<'a> Table<'a> {
 
     /// The value of `key`, if present.
     pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
-        self.known.push(key);
+        if !self.known.contains(&key) {
+            self.known.push(key);
+        }
         let node = self.entries.get(key)?;
         Some(Value {
             collector: self.collector,

@@ -46,15 +46,13 @@ pub struct ClientOptions {
     pub timeout: Option<Nanos>,
     /// Whether a single request may write and read.
     pub combine: bool,
-    /// Whether every change by the server is reported as an event, in addition to the image.
-    pub events: bool,
     pub(super) role: Role,
 }
 
 impl ClientOptions {
     /// Reads the keys of the bus. `moved` says that the address will be replaced.
-    pub fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
-        let line = Line::read(&mut table, ADDRESS, |address| {
+    pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        let line = Line::read(table, ADDRESS, |address| {
             if moved {
                 Ok(())
             } else {
@@ -67,8 +65,6 @@ impl ClientOptions {
         let timeout = table.take("timeout");
         let combine = table.take("read_write");
         let write_to = table.take("write_to");
-        let events = table.take("events");
-        table.finish();
 
         let units = match &line {
             Some(Line::Serial(_)) => Units::Serial,
@@ -82,7 +78,6 @@ impl ClientOptions {
         let outputs = AreaMapping::read(outputs.as_ref(), at, output, writes(Area::Output));
         let timeout = timeout.map_or(Some(None), |value| value.duration().map(Some));
         let combine = combine.map_or(Some(true), |value| value.boolean());
-        let events = events.map_or(Some(false), |value| value.boolean());
         let mut stations = stations?;
         if let Some(write_to) = write_to {
             stations.allow(Some(write_to?));
@@ -95,7 +90,6 @@ impl ClientOptions {
             at: BTreeMap::new(),
             timeout: timeout?,
             combine: combine?,
-            events: events?,
             role,
         })
     }

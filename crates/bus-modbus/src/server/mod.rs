@@ -7,8 +7,7 @@ mod tcp;
 mod units;
 
 use tickbus_base::time::Stop;
-use tickbus_fieldbus::{BusError, Free, Port, Role, tcp as many};
-use tickbus_image::signal::SignalTable;
+use tickbus_fieldbus::{BusError, BusSetup, Free, Port, tcp as many};
 
 use super::Line;
 pub use options::ServerOptions;
@@ -23,11 +22,11 @@ pub struct ModbusServer {
 }
 
 impl ModbusServer {
-    /// The bus that `options` describe, for the end with `role`, of the driver called `driver`.
-    pub fn new(options: &ServerOptions, table: &SignalTable, role: Role, driver: &str) -> Self {
+    /// The bus that `options` describe.
+    pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
         Self {
             options: options.clone(),
-            units: Units::new(options, table, role, driver),
+            units: Units::new(options, setup),
         }
     }
 }

@@ -5,7 +5,6 @@ use crate::stations::{Stations, Units};
 use crate::{ElementAddress, INPUTS, Map, Side, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::read_events;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::SignalTable;
 
@@ -30,21 +29,15 @@ pub struct ServerOptions {
     pub stations: Stations,
     /// The most clients at the same time.
     pub clients: usize,
-    /// Whether every change by a client is reported as an event, in addition to the image.
-    pub events: bool,
-    /// Whether every write is reported, changed or not.
-    pub every_write: bool,
 }
 
 impl ServerOptions {
     /// Reads the keys of the bus.
-    pub fn read(role: Role, mut table: Table<'_>) -> Option<Self> {
-        let line = Line::read(&mut table, ADDRESS, |_| Ok(()));
+    pub fn read(role: Role, table: &mut Table<'_>) -> Option<Self> {
+        let line = Line::read(table, ADDRESS, |_| Ok(()));
         let unit = table.take("unit");
         let inputs = table.take("inputs");
         let clients = table.take("clients");
-        let events = table.take("events");
-        table.finish();
 
         let units = match &line {
             Some(Line::Serial(_)) => Units::ServedOnSerial,
@@ -60,7 +53,6 @@ impl ServerOptions {
                 .whole(1..=10_000)
                 .and_then(|clients| usize::try_from(clients).ok())
         });
-        let events = events.as_ref().map_or(Some((false, false)), read_events);
         let input = match role {
             Role::Device => Side::Sends,
             Role::Controller => Side::Holds,
@@ -71,8 +63,6 @@ impl ServerOptions {
             window: window?,
             stations: stations?,
             clients: clients?,
-            events: events?.0,
-            every_write: events?.1,
         })
     }
 }

@@ -1,8 +1,8 @@
 //! The units of a server: each a station of the driver.
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::{Port, Receipt, Role};
-use tickbus_image::signal::{SignalTable, fail_safe_frame};
+use tickbus_fieldbus::{BusSetup, Events, Port, Receipt};
+use tickbus_image::signal::fail_safe_frame;
 
 use super::ServerOptions;
 use crate::{Done, Exception, Function, Identification, Map, Tables, answer};
@@ -41,13 +41,9 @@ pub(super) struct Carried {
 }
 
 impl Units {
-    pub(super) fn new(
-        options: &ServerOptions,
-        table: &SignalTable,
-        role: Role,
-        driver: &str,
-    ) -> Self {
-        let (sent, held) = role.areas();
+    pub(super) fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
+        let table = setup.table;
+        let (sent, held) = setup.role.areas();
         let unit = |station: usize| {
             let mut holds = fail_safe_frame(table, station, held).into_vec();
             let holds_len = holds.len();
@@ -63,8 +59,8 @@ impl Units {
             }
         };
         Self {
-            identification: Identification::of_driver(driver),
-            every_write: options.every_write,
+            identification: Identification::of_driver(setup.name),
+            every_write: setup.events == Events::Writes,
             all: (0..table.stations.len()).map(unit).collect(),
         }
     }

@@ -19,7 +19,7 @@ use socket2::SockRef;
 use tokio::sync::Notify;
 
 use tickbus_base::time::{Nanos, Pace, Stop};
-use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Port, Rarely, Role, tcp};
+use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Events, Free, Port, Rarely, Role, tcp};
 use tickbus_image::signal::SignalTable;
 
 use super::pki::Pki;
@@ -54,6 +54,7 @@ pub struct Server {
     table: Arc<SignalTable>,
     role: Role,
     cycle: Nanos,
+    events: Events,
 }
 
 impl Server {
@@ -68,6 +69,7 @@ impl Server {
             table: Arc::new(setup.table.clone()),
             role: setup.role,
             cycle: setup.cycle.unwrap_or(CYCLE),
+            events: setup.events,
         }
     }
 
@@ -212,7 +214,13 @@ impl Free for Server {
                     service
                 }
                 None => service.insert(Service {
-                    image: Image::new(&self.table, self.role, port, show, self.options.every_write),
+                    image: Image::new(
+                        &self.table,
+                        self.role,
+                        port,
+                        show,
+                        self.events == Events::Writes,
+                    ),
                     peers: Peers::default(),
                     table: &self.table,
                     waiting: waiting.clone(),

@@ -36,8 +36,6 @@ pub struct ClientOptions {
     pub pdu: u16,
     /// The identity of the CPU that may be written to.
     pub write_to: Option<String>,
-    /// Whether every change by the CPU is reported as an event, in addition to the image.
-    pub events: bool,
     /// The offset of the `[fieldbus]` table, for mistakes, and whether `[[station]]` tables have been read.
     at: usize,
     has_stations: bool,
@@ -151,9 +149,9 @@ impl ClientOptions {
         }
     }
 
-    /// Reads `address`, `rack`, `slot`, `remote_tsap`, `local_tsap`, `input`, `output`, `pdu`, `write_to` and
-    /// `events`. `moved` says that [`set_address`](Self::set_address) follows.
-    pub fn read(role: Role, moved: bool, mut table: Table<'_>) -> Option<Self> {
+    /// Reads `address`, `rack`, `slot`, `remote_tsap`, `local_tsap`, `input`, `output`, `pdu` and
+    /// `write_to`. `moved` says that [`set_address`](Self::set_address) follows.
+    pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let at = table.at();
         let address = if moved {
             table.take("address")
@@ -167,11 +165,9 @@ impl ClientOptions {
         let slot = table.take("slot");
         let remote = table.take("remote_tsap");
         let local = table.take("local_tsap");
-        let places = read_places(&mut table);
+        let places = read_places(table);
         let unit = table.take("pdu");
         let write_to = table.take("write_to");
-        let events = table.take("events");
-        table.finish();
 
         let address = match (&address, moved) {
             (Some(value), false) => read_address(value),
@@ -200,7 +196,6 @@ impl ClientOptions {
             let right = "write the identity that the CPU reports; log and statistics have it";
             value.label(IDENTITY_LIMIT, right).map(str::to_owned)
         });
-        let events = events.map_or(Some(false), |value| value.boolean());
         let [input, output] = places?;
         let first = |object| Start { object, byte: 0 };
         Some(Self {
@@ -217,7 +212,6 @@ impl ClientOptions {
                 None => None,
                 Some(write_to) => Some(write_to?),
             },
-            events: events?,
             at,
             has_stations: false,
             role,

@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{self, Address, Limits};
-use tickbus_fieldbus::{BusError, Free, Port, Receipt, Role};
-use tickbus_image::signal::{SignalTable, fail_safe_frame};
+use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Port, Receipt, Role};
+use tickbus_image::signal::fail_safe_frame;
 
 use super::item::{Object, ReturnCode};
 use super::szl::{Facts, Identity};
@@ -28,8 +28,9 @@ pub struct S7Server {
 }
 
 impl S7Server {
-    /// The bus that `options` describe, for the end with `role` of the driver called `name`.
-    pub fn new(options: &ServerOptions, table: &SignalTable, role: Role, name: &str) -> Self {
+    /// The bus that `options` describe.
+    pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
+        let (table, role) = (setup.table, setup.role);
         let (sends, receives) = role.areas();
         let stations = (0..table.stations.len()).map(|station| StationMemory {
             written: fail_safe_frame(table, station, receives),
@@ -41,7 +42,7 @@ impl S7Server {
             has_writer: false,
         });
         let facts = Facts {
-            identity: Identity::of_driver(name),
+            identity: Identity::of_driver(setup.name),
             pdu: options.pdu,
             clients: u16::try_from(options.clients).unwrap_or(u16::MAX),
             epoch: Facts::NEVER_SET,
@@ -56,7 +57,7 @@ impl S7Server {
                     role,
                     stations: stations.collect(),
                     flags: vec![0; options.flags].into(),
-                    every_write: options.every_write,
+                    every_write: setup.events == Events::Writes,
                     batch: None,
                 },
                 welcomed: 0,

@@ -3,7 +3,6 @@
 use crate::length::{LONGEST, read_length};
 use crate::tsap::{RACK, SLOT};
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::read_events;
 use tickbus_fieldbus::tcp::{Address, AddressError};
 use tickbus_image::signal::{AREA_LIMIT, Area, SignalTable};
 
@@ -31,10 +30,6 @@ pub struct ServerOptions {
     pub clients: usize,
     /// Rack and slot of each station; empty if there are no `[[station]]` tables.
     pub slots: Vec<Option<(u8, u8)>>,
-    /// Whether every change by a client is reported as an event, in addition to the image.
-    pub events: bool,
-    /// Whether every write is reported, changed or not.
-    pub every_write: bool,
 }
 
 /// A data block: a range of an area of a station.
@@ -81,15 +76,13 @@ impl ServerOptions {
         Ok(())
     }
 
-    /// Reads `address`, `db`, `m_bytes`, `pdu`, `clients` and `events`.
-    pub fn read(mut table: Table<'_>) -> Option<Self> {
+    /// Reads `address`, `db`, `m_bytes`, `pdu` and `clients`.
+    pub fn read(table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let blocks = table.take("db");
         let flags = table.take("m_bytes");
         let unit = table.take("pdu");
         let clients = table.take("clients");
-        let events = table.take("events");
-        table.finish();
 
         let address = address.as_ref().map_or(Some(ADDRESS), Address::read);
         let blocks = blocks.as_ref().map_or(Some(Vec::new()), read_blocks);
@@ -100,7 +93,6 @@ impl ServerOptions {
         let clients = clients
             .as_ref()
             .map_or(Some(CLIENTS), |value| size(value, 1..=1_000));
-        let events = events.as_ref().map_or(Some((false, false)), read_events);
         Some(Self {
             address: address?,
             blocks: blocks?,
@@ -108,8 +100,6 @@ impl ServerOptions {
             pdu: unit?,
             clients: clients?,
             slots: Vec::new(),
-            events: events?.0,
-            every_write: events?.1,
         })
     }
 

@@ -89,13 +89,13 @@ fn check_mistakes(mistakes: &Mistakes, text: &str) {
     assert!(mistakes.len() > 0);
     let lines: Vec<&str> = text.split('\n').collect();
     let mut before = (1, 1);
-    for mistake in mistakes {
-        let (line, column) = mistake.place.expect("a mistake in a text has a place");
+    for found in mistakes {
+        let (line, column) = found.place.expect("a mistake in a text has a place");
         assert!(before <= (line, column), "out of order");
         before = (line, column);
         assert!(line <= lines.len(), "line {line} of {}", lines.len());
         assert!(column <= lines[line - 1].chars().count() + 1, "column {column} in line {line}");
-        for part in [&mistake.what, &mistake.right] {
+        for part in [&found.mistake.what, &found.mistake.right] {
             assert!(!part.is_empty() && !part.contains(char::is_control), "{part:?}");
         }
     }

@@ -33,7 +33,7 @@ fuzz_target!(|data: &[u8]| {
             assert_eq!(config.table.signals.len(), imported.signals);
         }
         Err(mistakes) => {
-            assert!(mistakes.iter().all(|mistake| !mistake.what.is_empty()));
+            assert!(mistakes.iter().all(|found| !found.mistake.what.is_empty()));
         }
     }
 });

@@ -165,7 +165,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
 fn recording(file: &Path) -> Result<record::Options, String> {
     let path = std::path::absolute(file)
         .map_err(|error| format!("\"{}\" is no path: {error}", file.display()))?;
-    record::Options::to(&path)
+    record::Options::to(&path).map_err(|mistake| mistake.to_string())
 }
 
 /// Reports every change of the line, and the statistics when due, until stopped or done.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Outcome;
-use tickbus_base::toml_text::{Mistake, Mistakes};
+use tickbus_base::toml_text::{Mistakes, PlacedMistake};
 use tickbus_image::signal::Addressing;
 use tickbus_import::{Client, ImportOptions, Imported, import};
 
@@ -56,10 +56,9 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     match read(arguments).and_then(|imported| write(arguments, &imported).map(|()| imported)) {
         Ok(imported) => {
             let file = arguments.table.display();
-            for mistake in &imported.skipped {
-                let (line, column) = mistake.place.unwrap_or((1, 1));
-                let Mistake { what, right, .. } = mistake;
-                let _ = writeln!(stderr, "{file}:{line}:{column}: {what}; {right}");
+            for PlacedMistake { place, mistake } in &imported.skipped {
+                let (line, column) = place.unwrap_or((1, 1));
+                let _ = writeln!(stderr, "{file}:{line}:{column}: {mistake}");
             }
             let told = format!(
                 "import: ok signals={} skipped={}",

@@ -161,14 +161,14 @@ fn run_file(file: &Path, arguments: &Arguments, count: &mut Count) -> Group {
 /// A file that cannot be read, in the form that a CI server shows.
 fn wrong_file(mistakes: &Mistakes) -> Case {
     let first = mistakes.iter().next();
-    let line = first.and_then(|mistake| mistake.place);
+    let line = first.and_then(|found| found.place);
     Case {
         name: "the test file is right".to_owned(),
         line: line.map_or(1, |(line, _)| line),
         took: std::time::Duration::ZERO,
         verdict: Verdict::Wrong(
             first
-                .map(|mistake| mistake.what.clone())
+                .map(|found| found.mistake.what.clone())
                 .unwrap_or_default(),
             mistakes.to_string(),
         ),

@@ -161,7 +161,10 @@ fn left_out(text: &str) -> Vec<String> {
     let imported = import("tags.csv", text.as_bytes(), reading).expect("the rest");
     let skipped = imported.skipped.iter();
     skipped
-        .map(|mistake| format!("{:?} {}", mistake.place.expect("a place"), mistake.what))
+        .map(|found| {
+            let place = found.place.expect("a place");
+            format!("{place:?} {}", found.mistake.what)
+        })
         .collect()
 }
 

@@ -109,7 +109,7 @@ fn the_list_of_a_real_project_is_read_and_the_rest_of_it_is_told() {
     let skipped: Vec<String> = imported
         .skipped
         .iter()
-        .map(|m| format!("{:?} {}", m.place.unwrap(), m.what))
+        .map(|m| format!("{:?} {}", m.place.unwrap(), m.mistake.what))
         .collect();
     assert_eq!(
         skipped,

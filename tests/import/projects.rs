@@ -55,7 +55,7 @@ fn variables_of_plcopen_xml_with_an_address_become_signals_and_the_others_are_to
     let skipped: Vec<String> = imported
         .skipped
         .iter()
-        .map(|m| format!("{:?} {}", m.place.unwrap(), m.what))
+        .map(|m| format!("{:?} {}", m.place.unwrap(), m.mistake.what))
         .collect();
     assert_eq!(
         skipped,
@@ -123,7 +123,11 @@ fn aliases_of_module_points_in_l5x_become_signals_laid_out_without_gaps() {
         "{}",
         imported.text
     );
-    let skipped: Vec<&str> = imported.skipped.iter().map(|m| m.what.as_str()).collect();
+    let skipped: Vec<&str> = imported
+        .skipped
+        .iter()
+        .map(|m| m.mistake.what.as_str())
+        .collect();
     assert_eq!(
         skipped,
         [
@@ -197,5 +201,5 @@ fn modules_whose_names_begin_with_i_have_outputs_all_the_same() {
         .map(|(name, address, _)| format!("{name} {address}"))
         .collect();
     assert_eq!(found, ["a %QX0.0", "b %IX0.0"]);
-    assert!(imported.skipped[0].what.contains("\"c\" the first"));
+    assert!(imported.skipped[0].mistake.what.contains("\"c\" the first"));
 }

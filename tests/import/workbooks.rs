@@ -162,7 +162,11 @@ fn the_workbook_of_tia_portal_is_read_and_its_other_sheets_are_told() {
         "{}",
         imported.text
     );
-    let skipped: Vec<&str> = imported.skipped.iter().map(|m| m.what.as_str()).collect();
+    let skipped: Vec<&str> = imported
+        .skipped
+        .iter()
+        .map(|m| m.mistake.what.as_str())
+        .collect();
     assert_eq!(
         skipped,
         ["sheet \"TagTable Properties\": it has no column of addresses: skipped"]

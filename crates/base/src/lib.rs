@@ -6,6 +6,9 @@
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 
+mod mistake;
 pub mod os;
 pub mod time;
 pub mod toml_text;
+
+pub use mistake::Mistake;

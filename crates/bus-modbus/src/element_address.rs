@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 
 use super::table::{ADDRESSES, Table};
@@ -24,27 +25,14 @@ pub struct ElementAddress {
 pub(super) const SHAPE: &str = "write \"offset:20\", which counts from 0, or \"holding-register:21\", \
                                 \"4x00021\" or \"400021\", which count from 1";
 
-/// Why a text is not a place.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {right}")]
-pub struct ElementAddressError {
-    /// What is wrong with it.
-    pub what: String,
-    /// What would be right.
-    pub right: String,
-}
-
 impl ElementAddress {
     /// Reads a place; without a table in the text, it is in `table`.
     ///
     /// # Errors
     ///
     /// The text is not a place.
-    pub fn parse(text: &str, table: Table) -> Result<Self, ElementAddressError> {
-        let wrong = |what: String| ElementAddressError {
-            what,
-            right: SHAPE.to_owned(),
-        };
+    pub fn parse(text: &str, table: Table) -> Result<Self, Mistake> {
+        let wrong = |what: String| Mistake::new(what, SHAPE);
         let none = || wrong(format!("\"{}\" is no place in a table", shown(text)));
         // The table, the number that counting starts at, and the digits.
         let (table, from, digits) = if let Some((head, digits)) = text.rsplit_once("offset:") {
@@ -94,15 +82,14 @@ fn numbered(digit: char) -> Option<Table> {
 
 /// Reads a place that names its table.
 impl FromStr for ElementAddress {
-    type Err = ElementAddressError;
+    type Err = Mistake;
 
-    fn from_str(text: &str) -> Result<Self, ElementAddressError> {
+    fn from_str(text: &str) -> Result<Self, Mistake> {
         if text.starts_with("offset:") {
-            return Err(ElementAddressError {
-                what: format!("\"{}\" names no table", shown(text)),
-                right: "write it before the offset, as in \"holding-register offset:20\""
-                    .to_owned(),
-            });
+            return Err(Mistake::new(
+                format!("\"{}\" names no table", shown(text)),
+                "write it before the offset, as in \"holding-register offset:20\"",
+            ));
         }
         Self::parse(text, Table::HoldingRegisters)
     }

@@ -1,6 +1,7 @@
 //! The kinds `modbus-server` and `modbus-client`, for the list of bus kinds.
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::tcp::Address;
@@ -28,7 +29,7 @@ impl BusOptions for ServerOptions {
         Ok(Bus::Free(Box::new(server)))
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.line.set_address(address, |_| Ok(())))
     }
 
@@ -67,7 +68,7 @@ impl BusOptions for ClientOptions {
         Some(CYCLE)
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.line.set_address(address, Address::check_dialled))
     }
 

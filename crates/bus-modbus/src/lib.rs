@@ -53,7 +53,7 @@ pub use answer::{Done, answer, refuse};
 pub use client::{
     AnswerError, Block, Capabilities, ClientOptions, ModbusClient, Piece, Region, Request, queries,
 };
-pub use element_address::{ElementAddress, ElementAddressError};
+pub use element_address::ElementAddress;
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;
 pub use line::{Line, Serial};

@@ -2,11 +2,12 @@
 
 use std::fmt;
 
+use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 use tickbus_fieldbus::BusError;
-use tickbus_fieldbus::tcp::{Address, AddressError};
+use tickbus_fieldbus::tcp::Address;
 
 use super::rtu;
 
@@ -66,11 +67,10 @@ impl Line {
     pub fn set_address(
         &mut self,
         address: &str,
-        check: impl FnOnce(&Address) -> Result<(), AddressError>,
-    ) -> Result<(), String> {
-        let why = |error: AddressError| error.to_string();
-        let address: Address = address.parse().map_err(why)?;
-        check(&address).map_err(why)?;
+        check: impl FnOnce(&Address) -> Result<(), Mistake>,
+    ) -> Result<(), Mistake> {
+        let address: Address = address.parse()?;
+        check(&address)?;
         *self = Self::Tcp(address);
         Ok(())
     }
@@ -80,7 +80,7 @@ impl Line {
     pub(super) fn read(
         table: &mut Table<'_>,
         address: Address,
-        check: impl FnOnce(&Address) -> Result<(), AddressError>,
+        check: impl FnOnce(&Address) -> Result<(), Mistake>,
     ) -> Option<Self> {
         let stated = table.take("address");
         let device = table.take("device");
@@ -108,8 +108,8 @@ impl Line {
             });
             return match read {
                 Ok(address) => Some(Self::Tcp(address)),
-                Err(error) => {
-                    value.wrong(error.what, error.right);
+                Err(mistake) => {
+                    value.refuse(mistake);
                     None
                 }
             };

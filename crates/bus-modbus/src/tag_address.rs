@@ -3,10 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 use tickbus_image::signal::DataType;
 
-use super::{ElementAddress, ElementAddressError, Table};
+use super::{ElementAddress, Table};
 
 /// An element of a table, or a bit of a register.
 ///
@@ -29,13 +30,10 @@ const SHAPE: &str = "write \"holding-register:21\", \"4x00021\" or \"400021\", w
                      \"400021.5\"";
 
 impl FromStr for TagAddress {
-    type Err = ElementAddressError;
+    type Err = Mistake;
 
-    fn from_str(text: &str) -> Result<Self, ElementAddressError> {
-        let wrong = |what: String, right: &str| ElementAddressError {
-            what,
-            right: right.to_owned(),
-        };
+    fn from_str(text: &str) -> Result<Self, Mistake> {
+        let wrong = |what: String, right: &str| Mistake::new(what, right);
         if text.contains('{') {
             return Err(wrong(
                 format!("\"{}\" has options in braces", shown(text)),
@@ -96,7 +94,7 @@ impl FromStr for TagAddress {
                      coil with the offset 5; a %MD or %ML is written as the first %MW that it lies in",
                 ))
             }),
-            None => rest.parse().map_err(|error: ElementAddressError| {
+            None => rest.parse().map_err(|error: Mistake| {
                 if error.what.contains("no place") {
                     wrong(error.what, SHAPE)
                 } else {
@@ -123,7 +121,7 @@ impl FromStr for TagAddress {
 }
 
 /// The place of `%MW20` or `%M5`, without the percent sign; `None` for any other text.
-fn read_marker(marker: &str) -> Option<Result<ElementAddress, ElementAddressError>> {
+fn read_marker(marker: &str) -> Option<Result<ElementAddress, Mistake>> {
     let rest = marker.strip_prefix('M')?;
     let (table, digits) = match rest.strip_prefix('W') {
         Some(digits) => (Table::HoldingRegisters, digits),

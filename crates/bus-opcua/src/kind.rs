@@ -1,6 +1,7 @@
 //! The kinds `opcua-client` and `opcua-server`, for the list of bus kinds.
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable, Station};
@@ -31,7 +32,7 @@ impl BusOptions for ClientOptions {
         Err(not_in_this_build(Self::NAME))
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
 
@@ -76,7 +77,7 @@ impl BusOptions for ServerOptions {
         Err(not_in_this_build(Self::NAME))
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
 }

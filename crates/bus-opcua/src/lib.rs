@@ -26,9 +26,9 @@ mod values;
 
 #[cfg(feature = "opcua")]
 pub use client::Client;
-pub use node::{Identifier, Namespace, NodeName, NodeNameError, Pattern};
+pub use node::{Identifier, Namespace, NodeName, Pattern};
 pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};
 #[cfg(feature = "opcua")]
 pub use server::Server;
-pub use url::{Url, UrlError};
+pub use url::Url;

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 
 /// The remedy where a node id is expected.
@@ -39,23 +40,13 @@ pub enum Identifier {
     Number(u32),
 }
 
-/// Why a text is not a node id.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {right}")]
-pub struct NodeNameError {
-    pub(super) what: String,
-    pub(super) right: &'static str,
-}
-
 impl FromStr for NodeName {
-    type Err = NodeNameError;
+    type Err = Mistake;
 
-    fn from_str(text: &str) -> Result<Self, NodeNameError> {
-        let refuse = |why: &str, right| {
-            Err(NodeNameError {
-                what: format!("the node id \"{}\" {why}", shown(text)),
-                right,
-            })
+    fn from_str(text: &str) -> Result<Self, Mistake> {
+        let refuse = |why: &str, right: &str| {
+            let what = format!("the node id \"{}\" {why}", shown(text));
+            Err(Mistake::new(what, right))
         };
         let (namespace, rest) = if let Some(rest) = text.strip_prefix("nsu=") {
             match rest.split_once(';') {
@@ -128,7 +119,7 @@ impl Pattern {
     /// # Errors
     ///
     /// The result is not a node id.
-    pub fn node(&self, name: &str, station: &str) -> Result<NodeName, NodeNameError> {
+    pub fn node(&self, name: &str, station: &str) -> Result<NodeName, Mistake> {
         // In one pass, because a name may contain braces.
         let mut text = String::new();
         let mut rest = &*self.0;

@@ -2,14 +2,15 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::At;
-use tickbus_fieldbus::tcp::{Address, AddressError, Host};
+use tickbus_fieldbus::tcp::{Address, Host};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 
 use super::security::{Credentials, Keys, Mode, Policy};
-use super::{NodeName, NodeNameError, Pattern, Url, UrlError};
+use super::{NodeName, Pattern, Url};
 
 /// The longest `write_to`, in characters.
 const IDENTITY_LIMIT: usize = 1000;
@@ -73,17 +74,13 @@ impl ClientOptions {
     /// # Errors
     ///
     /// The text is neither.
-    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
+    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
         if address.contains("://") {
-            self.url = address.parse().map_err(|why: UrlError| why.to_string())?;
+            self.url = address.parse()?;
             return Ok(());
         }
-        let parsed: Address = address
-            .parse()
-            .map_err(|why: AddressError| why.to_string())?;
-        parsed
-            .check_dialled()
-            .map_err(|why: AddressError| why.to_string())?;
+        let parsed: Address = address.parse()?;
+        parsed.check_dialled()?;
         self.url.address = parsed;
         Ok(())
     }
@@ -110,9 +107,7 @@ impl ClientOptions {
             }),
             Some(value) => value.text(right).and_then(|text| {
                 let parsed = text.parse();
-                parsed
-                    .map_err(|error: UrlError| value.wrong(error.what, error.right))
-                    .ok()
+                parsed.map_err(|mistake| value.refuse(mistake)).ok()
             }),
         };
         let security = match &keys.security {
@@ -175,11 +170,7 @@ impl ClientOptions {
     /// # Errors
     ///
     /// The pattern and its name do not give a node id.
-    pub(super) fn node(
-        &self,
-        signal: &Signal,
-        station: &Station,
-    ) -> Result<NodeName, NodeNameError> {
+    pub(super) fn node(&self, signal: &Signal, station: &Station) -> Result<NodeName, Mistake> {
         if let Some(node) = self.nodes.get(&signal.name) {
             return Ok(node.name.clone());
         }
@@ -197,9 +188,8 @@ impl ClientOptions {
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         for line in lines {
             let name = &table.signals[line.signal].name;
-            let parsed: Result<NodeName, NodeNameError> = line.text.parse();
-            match parsed {
-                Err(error) => line.wrong(error.what, error.right),
+            match line.text.parse() {
+                Err(mistake) => line.refuse(mistake),
                 Ok(_) if self.nodes.contains_key(name) => line.wrong(
                     format!("the signal \"{}\" stands in \"nodes\", too", shown(name)),
                     "keep the line in [fieldbus.at], and remove the one in nodes",
@@ -257,10 +247,8 @@ impl ServerOptions {
     /// # Errors
     ///
     /// The text is not an address.
-    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
-        self.address = address
-            .parse()
-            .map_err(|why: AddressError| why.to_string())?;
+    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
+        self.address = address.parse()?;
         Ok(())
     }
 
@@ -399,10 +387,8 @@ fn read_nodes(value: &Value<'_>) -> Option<BTreeMap<String, Node>> {
     for (name, value) in table.all() {
         let node = value.text("write a node id in quotes, such as \"ns=2;s=Motor.Speed\"");
         let node: Option<NodeName> = node.and_then(|text| {
-            let parsed: Result<NodeName, NodeNameError> = text.parse();
-            parsed
-                .map_err(|error| value.wrong(error.what, error.right))
-                .ok()
+            let parsed = text.parse();
+            parsed.map_err(|mistake| value.refuse(mistake)).ok()
         });
         match node {
             Some(node) => {
@@ -426,8 +412,8 @@ fn read_pattern(value: &Value<'_>) -> Option<Pattern> {
         return None;
     }
     // With a plain name, a mistake can only be the pattern's.
-    if let Err(error) = pattern.node("name", "station") {
-        value.wrong(error.what, error.right);
+    if let Err(mistake) = pattern.node("name", "station") {
+        value.refuse(mistake);
         return None;
     }
     Some(pattern)

@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
-use tickbus_fieldbus::tcp::{Address, AddressError};
+use tickbus_fieldbus::tcp::Address;
 
 /// The port of OPC UA.
 pub(super) const PORT: u16 = 4840;
@@ -20,32 +21,13 @@ pub struct Url {
     pub path: String,
 }
 
-/// Why a text is not the URL of a server.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {right}")]
-pub struct UrlError {
-    pub(super) what: String,
-    pub(super) right: String,
-}
-
-impl From<AddressError> for UrlError {
-    fn from(error: AddressError) -> Self {
-        Self {
-            what: error.what,
-            right: error.right.to_owned(),
-        }
-    }
-}
-
 impl FromStr for Url {
-    type Err = UrlError;
+    type Err = Mistake;
 
-    fn from_str(text: &str) -> Result<Self, UrlError> {
+    fn from_str(text: &str) -> Result<Self, Mistake> {
         let refuse = |what: String| {
-            Err(UrlError {
-                what,
-                right: "write it as \"opc.tcp://192.168.0.1:4840\"".to_owned(),
-            })
+            let right = "write it as \"opc.tcp://192.168.0.1:4840\"";
+            Err(Mistake::new(what, right))
         };
         let Some(rest) = text.strip_prefix(SCHEME) else {
             return refuse(format!(

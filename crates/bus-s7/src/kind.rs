@@ -1,6 +1,7 @@
 //! The kinds `s7-server` and `s7-client`, for the list of bus kinds.
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, shown};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
@@ -38,7 +39,7 @@ impl BusOptions for ServerOptions {
         Ok(Bus::Free(Box::new(server)))
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
 
@@ -87,7 +88,7 @@ impl BusOptions for ClientOptions {
         Some(CYCLE)
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
 

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::item::Object;
 use super::place::LAST;
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 use tickbus_image::signal::{DataType, Signal, Width};
 
@@ -32,7 +33,7 @@ impl Variable {
     /// # Errors
     ///
     /// What does not match, and what to write instead.
-    pub(super) fn check(&self, signal: &Signal) -> Result<(), (String, String)> {
+    pub(super) fn check(&self, signal: &Signal) -> Result<(), Mistake> {
         let own = signal.data_type;
         let bits = |count: usize| match count {
             1 => "1 bit".to_owned(),
@@ -40,7 +41,7 @@ impl Variable {
         };
         let name = shown(&signal.name);
         if own.width() != self.width {
-            return Err((
+            return Err(Mistake::new(
                 format!(
                     "{self} has {}, and the signal \"{name}\" is of type {own} with {}",
                     bits(self.width.bits()),
@@ -58,9 +59,9 @@ impl Variable {
             Some(stated)
                 if is_float(stated) != is_float(own) && !is_plain(stated) && !is_plain(own) =>
             {
-                Err((
+                Err(Mistake::new(
                     format!("{self} is of type {stated}, and the signal \"{name}\" of type {own}"),
-                    "write the same type at both, or leave it out here".to_owned(),
+                    "write the same type at both, or leave it out here",
                 ))
             }
             _ => Ok(()),

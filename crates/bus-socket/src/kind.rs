@@ -1,6 +1,7 @@
 //! The kind `socket`, for the list of bus kinds.
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
@@ -52,7 +53,7 @@ impl BusOptions for Options {
         Some(CYCLE)
     }
 
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }
 

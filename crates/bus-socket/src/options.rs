@@ -1,10 +1,11 @@
 //! The options of the socket bus in a driver.cfg.
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::tcp::{Address, AddressError};
+use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::SignalTable;
 
 use super::Sending;
@@ -59,14 +60,13 @@ impl Options {
     /// # Errors
     ///
     /// The text is not an address, or one that this end cannot use.
-    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
-        let address: Address = address
-            .parse()
-            .map_err(|why: AddressError| why.to_string())?;
-        check_port(&address, self.tcp).map_err(|why| why.to_string())?;
+    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
+        let address: Address = address.parse()?;
+        check_port(&address, self.tcp)?;
         if !self.stations.is_empty() {
-            return Err(format!(
-                "each station has an address of its own; write \"{address}\" into its [[station]]"
+            return Err(Mistake::new(
+                "each station has an address of its own",
+                format!("write \"{address}\" into its [[station]]"),
             ));
         }
         self.address = address;
@@ -91,10 +91,10 @@ impl Options {
             value.choice("TCP roles", &roles)
         });
         if let (Some(value), Some(address), Some(tcp)) = (&address, &read, tcp)
-            && let Err(error) = check_port(address, tcp)
+            && let Err(mistake) = check_port(address, tcp)
             && !moved
         {
-            value.wrong(error.what, error.right);
+            value.refuse(mistake);
         }
         let stated = send.as_ref().map(|value| {
             let ways = [
@@ -179,7 +179,7 @@ impl Options {
 }
 
 /// Checks that an address can be used when listening, or connecting.
-fn check_port(address: &Address, tcp: TcpRole) -> Result<(), AddressError> {
+fn check_port(address: &Address, tcp: TcpRole) -> Result<(), Mistake> {
     match tcp {
         TcpRole::Listen => Ok(()),
         TcpRole::Connect => address.check_dialled(),

@@ -3,6 +3,7 @@
 use std::ops::{Deref, DerefMut};
 use std::path::Path;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
@@ -147,11 +148,12 @@ impl Options {
     /// # Errors
     ///
     /// The bus has no address, or the text is not a valid one.
-    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
+    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
         let kind = self.kind();
         self.deref_mut().set_address(address).unwrap_or_else(|| {
-            Err(format!(
-                "the bus \"{kind}\" has no address; remove \"{address}\" from the command"
+            Err(Mistake::new(
+                format!("the bus \"{kind}\" has no address"),
+                format!("remove \"{address}\" from the command"),
             ))
         })
     }

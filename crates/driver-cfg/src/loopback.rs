@@ -272,11 +272,7 @@ fn read_options(table: &Table<'_>, name: &str) -> Option<Vec<(String, String)>> 
             .as_ref()
             .map(|option| programs::check(name, std::slice::from_ref(option)));
         if let Some(Err(error)) = &made {
-            let error = error.to_string();
-            let (what, right) = error
-                .split_once("; ")
-                .unwrap_or((&error, "see the program's options"));
-            value.wrong(what, right);
+            value.refuse(error.mistake());
         }
         match (option, made, &mut read) {
             (Some(option), Some(Ok(())), Some(read)) => read.push(option),

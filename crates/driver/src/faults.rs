@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Driver;
 use super::bus_handle::BusHandle;
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::Mistakes;
 use tickbus_fieldbus::faults::{self, Fault, FaultBoard, FaultStatus, Faults, Slots};
 
@@ -13,7 +14,7 @@ impl Driver {
     /// # Errors
     ///
     /// Too many faults wait or are active.
-    pub fn inject(&mut self, fault: &Fault) -> Result<u32, String> {
+    pub fn inject(&mut self, fault: &Fault) -> Result<u32, Mistake> {
         let board = &self.board;
         let extras = self.extras.get_or_insert_default();
         let faults = extras
@@ -49,10 +50,8 @@ impl Driver {
     ///
     /// Too many faults wait or are active.
     pub fn inject_read(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
-        self.inject(fault).map_err(|error| {
-            let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
-            Mistakes::of_file("fault", what, right)
-        })
+        self.inject(fault)
+            .map_err(|mistake| Mistakes::of("fault", mistake))
     }
 
     /// Ends a fault at the next exchange; false if no fault has this number.

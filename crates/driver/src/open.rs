@@ -113,7 +113,9 @@ impl Driver {
             config: Arc::new(config),
         };
         for fault in &list {
-            driver.inject(fault).map_err(DriverError::Config)?;
+            driver
+                .inject(fault)
+                .map_err(|mistake| DriverError::Config(mistake.to_string()))?;
         }
         Ok(driver)
     }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Value, did_you_mean, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
@@ -55,6 +56,11 @@ impl<'a> At<'a> {
     /// Reports a mistake in this address.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
         self.value.wrong(what, right);
+    }
+
+    /// As [`wrong`](Self::wrong), for a mistake that something else has found.
+    pub fn refuse(&self, mistake: Mistake) {
+        self.value.refuse(mistake);
     }
 }
 

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_image::signal::{Signal, SignalTable, Station};
@@ -68,7 +69,7 @@ pub trait BusOptions {
 
     /// Replaces the address from the driver.cfg by one from a command line; `None` if the bus has no address.
     /// An error says what is wrong with the text.
-    fn set_address(&mut self, address: &str) -> Option<Result<(), String>> {
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         let _ = address;
         None
     }

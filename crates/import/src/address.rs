@@ -1,6 +1,7 @@
 //! Addresses as editors write them.
 
-use tickbus_image::signal::{Address, AddressError, Addressing};
+use tickbus_base::Mistake;
+use tickbus_image::signal::{Address, Addressing};
 
 /// The contents of an address cell.
 #[derive(Debug)]
@@ -10,7 +11,7 @@ pub(super) enum ParsedAddress {
     /// Something in the PLC outside the process image, and what it is.
     Elsewhere(&'static str),
     /// An input or output in the wrong notation.
-    Wrong(AddressError),
+    Wrong(Mistake),
     /// Not an address.
     Nothing,
 }

@@ -1,5 +1,6 @@
 //! Device addresses, as in the tag lists of PLC4X, KEPServer and other clients.
 
+use tickbus_base::Mistake;
 use tickbus_bus_modbus::TagAddress;
 use tickbus_bus_s7::Variable;
 use tickbus_bus_s7::item::Object;
@@ -74,14 +75,10 @@ pub(super) fn only(text: &str) -> Option<Client> {
 /// # Errors
 ///
 /// What is wrong with it, and what would be right.
-pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String)> {
+pub(super) fn spots(text: &str, client: Client) -> Result<Spots, Mistake> {
     match client {
         Client::Modbus => {
-            let spot: TagAddress =
-                text.parse()
-                    .map_err(|error: tickbus_bus_modbus::ElementAddressError| {
-                        (error.what, error.right)
-                    })?;
+            let spot: TagAddress = text.parse()?;
             let table = spot.place.table;
             let is_bit = table.is_bits() || spot.bit.is_some();
             Ok(Spots {
@@ -92,11 +89,10 @@ pub(super) fn spots(text: &str, client: Client) -> Result<Spots, (String, String
             })
         }
         Client::S7 => {
-            let variable: Variable = text.parse().map_err(|what| {
-                (
+            let variable: Variable = text.parse().map_err(|what: String| {
+                Mistake::new(
                     what,
-                    "write \"%DB10.DBX0.3\", \"%DB10.DBD4:REAL\", \"DB10,REAL4\" or \"%MW20\""
-                        .to_owned(),
+                    "write \"%DB10.DBX0.3\", \"%DB10.DBD4:REAL\", \"DB10,REAL4\" or \"%MW20\"",
                 )
             })?;
             Ok(Spots {

@@ -1,6 +1,7 @@
 //! Assigns addresses in %I and %Q to tags that have none.
 
 use super::rows::Tag;
+use tickbus_base::Mistake;
 use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
 
 /// Assigns an address to each tag without one: the widest first, bits last, so that no bytes are wasted.
@@ -8,7 +9,7 @@ use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
 /// # Errors
 ///
 /// There is not enough room: what is wrong, and what would be right.
-pub(super) fn lay(tags: &mut [Tag]) -> Result<(), (String, &'static str)> {
+pub(super) fn lay(tags: &mut [Tag]) -> Result<(), Mistake> {
     // The next free bit of %I and %Q.
     let mut free = [0_usize; 2];
     for width in [
@@ -33,7 +34,7 @@ pub(super) fn lay(tags: &mut [Tag]) -> Result<(), (String, &'static str)> {
             });
             *free += width.bits();
             if *free > AREA_LIMIT * 8 {
-                return Err((
+                return Err(Mistake::new(
                     format!(
                         "the tags fill more than the {AREA_LIMIT} bytes of {}",
                         tag.area

@@ -24,7 +24,7 @@ use cells::Record;
 use columns::Columns;
 use rows::{Taken, World};
 use text::FileType;
-use tickbus_base::toml_text::{Collector, Mistake, Mistakes};
+use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Addressing;
 
@@ -51,7 +51,7 @@ pub struct Imported {
     pub signals: usize,
     /// The lines that were left out, in line order: tags outside the process image, and lines with mistakes
     /// if those are skipped.
-    pub skipped: Vec<Mistake>,
+    pub skipped: Vec<PlacedMistake>,
 }
 
 /// A table, and the text that its positions refer to.
@@ -67,18 +67,18 @@ struct Sheet {
 /// The mistakes and notes of all sheets.
 #[derive(Default)]
 struct Told {
-    wrong: Vec<Mistake>,
-    skipped: Vec<Mistake>,
+    wrong: Vec<PlacedMistake>,
+    skipped: Vec<PlacedMistake>,
 }
 
 impl Told {
-    fn add(list: &mut Vec<Mistake>, sheet: Option<&str>, found: Collector<'_>) {
-        for mistake in found.finish().iter().flatten() {
-            let mut mistake = mistake.clone();
+    fn add(list: &mut Vec<PlacedMistake>, sheet: Option<&str>, found: Collector<'_>) {
+        for found in found.finish().iter().flatten() {
+            let mut found = found.clone();
             if let Some(sheet) = sheet {
-                mistake.what = format!("sheet \"{sheet}\": {}", mistake.what);
+                found.mistake.what = format!("sheet \"{sheet}\": {}", found.mistake.what);
             }
-            list.push(mistake);
+            list.push(found);
         }
     }
 }
@@ -107,7 +107,7 @@ pub fn import(file: &str, bytes: &[u8], reading: ImportOptions) -> Result<Import
         }
         FileType::Workbook => match workbook::sheets(bytes) {
             Ok(sheets) => sheets,
-            Err((what, right)) => return of_file(what, right),
+            Err(mistake) => return Err(Mistakes::of(file, mistake)),
         },
         FileType::Xml => {
             let text = text::decoded(bytes);
@@ -199,14 +199,14 @@ fn tags_of(
         mut skipped,
     } = told;
     if sheets.len() == 1 {
-        wrong.sort_by_key(|mistake| mistake.place);
+        wrong.sort_by_key(|found| found.place);
     }
     if !wrong.is_empty() {
         if !reading.lenient {
             return Err(Mistakes::of_list(file, wrong));
         }
         skipped.extend(wrong);
-        skipped.sort_by_key(|mistake| mistake.place);
+        skipped.sort_by_key(|found| found.place);
     }
     if tags.is_empty() {
         return Err(nothing(
@@ -215,16 +215,15 @@ fn tags_of(
             skipped.len(),
         ));
     }
-    if let Err((what, right)) = layout::lay(&mut tags) {
-        return Err(Mistakes::of_file(file, what, right));
+    if let Err(mistake) = layout::lay(&mut tags) {
+        return Err(Mistakes::of(file, mistake));
     }
     let text = write::driver_cfg(Path::new(file), &tags, world);
     // Mistakes that only the bus can find in the addresses are reported before the file is written.
     if let Err(mistakes) = Config::parse("driver.cfg", &text) {
-        let list = mistakes.iter().map(|mistake| Mistake {
+        let list = mistakes.iter().map(|found| PlacedMistake {
             place: None,
-            what: mistake.what.clone(),
-            right: mistake.right.clone(),
+            mistake: found.mistake.clone(),
         });
         return Err(Mistakes::of_list(file, list.collect()));
     }

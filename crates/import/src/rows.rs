@@ -6,6 +6,7 @@ use super::address::{ParsedAddress, place};
 use super::cells::{Cell, Record};
 use super::columns::Columns;
 use super::device::{self, Client, kepserver_type};
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, did_you_mean, shown};
 use tickbus_image::signal::section::NAME_LIMIT;
 use tickbus_image::signal::{AREA_LIMIT, Address, Addressing, Area, ByteOrder, DataType, Width};
@@ -196,7 +197,7 @@ impl Row<'_> {
     }
 
     fn in_image(&self, cell: &Cell, addressing: Addressing) -> Option<Found> {
-        let (what, right) = match place(&cell.text, addressing) {
+        let mistake = match place(&cell.text, addressing) {
             ParsedAddress::Image(address) => {
                 let (data_type, address) = kind(self.cell(self.columns.kind), address, self.wrong)?;
                 return Some(Found {
@@ -225,13 +226,13 @@ impl Row<'_> {
                 );
                 return None;
             }
-            ParsedAddress::Wrong(error) => (error.what, error.right),
-            ParsedAddress::Nothing => (
+            ParsedAddress::Wrong(mistake) => mistake,
+            ParsedAddress::Nothing => Mistake::new(
                 format!("{} is no address", quoted(&cell.text)),
-                "addresses look like %I0.0, %IB4, %QW2, %ID8".to_owned(),
+                "addresses look like %I0.0, %IB4, %QW2, %ID8",
             ),
         };
-        self.wrong.report(cell.at, what, right);
+        self.wrong.collect(cell.at, mistake);
         None
     }
 
@@ -246,8 +247,8 @@ impl Row<'_> {
         }
         let spots = match device::spots(&cell.text, client) {
             Ok(spots) => spots,
-            Err((what, right)) => {
-                self.wrong.report(cell.at, what, right);
+            Err(mistake) => {
+                self.wrong.collect(cell.at, mistake);
                 return None;
             }
         };

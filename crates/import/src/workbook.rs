@@ -6,6 +6,7 @@
 use std::io::{Cursor, Read};
 
 use calamine::{Data, Reader, Xlsx};
+use tickbus_base::Mistake;
 use zip::ZipArchive;
 
 use super::Sheet;
@@ -19,17 +20,15 @@ const ROWS: u32 = 200_000;
 const COLUMNS: u32 = 256;
 const TEXTS: u64 = 2_000_000;
 
-/// What is wrong, and what would be right.
-type Wrong = (String, &'static str);
-
 const DAMAGED: &str = "open it in Excel or LibreOffice and save it again, or save the sheet as CSV";
 const TOO_LARGE: &str = "save one tag table alone, or save the sheet as CSV";
 
 /// All sheets that are not empty.
-pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Wrong> {
+pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Mistake> {
     check_parts(bytes)?;
-    let damaged =
-        |error: calamine::XlsxError| (format!("this workbook cannot be read: {error}"), DAMAGED);
+    let damaged = |error: calamine::XlsxError| {
+        Mistake::new(format!("this workbook cannot be read: {error}"), DAMAGED)
+    };
     let mut workbook = Xlsx::new(Cursor::new(bytes)).map_err(damaged)?;
     let mut sheets = Vec::new();
     for name in workbook.sheet_names() {
@@ -49,7 +48,7 @@ pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Wrong> {
                 continue;
             }
             if row >= ROWS || column >= COLUMNS {
-                return Err((
+                return Err(Mistake::new(
                     format!(
                         "the sheet \"{name}\" has a cell in row {}, column {}: tables of tags have at most {ROWS} rows and \
                          {COLUMNS} columns",
@@ -106,16 +105,16 @@ fn sheet(name: String, mut cells: Vec<(u32, u32, String)>) -> Sheet {
 }
 
 /// Unpacks all parts once, and checks their stated sizes.
-fn check_parts(bytes: &[u8]) -> Result<(), Wrong> {
+fn check_parts(bytes: &[u8]) -> Result<(), Mistake> {
     let damaged = |error: &dyn std::fmt::Display| {
-        (
+        Mistake::new(
             format!("this workbook cannot be unpacked: {error}"),
             DAMAGED,
         )
     };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| damaged(&error))?;
     if archive.len() > PARTS {
-        return Err((
+        return Err(Mistake::new(
             format!("this workbook has {} parts", archive.len()),
             TOO_LARGE,
         ));
@@ -128,14 +127,14 @@ fn check_parts(bytes: &[u8]) -> Result<(), Wrong> {
         let read = file.take(left + 1).read_to_end(&mut part);
         let read = read.map_err(|error| damaged(&error))? as u64;
         if read > left {
-            return Err((
+            return Err(Mistake::new(
                 format!("this workbook unpacks to more than {} MiB", UNPACKED >> 20),
                 TOO_LARGE,
             ));
         }
         left -= read;
         if let Some(texts) = stated_texts(&part).filter(|texts| *texts > TEXTS) {
-            return Err((
+            return Err(Mistake::new(
                 format!(
                     "this workbook says that it has {texts} texts; tables of tags have at most {TEXTS}"
                 ),

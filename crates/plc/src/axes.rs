@@ -1,6 +1,7 @@
 //! The program "axes" in place of the machine: ideal drives for all axes of a driver.cfg, and nothing else.
 
 use tickbus_axis::{Axis, Drive, Reflexes};
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, Area, Plan, SignalTable, Slot};
 
@@ -66,8 +67,10 @@ impl Program for Axes {
         if self.drives.is_empty() {
             return Err(ProgramError::Unfit {
                 program: Self::NAME.to_owned(),
-                what: "finds no axis".to_owned(),
-                right: "write [[axis]] tables, or use `tickbus mirror`".to_owned(),
+                mistake: Mistake::new(
+                    "finds no axis",
+                    "write [[axis]] tables, or use `tickbus mirror`",
+                ),
             });
         }
         let station = &table.stations[0];

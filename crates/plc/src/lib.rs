@@ -4,8 +4,10 @@
 //! [`Program::scan`] at the scan interval, in wall time or in simulation time, and transfers the images.
 //! [`HostedProgram`] is a user's own program.
 
+use std::fmt;
 use std::sync::Arc;
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, SignalTable};
 
@@ -94,13 +96,9 @@ pub trait Report: Send + Sync + std::fmt::Debug {
 }
 
 /// Why there is no such program.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProgramError {
     /// No built-in program has that name.
-    #[error(
-        "no PLC program is called \"{name}\"; the built-in programs are {}",
-        list(known, "and")
-    )]
     UnknownName {
         /// The requested name.
         name: String,
@@ -108,10 +106,6 @@ pub enum ProgramError {
         known: &'static [&'static str],
     },
     /// The program does not have this option.
-    #[error(
-        "the PLC program \"{program}\" has no option \"{option}\"; {}",
-        if known.is_empty() { "it takes none".to_owned() } else { format!("it takes {}", list(known, "and")) }
-    )]
     UnknownOption {
         /// The program.
         program: &'static str,
@@ -121,11 +115,6 @@ pub enum ProgramError {
         known: &'static [&'static str],
     },
     /// The option does not accept the value.
-    #[error(
-        "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; \
-         write {}",
-        list(known, "or")
-    )]
     BadValue {
         /// The program.
         program: &'static str,
@@ -133,44 +122,78 @@ pub enum ProgramError {
         option: &'static str,
         /// The given value.
         value: String,
-        /// The values that it accepts.
-        known: &'static [&'static str],
-    },
-    /// A user's own program cannot be used.
-    #[error("the PLC program \"{program}\" {what}; {right}")]
-    HostedProgram {
-        /// The path of its file.
-        program: String,
-        /// What is wrong with it.
-        what: String,
         /// What would be right.
         right: String,
     },
-    /// The program does not fit the image of this driver.
-    #[error("the PLC program \"{program}\" {what}; {right}")]
+    /// A user's own program cannot be used, or the program does not fit the image of this driver.
     Unfit {
         /// The program.
         program: String,
-        /// What is missing.
-        what: String,
-        /// What would be right.
-        right: String,
-    },
-    /// The value of the option is malformed.
-    #[error(
-        "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\"; {right}"
-    )]
-    Malformed {
-        /// The program.
-        program: &'static str,
-        /// The option.
-        option: &'static str,
-        /// The given value.
-        value: String,
-        /// What would be right.
-        right: String,
+        /// What is wrong with it; its name comes before.
+        mistake: Mistake,
     },
 }
+
+impl ProgramError {
+    /// The option does not accept the value, but `known` ones.
+    pub fn none_of(
+        program: &'static str,
+        option: &'static str,
+        value: &str,
+        known: &[&str],
+    ) -> Self {
+        Self::BadValue {
+            program,
+            option,
+            value: value.to_owned(),
+            right: format!("write {}", list(known, "or")),
+        }
+    }
+
+    /// What is wrong, and what would be right.
+    pub fn mistake(&self) -> Mistake {
+        match self {
+            Self::UnknownName { name, known } => Mistake::new(
+                format!("no PLC program is called \"{name}\""),
+                format!("the built-in programs are {}", list(known, "and")),
+            ),
+            Self::UnknownOption {
+                program,
+                option,
+                known,
+            } => Mistake::new(
+                format!("the PLC program \"{program}\" has no option \"{option}\""),
+                match known {
+                    [] => "it takes none".to_owned(),
+                    known => format!("it takes {}", list(known, "and")),
+                },
+            ),
+            Self::BadValue {
+                program,
+                option,
+                value,
+                right,
+            } => Mistake::new(
+                format!(
+                    "the option \"{option}\" of the PLC program \"{program}\" cannot be \"{value}\""
+                ),
+                right,
+            ),
+            Self::Unfit { program, mistake } => Mistake::new(
+                format!("the PLC program \"{program}\" {}", mistake.what),
+                &mistake.right,
+            ),
+        }
+    }
+}
+
+impl fmt::Display for ProgramError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.mistake().fmt(f)
+    }
+}
+
+impl std::error::Error for ProgramError {}
 
 /// Writes `"a", "b" or "c"`, with `last` before the last one.
 fn list(names: &[&str], last: &str) -> String {

@@ -137,7 +137,7 @@ impl Reaction {
 }
 
 fn malformed(option: &'static str, value: &str, right: &str) -> ProgramError {
-    ProgramError::Malformed {
+    ProgramError::BadValue {
         program: Reaction::NAME,
         option,
         value: value.to_owned(),

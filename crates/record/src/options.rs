@@ -2,6 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value};
 
 /// The default capacity of the ring in ticks, unless that takes too much memory.
@@ -30,16 +31,15 @@ impl Format {
     ///
     /// # Errors
     ///
-    /// It is neither; the text says what would be right.
-    pub fn of(file: &Path) -> Result<Self, String> {
+    /// It is neither.
+    pub fn of(file: &Path) -> Result<Self, Mistake> {
         let ending = file.extension().map(std::ffi::OsStr::to_ascii_lowercase);
         match ending.as_ref().and_then(|ending| ending.to_str()) {
             Some("vcd") => Ok(Self::Vcd),
             Some("csv") => Ok(Self::Csv),
-            _ => Err(format!(
-                "\"{}\" ends neither in .vcd nor in .csv; name it run.vcd for waveform viewers, or run.csv \
-                 for tables",
-                file.display()
+            _ => Err(Mistake::new(
+                format!("\"{}\" ends neither in .vcd nor in .csv", file.display()),
+                "name it run.vcd for waveform viewers, or run.csv for tables",
             )),
         }
     }
@@ -77,7 +77,7 @@ impl Options {
     /// # Errors
     ///
     /// The file name implies no format.
-    pub fn to(file: &Path) -> Result<Self, String> {
+    pub fn to(file: &Path) -> Result<Self, Mistake> {
         Ok(Self {
             file: file.to_owned(),
             format: Format::of(file)?,
@@ -137,9 +137,8 @@ pub fn file_of(value: &Value<'_>) -> Option<(PathBuf, Format)> {
     let file = PathBuf::from(value.label(FILE_LIMIT, right)?);
     match Format::of(&file) {
         Ok(format) => Some((file, format)),
-        Err(error) => {
-            let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
-            value.wrong(what, right);
+        Err(mistake) => {
+            value.refuse(mistake);
             None
         }
     }

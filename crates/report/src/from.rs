@@ -71,7 +71,7 @@ pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingE
     if recording.is_cut() || error.is_some() {
         let why = error
             .as_ref()
-            .map_or_else(|| recording.ending(), |error| error.what.clone());
+            .map_or_else(|| recording.ending(), |error| error.mistake.what.clone());
         mark(
             &mut run,
             end,

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{short_number, shown};
 use tickbus_fieldbus::faults::{self, unknown};
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
@@ -43,16 +44,13 @@ pub enum Demand {
     Falls,
 }
 
-/// What is wrong with a text, and what would be right.
-type Wrong = (String, String);
-
 impl Condition {
     /// Reads a condition on a signal of `table`.
     ///
     /// # Errors
     ///
     /// What is wrong, and what would be right: the signal or the number to compare with is invalid.
-    pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Wrong> {
+    pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Mistake> {
         let text = text.trim();
         if let Some(signal) = table.position(text) {
             return bit(signal, Demand::On, table);
@@ -78,7 +76,7 @@ impl Condition {
         Self::compares(text, table)
     }
 
-    fn compares(text: &str, table: &SignalTable) -> Result<Self, Wrong> {
+    fn compares(text: &str, table: &SignalTable) -> Result<Self, Mistake> {
         let condition = faults::Condition::parse(text, table)?;
         let signal = condition.signal();
         if table.signals[signal].data_type == DataType::Bool {
@@ -175,26 +173,26 @@ impl fmt::Display for Demand {
 }
 
 /// A condition that only applies to a BOOL.
-fn bit(signal: usize, demand: Demand, table: &SignalTable) -> Result<Condition, Wrong> {
+fn bit(signal: usize, demand: Demand, table: &SignalTable) -> Result<Condition, Mistake> {
     // The faults' conditions have the error for other types.
     faults::Condition::parse(&table.signals[signal].name, table)?;
     Ok(Condition { signal, demand })
 }
 
 /// `NAME == 120 ± 0.5`, cut at its sign.
-fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condition, Wrong> {
+fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condition, Mistake> {
     let condition = Condition::compares(comparison.trim(), table)?;
     let Some((_, number)) = comparison.split_once("==") else {
-        return Err((
-            "a tolerance stands at a sign other than ==".to_owned(),
-            "write == for it, or leave the tolerance out".to_owned(),
+        return Err(Mistake::new(
+            "a tolerance stands at a sign other than ==",
+            "write == for it, or leave the tolerance out",
         ));
     };
     let name = &table.signals[condition.signal].name;
     let parsed = |text: &str| {
         let number = text.trim().parse::<f64>().ok();
         let wrong = || {
-            (
+            Mistake::new(
                 format!("\"{}\" is no number", shown(text.trim())),
                 format!("write such as \"{} == 120 ± 0.5\"", shown(name)),
             )
@@ -203,9 +201,9 @@ fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condit
     };
     let (middle, tolerance) = (parsed(number)?, parsed(tolerance)?);
     if tolerance < 0.0 {
-        return Err((
+        return Err(Mistake::new(
             format!("a tolerance of {tolerance} lets nothing through"),
-            "write 0 or more".to_owned(),
+            "write 0 or more",
         ));
     }
     Ok(Condition {
@@ -303,8 +301,8 @@ mod tests {
                 "a tolerance stands at a sign other than ==; write == for it, or leave the tolerance out",
             ),
         ] {
-            let (what, right) = Condition::parse(text, &table).expect_err(text);
-            assert_eq!(format!("{what}; {right}"), told);
+            let mistake = Condition::parse(text, &table).expect_err(text);
+            assert_eq!(mistake.to_string(), told);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{nearest, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
@@ -21,9 +22,6 @@ pub(super) struct MachineRecording {
     pub(super) place: TextPosition,
 }
 
-/// What is wrong with a recording, and what would be right.
-type Wrong = (String, String);
-
 impl MachineRecording {
     /// Opens the recording at `file`, which must contain signals of `table`; `own` is the area that the
     /// machine writes.
@@ -32,9 +30,11 @@ impl MachineRecording {
         table: &SignalTable,
         own: Area,
         place: TextPosition,
-    ) -> Result<Self, Wrong> {
-        let recording = Recording::open(file, Some(table))
-            .map_err(|error| (format!("{}: {}", file.display(), error.what), error.right))?;
+    ) -> Result<Self, Mistake> {
+        let recording = Recording::open(file, Some(table)).map_err(|error| {
+            let Mistake { what, right } = error.mistake;
+            Mistake::new(format!("{}: {what}", file.display()), right)
+        })?;
         let mut sent = Vec::new();
         for (index, signal) in table.signals.iter().enumerate() {
             if signal.area == own
@@ -44,9 +44,9 @@ impl MachineRecording {
             }
         }
         if sent.is_empty() {
-            return Err((
+            return Err(Mistake::new(
                 format!("{} has no signal that the PLC reads", file.display()),
-                "use a recording of a driver with this signal table".to_owned(),
+                "use a recording of a driver with this signal table",
             ));
         }
         Ok(Self {
@@ -58,10 +58,9 @@ impl MachineRecording {
     }
 
     /// Adds a signal that the PLC must send as recorded.
-    pub(super) fn compare(&mut self, index: usize, table: &SignalTable) -> Result<(), Wrong> {
+    pub(super) fn compare(&mut self, index: usize, table: &SignalTable) -> Result<(), Mistake> {
         let signal = &table.signals[index];
-        let recording =
-            Recording::open(&self.file, Some(table)).map_err(|error| (error.what, error.right))?;
+        let recording = Recording::open(&self.file, Some(table)).map_err(|error| error.mistake)?;
         let Some(column) = column(&recording, signal)? else {
             let names = recording.columns().columns.iter();
             let near = nearest(&signal.name, names.map(|column| column.name.as_str()));
@@ -69,7 +68,7 @@ impl MachineRecording {
                 || "compare signals that were recorded".to_owned(),
                 |near| format!("it has \"{near}\""),
             );
-            return Err((
+            return Err(Mistake::new(
                 format!("the recording has no \"{}\"", shown(&signal.name)),
                 right,
             ));
@@ -85,7 +84,7 @@ impl MachineRecording {
 }
 
 /// The column of a signal, if the recording has one of the same kind.
-fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Wrong> {
+fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Mistake> {
     let columns = recording.columns();
     let Some(index) = columns.position(&signal.name, false) else {
         return Ok(None);
@@ -93,14 +92,14 @@ fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Wrong
     let column = &columns.columns[index];
     let moved = column.address.is_some_and(|was| was.area != signal.area);
     if moved || column.kind != kind(signal) {
-        return Err((
+        return Err(Mistake::new(
             format!(
                 "\"{}\" ({} {}) is another signal in this recording",
                 shown(&signal.name),
                 signal.address(),
                 signal.data_type
             ),
-            "use a recording of a driver with this signal table".to_owned(),
+            "use a recording of a driver with this signal table",
         ));
     }
     Ok(Some(index))

@@ -57,7 +57,7 @@ impl Suite {
         config.record = record
             .map(record::Options::to)
             .transpose()
-            .map_err(DriverError::Config)?;
+            .map_err(|mistake| DriverError::Config(mistake.to_string()))?;
         let table = &bench.config.table;
         let playback = bench.tape.as_ref().map(|tape| Playback::start(tape, table));
         let playback = playback
@@ -149,7 +149,7 @@ impl Stand<'_> {
             let id = self
                 .driver
                 .inject(fault)
-                .map_err(|error| self.broken(*place, &error))?;
+                .map_err(|mistake| self.broken(*place, &mistake.to_string()))?;
             self.faults.retain(|(name, _)| *name != fault.name);
             self.faults.push((fault.name.clone(), id));
         }

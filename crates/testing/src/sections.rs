@@ -71,14 +71,13 @@ impl Reader<'_> {
 
     fn tape(&self, value: &Value<'_>, compare: Option<&Value<'_>>) -> Option<MachineRecording> {
         let file = value.text("write the path of a recording, as seen from this file")?;
-        let wrong = |value: &Value<'_>, (what, right): (String, String)| value.wrong(what, right);
         let opened = MachineRecording::open(
             &self.folder.join(file),
             self.table,
             self.own(),
             value.place(),
         );
-        let mut tape = opened.map_err(|error| wrong(value, error)).ok()?;
+        let mut tape = opened.map_err(|mistake| value.refuse(mistake)).ok()?;
         let compared = match compare {
             None => Vec::new(),
             Some(value) => value.list("write a list of signals, such as [\"LA1 run\"]")?,
@@ -89,8 +88,8 @@ impl Reader<'_> {
                 None => Err(unknown(name, self.table)),
                 Some(index) => tape.compare(index, self.table),
             };
-            if let Err(error) = added {
-                wrong(&value, error);
+            if let Err(mistake) = added {
+                value.refuse(mistake);
             }
         }
         Some(tape)
@@ -324,8 +323,7 @@ impl Reader<'_> {
     /// A signal that this end writes, by its name.
     fn settable(&self, value: &Value<'_>, name: &str) -> Option<usize> {
         let Some(index) = self.table.position(name) else {
-            let (what, right) = unknown(name, self.table);
-            value.wrong(what, right);
+            value.refuse(unknown(name, self.table));
             return None;
         };
         let signal = &self.table.signals[index];
@@ -422,8 +420,8 @@ impl Reader<'_> {
         let text = value.text("write a condition in quotes, such as \"Phase == 3\"")?;
         match Condition::parse(text, self.table) {
             Ok(condition) => Some((condition, value.place())),
-            Err((what, right)) => {
-                value.wrong(what, right);
+            Err(mistake) => {
+                value.refuse(mistake);
                 None
             }
         }
@@ -432,8 +430,7 @@ impl Reader<'_> {
     /// `"Phase" = 3` among expectations.
     fn equality(&self, name: &str, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
         let Some(signal) = self.table.position(name) else {
-            let (what, right) = unknown(name, self.table);
-            value.wrong(what, right);
+            value.refuse(unknown(name, self.table));
             return None;
         };
         let slot = slot_of(value, &self.table.signals[signal], "the value")?;

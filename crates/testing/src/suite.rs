@@ -150,7 +150,7 @@ fn load_config(
         Err(mistakes) => {
             match mistakes.iter().next() {
                 Some(mistake) if mistake.place.is_none() => {
-                    value.wrong(format!("{}: {}", shown(name), mistake.what), right);
+                    value.wrong(format!("{}: {}", shown(name), mistake.mistake.what), right);
                 }
                 _ => *of_config = Some(mistakes),
             }

@@ -13,7 +13,7 @@ mod wall;
 
 pub use clock::{Clock, Manual, Monotonic};
 pub use histogram::TimeHistogram;
-pub use nanos::{Nanos, ParseDurationError};
+pub use nanos::Nanos;
 pub use pace::Pace;
 pub use stop::{Stop, Waker};
 pub use wall::{WallClock, system_time};

@@ -4,6 +4,8 @@ use std::fmt;
 use std::ops::{Add, AddAssign, Sub};
 use std::str::FromStr;
 
+use crate::Mistake;
+
 /// A point in time or a span, in signed 64-bit nanoseconds (±292 years).
 ///
 /// As a point it counts from the epoch of the [`Clock`](super::Clock) that gave it. Arithmetic
@@ -111,42 +113,40 @@ impl fmt::Display for Nanos {
     }
 }
 
-/// Why a text is not a duration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "not a duration; write a number and a unit, such as \"10ms\" (units: ns, us, ms, s, min, h)"
-)]
-pub struct ParseDurationError;
+fn not_a_duration() -> Mistake {
+    let right = "write a number and a unit, such as \"10ms\" (units: ns, us, ms, s, min, h)";
+    Mistake::new("not a duration", right)
+}
 
 /// Reads `10ms`, `1.5 s`, `250us`: a non-negative decimal number and a unit.
 impl FromStr for Nanos {
-    type Err = ParseDurationError;
+    type Err = Mistake;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let text = text.trim();
         let digits = text
             .find(|c: char| !c.is_ascii_digit() && c != '.')
-            .ok_or(ParseDurationError)?;
+            .ok_or_else(not_a_duration)?;
         let (number, unit) = text.split_at(digits);
         let (_, size) = UNITS
             .iter()
             .find(|(name, _)| *name == unit.trim())
-            .ok_or(ParseDurationError)?;
+            .ok_or_else(not_a_duration)?;
         let (whole, fraction) = number.split_once('.').unwrap_or((number, ""));
         if whole.is_empty() || (number.contains('.') && fraction.is_empty()) {
-            return Err(ParseDurationError);
+            return Err(not_a_duration());
         }
-        let whole: i64 = whole.parse().map_err(|_| ParseDurationError)?;
-        let mut total = whole.checked_mul(*size).ok_or(ParseDurationError)?;
+        let whole: i64 = whole.parse().map_err(|_| not_a_duration())?;
+        let mut total = whole.checked_mul(*size).ok_or_else(not_a_duration)?;
         let mut digit_size = *size;
         for digit in fraction.bytes() {
             if !digit.is_ascii_digit() {
-                return Err(ParseDurationError);
+                return Err(not_a_duration());
             }
             digit_size /= 10;
             total = total
                 .checked_add(i64::from(digit - b'0') * digit_size)
-                .ok_or(ParseDurationError)?;
+                .ok_or_else(not_a_duration)?;
         }
         Ok(Self(total))
     }
@@ -186,7 +186,7 @@ mod tests {
             "10 parsecs",
             "9999999999h",
         ] {
-            assert_eq!(text.parse::<Nanos>(), Err(ParseDurationError), "{text}");
+            assert_eq!(text.parse::<Nanos>(), Err(not_a_duration()), "{text}");
         }
     }
 

@@ -4,16 +4,16 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt;
 
-/// One mistake: where it is, what is wrong, and what would be right.
+use crate::Mistake;
+
+/// A mistake, and where it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mistake {
+pub struct PlacedMistake {
     /// Line and column, both from 1; columns count characters. `None` when the file as a whole is wrong, such
     /// as one that does not exist.
     pub place: Option<(usize, usize)>,
-    /// What is wrong.
-    pub what: String,
-    /// What would be right.
-    pub right: String,
+    /// The mistake.
+    pub mistake: Mistake,
 }
 
 /// All mistakes of one file, in line order; at least one.
@@ -22,25 +22,23 @@ pub struct Mistake {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistakes {
     file: String,
-    list: Vec<Mistake>,
+    list: Vec<PlacedMistake>,
 }
 
 impl Mistakes {
     /// The single mistake of a file that is wrong as a whole.
     pub fn of_file(file: &str, what: impl Into<String>, right: impl Into<String>) -> Self {
-        let only = Mistake {
-            place: None,
-            what: what.into(),
-            right: right.into(),
-        };
-        Self {
-            file: file.to_owned(),
-            list: vec![only],
-        }
+        Self::of(file, Mistake::new(what, right))
+    }
+
+    /// As [`of_file`](Self::of_file), for a mistake that something else has found.
+    pub fn of(file: &str, mistake: Mistake) -> Self {
+        let place = None;
+        Self::of_list(file, vec![PlacedMistake { place, mistake }])
     }
 
     /// These mistakes of `file`, in the order given. The list must not be empty.
-    pub fn of_list(file: &str, list: Vec<Mistake>) -> Self {
+    pub fn of_list(file: &str, list: Vec<PlacedMistake>) -> Self {
         debug_assert!(!list.is_empty(), "no mistakes are none");
         Self {
             file: file.to_owned(),
@@ -49,7 +47,7 @@ impl Mistakes {
     }
 
     /// All mistakes, in line order.
-    pub fn iter(&self) -> std::slice::Iter<'_, Mistake> {
+    pub fn iter(&self) -> std::slice::Iter<'_, PlacedMistake> {
         self.list.iter()
     }
 
@@ -61,8 +59,8 @@ impl Mistakes {
 }
 
 impl<'a> IntoIterator for &'a Mistakes {
-    type Item = &'a Mistake;
-    type IntoIter = std::slice::Iter<'a, Mistake>;
+    type Item = &'a PlacedMistake;
+    type IntoIter = std::slice::Iter<'a, PlacedMistake>;
 
     fn into_iter(self) -> Self::IntoIter {
         self.iter()
@@ -71,7 +69,7 @@ impl<'a> IntoIterator for &'a Mistakes {
 
 impl fmt::Display for Mistakes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, Mistake { place, what, right }) in self.list.iter().enumerate() {
+        for (index, PlacedMistake { place, mistake }) in self.list.iter().enumerate() {
             if index > 0 {
                 f.write_str("\n")?;
             }
@@ -79,7 +77,7 @@ impl fmt::Display for Mistakes {
             if let Some((line, column)) = place {
                 write!(f, ":{line}:{column}")?;
             }
-            write!(f, ": {what}; {right}")?;
+            write!(f, ": {mistake}")?;
         }
         Ok(())
     }
@@ -91,8 +89,7 @@ impl std::error::Error for Mistakes {}
 #[derive(Debug)]
 struct Found {
     at: usize,
-    what: String,
-    right: String,
+    mistake: Mistake,
 }
 
 /// Collects the mistakes of one text while it is being read.
@@ -123,8 +120,12 @@ impl<'t> Collector<'t> {
 
     /// Records a mistake at byte offset `at` of the text.
     pub fn report(&self, at: usize, what: impl Into<String>, right: impl Into<String>) {
-        let (what, right) = (what.into(), right.into());
-        self.found.borrow_mut().push(Found { at, what, right });
+        self.collect(at, Mistake::new(what, right));
+    }
+
+    /// As [`report`](Self::report), for a mistake that something else has found.
+    pub fn collect(&self, at: usize, mistake: Mistake) {
+        self.found.borrow_mut().push(Found { at, mistake });
     }
 
     /// The line, from 1, of byte offset `at`.
@@ -169,7 +170,7 @@ impl<'t> Collector<'t> {
         // Counted on from the previous mistake: a long line with many mistakes must not be counted from its
         // start each time.
         let (mut line, mut column, mut counted) = (0, 0, 0);
-        for Found { at, what, right } in found {
+        for Found { at, mistake } in found {
             let at = at.min(self.text.len());
             if self.line(at) != line {
                 line = self.line(at);
@@ -178,10 +179,9 @@ impl<'t> Collector<'t> {
             let rest = self.text[counted..].char_indices();
             column += rest.take_while(|(offset, _)| counted + offset < at).count();
             counted = counted.max(at);
-            list.push(Mistake {
+            list.push(PlacedMistake {
                 place: Some((line, column)),
-                what,
-                right,
+                mistake,
             });
         }
         list.dedup();

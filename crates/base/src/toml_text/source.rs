@@ -98,7 +98,7 @@ fn repaired<'t>(collector: &mut Collector<'t>, text: &'t str) -> Option<Cow<'t, 
             let real = trusted || fault.kind != Kind::Grammar;
             readable &= real && !fault.header && !text[line.clone()].trim().is_empty();
             if real {
-                collector.report(fault.at, fault.what.clone(), fault.right.clone());
+                collector.collect(fault.at, fault.mistake.clone());
             }
             collector.break_line(fault.at);
             after.replace_range(line.clone(), &" ".repeat(line.len()));

@@ -4,6 +4,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
 
 use super::shown;
+use crate::Mistake;
 
 /// What a syntax error does to the rest of the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +27,7 @@ pub(super) struct SyntaxError {
     pub(super) kind: Kind,
     /// Whether it makes a table header unreadable, so that the keys below it belong nowhere.
     pub(super) header: bool,
-    pub(super) what: String,
-    pub(super) right: String,
+    pub(super) mistake: Mistake,
 }
 
 /// The syntax errors of a text in order, the first of each line, without mere consequences.
@@ -140,13 +140,11 @@ fn endless(error: &Error, text: &str, root: &DeTable<'_>) -> Option<SyntaxError>
             ),
         }
     };
-    let (what, right) = (what.to_owned(), right.to_owned());
     Some(SyntaxError {
         at,
         kind: Kind::Endless,
         header: false,
-        what,
-        right,
+        mistake: Mistake::new(what, right),
     })
 }
 
@@ -223,37 +221,34 @@ fn translate(error: &Error, text: &str) -> SyntaxError {
         .split_once(", expected ")
         .unwrap_or((error.message(), ""));
     let opens_no_header = message == "key with no value" && line.ends_with(']');
-    let (what, right) = words(message, expected, &piece, line);
     SyntaxError {
         at,
         kind: kind_of(message),
         header: line.starts_with('[') || opens_no_header,
-        what,
-        right,
+        mistake: words(message, expected, &piece, line),
     }
 }
 
 /// What is wrong and what would be right, derived from the parser's message and what it expected, the piece
 /// of text that it blames, and the line around that.
-fn words(message: &str, expected: &str, piece: &str, line: &str) -> (String, String) {
-    let both = |what: &str, right: &str| (what.to_owned(), right.to_owned());
+fn words(message: &str, expected: &str, piece: &str, line: &str) -> Mistake {
     let foreign_comment = ["//", ";", "--", "/*"]
         .iter()
         .any(|sign| line.starts_with(sign));
     match message {
-        _ if foreign_comment => both("this is no comment", "a comment begins with #"),
+        _ if foreign_comment => Mistake::new("this is no comment", "a comment begins with #"),
         "string values must be quoted" if piece.is_empty() => {
-            both("a value is missing", "write key = value")
+            Mistake::new("a value is missing", "write key = value")
         }
-        "string values must be quoted" => (
+        "string values must be quoted" => Mistake::new(
             format!("{piece} is not a value"),
-            "a text stands in quotes, a comment begins with #".to_owned(),
+            "a text stands in quotes, a comment begins with #",
         ),
         "key with no value" if line.ends_with(']') => {
-            both("a table header is not opened", "begin it with [")
+            Mistake::new("a table header is not opened", "begin it with [")
         }
-        "key with no value" => both("a key has no value", "write key = value"),
-        "duplicate key" if line.starts_with('[') => (
+        "key with no value" => Mistake::new("a key has no value", "write key = value"),
+        "duplicate key" if line.starts_with('[') => Mistake::new(
             format!("there is a table {piece} already"),
             if piece == "signal" || piece == "station" {
                 format!("write [[{piece}]], with two brackets, for each of several")
@@ -261,45 +256,46 @@ fn words(message: &str, expected: &str, piece: &str, line: &str) -> (String, Str
                 "write its keys into one table".to_owned()
             },
         ),
-        "duplicate key" => (
+        "duplicate key" => Mistake::new(
             format!("the key {piece} stands twice in one table"),
-            "keep one of them".to_owned(),
+            "keep one of them",
         ),
-        "unclosed table" => both("a table header is not closed", "end it with ]"),
-        "unclosed array table" => both("a table header is not closed", "end it with ]]"),
+        "unclosed table" => Mistake::new("a table header is not closed", "end it with ]"),
+        "unclosed array table" => Mistake::new("a table header is not closed", "end it with ]]"),
         "missing comma between array elements" => {
-            both("a list lacks a comma", "write a comma between its elements")
+            Mistake::new("a list lacks a comma", "write a comma between its elements")
         }
-        "missing comma between key-value pairs" => both(
+        "missing comma between key-value pairs" => Mistake::new(
             "a table in braces lacks a comma",
             "write a comma between its keys",
         ),
-        "unexpected key or value" | "unexpected content" => both(
+        "unexpected key or value" | "unexpected content" => Mistake::new(
             "the line goes on after its end",
             "write one key = value on each line",
         ),
         "invalid unquoted key" if line.contains(':') && !line.contains('=') => {
-            both("this line is no key with a value", "write key = value")
+            Mistake::new("this line is no key with a value", "write key = value")
         }
-        "invalid unquoted key" => (
+        "invalid unquoted key" => Mistake::new(
             format!("{piece} cannot stand in a key"),
-            "keys have letters, digits, - and _".to_owned(),
+            "keys have letters, digits, - and _",
         ),
-        "invalid key-value pair" => both("this line is no key with a value", "write key = value"),
-        "unexpected leading zero" => both("a number begins with 0", "write it without that"),
+        "invalid key-value pair" => {
+            Mistake::new("this line is no key with a value", "write key = value")
+        }
+        "unexpected leading zero" => {
+            Mistake::new("a number begins with 0", "write it without that")
+        }
         _ if message.starts_with("invalid basic string")
             || message.starts_with("invalid literal") =>
         {
-            (
-                String::from("a text is not closed"),
-                format!("end it with {expected}"),
-            )
+            Mistake::new("a text is not closed", format!("end it with {expected}"))
         }
-        _ if expected.is_empty() || expected == "nothing" => (
+        _ if expected.is_empty() || expected == "nothing" => Mistake::new(
             message.replace(';', ","),
-            "see toml.io for how TOML is written".to_owned(),
+            "see toml.io for how TOML is written",
         ),
-        _ => (
+        _ => Mistake::new(
             message.replace(';', ","),
             format!("TOML expects {expected} here"),
         ),

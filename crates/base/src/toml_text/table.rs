@@ -6,6 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::{Collector, did_you_mean, nearest, shown};
+use crate::Mistake;
 use crate::time::Nanos;
 
 /// What messages call the root table.
@@ -203,7 +204,12 @@ impl<'a> Value<'a> {
 
     /// Reports a mistake in this value.
     pub fn wrong(&self, what: impl Into<String>, right: impl Into<String>) {
-        self.collector.report(self.at(), what, right);
+        self.refuse(Mistake::new(what, right));
+    }
+
+    /// As [`wrong`](Self::wrong), for a mistake that something else has found.
+    pub fn refuse(&self, mistake: Mistake) {
+        self.collector.collect(self.at(), mistake);
     }
 
     /// The value is a boolean.
@@ -335,9 +341,7 @@ impl<'a> Value<'a> {
                 None
             }
             Ok(span) => Some(span),
-            Err(error) => {
-                let error = error.to_string();
-                let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
+            Err(Mistake { what, right }) => {
                 self.wrong(format!("\"{}\" is {what}", shown(text)), right);
                 None
             }

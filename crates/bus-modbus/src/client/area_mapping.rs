@@ -3,6 +3,7 @@
 use crate::ElementAddress;
 use crate::element_address::SHAPE;
 use crate::table::{ADDRESSES, Span, Table};
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::Value;
 use tickbus_image::signal::Area;
 
@@ -122,7 +123,7 @@ impl AreaMapping {
     /// # Errors
     ///
     /// It does not fit: what is wrong, and what would be right.
-    pub(super) fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, (String, String)> {
+    pub(super) fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, Mistake> {
         let mut blocks = Vec::new();
         let mut byte = 0;
         for (number, part) in self.parts.iter().enumerate() {
@@ -131,11 +132,10 @@ impl AreaMapping {
             let size = part.bytes.unwrap_or(left);
             if size > left || (is_last && size < left) {
                 let all: usize = self.parts.iter().filter_map(|part| part.bytes).sum();
-                return Err((
+                return Err(Mistake::new(
                     format!("the parts of {area} have {all} bytes, but {area} has {bytes}"),
                     "let \"bytes\" out of the last part, which then has all that are left, or change the \
-                     size of the image"
-                        .to_owned(),
+                     size of the image",
                 ));
             }
             let block = Block {
@@ -145,7 +145,7 @@ impl AreaMapping {
                 bytes: size,
             };
             if block.span().end() > ADDRESSES {
-                return Err((
+                return Err(Mistake::new(
                     format!(
                         "{area} would lie at {} {} from {} on, and end at offset {}",
                         block.span().count,
@@ -153,7 +153,7 @@ impl AreaMapping {
                         part.place,
                         block.span().end() - 1
                     ),
-                    "begin further to the front; the last offset is 65535".to_owned(),
+                    "begin further to the front; the last offset is 65535",
                 ));
             }
             byte += size;
@@ -169,7 +169,7 @@ impl AreaMapping {
     /// # Errors
     ///
     /// Two blocks overlap: what is wrong, and what would be right.
-    pub(super) fn check_apart(area: Area, blocks: &[Block]) -> Result<(), (String, String)> {
+    pub(super) fn check_apart(area: Area, blocks: &[Block]) -> Result<(), Mistake> {
         for (index, block) in blocks.iter().enumerate() {
             let other = blocks[..index].iter().find(|other| {
                 let (own, others) = (block.span(), other.span());
@@ -182,7 +182,7 @@ impl AreaMapping {
                 table: block.table,
                 offset: block.first,
             };
-            return Err((
+            return Err(Mistake::new(
                 format!(
                     "the parts of {area} at {} and at {} would be written over one another: the first has {} {}, the \
                      second {}",
@@ -192,8 +192,7 @@ impl AreaMapping {
                     block.table,
                     block.span().count
                 ),
-                "begin the second one behind the first; a register has 2 bytes of the image, a coil 1 bit"
-                    .to_owned(),
+                "begin the second one behind the first; a register has 2 bytes of the image, a coil 1 bit",
             ));
         }
         Ok(())
@@ -202,19 +201,18 @@ impl AreaMapping {
 
 fn read_place(value: &Value<'_>, table: Table, writes: bool) -> Option<ElementAddress> {
     let place = ElementAddress::parse(value.text(SHAPE)?, table)
-        .map_err(|error| value.wrong(error.what, error.right))
+        .map_err(|mistake| value.refuse(mistake))
         .ok()?;
     if writes && !place.table.is_writable() {
-        let (what, right) = nobody_writes(place.table);
-        value.wrong(what, right);
+        value.refuse(nobody_writes(place.table));
         return None;
     }
     Some(place)
 }
 
 /// The error for writing to a read-only table: what is wrong, and what would be right.
-pub(super) fn nobody_writes(table: Table) -> (String, &'static str) {
-    (
+pub(super) fn nobody_writes(table: Table) -> Mistake {
+    Mistake::new(
         format!("nobody can write {table}"),
         "this end writes them: choose holding registers or coils, or check \"role\"",
     )

@@ -18,20 +18,18 @@ impl ClientOptions {
             let signal = &table.signals[line.signal];
             let spot: TagAddress = match line.text.parse() {
                 Ok(spot) => spot,
-                Err(error) => {
-                    let error: super::super::ElementAddressError = error;
-                    line.wrong(error.what, error.right);
+                Err(mistake) => {
+                    line.refuse(mistake);
                     continue;
                 }
             };
-            if let Err((what, right)) = Piece::of_spot(signal, spot) {
-                line.wrong(what, right);
+            if let Err(mistake) = Piece::of_spot(signal, spot) {
+                line.refuse(mistake);
                 continue;
             }
             let of_table = spot.place.table;
             if signal.area == writes && !of_table.is_writable() {
-                let (what, right) = nobody_writes(of_table);
-                line.wrong(what, right);
+                line.refuse(nobody_writes(of_table));
                 continue;
             }
             self.at.insert(signal.name.clone(), spot);

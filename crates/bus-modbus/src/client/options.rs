@@ -6,6 +6,7 @@ use crate::line::Line;
 use crate::stations::{Stations, Units, read_write_to};
 use crate::table::Table as OfTable;
 use crate::{ElementAddress, INPUTS, TagAddress};
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::Role;
@@ -116,8 +117,8 @@ impl ClientOptions {
                         Ok(())
                     }
                 });
-                if let Err((what, right)) = fits {
-                    collector.report(self.lie(area).at, what, right);
+                if let Err(mistake) = fits {
+                    collector.collect(self.lie(area).at, mistake);
                     break;
                 }
             }
@@ -164,7 +165,7 @@ impl ClientOptions {
     /// # Errors
     ///
     /// It does not fit: what is wrong, and what would be right.
-    pub fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, (String, String)> {
+    pub fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, Mistake> {
         self.lie(area).blocks(area, bytes)
     }
 

@@ -2,6 +2,7 @@
 
 use crate::table::{ADDRESSES, Span, Table};
 use crate::{ElementAddress, TagAddress};
+use tickbus_base::Mistake;
 use tickbus_image::signal::{DataType, Signal};
 
 use super::Block;
@@ -79,13 +80,13 @@ impl Piece {
     /// # Errors
     ///
     /// It does not fit there: what is wrong, and what would be right.
-    pub(super) fn of_spot(signal: &Signal, spot: TagAddress) -> Result<Self, (String, String)> {
+    pub(super) fn of_spot(signal: &Signal, spot: TagAddress) -> Result<Self, Mistake> {
         let ElementAddress { table, offset } = spot.place;
         let data_type = signal.data_type;
         if let Some(stated) = spot.data_type
             && stated != data_type
         {
-            return Err((
+            return Err(Mistake::new(
                 format!("the address says {stated}, and the signal is {data_type}"),
                 format!(
                     "write \"type\" in its [[signal]] section as the device has it, or \":{data_type}\""
@@ -97,9 +98,9 @@ impl Piece {
         let first = offset * table.width();
         let within = if table.is_bits() {
             if data_type != DataType::Bool {
-                return Err((
+                return Err(Mistake::new(
                     format!("a {data_type} does not fit into a {}", table.element()),
-                    "that is a single bit, for a BOOL; a longer value lies in registers".to_owned(),
+                    "that is a single bit, for a BOOL; a longer value lies in registers",
                 ));
             }
             0
@@ -108,23 +109,22 @@ impl Piece {
                 // Bits 0 to 7 of a register are in its second byte, the low one; bits 8 to 15 in its first.
                 (1, Some(bit)) => 8 * (1 - usize::from(bit / 8)) + usize::from(bit % 8),
                 (1, None) => {
-                    return Err((
+                    return Err(Mistake::new(
                         format!("a BOOL is one bit, and a {} has 16", table.element()),
-                        "name the bit behind a dot, from 0 for the lowest to 15, as in \"400021.5\"".to_owned(),
+                        "name the bit behind a dot, from 0 for the lowest to 15, as in \"400021.5\"",
                     ));
                 }
                 (8, Some(half @ (0 | 8))) => 8 - usize::from(half),
                 (8, _) => {
-                    return Err((
+                    return Err(Mistake::new(
                         format!("a {data_type} is half of a {}", table.element()),
-                        "write \"400021.0\" for the low byte and \"400021.8\" for the high one"
-                            .to_owned(),
+                        "write \"400021.0\" for the low byte and \"400021.8\" for the high one",
                     ));
                 }
                 (_, Some(_)) => {
-                    return Err((
+                    return Err(Mistake::new(
                         format!("the address names a bit, and the signal is a {data_type}"),
-                        "remove the dot and what follows it, or write type = \"BOOL\"".to_owned(),
+                        "remove the dot and what follows it, or write type = \"BOOL\"",
                     ));
                 }
                 (_, None) => 0,
@@ -138,12 +138,12 @@ impl Piece {
             fills: false,
         };
         if piece.span().end() > ADDRESSES {
-            return Err((
+            return Err(Mistake::new(
                 format!(
                     "a {data_type} from {} on reaches beyond the table",
                     spot.place
                 ),
-                "the last offset is 65535".to_owned(),
+                "the last offset is 65535",
             ));
         }
         Ok(piece)

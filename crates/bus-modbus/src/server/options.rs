@@ -103,7 +103,7 @@ impl ServerOptions {
 fn read_window(value: &Value<'_>) -> Option<usize> {
     let text = value.text(SHAPE)?;
     let place = ElementAddress::parse(text, table::Table::HoldingRegisters)
-        .map_err(|error| value.wrong(error.what, error.right))
+        .map_err(|mistake| value.refuse(mistake))
         .ok()?;
     if place.table != table::Table::HoldingRegisters {
         value.wrong(

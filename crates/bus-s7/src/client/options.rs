@@ -7,9 +7,10 @@ use crate::length::{LONGEST, read_length};
 use crate::transport::PORT;
 use crate::tsap::{RACK, SLOT};
 use crate::{Start, Tsap, Variable};
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::both_ways;
-use tickbus_fieldbus::tcp::{Address, AddressError};
+use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
@@ -48,8 +49,8 @@ impl ClientOptions {
     /// # Errors
     ///
     /// The text is not an address, or one that cannot be connected to.
-    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
-        self.address = parse_address(address).map_err(|why| why.to_string())?;
+    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
+        self.address = parse_address(address)?;
         Ok(())
     }
 
@@ -91,8 +92,8 @@ impl ClientOptions {
                     continue;
                 }
             };
-            if let Err((what, right)) = variable.check(signal) {
-                line.wrong(what, right);
+            if let Err(mistake) = variable.check(signal) {
+                line.refuse(mistake);
             }
             self.variables.insert(signal.name.clone(), variable);
         }
@@ -291,12 +292,12 @@ fn read_tsap(value: &Value<'_>) -> Option<Tsap> {
 fn read_address(value: &Value<'_>) -> Option<Address> {
     let text = value.text("write the CPU's address in quotes, such as \"192.168.0.1:102\"")?;
     parse_address(text)
-        .map_err(|error| value.wrong(error.what, error.right))
+        .map_err(|mistake| value.refuse(mistake))
         .ok()
 }
 
 /// Reads a host with or without a port; the default is the port of all CPUs.
-fn parse_address(text: &str) -> Result<Address, AddressError> {
+fn parse_address(text: &str) -> Result<Address, Mistake> {
     let address: Address = match text.parse() {
         Err(_) if !text.contains(':') => format!("{text}:{PORT}").parse()?,
         parsed => parsed?,

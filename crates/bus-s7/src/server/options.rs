@@ -2,8 +2,9 @@
 
 use crate::length::{LONGEST, read_length};
 use crate::tsap::{RACK, SLOT};
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::tcp::{Address, AddressError};
+use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::{AREA_LIMIT, Area, SignalTable};
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
@@ -69,10 +70,8 @@ impl ServerOptions {
     /// # Errors
     ///
     /// The text is not an address.
-    pub fn set_address(&mut self, address: &str) -> Result<(), String> {
-        self.address = address
-            .parse()
-            .map_err(|why: AddressError| why.to_string())?;
+    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
+        self.address = address.parse()?;
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::measure::{check_unit, split};
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{did_you_mean, nearest, short_number, shown};
 use tickbus_image::signal::section::value_limits;
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
@@ -48,9 +49,6 @@ impl Relation {
     ];
 }
 
-/// What is wrong with a condition, and what would be right.
-pub(super) type Wrong = (String, String);
-
 const SHAPE: &str = "write a signal, a sign and a number, such as \"LA1 position > 120\"";
 
 impl Condition {
@@ -59,7 +57,7 @@ impl Condition {
     /// # Errors
     ///
     /// What is wrong with it, and what would be right.
-    pub fn parse(text: &str, table: &SignalTable) -> Result<Self, (String, String)> {
+    pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Mistake> {
         let text = text.trim();
         let position = |name: &str| table.position(name);
         // A name may contain a comparison operator.
@@ -76,7 +74,7 @@ impl Condition {
         let relation = Relation::SIGNS.iter().find(|(known, _)| *known == sign);
         let Some((_, relation)) = relation else {
             let signs = Relation::SIGNS.map(|(sign, _)| sign).join(" ");
-            return Err((
+            return Err(Mistake::new(
                 format!("\"{}\" is no sign of comparison", shown(sign)),
                 format!("signs are {signs}"),
             ));
@@ -97,9 +95,9 @@ impl Condition {
         Ok(condition)
     }
 
-    fn of_bool(text: &str, index: usize, signal: &Signal) -> Result<Self, Wrong> {
+    fn of_bool(text: &str, index: usize, signal: &Signal) -> Result<Self, Mistake> {
         if signal.data_type != DataType::Bool {
-            return Err((
+            return Err(Mistake::new(
                 format!(
                     "\"{}\" is no BOOL, and cannot be true by itself",
                     shown(text)
@@ -117,7 +115,7 @@ impl Condition {
     }
 
     /// Rejects a condition that can never become true, or never false.
-    fn check_reach(&self, number: f64, signal: &Signal) -> Result<(), Wrong> {
+    fn check_reach(&self, number: f64, signal: &Signal) -> Result<(), Mistake> {
         let (low, high) = value_limits(signal);
         let (number, tolerance) = (number, self.tolerance);
         let inside = number >= low - tolerance && number <= high + tolerance;
@@ -131,7 +129,7 @@ impl Condition {
         }
         let unit = signal.unit.as_deref().unwrap_or_default();
         let (low, high) = (short_number(low), short_number(high));
-        Err((
+        Err(Mistake::new(
             format!("\"{}\" never changes", shown(&self.text)),
             format!(
                 "\"{}\" ({}) goes from {low} to {high} {unit}",
@@ -191,7 +189,7 @@ impl fmt::Display for Condition {
     clippy::cast_precision_loss,
     reason = "to be compared with the ends of ranges"
 )]
-fn number_of(text: &str, signal: &Signal) -> Result<(Number, f64), Wrong> {
+fn number_of(text: &str, signal: &Signal) -> Result<(Number, f64), Mistake> {
     let text = text.trim();
     if signal.data_type == DataType::Bool
         && let Some(level) = match text {
@@ -218,20 +216,20 @@ fn number_of(text: &str, signal: &Signal) -> Result<(Number, f64), Wrong> {
         } else {
             format!("\"{}\" is no number", shown(text))
         };
-        return Err((what, SHAPE.to_owned()));
+        return Err(Mistake::new(what, SHAPE.to_owned()));
     };
     check_unit(unit, signal)?;
     if signal.is_integer_slot() {
-        return Err((
+        return Err(Mistake::new(
             format!("\"{}\" takes whole numbers", shown(&signal.name)),
-            "write it without a fraction and a unit".to_owned(),
+            "write it without a fraction and a unit",
         ));
     }
     Ok((Number::Real(number), number))
 }
 
 /// What is wrong with a name that no signal of `table` has, and what would be right.
-pub fn unknown(name: &str, table: &SignalTable) -> (String, String) {
+pub fn unknown(name: &str, table: &SignalTable) -> Mistake {
     const MOST: usize = 20;
     let names: Vec<&str> = table.signals.iter().map(|s| s.name.as_str()).collect();
     let what = if name.is_empty() {
@@ -246,7 +244,7 @@ pub fn unknown(name: &str, table: &SignalTable) -> (String, String) {
     } else {
         did_you_mean(name, "signals", &names)
     };
-    (what, right)
+    Mistake::new(what, right)
 }
 
 #[cfg(test)]
@@ -324,8 +322,9 @@ mod tests {
             ("level < -297", "never changes"),
             ("whole == 0.5", "\"whole\" takes whole numbers"),
         ] {
-            let (wrong, right) = Condition::parse(text, &table()).expect_err(text);
-            let told = format!("{wrong}; {right}");
+            let told = Condition::parse(text, &table())
+                .expect_err(text)
+                .to_string();
             assert!(
                 told.starts_with(what) || told.contains(what),
                 "{text}: {told}"

@@ -7,6 +7,7 @@ use super::random::Random;
 use super::schedule::{Schedule, Step};
 use super::signal_fault::SignalFault;
 use super::{Effect, Fault, FaultBoard, LIMIT, LineFault, Phase, TickTime};
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
@@ -67,11 +68,12 @@ impl Faults {
     /// # Errors
     ///
     /// Too many faults wait or are active.
-    pub fn add(&mut self, fault: &Fault, slots: Slots<'_>) -> Result<u32, String> {
+    pub fn add(&mut self, fault: &Fault, slots: Slots<'_>) -> Result<u32, Mistake> {
         while self.entries.len() >= LIMIT {
             let Some(over) = self.board.forget_one() else {
-                return Err(format!(
-                    "{LIMIT} faults wait or are active, and that is the most; end some of them"
+                return Err(Mistake::new(
+                    format!("{LIMIT} faults wait or are active, and that is the most"),
+                    "end some of them",
                 ));
             };
             self.entries.retain(|entry| entry.id != over);

@@ -1,5 +1,6 @@
 //! Numbers with the unit of their signal.
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Value, shown};
 use tickbus_image::signal::Signal;
 
@@ -23,11 +24,11 @@ pub(super) fn split(text: &str) -> Option<(f64, &str)> {
 }
 
 /// Whether `unit` is the signal's; if not, what is wrong and what would be right.
-pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), (String, String)> {
+pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), Mistake> {
     match signal.unit.as_deref() {
         _ if unit.is_empty() => Ok(()),
         Some(own) if own == unit => Ok(()),
-        Some(own) => Err((
+        Some(own) => Err(Mistake::new(
             format!(
                 "\"{}\" is in {}, not in {}",
                 shown(&signal.name),
@@ -36,9 +37,9 @@ pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), (String, Str
             ),
             format!("write the number in {}", shown(own)),
         )),
-        None => Err((
+        None => Err(Mistake::new(
             format!("\"{}\" has no unit", shown(&signal.name)),
-            "write the number alone".to_owned(),
+            "write the number alone",
         )),
     }
 }
@@ -58,8 +59,8 @@ pub(super) fn of_value(value: &Value<'_>, signal: &Signal) -> Option<f64> {
     };
     match check_unit(unit, signal) {
         Ok(()) => Some(number),
-        Err((what, right)) => {
-            value.wrong(what, right);
+        Err(mistake) => {
+            value.refuse(mistake);
             None
         }
     }

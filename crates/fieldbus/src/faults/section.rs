@@ -298,7 +298,7 @@ fn read_begin(keys: &Keys<'_>, table: Option<&SignalTable>) -> Option<Begin> {
 fn read_condition(value: &Value<'_>, table: Option<&SignalTable>) -> Option<Condition> {
     let text = value.text("write a condition in quotes, such as \"LA1 run == 1\"")?;
     Condition::parse(text, table?)
-        .map_err(|(what, right)| value.wrong(what, right))
+        .map_err(|mistake| value.refuse(mistake))
         .ok()
 }
 

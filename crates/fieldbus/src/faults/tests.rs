@@ -264,7 +264,7 @@ fn those_that_are_over_make_room_and_those_that_wait_do_not() {
     };
     let refused = end.faults.add(&fault, slots).expect_err("no room");
     assert!(
-        refused.contains("64 faults wait or are active"),
+        refused.what.contains("64 faults wait or are active"),
         "{refused}"
     );
     end.tick(nothing);

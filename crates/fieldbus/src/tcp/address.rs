@@ -4,6 +4,7 @@ use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::str::FromStr;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Value, shown};
 
 /// The longest host name in DNS.
@@ -39,9 +40,7 @@ impl Address {
     /// Reads the value of the key `address`, and reports mistakes in it.
     pub fn read(value: &Value<'_>) -> Option<Self> {
         let text = value.text("write a host and a port in quotes, such as \"127.0.0.1:20030\"")?;
-        text.parse()
-            .map_err(|error: AddressError| value.wrong(error.what, error.right))
-            .ok()
+        text.parse().map_err(|mistake| value.refuse(mistake)).ok()
     }
 
     /// Checks that it can be connected to.
@@ -49,36 +48,26 @@ impl Address {
     /// # Errors
     ///
     /// Nothing can listen on port 0.
-    pub fn check_dialled(&self) -> Result<(), AddressError> {
+    pub fn check_dialled(&self) -> Result<(), Mistake> {
         if self.port == 0 {
-            return Err(AddressError {
-                what: "port 0 cannot be connected to".to_owned(),
-                right: "write the port on which the other end listens, or give its address on the \
+            return Err(Mistake::new(
+                "port 0 cannot be connected to",
+                "write the port on which the other end listens, or give its address on the \
                         command line with --address; 0 is for an end that listens, and lets the system \
                         choose",
-            });
+            ));
         }
         Ok(())
     }
 }
 
-/// Why a text is not an address.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {right}")]
-pub struct AddressError {
-    /// What is wrong.
-    pub what: String,
-    /// What would be right.
-    pub right: &'static str,
-}
-
 /// Reads `HOST:PORT`: `127.0.0.1:20030`, `[::1]:20030`, `plc.example.com:20030`.
 impl FromStr for Address {
-    type Err = AddressError;
+    type Err = Mistake;
 
-    fn from_str(text: &str) -> Result<Self, AddressError> {
+    fn from_str(text: &str) -> Result<Self, Mistake> {
         const SHAPE: &str = "write a host and a port, such as \"127.0.0.1:20030\"";
-        let refuse = |what: String, right| Err(AddressError { what, right });
+        let refuse = |what: String, right: &str| Err(Mistake::new(what, right));
         let Some((host, digits)) = text.rsplit_once(':') else {
             return refuse(
                 format!("the address \"{}\" has no port", shown(text)),
@@ -106,10 +95,10 @@ impl FromStr for Address {
 }
 
 impl FromStr for Host {
-    type Err = AddressError;
+    type Err = Mistake;
 
-    fn from_str(text: &str) -> Result<Self, AddressError> {
-        let refuse = |what: String, right| Err(AddressError { what, right });
+    fn from_str(text: &str) -> Result<Self, Mistake> {
+        let refuse = |what: String, right: &str| Err(Mistake::new(what, right));
         if text.is_empty() {
             let right = "write the host before the colon: 127.0.0.1 is this machine alone, 0.0.0.0 \
                          all of its networks";

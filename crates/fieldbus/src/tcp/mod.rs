@@ -11,7 +11,7 @@ mod stream;
 
 use super::BusError;
 
-pub use address::{Address, AddressError, Host};
+pub use address::{Address, Host};
 pub use connect::connect;
 pub use dial::{Call, Caller, Stream, dial};
 pub use listen::{is_of_the_client, listen, not_accepted};

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use tickbus_base::Mistake;
+
 /// The largest size of one area of one station, in bytes.
 pub const AREA_LIMIT: usize = 65_536;
 
@@ -101,32 +103,13 @@ pub struct Address {
     pub bit: u8,
 }
 
-/// Why a text is not an address, and what would be right.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {right}")]
-pub struct AddressError {
-    /// What is wrong.
-    pub what: String,
-    /// What would be right.
-    pub right: String,
-}
-
-impl AddressError {
-    fn new(what: impl Into<String>, right: impl Into<String>) -> Self {
-        Self {
-            what: what.into(),
-            right: right.into(),
-        }
-    }
-}
-
 impl Address {
     /// Reads an address such as `%QX1.0`, `%IW4`, `%id8` or `%I0.3`.
     ///
     /// # Errors
     ///
     /// When the text is not an address of a PLC's inputs or outputs, or is beyond [`AREA_LIMIT`].
-    pub fn parse(text: &str, addressing: Addressing) -> Result<Self, AddressError> {
+    pub fn parse(text: &str, addressing: Addressing) -> Result<Self, Mistake> {
         let shown = shorten(text);
         let upper = text.trim().to_ascii_uppercase();
         let Some(rest) = upper.strip_prefix('%') else {
@@ -134,7 +117,7 @@ impl Address {
                 Ok(_) => format!("write \"%{upper}\""),
                 Err(_) => EXAMPLES.to_owned(),
             };
-            return Err(AddressError::new(
+            return Err(Mistake::new(
                 format!("the address \"{shown}\" does not start with %"),
                 right,
             ));
@@ -149,7 +132,7 @@ impl Address {
         let width = match letter {
             None => Width::Bit,
             Some(letter) => Width::of_letter(letter).ok_or_else(|| {
-                AddressError::new(
+                Mistake::new(
                     format!("'{letter}' in the address \"{shown}\" is no size"),
                     "sizes are X (bit), B (8 bits), W (16), D (32), L (64)",
                 )
@@ -160,7 +143,7 @@ impl Address {
             Some((offset, bit)) => (offset, Some(bit)),
             None => (numbers, None),
         };
-        let malformed = || AddressError::new(format!("\"{shown}\" is not an address"), EXAMPLES);
+        let malformed = || Mistake::new(format!("\"{shown}\" is not an address"), EXAMPLES);
         let offset = number(offset).ok_or_else(malformed)?;
         let bit = bit
             .map(|bit| number(bit).ok_or_else(malformed))
@@ -173,7 +156,7 @@ impl Address {
             .checked_mul(element)
             .filter(|byte| byte + width.bytes() <= AREA_LIMIT);
         let Some(byte) = byte else {
-            return Err(AddressError::new(
+            return Err(Mistake::new(
                 format!("the address \"{shown}\" lies beyond the {AREA_LIMIT} bytes of an area"),
                 format!(
                     "the last {area}{} is {area}{}{}",
@@ -208,9 +191,9 @@ fn bit_of(
     byte: usize,
     bit: Option<usize>,
     shown: &str,
-) -> Result<u8, AddressError> {
+) -> Result<u8, Mistake> {
     match (width, bit) {
-        (Width::Bit, None) => Err(AddressError::new(
+        (Width::Bit, None) => Err(Mistake::new(
             format!("the bit address \"{shown}\" names no bit"),
             format!(
                 "write {area}X{byte}.0 to {area}X{byte}.7, or {area}B{byte} for the whole byte"
@@ -229,12 +212,12 @@ fn bit_of(
                 } else {
                     "bits go from 0 to 7".to_owned()
                 };
-                AddressError::new(
+                Mistake::new(
                     format!("bit {bit} in the address \"{shown}\" does not exist"),
                     right,
                 )
             }),
-        (_, Some(bit)) => Err(AddressError::new(
+        (_, Some(bit)) => Err(Mistake::new(
             format!(
                 "the address \"{shown}\" has a bit, but its size is {} bits",
                 width.bits()
@@ -250,24 +233,24 @@ fn bit_of(
 }
 
 /// The error for an area that no fieldbus carries, or that does not exist.
-fn foreign_area(shown: &str, rest: &str, letter: Option<char>) -> AddressError {
+fn foreign_area(shown: &str, rest: &str, letter: Option<char>) -> Mistake {
     match letter {
-        Some('M') => AddressError::new(
+        Some('M') => Mistake::new(
             format!("\"{shown}\" is a marker: memory of the PLC that no fieldbus carries"),
             "use an address in %I or %Q, and let the PLC program copy the marker there",
         ),
-        Some('D') if rest.starts_with("DB") => AddressError::new(
+        Some('D') if rest.starts_with("DB") => Mistake::new(
             format!("\"{shown}\" lies in a data block, which no process image carries"),
             "use an address in %I or %Q, and let the PLC program copy the value there",
         ),
         Some(letter @ ('E' | 'A')) => {
             let area = if letter == 'E' { 'I' } else { 'Q' };
-            AddressError::new(
+            Mistake::new(
                 format!("\"{shown}\" is a German mnemonic"),
                 format!("write \"%{area}{}\"", &rest[1..]),
             )
         }
-        _ => AddressError::new(format!("\"{shown}\" is neither in %I nor in %Q"), EXAMPLES),
+        _ => Mistake::new(format!("\"{shown}\" is neither in %I nor in %Q"), EXAMPLES),
     }
 }
 
@@ -289,7 +272,7 @@ fn shorten(text: &str) -> String {
 }
 
 impl FromStr for Address {
-    type Err = AddressError;
+    type Err = Mistake;
 
     /// Reads an address whose number counts bytes.
     fn from_str(text: &str) -> Result<Self, Self::Err> {

@@ -9,7 +9,7 @@ mod slot;
 mod table;
 mod types;
 
-pub use address::{AREA_LIMIT, Address, AddressError, Addressing, Area, Width};
+pub use address::{AREA_LIMIT, Address, Addressing, Area, Width};
 pub use order::ByteOrder;
 pub use plan::{Conversions, Plan, fail_safe_frame};
 pub use scale::Scale;

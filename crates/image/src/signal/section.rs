@@ -205,7 +205,7 @@ pub fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
 pub fn address_of(value: &Value<'_>, addressing: Addressing) -> Option<Address> {
     let text = value.text("write an address in quotes, such as \"%QX1.0\"")?;
     Address::parse(text, addressing)
-        .map_err(|error| value.wrong(error.what, error.right))
+        .map_err(|mistake| value.refuse(mistake))
         .ok()
 }
 

@@ -12,8 +12,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use self::object::Machine;
 use self::plan::{Plan, Settings};
-use self::table::{Compiled, Declared, Refusal};
+use self::table::{Compiled, Declared};
 use super::{Program, ProgramError, Scan, list};
+use tickbus_base::Mistake;
 use tickbus_base::os::Library;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Address, Addressing, Area, ByteOrder, SignalTable};
@@ -64,7 +65,7 @@ impl HostedProgram {
     pub fn check_options(name: &str, options: &[(String, String)]) -> Result<(), ProgramError> {
         settings(options)
             .map(drop)
-            .map_err(|refusal| error(name, refusal))
+            .map_err(|mistake| error(name, mistake))
     }
 
     /// Loads the program at `path` and initialises it.
@@ -74,16 +75,16 @@ impl HostedProgram {
     /// The file cannot be read, cannot be loaded here, or does not contain a program; or an option is wrong.
     pub fn load(path: &Path, options: &[(String, String)]) -> Result<Self, ProgramError> {
         let name = path.display().to_string();
-        Self::try_load(path, options).map_err(|refusal| error(&name, refusal))
+        Self::try_load(path, options).map_err(|mistake| error(&name, mistake))
     }
 
-    fn try_load(path: &Path, options: &[(String, String)]) -> Result<Self, Refusal> {
+    fn try_load(path: &Path, options: &[(String, String)]) -> Result<Self, Mistake> {
         let settings = settings(options)?;
         let bytes = read(path)?;
         object::check(&bytes, Machine::own())?;
         let copy = PrivateCopy::new(&bytes, path).map_err(|(path, error)| {
             let what = format!("cannot be copied to {}: {error}", path.display());
-            (what, TEMPORARY.to_owned())
+            Mistake::new(what, TEMPORARY)
         })?;
         let library = Library::load(copy.path()).map_err(|words| not_loaded(&words, &copy))?;
         let (compiled, declared) = Compiled::begin(library)?;
@@ -114,7 +115,7 @@ impl Program for HostedProgram {
 
     fn fit(&mut self, table: &SignalTable, addressing: Addressing) -> Result<(), ProgramError> {
         let plan = Plan::new(&self.declared, &self.settings, addressing, Some(table));
-        self.plan = plan.map_err(|refusal| error(&self.name, refusal))?;
+        self.plan = plan.map_err(|mistake| error(&self.name, mistake))?;
         Ok(())
     }
 
@@ -142,19 +143,18 @@ impl Program for HostedProgram {
     }
 }
 
-fn error(name: &str, (what, right): Refusal) -> ProgramError {
-    ProgramError::HostedProgram {
+fn error(name: &str, mistake: Mistake) -> ProgramError {
+    ProgramError::Unfit {
         program: name.to_owned(),
-        what,
-        right,
+        mistake,
     }
 }
 
-fn settings(options: &[(String, String)]) -> Result<Settings, Refusal> {
+fn settings(options: &[(String, String)]) -> Result<Settings, Mistake> {
     let mut settings = Settings::default();
     let bad = |option: &str, value: &str, right: String| {
         let what = format!("cannot have \"{value}\" as its option \"{option}\"");
-        Err((what, right))
+        Err(Mistake::new(what, right))
     };
     for (option, value) in options {
         match option.as_str() {
@@ -191,7 +191,7 @@ fn settings(options: &[(String, String)]) -> Result<Settings, Refusal> {
                 settings.alive = Some(value.clone());
             }
             _ => {
-                return Err((
+                return Err(Mistake::new(
                     format!("has no option \"{option}\""),
                     format!("it takes {}", list(&HostedProgram::OPTIONS, "and")),
                 ));
@@ -202,30 +202,27 @@ fn settings(options: &[(String, String)]) -> Result<Settings, Refusal> {
 }
 
 /// The contents of the file.
-fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
+fn read(path: &Path) -> Result<Vec<u8>, Mistake> {
     let cannot = |error: &io::Error| match error.kind() {
-        ErrorKind::NotFound => (
-            "is not there".to_owned(),
-            "check the path; one in a driver.cfg counts from the folder of that file".to_owned(),
+        ErrorKind::NotFound => Mistake::new(
+            "is not there",
+            "check the path; one in a driver.cfg counts from the folder of that file",
         ),
-        ErrorKind::PermissionDenied => (
-            "may not be read".to_owned(),
-            "check its permissions".to_owned(),
-        ),
-        _ => (
+        ErrorKind::PermissionDenied => Mistake::new("may not be read", "check its permissions"),
+        _ => Mistake::new(
             format!("cannot be read: {error}"),
-            "check the path and the disk".to_owned(),
+            "check the path and the disk",
         ),
     };
     let metadata = fs::metadata(path).map_err(|error| cannot(&error))?;
     if !metadata.is_file() {
-        return Err((
-            "is no file".to_owned(),
-            "name the shared object, such as ./program.so".to_owned(),
+        return Err(Mistake::new(
+            "is no file",
+            "name the shared object, such as ./program.so",
         ));
     }
     if metadata.len() > FILE_LIMIT {
-        return Err((
+        return Err(Mistake::new(
             format!("has {} bytes", metadata.len()),
             format!("a program has at most {FILE_LIMIT}; check the path"),
         ));
@@ -238,7 +235,7 @@ const TEMPORARY: &str = "tickbus loads a private copy of the program; set TMPDIR
     with room, from which programs may be run";
 
 /// The refusal for a loader's message.
-fn not_loaded(words: &str, copy: &PrivateCopy) -> Refusal {
+fn not_loaded(words: &str, copy: &PrivateCopy) -> Mistake {
     let words = words.replace(&copy.path().display().to_string(), "it");
     let right = if words.contains("undefined symbol") {
         "compile in all C files that iec2c wrote, and the glue with the same LOCATED_VARIABLES.h; functions of \
@@ -248,7 +245,7 @@ fn not_loaded(words: &str, copy: &PrivateCopy) -> Refusal {
     } else {
         "check that the libraries that it needs are there, and build it anew"
     };
-    (format!("cannot be loaded ({words})"), right.to_owned())
+    Mistake::new(format!("cannot be loaded ({words})"), right)
 }
 
 /// A copy of the program's file that is loaded only once, so that its global variables are its own, and that

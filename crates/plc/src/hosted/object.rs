@@ -1,6 +1,8 @@
 //! Determines the type of a program file from its first bytes, because the messages of the system's loader
 //! ("wrong ELF class") do not help users.
 
+use tickbus_base::Mistake;
+
 /// The magic bytes of an ELF file.
 const ELF: &[u8] = b"\x7FELF";
 
@@ -61,10 +63,10 @@ impl Machine {
 /// # Errors
 ///
 /// What the file is instead, and what would be right.
-pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), (String, String)> {
+pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), Mistake> {
     let build = "build a shared object from it (docs/own-plc-program.md)".to_owned();
     if bytes.is_empty() {
-        return Err(("is an empty file".to_owned(), build));
+        return Err(Mistake::new("is an empty file", build));
     }
     let Some(own) = own else {
         // Other systems' formats are left to their loader.
@@ -79,9 +81,12 @@ pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), (String, S
         {
             "is a library for macOS".to_owned()
         } else {
-            return Err(("is no shared object".to_owned(), build));
+            return Err(Mistake::new("is no shared object", build));
         };
-        return Err((what, format!("build it for this system ({})", own.name())));
+        return Err(Mistake::new(
+            what,
+            format!("build it for this system ({})", own.name()),
+        ));
     }
     let header = bytes.get(..20).and_then(|header| {
         let bits = match header[4] {
@@ -110,32 +115,29 @@ pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), (String, S
         Some((machine, half(16)))
     });
     let Some((machine, kind)) = header else {
-        return Err((
-            "is an ELF file that is cut off or damaged".to_owned(),
-            "build it anew".to_owned(),
+        return Err(Mistake::new(
+            "is an ELF file that is cut off or damaged",
+            "build it anew",
         ));
     };
     if machine != own {
-        return Err((
+        return Err(Mistake::new(
             format!("is built for another machine ({})", machine.name()),
             format!("build it for this one ({})", own.name()),
         ));
     }
     match kind {
         3 if is_whole(bytes, machine) => Ok(()),
-        3 => Err((
-            "is cut off".to_owned(),
-            "copy the whole of it, or build it anew".to_owned(),
+        3 => Err(Mistake::new(
+            "is cut off",
+            "copy the whole of it, or build it anew",
         )),
-        1 => Err((
-            "is an object file that is not linked".to_owned(),
-            "link it with cc -shared".to_owned(),
+        1 => Err(Mistake::new(
+            "is an object file that is not linked",
+            "link it with cc -shared",
         )),
-        2 => Err((
-            "is an executable".to_owned(),
-            "link it with cc -shared".to_owned(),
-        )),
-        _ => Err(("is an ELF file, but no shared object".to_owned(), build)),
+        2 => Err(Mistake::new("is an executable", "link it with cc -shared")),
+        _ => Err(Mistake::new("is an ELF file, but no shared object", build)),
     }
 }
 
@@ -196,8 +198,8 @@ mod tests {
     }
 
     fn refusal(bytes: &[u8]) -> String {
-        let (what, right) = check(bytes, Some(OWN)).expect_err("refused");
-        format!("{what}; {right}")
+        let mistake = check(bytes, Some(OWN)).expect_err("refused");
+        mistake.to_string()
     }
 
     /// A shared object for [`OWN`] with one segment that ends with the file.

@@ -1,6 +1,7 @@
 //! Maps the variables of a program to the process image.
 
-use super::table::{Declared, Refusal};
+use super::table::Declared;
+use tickbus_base::Mistake;
 use tickbus_image::signal::{Address, Addressing, Area, ByteOrder, DataType, SignalTable, Width};
 
 /// The settings for fitting a program to the image.
@@ -85,7 +86,7 @@ impl Plan {
         settings: &Settings,
         addressing: Addressing,
         table: Option<&SignalTable>,
-    ) -> Result<Self, Refusal> {
+    ) -> Result<Self, Mistake> {
         let addressing = settings.addressing.unwrap_or(addressing);
         let mut plan = Self::default();
         for (variable, declared) in declared.iter().enumerate() {
@@ -104,9 +105,9 @@ impl Plan {
             }
         }
         if plan.inputs.is_empty() && plan.outputs.is_empty() {
-            return Err((
-                "has no variable in %I or %Q, so that it can do nothing".to_owned(),
-                "declare some, such as lamp AT %QX0.0 : BOOL".to_owned(),
+            return Err(Mistake::new(
+                "has no variable in %I or %Q, so that it can do nothing",
+                "declare some, such as lamp AT %QX0.0 : BOOL",
             ));
         }
         plan.check_overlaps(addressing)?;
@@ -120,7 +121,7 @@ impl Plan {
     }
 
     /// Each variable has its own value, so of two outputs on the same bit only one would take effect.
-    fn check_overlaps(&self, addressing: Addressing) -> Result<(), Refusal> {
+    fn check_overlaps(&self, addressing: Addressing) -> Result<(), Mistake> {
         let keep = "keep one of them, or move one: each is a variable of its own, and only one would count";
         let right = match addressing {
             Addressing::Bytes => {
@@ -135,7 +136,7 @@ impl Plan {
             if let Some(last) = last
                 && place.address.bits().start < last.address.bits().end
             {
-                return Err((
+                return Err(Mistake::new(
                     format!(
                         "has two outputs on the same bits, {} and {}",
                         last.written, place.written
@@ -153,12 +154,11 @@ impl Plan {
         text: &str,
         addressing: Addressing,
         table: Option<&SignalTable>,
-    ) -> Result<(), Refusal> {
-        let address =
-            Address::parse(text, addressing).map_err(|error| (error.what, error.right))?;
+    ) -> Result<(), Mistake> {
+        let address = Address::parse(text, addressing)?;
         let on_it = |place: &LocatedVariable| place.address == address;
         let Some(at) = self.inputs.iter().position(on_it) else {
-            return Err((
+            return Err(Mistake::new(
                 format!("has no variable at {text}, which the option \"alive\" names"),
                 format!("declare one in it, such as link_alive AT {text} : BOOL"),
             ));
@@ -168,19 +168,19 @@ impl Plan {
             signal.area == Area::Input && signal.address().bits().contains(&address.bits().start)
         });
         if let Some(signal) = taken {
-            return Err((
+            return Err(Mistake::new(
                 format!(
                     "takes {text} for the option \"alive\", where the signal \"{}\" lies",
                     signal.name
                 ),
-                "take a bit that no signal has".to_owned(),
+                "take a bit that no signal has",
             ));
         }
         self.alive.push(self.inputs.remove(at).variable);
         Ok(())
     }
 
-    fn check_image(&self, table: &SignalTable) -> Result<(), Refusal> {
+    fn check_image(&self, table: &SignalTable) -> Result<(), Mistake> {
         let Some(station) = table.stations.first() else {
             return Ok(());
         };
@@ -193,7 +193,7 @@ impl Plan {
                     Area::Input => "input_bytes",
                     Area::Output => "output_bytes",
                 };
-                return Err((
+                return Err(Mistake::new(
                     format!(
                         "uses {} (to byte {}), but {area} has {has} bytes in this driver.cfg",
                         place.written,
@@ -227,12 +227,12 @@ fn place(
     settings: &Settings,
     addressing: Addressing,
     table: Option<&SignalTable>,
-) -> Result<LocatedVariable, Refusal> {
+) -> Result<LocatedVariable, Mistake> {
     let numbers: Vec<String> = declared.numbers.iter().map(u32::to_string).collect();
     let written = format!("%{}{}{}", declared.area, declared.size, numbers.join("."));
     let wrong = |what: String, right: String| {
         let name = format!("{written} : {}", declared.data_type);
-        Err((format!("declares {name}, and {what}"), right))
+        Err(Mistake::new(format!("declares {name}, and {what}"), right))
     };
     let Ok(data_type) = declared.data_type.parse::<DataType>() else {
         let types = DataType::ALL.map(DataType::name).join(", ");
@@ -312,7 +312,7 @@ mod tests {
 
     fn plan(declared: &[Declared], settings: &Settings) -> Result<Plan, String> {
         Plan::new(declared, settings, Addressing::Bytes, None)
-            .map_err(|(what, right)| format!("{what}; {right}"))
+            .map_err(|mistake| mistake.to_string())
     }
 
     fn lies(declared: &[Declared], settings: &Settings) -> Vec<String> {
@@ -490,7 +490,7 @@ mod tests {
         };
         let table = table(&[variable("WORD", "%QW0", 2)]);
         let plan = Plan::new(&declared, &settings, Addressing::Bytes, Some(&table));
-        let (what, right) = plan.expect_err("refused");
+        let Mistake { what, right } = plan.expect_err("refused");
         assert_eq!(
             what,
             "uses %QW2 (to byte 5), but %Q has 4 bytes in this driver.cfg"
@@ -508,7 +508,7 @@ mod tests {
         let settings = Settings::default();
         let plan = Plan::new(&declared, &settings, Addressing::Bytes, Some(&table));
         assert_eq!(
-            plan.expect_err("refused").0,
+            plan.expect_err("refused").what,
             "declares %QD0 : REAL, and the signal \"S0\" there is a DINT"
         );
     }
@@ -542,7 +542,7 @@ mod tests {
             Some(&table),
         );
         assert_eq!(
-            taken.expect_err("refused").0,
+            taken.expect_err("refused").what,
             "takes %IX0.3 for the option \"alive\", where the signal \"S0\" lies"
         );
     }

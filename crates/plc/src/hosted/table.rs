@@ -9,6 +9,7 @@
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::NonNull;
 
+use tickbus_base::Mistake;
 use tickbus_base::os::Library;
 use tickbus_base::time::Nanos;
 
@@ -81,14 +82,7 @@ pub(super) struct Compiled {
     library: Library,
 }
 
-/// What is wrong with a table, and what would be right.
-pub(super) type Refusal = (String, String);
-
 const REBUILD: &str = "build it anew with the plc/glue of this tickbus";
-
-fn refused(what: impl Into<String>, right: &str) -> Refusal {
-    (what.into(), right.to_owned())
-}
 
 impl Compiled {
     /// Finds the program in a library that was loaded only once, and initialises it.
@@ -96,20 +90,20 @@ impl Compiled {
     /// # Errors
     ///
     /// The library has no table, or one of another version, or an invalid one.
-    pub(super) fn begin(library: Library) -> Result<(Self, Vec<Declared>), Refusal> {
+    pub(super) fn begin(library: Library) -> Result<(Self, Vec<Declared>), Mistake> {
         // SAFETY: the glue exports a variable of this type under this name, in every version of the table.
         let Ok(address) = (unsafe { library.symbol::<*const Table>("tickbus_plc") }) else {
             let what = "has no symbol \"tickbus_plc\"";
             return Err(if library.has("config_run__") {
-                refused(
+                Mistake::new(
                     what,
                     "compile plc/glue/tickbus_plc.c into it, beside the files that iec2c wrote",
                 )
             } else {
-                refused(what, "build it as docs/own-plc-program.md tells")
+                Mistake::new(what, "build it as docs/own-plc-program.md tells")
             });
         };
-        let broken = |what: &str| refused(format!("has a broken table: {what}"), REBUILD);
+        let broken = |what: &str| Mistake::new(format!("has a broken table: {what}"), REBUILD);
         if address.is_null() || !address.is_aligned() {
             return Err(broken("it lies nowhere"));
         }
@@ -117,7 +111,7 @@ impl Compiled {
         // the header its first two numbers are version and size in every version of the table, and constant.
         let (version, bytes) = unsafe { ((*address).version, (*address).bytes) };
         if version != VERSION {
-            return Err(refused(
+            return Err(Mistake::new(
                 format!(
                     "was built with version {version} of the glue, and this tickbus has version {VERSION}"
                 ),
@@ -219,10 +213,10 @@ impl Compiled {
 unsafe impl Send for Compiled {}
 
 /// Copies the declarations from the table.
-fn declarations(table: &Table) -> Result<(Vec<Declared>, Vec<Value>), Refusal> {
+fn declarations(table: &Table) -> Result<(Vec<Declared>, Vec<Value>), Mistake> {
     let count = table.located_count;
     let broken =
-        |what: &str| -> Refusal { refused(format!("has a broken table: {what}"), REBUILD) };
+        |what: &str| -> Mistake { Mistake::new(format!("has a broken table: {what}"), REBUILD) };
     if count == 0 {
         return Ok((Vec::new(), Vec::new()));
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::report::PeelerCounters;
 use tickbus_axis::{AxisKind, Field, Motion};
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, Plan, SignalTable, Slot};
 use tickbus_plc::blocks::{AxisCommand, AxisControl, AxisInputs, Execute};
@@ -237,13 +238,15 @@ impl Axis {
 fn missing(program: &str, signal: &str) -> ProgramError {
     ProgramError::Unfit {
         program: program.to_owned(),
-        what: format!("finds no signal \"{signal}\""),
-        right: if signal.ends_with(".Acknowledge") {
-            "write acknowledge = true at its [[axis]], or give the option hold, such as hold=500ms"
-                .to_owned()
-        } else {
-            format!("add it to driver.cfg, or copy plc/peeler/{program}.cfg")
-        },
+        mistake: Mistake::new(
+            format!("finds no signal \"{signal}\""),
+            if signal.ends_with(".Acknowledge") {
+                "write acknowledge = true at its [[axis]], or give the option hold, such as hold=500ms"
+                    .to_owned()
+            } else {
+                format!("add it to driver.cfg, or copy plc/peeler/{program}.cfg")
+            },
+        ),
     }
 }
 

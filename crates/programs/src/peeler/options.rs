@@ -35,7 +35,7 @@ impl Options {
             thickness: 1.5,
         };
         for (key, value) in options {
-            let wrong = |option: &'static str, right: &str| ProgramError::Malformed {
+            let wrong = |option: &'static str, right: &str| ProgramError::BadValue {
                 program,
                 option,
                 value: value.clone(),

@@ -178,12 +178,8 @@ impl Rig {
                 ("la1_code", "msb-first") => la1_code = La1Code::MsbFirst,
                 ("la1_code", "lsb-first") => la1_code = La1Code::LsbFirst,
                 ("la1_code", _) => {
-                    return Err(ProgramError::BadValue {
-                        program: Self::NAME,
-                        option: "la1_code",
-                        value: value.clone(),
-                        known: &La1Code::NAMES,
-                    });
+                    let known = &La1Code::NAMES;
+                    return Err(ProgramError::none_of(Self::NAME, "la1_code", value, known));
                 }
                 _ => {
                     return Err(ProgramError::UnknownOption {

@@ -11,27 +11,25 @@ use std::path::Path;
 use self::csv::CsvReader;
 use self::vcd::VcdReader;
 use super::{Columns, Format, Tick};
+use tickbus_base::Mistake;
 use tickbus_image::signal::SignalTable;
 
 /// Why a recording cannot be read, or not any further.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{file}{}: {what}; {right}", line.map(|line| format!(":{line}")).unwrap_or_default())]
+#[error("{file}{}: {mistake}", line.map(|line| format!(":{line}")).unwrap_or_default())]
 pub struct RecordingError {
     /// The file.
     pub file: String,
     /// The line, from 1, if a single line is at fault.
     pub line: Option<u64>,
-    /// What is wrong.
-    pub what: String,
-    /// What would be right.
-    pub right: String,
+    /// What is wrong, and what would be right.
+    pub mistake: Mistake,
 }
 
 /// What a reader finds wrong at its current line.
 #[derive(Debug)]
 struct ReadError {
-    what: String,
-    right: String,
+    mistake: Mistake,
     /// No single line is at fault.
     of_file: bool,
 }
@@ -39,8 +37,7 @@ struct ReadError {
 impl ReadError {
     fn new(what: impl Into<String>, right: impl Into<String>) -> Self {
         Self {
-            what: what.into(),
-            right: right.into(),
+            mistake: Mistake::new(what, right),
             of_file: false,
         }
     }
@@ -95,16 +92,12 @@ impl Recording {
     /// The file cannot be read, or is not a recording.
     pub fn open(path: &Path, table: Option<&SignalTable>) -> Result<Self, RecordingError> {
         let file = path.display().to_string();
-        let refused = |what: String, right: &str| RecordingError {
+        let refused = |mistake| RecordingError {
             file: file.clone(),
             line: None,
-            what,
-            right: right.to_owned(),
+            mistake,
         };
-        let format = Format::of(path).map_err(|error| {
-            let (what, right) = error.split_once("; ").unwrap_or((&error, ""));
-            refused(what.to_owned(), right)
-        })?;
+        let format = Format::of(path).map_err(refused)?;
         let opened = File::open(path).and_then(|file| {
             if file.metadata()?.is_dir() {
                 return Err(io::ErrorKind::IsADirectory.into());
@@ -112,10 +105,10 @@ impl Recording {
             Ok(file)
         });
         let opened = opened.map_err(|error| {
-            refused(
+            refused(Mistake::new(
                 format!("the recording cannot be read: {error}"),
                 "check the path and the name",
-            )
+            ))
         })?;
         Self::read(
             &file,
@@ -196,7 +189,6 @@ fn error(file: &str, fault: ReadError, line: u64) -> RecordingError {
     RecordingError {
         file: file.to_owned(),
         line: (!fault.of_file).then_some(line),
-        what: fault.what,
-        right: fault.right,
+        mistake: fault.mistake,
     }
 }

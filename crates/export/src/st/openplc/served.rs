@@ -31,7 +31,8 @@ pub(super) fn text(config: &Config, options: &ClientOptions) -> Result<String, M
     let registers = |area: Area| -> Result<Vec<String>, Mistakes> {
         let bytes = config.table.stations[0].bytes(area);
         let blocks = options.blocks(area, bytes);
-        let blocks = blocks.map_err(|(what, right)| wrong(what, &right))?;
+        let file = config.path.display().to_string();
+        let blocks = blocks.map_err(|mistake| Mistakes::of(&file, mistake))?;
         let mut addresses = Vec::new();
         for block in blocks {
             if block.table != Table::HoldingRegisters || !block.byte.is_multiple_of(2) {

@@ -108,8 +108,7 @@ fn read_change(
     let (value, table) = (keys.signal.as_ref()?, table?);
     let name = value.text(SIGNAL)?;
     let Some(index) = table.position(name) else {
-        let (what, right) = unknown(name, table);
-        value.wrong(what, right);
+        value.refuse(unknown(name, table));
         return None;
     };
     let signal = &table.signals[index];

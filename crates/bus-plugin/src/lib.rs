@@ -37,6 +37,7 @@ pub use setup::{Setup, Station};
 #[cfg(unix)]
 pub use wire::{Inbox, Message, WireError};
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{BusSetup, Free, OpenError};
 
@@ -63,9 +64,9 @@ struct Limits {
 pub fn open(options: &Options, line: &BusSetup<'_>) -> Result<Box<dyn Free>, OpenError> {
     let library = absolute(line.folder, &options.library);
     if !library.is_file() {
-        return Err(OpenError::Config(format!(
-            "there is no library {}; check `library`, which begins at the folder of the driver.cfg",
-            library.display()
+        return Err(OpenError::Config(Mistake::new(
+            format!("there is no library {}", library.display()),
+            "check `library`, which begins at the folder of the driver.cfg",
         )));
     }
     let limits = Limits {

@@ -3,6 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
+use tickbus_base::Mistake;
 use tickbus_base::os;
 
 /// The variable that names the command.
@@ -19,7 +20,7 @@ type Candidate = (&'static str, Result<PathBuf, String>);
 /// # Errors
 ///
 /// Every place that was searched, and what to do.
-pub(super) fn helper(named: Option<PathBuf>, directory: &Path) -> Result<PathBuf, String> {
+pub(super) fn helper(named: Option<PathBuf>, directory: &Path) -> Result<PathBuf, Mistake> {
     search(places(named, directory))
 }
 
@@ -54,7 +55,7 @@ fn places(named: Option<PathBuf>, directory: &Path) -> Vec<Candidate> {
     places
 }
 
-fn search(places: Vec<Candidate>) -> Result<PathBuf, String> {
+fn search(places: Vec<Candidate>) -> Result<PathBuf, Mistake> {
     let mut tried = Vec::new();
     for (name, place) in places {
         let why = match place {
@@ -64,10 +65,12 @@ fn search(places: Vec<Candidate>) -> Result<PathBuf, String> {
         };
         tried.push(format!("{name} ({why})"));
     }
-    Err(format!(
-        "isolated = true needs the tickbus command to start helper processes with, and it was not found: {}; \
-         name it as `helper` in the driver.cfg, or in the variable {VARIABLE}",
-        tried.join(", ")
+    Err(Mistake::new(
+        format!(
+            "isolated = true needs the tickbus command to start helper processes with, and it was not found: {}",
+            tried.join(", ")
+        ),
+        format!("name it as `helper` in the driver.cfg, or in the variable {VARIABLE}"),
     ))
 }
 
@@ -111,7 +114,7 @@ mod tests {
             ("there", Ok("/no/such/tickbus".into())),
         ];
         assert_eq!(
-            search(places).expect_err("not there"),
+            search(places).expect_err("not there").to_string(),
             "isolated = true needs the tickbus command to start helper processes with, and it was not found: \
              here (it has no name), there (/no/such/tickbus is not there, or no program); name it as `helper` \
              in the driver.cfg, or in the variable TICKBUS_HELPER"
@@ -123,9 +126,11 @@ mod tests {
         let error =
             helper(Some("/no/such/tickbus".into()), Path::new("/opt")).expect_err("not there");
         assert!(
-            error.contains("`helper` in the driver.cfg (/no/such/tickbus"),
+            error
+                .what
+                .contains("`helper` in the driver.cfg (/no/such/tickbus"),
             "{error}"
         );
-        assert!(!error.contains("PATH"), "{error}");
+        assert!(!error.what.contains("PATH"), "{error}");
     }
 }

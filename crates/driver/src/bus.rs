@@ -48,10 +48,10 @@ pub(super) fn open(
         events: config.events,
     };
     let bus = config.bus.open(&setup).map_err(|error| {
-        let named = |what| format!("{}: {what}", config.path.display());
+        let file = config.path.display().to_string();
         match error {
-            OpenError::Config(what) => DriverError::Config(named(what)),
-            OpenError::Unsupported(what) => DriverError::Unsupported(named(what)),
+            OpenError::Config(mistake) => DriverError::Bus { file, mistake },
+            OpenError::Unsupported(what) => DriverError::Unsupported(format!("{file}: {what}")),
         }
     })?;
     Ok((bus, None))
@@ -95,7 +95,8 @@ fn open_hosted(
         Role::Controller,
         bus_of_program,
         clock,
-    )?;
+    )
+    .map_err(DriverError::no_thread)?;
     Ok((
         Bus::Free(bus(device)),
         Some(Program::Thread(Box::new(host))),

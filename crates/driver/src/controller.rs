@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
+use tickbus_base::Mistake;
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultStatus;
@@ -34,21 +35,23 @@ impl Host {
         interval: Nanos,
         clock: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
+        let unfit = |what: &str, right: &str| DriverError::Fit {
+            file: config.path.display().to_string(),
+            mistake: Mistake::new(what, right),
+        };
         check_fit(config, &mut *program, config.role)?;
         if config.table.stations.len() > 1 && !(config.faults.is_empty() && config.record.is_none())
         {
-            return Err(DriverError::Config(format!(
-                "{}: a program behind several stations can neither be recorded nor have faults injected; use one \
-                 driver.cfg per station for that",
-                config.path.display()
-            )));
+            return Err(unfit(
+                "a program behind several stations can neither be recorded nor have faults injected",
+                "use one driver.cfg per station for that",
+            ));
         }
         let (Bus::Free(bus), None) = bus::open(config, &clock)? else {
-            return Err(DriverError::Config(format!(
-                "{}: this bus runs on the ticks of a simulation, so that no PLC program can run on it \
-                 by itself; choose mode = \"free\" and a \"link\", or another kind of bus",
-                config.path.display()
-            )));
+            return Err(unfit(
+                "this bus runs on the ticks of a simulation, so that no PLC program can run on it by itself",
+                "choose mode = \"free\" and a \"link\", or another kind of bus",
+            ));
         };
         let title = format!("plc {}", program.name());
         let role = config.role;
@@ -59,7 +62,7 @@ impl Host {
         };
         HostThread::start(hosted, title, config, role, bus, clock)
             .map(Self)
-            .map_err(DriverError::Thread)
+            .map_err(DriverError::no_thread)
     }
 
     /// The state of the line.

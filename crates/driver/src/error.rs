@@ -1,7 +1,8 @@
 //! Why a driver cannot be opened.
 
+use tickbus_base::Mistake;
 use tickbus_plc as plc;
-use tickbus_record::RecorderError;
+use tickbus_record::{RecorderError, RecordingError};
 
 use super::Code;
 
@@ -10,10 +11,15 @@ use super::Code;
 pub enum DriverError {
     /// The system refused a thread.
     #[error(
-        "the system refused a thread for the bus: {0}; close other programs or raise the limit"
+        "the system refused a thread for {what}: {source}; close other programs or raise the limit"
     )]
-    Thread(#[from] std::io::Error),
-    /// The hosted program does not exist, or rejects its options.
+    System {
+        /// The part of the driver that needs it.
+        what: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The hosted program does not exist, or rejects its options or the image.
     #[error("{file}: {source}")]
     Program {
         /// The driver.cfg.
@@ -21,18 +27,55 @@ pub enum DriverError {
         /// The program's error.
         source: plc::ProgramError,
     },
-    /// The recording cannot be started.
+    /// The program, the stations and the bus do not fit together.
+    #[error("{file}: {mistake}")]
+    Fit {
+        /// The driver.cfg.
+        file: String,
+        /// What does not fit, and what would.
+        mistake: Mistake,
+    },
+    /// The bus does not find what the driver.cfg names.
+    #[error("{file}: {mistake}")]
+    Bus {
+        /// The driver.cfg.
+        file: String,
+        /// What is missing, and what to do.
+        mistake: Mistake,
+    },
+    /// The recording cannot be made.
     #[error("{0}")]
-    Recording(#[from] RecorderError),
-    /// The program and the signal table do not fit.
+    Record(String),
+    /// The recording that stands in for the peer cannot be read, or is of other signals.
+    #[error(transparent)]
+    Replay(#[from] RecordingError),
+    /// A fault cannot be injected.
     #[error("{0}")]
-    Config(String),
+    Fault(Mistake),
     /// The driver.cfg is correct, but asks for something that this build or platform does not have.
     #[error("{0}")]
     Unsupported(String),
 }
 
+impl From<RecorderError> for DriverError {
+    fn from(error: RecorderError) -> Self {
+        match error {
+            RecorderError::File(text) => Self::Record(text),
+            RecorderError::Thread(source) => Self::System {
+                what: "the recording",
+                source,
+            },
+        }
+    }
+}
+
 impl DriverError {
+    /// The system refused the thread of the bus.
+    pub(crate) fn no_thread(source: std::io::Error) -> Self {
+        let what = "the bus";
+        Self::System { what, source }
+    }
+
     /// Whether the driver.cfg must be changed, rather than the system.
     pub fn is_wrong_input(&self) -> bool {
         matches!(self.code(), Code::BadConfig | Code::Unsupported)
@@ -41,11 +84,14 @@ impl DriverError {
     /// The status code for it.
     pub fn code(&self) -> Code {
         match self {
-            Self::Thread(_) | Self::Recording(RecorderError::Thread(_)) => Code::BusFailed,
-            Self::Program { .. } | Self::Config(_) | Self::Recording(RecorderError::File(_)) => {
-                Code::BadConfig
-            }
+            Self::System { .. } => Code::BusFailed,
             Self::Unsupported(_) => Code::Unsupported,
+            Self::Program { .. }
+            | Self::Fit { .. }
+            | Self::Bus { .. }
+            | Self::Record(_)
+            | Self::Replay(_)
+            | Self::Fault(_) => Code::BadConfig,
         }
     }
 }
@@ -59,6 +105,7 @@ mod tests {
         let refused = || std::io::Error::from(std::io::ErrorKind::WouldBlock);
         let error = DriverError::from(RecorderError::Thread(refused()));
         assert!(!error.is_wrong_input(), "{error}");
+        assert!(error.to_string().contains("for the recording: "), "{error}");
         assert_eq!(error.code(), Code::BusFailed);
         let error = DriverError::from(RecorderError::File("run.csv: no".to_owned()));
         assert_eq!(error.code(), Code::BadConfig);

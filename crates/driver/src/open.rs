@@ -67,13 +67,8 @@ impl Driver {
         let line = match bus {
             Bus::Free(bus) => {
                 let reconnect = config.timing.reconnect.clone();
-                BusHandle::Free(BusThread::start(
-                    bus,
-                    port,
-                    reconnect,
-                    status.clone(),
-                    &config.name,
-                )?)
+                let thread = BusThread::start(bus, port, reconnect, status.clone(), &config.name);
+                BusHandle::Free(thread.map_err(DriverError::no_thread)?)
             }
             Bus::Stepped(bus) => BusHandle::Stepped {
                 bus,
@@ -113,9 +108,7 @@ impl Driver {
             config: Arc::new(config),
         };
         for fault in &list {
-            driver
-                .inject(fault)
-                .map_err(|mistake| DriverError::Config(mistake.to_string()))?;
+            driver.inject(fault).map_err(DriverError::Fault)?;
         }
         Ok(driver)
     }

@@ -98,15 +98,14 @@ impl Replay {
         config: &Config,
         path: &Path,
     ) -> Result<(Self, Arc<ReplayTally>), DriverError> {
-        let refused = |error: RecordingError| DriverError::Config(error.to_string());
-        let place = FileClaim::to_replay(path).map_err(DriverError::Config)?;
-        let mut recording = Recording::open(path, Some(&config.table)).map_err(refused)?;
+        let place = FileClaim::to_replay(path)?;
+        let mut recording = Recording::open(path, Some(&config.table))?;
         let map = Map::new(config, recording.columns()).map_err(|what| {
-            DriverError::Config(format!(
-                "{}: this recording is of another signal table: {what}; record again, or use the signals that \
-                 it was recorded with",
-                path.display()
-            ))
+            RecordingError::of_file(
+                path,
+                format!("this recording is of another signal table: {what}"),
+                "record again, or use the signals that it was recorded with",
+            )
         })?;
         let (tx, _) = config.role.areas();
         let signals = config.table.signals.iter().zip(&map.signals);
@@ -123,7 +122,7 @@ impl Replay {
             );
         }
         let mut next = Tick::new(recording.columns());
-        let more = recording.next(&mut next).map_err(refused)?;
+        let more = recording.next(&mut next)?;
         let tally = Arc::new(ReplayTally {
             file: path.display().to_string(),
             unknown: unknown.len() as u64,

@@ -37,8 +37,8 @@ pub struct BusSetup<'a> {
 /// Why a bus does not open.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum OpenError {
-    /// The driver.cfg must be changed: what is wrong, and what to do.
-    Config(String),
+    /// The driver.cfg must be changed.
+    Config(Mistake),
     /// This system, or this build, does not have what the driver.cfg asks for.
     Unsupported(String),
 }

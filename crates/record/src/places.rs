@@ -7,6 +7,8 @@ use std::io;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use super::RecordingError;
+
 /// How each file in use is used.
 static IN_USE: Mutex<BTreeMap<Identity, Use>> = Mutex::new(BTreeMap::new());
 
@@ -54,21 +56,24 @@ impl FileClaim {
     ///
     /// # Errors
     ///
-    /// The file does not exist, or is being recorded to; the text says what to do.
-    pub fn to_replay(path: &Path) -> Result<Self, String> {
-        let shown = path.display();
+    /// The file does not exist, or is being recorded to.
+    pub fn to_replay(path: &Path) -> Result<Self, RecordingError> {
         let id = fs::metadata(path).and_then(|metadata| identity(path, &metadata));
         let id = id.map_err(|error| {
-            format!(
-                "{shown}: the recording cannot be read: {error}; check its name and permissions"
+            RecordingError::of_file(
+                path,
+                format!("the recording cannot be read: {error}"),
+                "check its name and permissions",
             )
         })?;
         let mut in_use = lock();
         match in_use.entry(id.to_owned()).or_insert(Use::Replayed(0)) {
             Use::Replayed(count) => *count += 1,
             Use::Recorded => {
-                return Err(format!(
-                    "{shown}: a driver of this process records to this file; close it before the file is replayed"
+                return Err(RecordingError::of_file(
+                    path,
+                    "a driver of this process records to this file",
+                    "close it before the file is replayed",
                 ));
             }
         }

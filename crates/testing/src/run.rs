@@ -57,12 +57,10 @@ impl Suite {
         config.record = record
             .map(record::Options::to)
             .transpose()
-            .map_err(|mistake| DriverError::Config(mistake.to_string()))?;
+            .map_err(|mistake| DriverError::Record(mistake.to_string()))?;
         let table = &bench.config.table;
         let playback = bench.tape.as_ref().map(|tape| Playback::start(tape, table));
-        let playback = playback
-            .transpose()
-            .map_err(|error| DriverError::Config(error.to_string()))?;
+        let playback = playback.transpose()?;
         // A stepped bus uses simulation time, and no other clock.
         let driver = Driver::open(config, Manual::new())?;
         let mut slots = driver.initial_slots();

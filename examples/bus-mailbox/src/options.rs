@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
@@ -40,9 +41,9 @@ impl BusOptions for Options {
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
         let folder = setup.folder.join(&self.folder);
         if !folder.is_dir() {
-            return Err(OpenError::Config(format!(
-                "there is no folder {}; make it, or name another one in `folder`",
-                folder.display()
+            return Err(OpenError::Config(Mistake::new(
+                format!("there is no folder {}", folder.display()),
+                "make it, or name another one in `folder`",
             )));
         }
         let mailbox = Mailbox::new(&folder, setup.role, setup.cycle.unwrap_or(CYCLE));

@@ -13,6 +13,7 @@ use std::sync::Arc;
 
 use opcua::types::EndpointDescription;
 
+use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp;
 use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Port, Role, WriteGuard};
@@ -65,7 +66,7 @@ impl Client {
     /// # Errors
     ///
     /// Node ids and signals do not match.
-    pub fn new(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Self, String> {
+    pub fn new(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Self, Mistake> {
         Ok(Self {
             options: options.clone(),
             pki: Pki::new(&options.credentials, setup),
@@ -209,7 +210,7 @@ impl Free for Client {
 }
 
 /// The node of each signal.
-fn fields(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Vec<Field>, String> {
+fn fields(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Vec<Field>, Mistake> {
     let read: Area = setup.role.areas().1;
     let field = |signal: &Signal| {
         let node = options.node(signal, &setup.table.stations[signal.station]);
@@ -218,7 +219,9 @@ fn fields(options: &ClientOptions, setup: &BusSetup<'_>) -> Result<Vec<Field>, S
             data_type: signal.data_type,
             latched: signal.latch.is_some(),
             is_read: signal.area == read,
-            node: node.map_err(|error| format!("signal \"{}\": {error}", signal.name))?,
+            node: node.map_err(|Mistake { what, right }| {
+                Mistake::new(format!("signal \"{}\": {what}", signal.name), right)
+            })?,
         })
     };
     setup.table.signals.iter().map(field).collect()

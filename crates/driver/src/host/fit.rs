@@ -1,6 +1,7 @@
 //! Whether a program and a signal table fit.
 
 use crate::DriverError;
+use tickbus_base::Mistake;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_plc as plc;
@@ -12,14 +13,19 @@ pub(crate) fn check_fit(
     role: Role,
 ) -> Result<(), DriverError> {
     let name = program.name().to_owned();
-    let refused = |what: String| DriverError::Config(format!("{}: {what}", config.path.display()));
+    let refused = |what: String, right: &str| DriverError::Fit {
+        file: config.path.display().to_string(),
+        mistake: Mistake::new(what, right),
+    };
     let stations = &config.table.stations;
     if stations.len() > 1 && program.for_another_station().is_none() {
-        return Err(refused(format!(
-            "the PLC program \"{name}\" serves one station, but this driver has {}; use one \
-             driver.cfg per station",
-            stations.len()
-        )));
+        return Err(refused(
+            format!(
+                "the PLC program \"{name}\" serves one station, but this driver has {}",
+                stations.len()
+            ),
+            "use one driver.cfg per station",
+        ));
     }
     program
         .fit(&config.table, config.addressing)
@@ -32,10 +38,13 @@ pub(crate) fn check_fit(
     for (station, (area, needs)) in stations.iter().flat_map(|s| needs.map(|need| (s, need))) {
         let has = station.bytes(area);
         if has < needs {
-            return Err(refused(format!(
-                "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \
-                 this driver cover {has}; complete the signal table"
-            )));
+            return Err(refused(
+                format!(
+                    "the PLC program \"{name}\" works on {needs} bytes of {area}, but the signals of \
+                     this driver cover {has}"
+                ),
+                "complete the signal table",
+            ));
         }
     }
     Ok(())

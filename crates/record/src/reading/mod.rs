@@ -26,6 +26,17 @@ pub struct RecordingError {
     pub mistake: Mistake,
 }
 
+impl RecordingError {
+    /// The file as a whole is at fault.
+    pub fn of_file(path: &Path, what: impl Into<String>, right: impl Into<String>) -> Self {
+        Self {
+            file: path.display().to_string(),
+            line: None,
+            mistake: Mistake::new(what, right),
+        }
+    }
+}
+
 /// What a reader finds wrong at its current line.
 #[derive(Debug)]
 struct ReadError {
@@ -92,12 +103,8 @@ impl Recording {
     /// The file cannot be read, or is not a recording.
     pub fn open(path: &Path, table: Option<&SignalTable>) -> Result<Self, RecordingError> {
         let file = path.display().to_string();
-        let refused = |mistake| RecordingError {
-            file: file.clone(),
-            line: None,
-            mistake,
-        };
-        let format = Format::of(path).map_err(refused)?;
+        let format = Format::of(path)
+            .map_err(|Mistake { what, right }| RecordingError::of_file(path, what, right))?;
         let opened = File::open(path).and_then(|file| {
             if file.metadata()?.is_dir() {
                 return Err(io::ErrorKind::IsADirectory.into());
@@ -105,10 +112,11 @@ impl Recording {
             Ok(file)
         });
         let opened = opened.map_err(|error| {
-            refused(Mistake::new(
+            RecordingError::of_file(
+                path,
                 format!("the recording cannot be read: {error}"),
                 "check the path and the name",
-            ))
+            )
         })?;
         Self::read(
             &file,

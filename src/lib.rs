@@ -32,7 +32,7 @@ pub mod cli;
 mod jni;
 
 pub use tickbus_axis as axis;
-pub use tickbus_base::{Mistake, os, time, toml_text};
+pub use tickbus_base::{Mistake, os, statistics, time, toml_text};
 pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;
 pub use tickbus_export as export;

@@ -201,7 +201,7 @@ fn names_and_texts_are_shown_and_never_run() {
         run.mark(samples::mark(0, None, kind, attack));
     }
     let statistics = Statistics::read(&format!(
-        "state=running\nreason={attack}\n{}=1",
+        "state=running\nreason={attack}\nplc.rises.{}=1",
         attack.replace('=', "-")
     ));
     let texts = [(attack.to_owned(), attack.to_owned())];

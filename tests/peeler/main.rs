@@ -5,11 +5,13 @@ mod plant;
 
 use line::Line;
 use tickbus::plc::Report;
+use tickbus::statistics::Statistics;
 
 /// The number after `key=` in a report.
 fn told(report: &dyn Report, key: &str) -> f64 {
-    let mut text = String::new();
-    report.write(&mut text);
+    let mut statistics = Statistics::default();
+    report.write(&mut statistics);
+    let text = statistics.to_string();
     let line = text
         .lines()
         .find_map(|line| line.strip_prefix(&format!("{key}=")));

@@ -4,10 +4,12 @@
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
+//! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 
 mod mistake;
 pub mod os;
+pub mod statistics;
 pub mod time;
 pub mod toml_text;
 

@@ -1,10 +1,10 @@
 //! A PLC program at one end of a bus, by itself: the other front door, beside that of a simulation.
 
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::os::dropped_log_lines;
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultStatus;
 use tickbus_fieldbus::{Bus, Link};
@@ -74,15 +74,14 @@ impl Host {
     /// The counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         let now = self.0.told.clock.now();
-        let mut text = String::new();
+        let mut statistics = Statistics::default();
         self.0.status.observe_call(now);
-        self.0.status.write(now, &mut text);
+        self.0.status.write(now, &mut statistics);
         self.0.board.tell(self.0.status.driver());
-        self.0.board.write(&mut text);
-        self.0.told.write(&mut text);
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "log.dropped={}", dropped_log_lines());
-        text
+        self.0.board.write(&mut statistics);
+        self.0.told.write(&mut statistics);
+        statistics.count("log.dropped", dropped_log_lines());
+        statistics.to_string()
     }
 
     /// The injected faults of this end.

@@ -5,7 +5,6 @@ mod differences;
 mod station;
 
 use std::collections::HashMap;
-use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -13,6 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use self::differences::Differences;
 use self::station::Station;
 use super::DriverError;
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::did_you_mean;
 use tickbus_driver_cfg::Config;
@@ -38,17 +38,16 @@ pub(super) struct ReplayTally {
 }
 
 impl ReplayTally {
-    /// Appends the results, one `key=value` per line.
-    pub(super) fn write(&self, text: &mut String) {
+    /// Adds the results.
+    pub(super) fn write(&self, statistics: &mut Statistics) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "replay.file={}", self.file);
-        let _ = writeln!(text, "replay.ticks={}", count(&self.ticks));
-        let _ = writeln!(text, "replay.compared={}", count(&self.compared));
-        let _ = writeln!(text, "replay.differences={}", count(&self.differences));
-        let _ = writeln!(text, "replay.not_compared_signals={}", self.unknown);
+        statistics.text("replay.file", &self.file);
+        statistics.count("replay.ticks", count(&self.ticks));
+        statistics.count("replay.compared", count(&self.compared));
+        statistics.count("replay.differences", count(&self.differences));
+        statistics.count("replay.not_compared_signals", self.unknown);
         let ended = self.ended.load(Ordering::Relaxed);
-        let _ = writeln!(text, "replay.ended={}", u8::from(ended));
+        statistics.count("replay.ended", ended.into());
     }
 }
 

@@ -1,11 +1,12 @@
 //! The counters of a driver.
 
-use std::fmt::{self, Write as _};
+use std::fmt;
 use std::sync::Arc;
 
 use super::Code;
 use super::host::ProgramTally;
 use tickbus_base::os::dropped_log_lines;
+use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkStatus;
@@ -43,26 +44,15 @@ impl TickCounters {
     }
 }
 
-/// One `key=value` per line.
-impl fmt::Display for TickCounters {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            ticks,
-            fresh,
-            unchanged,
-            stale,
-            failed,
-            saturated,
-            not_a_number,
-        } = self;
-        writeln!(
-            f,
-            "ticks={ticks}\nfresh={fresh}\nunchanged={unchanged}\nstale={stale}"
-        )?;
-        writeln!(
-            f,
-            "failed={failed}\nsaturated={saturated}\nnot_a_number={not_a_number}"
-        )
+impl TickCounters {
+    fn write(&self, statistics: &mut Statistics) {
+        statistics.count("ticks", self.ticks);
+        statistics.count("fresh", self.fresh);
+        statistics.count("unchanged", self.unchanged);
+        statistics.count("stale", self.stale);
+        statistics.count("failed", self.failed);
+        statistics.count("saturated", self.saturated);
+        statistics.count("not_a_number", self.not_a_number);
     }
 }
 
@@ -95,10 +85,10 @@ impl TickTimes {
         }
     }
 
-    /// Appends both, one `key=value` a line.
-    pub(super) fn write(&self, text: &mut String) {
-        self.exchange.write("exchange", text);
-        self.age.write("age", text);
+    /// Adds both.
+    pub(super) fn write(&self, statistics: &mut Statistics) {
+        statistics.distribution("exchange", &self.exchange);
+        statistics.distribution("age", &self.age);
     }
 }
 
@@ -122,24 +112,45 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Appends the age of each station's data and its number of bus cycles; nothing for a single station.
-    fn write_stations(&self, text: &mut String) {
+    /// The statistics.
+    pub fn statistics(&self) -> Statistics {
+        let ages = self.stations.iter().map(|(age, _, _)| *age);
+        self.status.observe(self.now, ages);
+        self.status.observe_call(self.now);
+        let mut statistics = Statistics::default();
+        self.counters.write(&mut statistics);
+        let cycles = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
+        statistics.count("bus_cycles", cycles);
+        statistics.count("events_lost", self.events_lost);
+        self.status.write(self.now, &mut statistics);
+        self.write_stations(&mut statistics);
+        self.samples.write(&mut statistics);
+        self.board.tell(self.status.driver());
+        self.board.write(&mut statistics);
+        if let Some(program) = &self.program {
+            program.write(&mut statistics);
+        }
+        if let Some(record) = &self.record {
+            record.write(&mut statistics);
+        }
+        statistics.count("log.dropped", dropped_log_lines());
+        statistics
+    }
+
+    /// Adds the age of each station's data and its number of bus cycles; nothing for a single station.
+    fn write_stations(&self, statistics: &mut Statistics) {
         if self.stations.len() < 2 {
             return;
         }
         let sections = &self.config.table.stations;
         for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
-            let name = &section.name;
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                text,
-                "station.{name}.stale={}",
-                *age > self.config.timing.max_age || !is_valid
-            );
+            let key = |tail| Key::of_station("station", &section.name, tail);
+            let is_stale = *age > self.config.timing.max_age || !is_valid;
+            statistics.text(key("stale"), if is_stale { "true" } else { "false" });
             if *age != Nanos::MAX {
-                let _ = writeln!(text, "station.{name}.age_ms={:.3}", age.as_micros() / 1e3);
+                statistics.number(key("age_ms"), age.as_micros() / 1e3, 3);
             }
-            let _ = writeln!(text, "station.{name}.bus_cycles={cycles}");
+            statistics.count(key("bus_cycles"), *cycles);
         }
     }
 }
@@ -147,28 +158,6 @@ impl Snapshot {
 /// One `key=value` per line.
 impl fmt::Display for Snapshot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ages = self.stations.iter().map(|(age, _, _)| *age);
-        self.status.observe(self.now, ages);
-        self.status.observe_call(self.now);
-        let mut text = self.counters.to_string();
-        let cycles: u64 = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
-        writeln!(
-            text,
-            "bus_cycles={cycles}\nevents_lost={}",
-            self.events_lost
-        )?;
-        self.status.write(self.now, &mut text);
-        self.write_stations(&mut text);
-        self.samples.write(&mut text);
-        self.board.tell(self.status.driver());
-        self.board.write(&mut text);
-        if let Some(program) = &self.program {
-            program.write(&mut text);
-        }
-        if let Some(record) = &self.record {
-            record.write(&mut text);
-        }
-        writeln!(text, "log.dropped={}", dropped_log_lines())?;
-        f.write_str(&text)
+        self.statistics().fmt(f)
     }
 }

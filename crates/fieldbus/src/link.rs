@@ -1,12 +1,12 @@
 //! The state of a line, its cause, and the reason in words.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::{Arguments, Write as _};
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::os::one_line;
+use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, TimeHistogram};
 
 use super::BusError;
@@ -178,7 +178,7 @@ struct Record {
     /// How often each state was entered, and each cause occurred.
     entered: [u64; LinkState::ALL.len()],
     caused: [u64; Cause::ALL.len()],
-    facts: BTreeMap<Cow<'static, str>, String>,
+    facts: BTreeMap<Key, String>,
     counts: BTreeMap<&'static str, u64>,
     /// What was logged.
     log: Rarely,
@@ -436,7 +436,7 @@ impl LinkStatus {
     }
 
     /// Sets a fact for the statistics, such as the bound address.
-    pub fn tell(&self, key: impl Into<Cow<'static, str>>, fact: &str) {
+    pub fn tell(&self, key: impl Into<Key>, fact: &str) {
         self.lock().facts.insert(key.into(), one_line(fact));
     }
 
@@ -459,38 +459,33 @@ impl LinkStatus {
         self.lock().cycle.record(span);
     }
 
-    /// Appends the state of the line, one `key=value` per line.
-    pub fn write(&self, now: Nanos, text: &mut String) {
+    /// Adds the state of the line.
+    pub fn write(&self, now: Nanos, statistics: &mut Statistics) {
         let record = self.lock();
         let link = &record.link;
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "state={}", link.state.name());
-        let _ = writeln!(text, "state.code={}", link.state as u8);
-        let _ = writeln!(text, "cause={}", link.cause.name());
-        let _ = writeln!(text, "cause.code={}", link.cause as u8);
-        let _ = writeln!(text, "reason={}", link.reason);
-        let _ = writeln!(
-            text,
-            "state.for_s={:.3}",
-            (now - link.since).as_micros() / 1e6
-        );
-        let _ = writeln!(text, "max_age={}", self.0.max_age);
+        statistics.text("state", link.state.name());
+        statistics.count("state.code", link.state as u64);
+        statistics.text("cause", link.cause.name());
+        statistics.count("cause.code", link.cause as u64);
+        statistics.text("reason", &link.reason);
+        statistics.number("state.for_s", (now - link.since).as_micros() / 1e6, 3);
+        statistics.time("max_age", self.0.max_age);
         for (key, fact) in &record.facts {
-            let _ = writeln!(text, "{key}={fact}");
+            statistics.text(key.clone(), fact);
         }
         for (state, count) in LinkState::ALL.iter().zip(record.entered) {
-            let _ = writeln!(text, "link.{}={count}", state.name());
+            statistics.count(format!("link.{}", state.name()), count);
         }
         for (cause, count) in Cause::ALL.iter().zip(record.caused) {
             if count > 0 {
-                let _ = writeln!(text, "cause.{}={count}", cause.name());
+                statistics.count(format!("cause.{}", cause.name()), count);
             }
         }
         for (key, count) in &record.counts {
-            let _ = writeln!(text, "{key}={count}");
+            statistics.count(*key, *count);
         }
-        let _ = writeln!(text, "log.untold={}", record.log.untold());
-        record.cycle.write("bus_cycle", text);
+        statistics.count("log.untold", record.log.untold());
+        statistics.distribution("bus_cycle", &record.cycle);
     }
 
     fn lock(&self) -> MutexGuard<'_, Record> {

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Cause, alive::Watch};
+use tickbus_base::statistics::Key;
 use tickbus_base::time::Nanos;
 
 /// The operating state reported by a PLC.
@@ -165,7 +166,7 @@ impl Validity {
     }
 
     /// The facts for the statistics: `cpu`, or `cpu.<station>` if there are several stations.
-    pub(super) fn facts(&self) -> Vec<(String, &'static str)> {
+    pub(super) fn facts(&self) -> Vec<(Key, &'static str)> {
         let known = || {
             self.stations
                 .iter()
@@ -177,9 +178,11 @@ impl Validity {
         } else {
             PlcState::Run
         };
-        let mut facts = vec![("cpu".to_owned(), all.name())];
+        let mut facts = vec![("cpu".into(), all.name())];
         if self.stations.len() > 1 {
-            facts.extend(known().map(|(name, state)| (format!("cpu.{name}"), state.name())));
+            facts.extend(
+                known().map(|(name, state)| (Key::of_station("cpu", name, ""), state.name())),
+            );
         }
         facts
     }
@@ -260,8 +263,9 @@ mod tests {
     }
 
     fn is_told(status: &LinkStatus, line: &str) -> bool {
-        let mut text = String::new();
-        status.write(at(0), &mut text);
+        let mut statistics = tickbus_base::statistics::Statistics::default();
+        status.write(at(0), &mut statistics);
+        let text = statistics.to_string();
         text.lines().any(|told| told == line)
     }
 

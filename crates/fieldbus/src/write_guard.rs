@@ -87,9 +87,9 @@ mod tests {
     }
 
     fn statistics(status: &LinkStatus) -> String {
-        let mut text = String::new();
-        status.write(Nanos::ZERO, &mut text);
-        text
+        let mut statistics = tickbus_base::statistics::Statistics::default();
+        status.write(Nanos::ZERO, &mut statistics);
+        statistics.to_string()
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Addressing, SignalTable};
 
@@ -82,8 +83,8 @@ pub trait Program: Send {
 
 /// A program's report in addition to its outputs, shared with its host.
 pub trait Report: Send + Sync + std::fmt::Debug {
-    /// Appends the report, one `key=value` per line.
-    fn write(&self, text: &mut String);
+    /// Adds the report.
+    fn write(&self, statistics: &mut Statistics);
 
     /// The report for people, shown when the program ends.
     fn summary(&self) -> String;

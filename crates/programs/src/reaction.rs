@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_image::signal::{Address, Addressing, Area, Width};
 use tickbus_plc::{Program, ProgramError, Report, Scan};
@@ -254,16 +255,15 @@ impl Result {
 }
 
 impl Report for Result {
-    fn write(&self, text: &mut String) {
+    fn write(&self, statistics: &mut Statistics) {
         let measured = self.lock();
-        measured.spans.write("reaction", text);
+        statistics.distribution("reaction", &measured.spans);
         let micro = Nanos::from_micros(1);
-        measured.cycles.write_in("reaction.cycles", micro, "", text);
+        statistics.distribution_in("reaction.cycles", &measured.cycles, micro, "");
         if let Some(tick) = self.tick {
-            measured.spans.write_in("reaction.ticks", tick, "", text);
+            statistics.distribution_in("reaction.ticks", &measured.spans, tick, "");
         }
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "reaction.lost={}", measured.lost);
+        statistics.count("reaction.lost", measured.lost);
     }
 
     fn summary(&self) -> String {
@@ -368,8 +368,9 @@ mod tests {
         ]);
         let report = measure(&mut program, Some(Nanos::from_millis(3)));
         assert!(report.is_done() && report.failure().is_none());
-        let mut text = String::new();
-        report.write(&mut text);
+        let mut statistics = Statistics::default();
+        report.write(&mut statistics);
+        let text = statistics.to_string();
         assert!(
             text.starts_with("reaction.count=100\nreaction.p50_us=30"),
             "{text}"

@@ -1,6 +1,5 @@
 //! The recorder: takes ticks from the tick, and writes them on its own thread.
 
-use std::fmt::Write as _;
 use std::fs::{File, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -16,6 +15,7 @@ use super::places::FileClaim;
 use super::sink::Sink;
 use super::vcd::VcdSink;
 use super::{Format, Options};
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
 use tickbus_image::{RowReader, RowWriter, row_ring};
@@ -68,19 +68,18 @@ impl RecorderCounters {
         self.lock_error().clone()
     }
 
-    /// Appends the counters, one `key=value` per line.
-    pub fn write(&self, text: &mut String) {
+    /// Adds the counters.
+    pub fn write(&self, statistics: &mut Statistics) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "record.file={}", self.file.display());
-        let _ = writeln!(text, "record.ticks={}", count(&self.ticks));
-        let _ = writeln!(text, "record.dropped={}", count(&self.dropped));
+        statistics.text("record.file", &self.file.display().to_string());
+        statistics.count("record.ticks", count(&self.ticks));
+        statistics.count("record.dropped", count(&self.dropped));
         let backwards = count(&self.backwards);
         if backwards > 0 {
-            let _ = writeln!(text, "record.backwards={backwards}");
+            statistics.count("record.backwards", backwards);
         }
         if let Some(error) = self.error() {
-            let _ = writeln!(text, "record.error={error}");
+            statistics.text("record.error", &error);
         }
     }
 

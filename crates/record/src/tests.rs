@@ -340,8 +340,9 @@ fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String,
         recorder.record(number, time, 0, std::iter::empty(), &slots);
     }
     let tally = recorder.tally().clone();
-    let mut text = String::new();
-    tally.write(&mut text);
+    let mut statistics = tickbus_base::statistics::Statistics::default();
+    tally.write(&mut statistics);
+    let mut text = statistics.to_string();
     drop(recorder);
     if let Some(error) = tally.error() {
         text = format!("record.error={error}");

@@ -1,5 +1,7 @@
 //! Reading statistics: `key=value` lines, as documented in `docs/statistics.md`.
 
+use tickbus_base::statistics::entries;
+
 /// Statistics of a driver or of a PLC program. If a key occurs more than once, its last value counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics(Vec<(String, String)>);
@@ -27,17 +29,9 @@ impl Statistics {
     pub fn read(text: &str) -> Self {
         let mut found: Vec<(String, String)> = Vec::new();
         let mut places = std::collections::HashMap::new();
-        for line in text.lines() {
-            let Some((key, value)) = line.trim().split_once('=') else {
-                continue;
-            };
-            // A key may contain a signal's name, spaces included; a sentence that contains "=" has ": "
-            // before it.
-            if key.is_empty() || key.contains(": ") {
-                continue;
-            }
-            let place = *places.entry(key.to_owned()).or_insert_with(|| {
-                found.push((key.to_owned(), String::new()));
+        for (key, value) in entries(text) {
+            let place = *places.entry(key).or_insert_with_key(|key| {
+                found.push((key.clone(), String::new()));
                 found.len() - 1
             });
             value.clone_into(&mut found[place].1);

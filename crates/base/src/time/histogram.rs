@@ -104,32 +104,6 @@ impl TimeHistogram {
         })
     }
 
-    /// Appends `key.count` and, unless it is zero, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and
-    /// `stdev`, in microseconds, one `key=value` per line.
-    pub fn write(&self, key: &str, text: &mut String) {
-        self.write_in(key, Nanos::from_micros(1), "_us", text);
-    }
-
-    /// As [`write`](Self::write), in multiples of `unit`, which `suffix` names.
-    pub fn write_in(&self, key: &str, unit: Nanos, suffix: &str, text: &mut String) {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{key}.count={}", self.count());
-        if self.count() == 0 {
-            return;
-        }
-        let units = |span: Nanos| span.as_micros() / unit.as_micros();
-        for (name, share) in [("p50", 0.5), ("p90", 0.9), ("p99", 0.99)] {
-            let span = units(self.quantile(share));
-            let _ = writeln!(text, "{key}.{name}{suffix}={span:.1}");
-        }
-        let _ = writeln!(text, "{key}.max{suffix}={:.1}", units(self.longest()));
-        let mean = self.mean() / 1e3 / unit.as_micros();
-        let _ = writeln!(text, "{key}.mean{suffix}={mean:.1}");
-        let _ = writeln!(text, "{key}.min{suffix}={:.1}", units(self.shortest()));
-        let deviation = self.deviation() / 1e3 / unit.as_micros();
-        let _ = writeln!(text, "{key}.stdev{suffix}={deviation:.1}");
-    }
-
     /// The distribution as text: at most twelve rows, whose limits grow by a constant factor, each with a bar
     /// for its share.
     pub fn chart(&self) -> String {
@@ -210,12 +184,6 @@ mod tests {
             "{}",
             spans.deviation()
         );
-        let mut text = String::new();
-        spans.write("age", &mut text);
-        assert!(
-            text.contains("age.min_us=9999.0\nage.stdev_us=1.9\n"),
-            "{text}"
-        );
     }
 
     #[test]
@@ -246,12 +214,5 @@ mod tests {
         assert_eq!(spans.chart(), "");
         spans.record(Nanos::from_micros(7));
         assert_eq!(spans.chart().lines().count(), 1);
-    }
-
-    #[test]
-    fn an_empty_one_says_so() {
-        let mut text = String::new();
-        TimeHistogram::new().write("age", &mut text);
-        assert_eq!(text, "age.count=0\n");
     }
 }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use tickbus_base::statistics::Statistics;
+
 use crate::replay::ReplayTally;
 
 use super::{HostCounters, HostThread, ScanCounters};
@@ -33,12 +35,12 @@ impl Program {
 }
 
 impl ProgramTally {
-    /// Appends the counters, one `key=value` per line.
-    pub(crate) fn write(&self, text: &mut String) {
+    /// Adds the counters.
+    pub(crate) fn write(&self, statistics: &mut Statistics) {
         match self {
-            Self::Thread(host) => host.write(text),
-            Self::Stepped(tally) => tally.write(text),
-            Self::Replay(tally) => tally.write(text),
+            Self::Thread(host) => host.write(statistics),
+            Self::Stepped(tally) => tally.write(statistics),
+            Self::Replay(tally) => tally.write(statistics),
         }
     }
 }

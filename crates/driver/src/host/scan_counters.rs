@@ -1,9 +1,9 @@
 //! The counters of a hosted program.
 
-use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_image::signal::{Area, DataType, SignalTable};
 
@@ -149,18 +149,14 @@ impl ScanCounters {
         (count(&self.scans), count(&self.stale))
     }
 
-    /// Appends one `plc.` line per count.
-    pub(crate) fn write(&self, text: &mut String) {
-        let _ = writeln!(text, "plc.scans={}", self.scans.load(Ordering::Relaxed));
-        let _ = writeln!(text, "plc.stale={}", self.stale.load(Ordering::Relaxed));
-        self.lock_age().write("plc.age", text);
+    /// Adds the counts.
+    pub(crate) fn write(&self, statistics: &mut Statistics) {
+        statistics.count("plc.scans", self.scans.load(Ordering::Relaxed));
+        statistics.count("plc.stale", self.stale.load(Ordering::Relaxed));
+        statistics.distribution("plc.age", &self.lock_age());
         for bit in &self.bits {
-            let _ = writeln!(
-                text,
-                "plc.rises.{}={}",
-                bit.name,
-                bit.rises.load(Ordering::Relaxed)
-            );
+            let rises = bit.rises.load(Ordering::Relaxed);
+            statistics.count(Key::of_signal("plc.rises", &bit.name), rises);
         }
     }
 }

@@ -1,6 +1,5 @@
 //! A program scanned at a fixed interval by its own thread.
 
-use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
@@ -10,6 +9,7 @@ use std::thread::JoinHandle;
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
 use tickbus_base::os::wake_on_time;
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
@@ -153,18 +153,17 @@ impl HostThread {
 }
 
 impl HostCounters {
-    /// Appends the program's counters, and its fault.
-    pub(crate) fn write(&self, text: &mut String) {
-        self.tally.write(text);
+    /// Adds the program's counters, and its fault.
+    pub(crate) fn write(&self, statistics: &mut Statistics) {
+        self.tally.write(statistics);
         if let Some(report) = &self.report {
-            report.write(text);
+            report.write(statistics);
         }
         if let Some(fault) = self.fault() {
-            let fault = fault.split_whitespace().collect::<Vec<_>>().join(" ");
-            let _ = writeln!(text, "plc.fault={fault}");
+            statistics.text("plc.fault", &fault);
         }
         if let Some(record) = &self.record {
-            record.write(text);
+            record.write(statistics);
         }
     }
 

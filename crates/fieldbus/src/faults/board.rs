@@ -1,11 +1,11 @@
 //! What the tick and the bus tell each other about faults, and tell any other thread that asks.
 
-use std::fmt::Write as _;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::cell::Cell;
 use super::{FaultStatus, LineFault, Phase, TickTime};
+use tickbus_base::statistics::Statistics;
 
 /// What the tick, the bus and other threads share about a driver's faults.
 #[derive(Debug, Default)]
@@ -73,8 +73,8 @@ impl FaultBoard {
         self.cells().iter().map(|cell| cell.seen()).collect()
     }
 
-    /// Appends the state of all faults, one `key=value` per line; nothing if there was never a fault.
-    pub fn write(&self, text: &mut String) {
+    /// Adds the state of all faults; nothing if there was never a fault.
+    pub fn write(&self, statistics: &mut Statistics) {
         if self.news() == 0 {
             return;
         }
@@ -83,22 +83,21 @@ impl FaultBoard {
         let active: Vec<&str> = active.map(|fault| fault.name.as_str()).collect();
         let begun: u64 = faults.iter().map(|fault| fault.begun).sum();
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "fault.active={}", active.join(", "));
-        let _ = writeln!(text, "fault.begun={}", begun + count(&self.forgotten));
-        let _ = writeln!(text, "fault.dropped={}", count(&self.dropped));
-        let _ = writeln!(text, "fault.duplicated={}", count(&self.duplicated));
-        let _ = writeln!(text, "fault.hurried={}", count(&self.hurried));
+        statistics.text("fault.active", &active.join(", "));
+        statistics.count("fault.begun", begun + count(&self.forgotten));
+        statistics.count("fault.dropped", count(&self.dropped));
+        statistics.count("fault.duplicated", count(&self.duplicated));
+        statistics.count("fault.hurried", count(&self.hurried));
         for fault in &faults {
-            let id = fault.id;
-            let _ = writeln!(text, "fault.{id}.name={}", fault.name);
-            let _ = writeln!(text, "fault.{id}.kind={}", fault.kind);
-            let _ = writeln!(text, "fault.{id}.what={}", fault.what);
-            let _ = writeln!(text, "fault.{id}.state={}", fault.phase.name());
-            let _ = writeln!(text, "fault.{id}.begun={}", fault.begun);
+            let key = |what: &str| format!("fault.{}.{what}", fault.id);
+            statistics.text(key("name"), &fault.name);
+            statistics.text(key("kind"), fault.kind);
+            statistics.text(key("what"), &fault.what);
+            statistics.text(key("state"), fault.phase.name());
+            statistics.count(key("begun"), fault.begun);
             if fault.tick > 0 {
-                let _ = writeln!(text, "fault.{id}.since={}", fault.since);
-                let _ = writeln!(text, "fault.{id}.tick={}", fault.tick);
+                statistics.time(key("since"), fault.since);
+                statistics.count(key("tick"), fault.tick);
             }
         }
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use super::*;
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{
     Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Slot, Station,
@@ -227,9 +228,9 @@ fn a_condition_sees_the_truth() {
 #[test]
 fn the_board_tells_what_is_active_and_how_often_it_began() {
     let mut end = End::new();
-    let mut text = String::new();
-    end.board.write(&mut text);
-    assert_eq!(text, "", "no fault, no word");
+    let mut statistics = Statistics::default();
+    end.board.write(&mut statistics);
+    assert_eq!(statistics.to_string(), "", "no fault, no word");
     end.inject(
         "kind = \"invert\"\nname = \"jam\"\nsignal = \"run\"\nwhen = \"run\"\nticks = 2\ntimes = 2",
     );
@@ -238,9 +239,9 @@ fn the_board_tells_what_is_active_and_how_often_it_began() {
         end.set(0, level);
         end.tick(nothing);
     }
-    end.board.write(&mut text);
+    end.board.write(&mut statistics);
     assert_eq!(
-        text,
+        statistics.to_string(),
         "fault.active=jam, link-down\nfault.begun=3\nfault.dropped=0\nfault.duplicated=0\n\
          fault.hurried=0\nfault.1.name=jam\nfault.1.kind=invert\nfault.1.what=\"run\" is inverted\n\
          fault.1.state=active\nfault.1.begun=2\nfault.1.since=30ms\nfault.1.tick=4\n\

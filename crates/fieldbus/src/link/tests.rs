@@ -118,8 +118,9 @@ fn statistics_have_one_line_per_key_whatever_the_reason_says() {
     );
     status.tell("address", "127.0.0.1:5");
     status.count("socket.turned_away");
-    let mut text = String::new();
-    status.write(at(1005), &mut text);
+    let mut statistics = tickbus_base::statistics::Statistics::default();
+    status.write(at(1005), &mut statistics);
+    let text = statistics.to_string();
     assert!(
         text.starts_with(
             "state=failed\nstate.code=4\ncause=defect\ncause.code=8\n\

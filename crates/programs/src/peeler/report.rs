@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
 
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_plc::Report;
 
@@ -138,32 +139,25 @@ impl PeelerCounters {
 }
 
 impl Report for PeelerCounters {
-    fn write(&self, text: &mut String) {
-        // Writing to a string cannot fail.
-        let _ = write!(
-            text,
-            "peeler.blocks={}\npeeler.faults={}\npeeler.restarts={}\npeeler.commands={}\n",
-            self.blocks.load(Relaxed),
-            self.faults.load(Relaxed),
-            self.restarts.load(Relaxed),
-            self.commands(),
-        );
+    fn write(&self, statistics: &mut Statistics) {
+        statistics.count("peeler.blocks", self.blocks.load(Relaxed));
+        statistics.count("peeler.faults", self.faults.load(Relaxed));
+        statistics.count("peeler.restarts", self.restarts.load(Relaxed));
+        statistics.count("peeler.commands", self.commands());
         for axis in &self.axes {
-            let name = axis.name;
-            let _ = write!(
-                text,
-                "peeler.commands.{name}={}\npeeler.commands_per_s.{name}={}\n\
-                 peeler.command_interval_us.{name}={}\n",
-                axis.commands.load(Relaxed),
-                axis.busiest.load(Relaxed),
-                axis.least.load(Relaxed) / 1_000,
+            let mut count = |of: &str, count| {
+                statistics.count(format!("peeler.{of}.{}", axis.name), count);
+            };
+            count("commands", axis.commands.load(Relaxed));
+            count("commands_per_s", axis.busiest.load(Relaxed));
+            count(
+                "command_interval_us",
+                axis.least.load(Relaxed).unsigned_abs() / 1_000,
             );
         }
         if let Some((mean, most)) = self.kept.per_cent() {
-            let _ = write!(
-                text,
-                "peeler.speed_error_rms_percent={mean:.2}\npeeler.speed_error_max_percent={most:.1}\n"
-            );
+            statistics.number("peeler.speed_error_rms_percent", mean, 2);
+            statistics.number("peeler.speed_error_max_percent", most, 1);
         }
     }
 

@@ -219,8 +219,9 @@ impl Line<'_> {
     }
 
     fn statistic(&self, key: &str) -> Option<String> {
-        let mut text = String::new();
-        self.status.write(self.now, &mut text);
+        let mut statistics = tickbus_base::statistics::Statistics::default();
+        self.status.write(self.now, &mut statistics);
+        let text = statistics.to_string();
         let mut lines = text.lines();
         lines.find_map(|line| Some(line.strip_prefix(key)?.strip_prefix('=')?.to_owned()))
     }

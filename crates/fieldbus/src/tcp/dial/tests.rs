@@ -300,8 +300,9 @@ fn dialling_reaches_whoever_listens_and_says_who_that_is() {
     let dialled = dial(&address, SECOND, &mut port, &stop).expect("it listens");
     let (_call, peer) = dialled.expect("no stop came");
     assert_eq!(peer, bound);
-    let mut text = String::new();
-    status.write(clock.now(), &mut text);
+    let mut statistics = tickbus_base::statistics::Statistics::default();
+    status.write(clock.now(), &mut statistics);
+    let text = statistics.to_string();
     assert!(text.contains(&format!("address={bound}\n")), "{text}");
     drop(listener);
     let error = dial(&address, SECOND, &mut port, &stop).expect_err("nobody listens");

@@ -127,8 +127,9 @@ impl Running {
     }
 
     fn fact(&self, key: &str) -> Option<String> {
-        let mut text = String::new();
-        self.status.write(self.clock.now(), &mut text);
+        let mut statistics = tickbus_base::statistics::Statistics::default();
+        self.status.write(self.clock.now(), &mut statistics);
+        let text = statistics.to_string();
         let mut lines = text.lines();
         lines.find_map(|line| Some(line.strip_prefix(key)?.strip_prefix('=')?.to_owned()))
     }

@@ -6,7 +6,6 @@ import java.nio.LongBuffer;
 import java.nio.file.Path;
 import java.util.Collections;
 import java.util.HashMap;
-import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Locale;
 import java.util.Map;
@@ -14,7 +13,6 @@ import java.util.Objects;
 import java.util.Optional;
 import java.util.function.LongToIntFunction;
 import java.util.function.Supplier;
-import java.util.stream.Collectors;
 import java.util.stream.Stream;
 
 /**
@@ -376,13 +374,7 @@ public final class Tickbus implements AutoCloseable {
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public Map<String, String> statistics() {
-        String text = whenIdle(() -> statisticsNative(handle));
-        Map<String, String> statistics = new LinkedHashMap<>();
-        text.lines().forEach(line -> {
-            // The key of such a count contains a signal's name, which may contain a '='.
-            int equals = line.startsWith("plc.rises.") ? line.lastIndexOf('=') : line.indexOf('=');
-            statistics.put(line.substring(0, equals), line.substring(equals + 1));
-        });
+        Map<String, String> statistics = StatisticsText.read(whenIdle(() -> statisticsNative(handle)));
         add(statistics, "saturated", conversions.saturated());
         add(statistics, "not_a_number", conversions.notANumber());
         return Collections.unmodifiableMap(statistics);
@@ -619,9 +611,7 @@ public final class Tickbus implements AutoCloseable {
      */
     public static Path report(Path recording, String title, Map<String, String> statistics, String heading, String text) {
         NativeLibrary.load();
-        String lines = statistics.entrySet().stream().map(entry -> entry.getKey() + "=" + entry.getValue())
-            .collect(Collectors.joining("\n"));
-        return Path.of(reportNative(recording.toString(), title, lines, heading + "\n" + text));
+        return Path.of(reportNative(recording.toString(), title, StatisticsText.write(statistics), heading + "\n" + text));
     }
 
     /** Opens a driver and describes it to {@code layout}; throws {@link FieldbusException}. */
@@ -639,7 +629,7 @@ public final class Tickbus implements AutoCloseable {
     /** Closes a driver; throws {@link FieldbusException}. */
     static native void finalizeNative(long handle);
 
-    /** Lines of {@code key=value}; throws {@link FieldbusException}. */
+    /** Text for {@link StatisticsText}; throws {@link FieldbusException}. */
     static native String statisticsNative(long handle);
 
     /**

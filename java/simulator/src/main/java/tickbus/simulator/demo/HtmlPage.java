@@ -34,7 +34,9 @@ public final class HtmlPage {
      * @throws IOException if the file cannot be written
      */
     public static void keepStatistics(Path file, Map<String, String> statistics) throws IOException {
-        String lines = statistics.entrySet().stream().map(entry -> entry.getKey() + "=" + entry.getValue() + "\n")
+        // As the command writes them: a backslash before each = and backslash in a key.
+        String lines = statistics.entrySet().stream()
+                .map(entry -> entry.getKey().replaceAll("[=\\\\]", "\\\\$0") + "=" + entry.getValue() + "\n")
                 .collect(Collectors.joining());
         Files.writeString(file, lines);
     }

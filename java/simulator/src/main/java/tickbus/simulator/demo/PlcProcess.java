@@ -14,6 +14,8 @@ import java.util.Queue;
 import java.util.concurrent.ConcurrentLinkedQueue;
 import java.util.concurrent.TimeUnit;
 import java.util.function.Supplier;
+import java.util.regex.Matcher;
+import java.util.regex.Pattern;
 
 /**
  * A PLC as a separate process, such as {@code tickbus plc}: started, killed, restarted, and reliably ended.
@@ -31,6 +33,8 @@ public final class PlcProcess implements Plc {
 
     /** The prefix of lines for people. */
     private static final String WORDS = "plc: ";
+    /** A key, in which a backslash stands before each = and backslash, and its value. */
+    private static final Pattern STATISTIC = Pattern.compile("([^=\\\\]++(?:\\\\.[^=\\\\]*+)*+)=(.*)");
 
     private final Supplier<List<String>> command;
     private final Path log;
@@ -59,7 +63,7 @@ public final class PlcProcess implements Plc {
             Map<String, String> lines = new LinkedHashMap<>();
             try (BufferedReader out = process.inputReader(StandardCharsets.UTF_8)) {
                 for (String line = out.readLine(); line != null; line = out.readLine()) {
-                    int equals = line.indexOf('=');
+                    Matcher entry = STATISTIC.matcher(line);
                     if (line.isEmpty() && !lines.isEmpty()) {
                         long now = System.nanoTime();
                         if (!block.isEmpty()) {
@@ -68,8 +72,8 @@ public final class PlcProcess implements Plc {
                         blockTime = now;
                         block = Map.copyOf(lines);
                         lines.clear();
-                    } else if (equals > 0 && !line.startsWith(WORDS)) {
-                        lines.put(line.substring(0, equals), line.substring(equals + 1));
+                    } else if (!line.startsWith(WORDS) && entry.matches()) {
+                        lines.put(entry.group(1).replaceAll("\\\\(.)", "$1"), entry.group(2));
                     } else if (!line.isEmpty()) {
                         news.add(line);
                     }

@@ -53,13 +53,13 @@ class PlcProcessTest {
         try (PlcProcess plc = process("""
                 echo 'plc: opening: a=b'
                 printf 'plc.scans=7\\nreason=no: none\\nplc.rises.LA1 run=3\\n\\n'
-                printf 'plc.scans=9\\nplc.rises.LA1 run=4\\n\\n'
+                printf 'plc.scans=9\\nplc.rises.LA1 run=4\\nplc.rises.a\\\\=b=5\\n\\n'
                 printf 'plc.scans=10\\nplc.rises.LA1 run=99\\n'
                 """ + LIVES_ON)) {
             assertEquals(Plc.Counts.NONE, plc.counts());
             plc.start();
             await(() -> plc.counts().scans() == 9);
-            assertEquals(Map.of("LA1 run", 4L), plc.counts().rises());
+            assertEquals(Map.of("LA1 run", 4L, "a=b", 5L), plc.counts().rises());
             assertTrue(plc.counts().nanoTime() - System.nanoTime() <= 0);
             assertEquals(List.of("plc: opening: a=b"), plc.news());
             assertEquals(List.of(), plc.news());

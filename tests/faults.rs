@@ -17,6 +17,7 @@ use tickbus::fieldbus::{Cause, LinkState};
 use tickbus::programs::Mirror;
 use tickbus::time::{Manual, Nanos};
 use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, MAX_AGE, Rig, await_that, config, pass};
+use tickbus_test_log as logged;
 
 /// A link name used by one test only.
 struct Link(String);
@@ -501,6 +502,7 @@ fn a_hosted_program_gets_wrong_inputs_and_its_outputs_arrive_wrong() {
     let text = config(&link, "controller", "") + faults;
     let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
     let scan = Nanos::from_millis(1);
+    let _logged = logged::Watch::new();
     let host = Host::open(&config, Box::new(Mirror), scan, Arc::clone(&clock) as _).expect("opens");
     device.set("position", 5.0);
     await_that("the answer comes", || {

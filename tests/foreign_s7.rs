@@ -15,6 +15,7 @@ use std::process::{Child, ChildStdout, Command, ExitCode, Stdio};
 
 use foreign::machine::Machine;
 use foreign::{Absent, pcap};
+use tickbus_test_log as logged;
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -172,7 +173,14 @@ impl Drop for Cpu {
     }
 }
 
+/// What the client says of a CPU that its driver.cfg does not name, and that does not tell whether it is in RUN.
+fn expect_warnings() {
+    logged::expect("nothing is written into the PLC \"6ES7 315-2EH14-0AB0");
+    logged::expect("does not say whether it is in RUN");
+}
+
 fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> {
+    expect_warnings();
     let cpu = Cpu::start(foreign::python_with("main", &["snap7"])?, "snap7_server.py");
     let who = "6ES7 315-2EH14-0AB0 CPU 315-2 PN/DP S C-C2UR28922012";
     let fieldbus = |further: &str| {
@@ -254,6 +262,7 @@ fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
 }
 
 fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result<(), Absent> {
+    expect_warnings();
     let mut cpu = Cpu::start(snap7_in_c()?, "snap7c_server.py");
     let fieldbus = |further: &str| {
         format!(

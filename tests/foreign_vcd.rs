@@ -11,6 +11,7 @@ use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};
+use tickbus_test_log as logged;
 
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/read_vcd.py");
 
@@ -68,6 +69,7 @@ fn record(folder: &Path, file: &str) {
     let path = folder.join("driver.cfg");
     let config = Config::parse(path.to_str().expect("UTF-8"), &text)
         .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let _logged = logged::Watch::new();
     let mut driver = Driver::open(config, Manual::new()).expect("opens");
     let mut slots = driver.initial_slots();
     let table = driver.config().table.clone();

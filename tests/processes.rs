@@ -11,6 +11,7 @@ use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
+use tickbus_test_log as logged;
 
 const SIGNALS: &str = r#"
 [[signal]]
@@ -121,7 +122,8 @@ fn await_that(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
-fn device() -> (Driver, Vec<Slot>, String) {
+fn device() -> (logged::Watch, Driver, Vec<Slot>, String) {
+    let logged = logged::Watch::new();
     let text = config("address = \"127.0.0.1:0\"\nmax_age = \"100ms\"");
     let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
@@ -132,14 +134,14 @@ fn device() -> (Driver, Vec<Slot>, String) {
         address.is_some()
     });
     let slots = driver.initial_slots();
-    (driver, slots, address.expect("found"))
+    (logged, driver, slots, address.expect("found"))
 }
 
 /// A PLC is killed at arbitrary times, and restarted.
 #[test]
 fn a_killed_plc_is_stale_and_its_successor_is_served() {
     const KILLS: u8 = 200;
-    let (mut driver, mut slots, address) = device();
+    let (_logged, mut driver, mut slots, address) = device();
     let file = save(&config(""));
     let path = file.path().to_str().expect("a plain name");
     for kill in 1..=KILLS {
@@ -234,7 +236,7 @@ fn reaction_measures_a_mirror() {
 
 #[test]
 fn a_machine_that_does_not_answer_ends_the_measurement_with_code_3() {
-    let (mut driver, mut slots, address) = device();
+    let (_logged, mut driver, mut slots, address) = device();
     let file = save(&config(""));
     let path = file.path().to_str().expect("a plain name");
     let over = std::sync::atomic::AtomicBool::new(false);
@@ -369,6 +371,7 @@ fn a_mirror_serves_several_stations() {
     let plc = format!("role = \"controller\"\naddress = \"{address}\"");
     let config = Config::parse("driver.cfg", &text(&plc)).unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
+    let _logged = logged::Watch::new();
     let mut driver = Driver::open(config, clock).expect("opens");
     let mut slots = driver.initial_slots();
     (slots[0], slots[2]) = (Slot::from_real(5.0), Slot::from_real(7.0));

@@ -19,6 +19,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::record::{Recording, Tick};
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};
+use tickbus_test_log as logged;
 
 /// A folder with driver.cfg files and recordings; deleted with the test.
 struct Folder(tempfile::TempDir);
@@ -48,6 +49,7 @@ impl Folder {
     /// The error on opening.
     fn refusal(&self, text: &str) -> String {
         let config = self.config(text);
+        let _logged = logged::Watch::new();
         let error = Driver::open(config, Manual::new()).expect_err("refused");
         assert!(error.is_wrong_input(), "{error}");
         error.to_string()
@@ -59,6 +61,7 @@ struct Run {
     driver: Driver,
     slots: Vec<Slot>,
     random: u64,
+    _logged: logged::Watch,
 }
 
 impl Run {
@@ -67,6 +70,7 @@ impl Run {
     }
 
     fn on(folder: &Folder, text: &str, clock: &Arc<Manual>) -> Self {
+        let logged = logged::Watch::new();
         let driver = Driver::open(folder.config(text), Arc::clone(clock) as _)
             .unwrap_or_else(|error| panic!("{error}"));
         let slots = driver.initial_slots();
@@ -74,6 +78,7 @@ impl Run {
             driver,
             slots,
             random: 1,
+            _logged: logged,
         }
     }
 
@@ -320,6 +325,9 @@ fn without_simulation_time_a_recording_on_a_free_bus_has_the_clocks() {
 
 #[test]
 fn differences_are_listed_with_tick_signal_expected_and_seen() {
+    logged::expect("tick 7 at 7ms: \"LA1 position\" was 125, and is 250");
+    logged::expect("tick 9 at 9ms: \"Start button\" was 0, and is 1");
+    logged::expect("20 ticks compared, 2 differences");
     let folder = Folder::new();
     let mut run = Run::open(&folder, &rig(RIG, "run.vcd"));
     for tick in 1..=20 {
@@ -490,6 +498,7 @@ fn stale_data_are_stale_again_in_a_replay() {
 
 #[test]
 fn another_signal_table_is_refused_by_name() {
+    logged::expect("1 signals are not in this recording and are not compared: new");
     let folder = Folder::new();
     let mut run = Run::open(&folder, &rig(RIG, "run.vcd"));
     run.exchange(1);

@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::time::Manual;
+use tickbus_test_log as logged;
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 
@@ -41,6 +42,7 @@ fn a_record_and_its_reply() {
                 [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\nlatch = \"both\"\n\
                 [[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\nlatch = \"both\"\n";
     let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    let _logged = logged::Watch::new();
     let driver = Driver::open(config, Manual::new()).expect("opens");
     let address = loop {
         let statistics = driver.statistics();

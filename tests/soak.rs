@@ -25,6 +25,7 @@ use socket2::SockRef;
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::time::{Monotonic, Nanos};
+use tickbus_test_log as logged;
 
 const CONFIG: &str = r#"
 [driver]
@@ -123,6 +124,7 @@ fn live(address: SocketAddr, span: Duration, death: Death) -> u64 {
 #[test]
 fn a_device_outlives_all_peers() {
     let end = common::end();
+    let _logged = logged::Watch::new();
     let clock = Monotonic::shared();
     let config = Config::parse("soak.cfg", CONFIG).unwrap_or_else(|why| panic!("{why}"));
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use tickbus::driver::Driver;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
+use tickbus_test_log as logged;
 
 use crate::parse;
 
@@ -23,15 +24,18 @@ pub(crate) struct Machine {
     pub(crate) driver: Driver,
     pub(crate) slots: Vec<Slot>,
     pub(crate) ticks: i64,
+    _logged: logged::Watch,
 }
 
 impl Machine {
     pub(crate) fn new(text: &str) -> Self {
+        let logged = logged::Watch::new();
         let driver = Driver::open(parse(text), Monotonic::shared()).expect("opens");
         Self {
             slots: driver.initial_slots(),
             driver,
             ticks: 0,
+            _logged: logged,
         }
     }
 

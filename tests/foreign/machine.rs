@@ -10,6 +10,7 @@ use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Clock, Monotonic, Nanos};
+use tickbus_test_log as logged;
 
 use super::recorder::Recorder;
 
@@ -22,6 +23,7 @@ pub struct Machine {
     pub slots: Vec<Slot>,
     text: String,
     recorder: Option<Recorder>,
+    _logged: logged::Watch,
 }
 
 impl Machine {
@@ -34,6 +36,7 @@ impl Machine {
     #[track_caller]
     pub fn open_on<C: Clock + 'static>(clock: Arc<C>, text: &str) -> Self {
         let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let logged = logged::Watch::new();
         let driver = Driver::open(config, clock as _).expect("opens");
         let slots = driver.initial_slots();
         Self {
@@ -41,6 +44,7 @@ impl Machine {
             slots,
             text: text.to_owned(),
             recorder: None,
+            _logged: logged,
         }
     }
 

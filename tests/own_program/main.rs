@@ -14,6 +14,7 @@ use tickbus::plc::{self, HostedProgram, Program};
 use tickbus::programs;
 use tickbus::signal::{Addressing, Slot};
 use tickbus::time::{Manual, Nanos};
+use tickbus_test_log as logged;
 
 #[test]
 #[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
@@ -346,9 +347,11 @@ fn driver_cfg(folder: &Path, driver: &str, fieldbus: &str) -> PathBuf {
 const STEPPED: &str = "kind = \"loopback\"\nmode = \"stepped\"\nprogram = \"./program.so\"\n\
     program_options = { alive = \"%IX9.0\" }";
 
-fn open(path: &Path) -> Result<Driver, String> {
+fn open(path: &Path) -> Result<(logged::Watch, Driver), String> {
+    let logged = logged::Watch::new();
     let config = Config::load(path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
-    Driver::open(config, Manual::new()).map_err(|error| error.to_string())
+    let driver = Driver::open(config, Manual::new()).map_err(|error| error.to_string())?;
+    Ok((logged, driver))
 }
 
 #[test]
@@ -357,7 +360,7 @@ fn a_loopback_hosts_the_program_beside_its_driver_cfg() {
     let folder = folder();
     by_hand(folder.path(), &[]);
     let path = driver_cfg(folder.path(), "addressing = \"iec\"", STEPPED);
-    let mut driver = open(&path).expect("opens");
+    let (_logged, mut driver) = open(&path).expect("opens");
     let mut slots = driver.initial_slots();
     let at = |name: &str| driver.config().table.position(name).expect("a signal");
     let [input, number, half_of, lamp, alive, next, half] =
@@ -391,7 +394,7 @@ fn a_loopback_hosts_the_program_beside_its_driver_cfg() {
 fn a_program_that_does_not_fit_its_driver_cfg_is_refused() {
     let folder = folder();
     let path = driver_cfg(folder.path(), "addressing = \"iec\"", STEPPED);
-    let error = open(&path).expect_err("refused");
+    let error = open(&path).map(drop).expect_err("refused");
     let missing = format!(
         "{}: the PLC program \"{}/./program.so\" is not there; check the path; one in a driver.cfg counts from \
          the folder of that file",
@@ -404,7 +407,7 @@ fn a_program_that_does_not_fit_its_driver_cfg_is_refused() {
     open(&path).expect("it fits");
     let other = STEPPED.replace("%IX9.0", "%IX0.0");
     let path = driver_cfg(folder.path(), "addressing = \"iec\"", &other);
-    let error = open(&path).expect_err("refused");
+    let error = open(&path).map(drop).expect_err("refused");
     assert!(
         error.contains("takes %IX0.0 for the option \"alive\", where the signal \"in\" lies"),
         "{error}"
@@ -419,7 +422,7 @@ fn a_program_that_does_not_fit_its_driver_cfg_is_refused() {
     // Without the option, the variable needs a place in the image.
     let none = STEPPED.replace("alive = \"%IX9.0\"", "");
     let path = driver_cfg(folder.path(), "addressing = \"iec\"", &none);
-    let error = open(&path).expect_err("refused");
+    let error = open(&path).map(drop).expect_err("refused");
     assert!(
         error.contains("uses %IX9.0 (to byte 9), but %I has 8 bytes in this driver.cfg"),
         "{error}"

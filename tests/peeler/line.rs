@@ -9,6 +9,7 @@ use tickbus::plc::{Program, Report, Scan};
 use tickbus::programs;
 use tickbus::signal::{Area, Plan, Slot};
 use tickbus::time::Nanos;
+use tickbus_test_log as logged;
 
 use super::plant::Plant;
 
@@ -62,6 +63,7 @@ pub(crate) struct Line {
     pub(crate) alive: [bool; 2],
     /// The simulation stands still.
     pub(crate) frozen: bool,
+    _logged: logged::Watch,
 }
 
 impl Line {
@@ -74,6 +76,7 @@ impl Line {
             now: Nanos::ZERO,
             alive: [true; 2],
             frozen: false,
+            _logged: logged::Watch::new(),
         }
     }
 

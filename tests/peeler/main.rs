@@ -6,6 +6,7 @@ mod plant;
 use line::Line;
 use tickbus::plc::Report;
 use tickbus::statistics::Statistics;
+use tickbus_test_log as logged;
 
 /// The number after `key=` in a report.
 fn told(report: &dyn Report, key: &str) -> f64 {
@@ -68,6 +69,7 @@ fn an_acknowledge_gives_many_commands_a_second_where_holding_gives_two() {
 
 #[test]
 fn an_axis_that_fails_stops_all_axes_and_the_line_goes_on_when_it_is_well() {
+    logged::expect("an axis is not healthy; all axes stop, and the sequence begins anew");
     for (number, axis) in [(1, 3), (0, 8), (0, 2), (1, 0)] {
         let mut line = Line::new(&[], &[]);
         line.until("a core", 150.0, |line| line.plant.cores == 1);
@@ -91,6 +93,9 @@ fn an_axis_that_fails_stops_all_axes_and_the_line_goes_on_when_it_is_well() {
 
 #[test]
 fn a_simulation_that_is_started_again_begins_anew() {
+    logged::expect(
+        "lathe: the step Clamp takes too long; all axes stop, and the sequence begins anew",
+    );
     let mut line = Line::new(&[], &[]);
     line.until("a block in the lathe", 60.0, |line| {
         line.plant.held.is_some()
@@ -117,6 +122,9 @@ fn a_link_that_breaks_at_any_moment_loses_no_block() {
 
 #[test]
 fn a_line_that_stands_still_waits_and_goes_on() {
+    logged::expect(
+        "lathe: the step Clamp takes too long; all axes stop, and the sequence begins anew",
+    );
     let mut line = Line::new(&[], &[]);
     line.until("a block in the lathe", 60.0, |line| {
         line.plant.held.is_some()
@@ -203,6 +211,7 @@ fn a_program_is_done_after_its_blocks() {
 /// Three disturbances one after another, at random times; what two hold must not be released by both.
 #[test]
 fn troubles_at_random_moments_lose_no_block() {
+    logged::expect("all axes stop, and the sequence begins anew");
     let mut random = 0x2545_F491_u32;
     let mut next = |below: u32| {
         random ^= random << 13;

@@ -12,7 +12,7 @@ use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::time::Manual;
 
-use crate::conformance::rig::{CYCLE, End, await_that};
+use crate::conformance::rig::{CYCLE, End, await_that, logged};
 use crate::fixture::{HELPER, Misbehaving, until, until_it_echoes};
 
 #[test]
@@ -251,6 +251,7 @@ fn the_command_beside_the_driver_cfg_is_found() {
     fs::write(&file, plugin.text()).expect("written");
     let clock = Manual::new();
     let config = Config::load(&file).expect("a right file");
+    let _logged = logged::Watch::new();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     await_that("it runs", || {
         clock.advance(CYCLE);

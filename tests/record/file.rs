@@ -5,6 +5,7 @@ use super::*;
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disc_ends_the_recording_and_not_the_run() {
+    logged::expect("the recording ended with tick ");
     let folder = Folder::new();
     std::os::unix::fs::symlink("/dev/full", folder.path("run.vcd")).expect("a link");
     let mut run = Run::open(&folder, &rig(RIG, "run.vcd"));
@@ -236,6 +237,7 @@ fn a_test_that_replays_the_plant_s_recording_leaves_it_as_it_is() {
         driver,
         slots,
         random: 1,
+        _logged: logged::Watch::new(),
     };
     test.ticks(1..=200);
     assert_eq!(test.statistic("replay.ticks"), "200");

@@ -9,6 +9,7 @@ use super::file::tests::SmallDisc;
 use super::*;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot, Station};
+use tickbus_test_log as logged;
 
 /// A signal of each type, in both areas, with names that are difficult for VCD and CSV.
 fn table(stations: &[&str]) -> SignalTable {
@@ -331,6 +332,7 @@ fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String,
     let disc = SmallDisc::new(room);
     let target = Box::new(disc.clone());
     let path = PathBuf::from("run");
+    let _logged = logged::Watch::new();
     let mut recorder =
         Recorder::over(target, format, columns.clone(), 8, lossless, path, None).expect("a thread");
     let mut slots = Tick::new(&columns).values;
@@ -370,6 +372,7 @@ fn a_lossless_recorder_has_every_tick_however_small_its_ring() {
 
 #[test]
 fn dropped_ticks_are_counted_and_marked() {
+    logged::expect("ticks are dropped, since they come faster than they can be written");
     let (text, bytes, _) = recorded(Format::Vcd, usize::MAX, 50_000, false);
     let recording = open(Format::Vcd, &bytes, &table(&[""])).expect("a recording");
     let (ticks, _) = read(recording);
@@ -386,6 +389,7 @@ fn dropped_ticks_are_counted_and_marked() {
 
 #[test]
 fn on_a_full_disc_the_recording_ends_whole_and_says_so() {
+    logged::expect("of the file: no storage space; the run goes on without it");
     for format in [Format::Vcd, Format::Csv] {
         let (_, whole, _) = recorded(format, usize::MAX, 300, true);
         let header = written(format, &columns(&table(&[""])), &[]).1[0];
@@ -434,6 +438,8 @@ impl super::file::Target for Stuck {
 
 #[test]
 fn a_file_that_takes_nothing_does_not_keep_its_recorder_from_closing() {
+    logged::expect("the file has taken nothing for 20ms");
+    logged::expect("of the file: broken pipe; the run goes on without it");
     let columns = columns(&table(&[""]));
     let (answers, stuck) = std::sync::mpsc::channel();
     let target = Box::new(Stuck(stuck));

@@ -43,33 +43,54 @@ pub(super) struct Stream<'a> {
     pub(super) max_age: Nanos,
 }
 
+/// What an editor's library needs to carry records over TCP.
+#[derive(Debug)]
+pub(super) struct Calls<'a> {
+    /// What is to be set up first, and what a person should know at last.
+    pub(super) steps: [&'a str; 2],
+    /// Global variables of the connection.
+    pub(super) globals: Vec<Variable>,
+    /// The global variable that tells whether there is a connection.
+    pub(super) connected: &'a str,
+    /// Makes the connection, and makes it anew when it is lost.
+    pub(super) connection: Part,
+    /// The variables of the receiving block, and the type in which it counts bytes.
+    pub(super) receiver: Vec<Variable>,
+    pub(super) count: &'static str,
+    /// Receives bytes to `Incoming`: the statements before and after a complete record is taken.
+    pub(super) receive: [&'a [&'a str]; 2],
+    /// How far the statements that take it are indented.
+    pub(super) indent: usize,
+    /// The sending block.
+    pub(super) sender: Variable,
+    /// Sends `Outgoing`: the statements before and after a record is made, which leaves an `IF` open.
+    pub(super) send: [&'a [&'a str]; 2],
+}
+
 impl Link {
-    /// Records over TCP: what is to be set up `first`, and what is to be known at `last`.
-    pub(super) fn of_records(
-        stream: &Stream<'_>,
-        globals: impl IntoIterator<Item = Variable>,
-        [before, after]: [Part; 2],
-        first: &str,
-        last: String,
-    ) -> Self {
+    /// Records over TCP.
+    pub(super) fn of_records(stream: &Stream<'_>, calls: &Calls<'_>) -> Self {
         let Stream {
             host,
             port,
             bytes: [received, sent],
             ..
         } = stream;
+        let [first, last] = calls.steps;
         let steps = [
             first.to_owned(),
             format!(
                 "In the first program check the address of the simulation's computer, '{host}', port {port}; let its \
                  firewall pass the port. Records have {received} bytes from the simulation, {sent} bytes to it."
             ),
-            last,
+            last.to_owned(),
         ];
+        let mut globals = Self::counters();
+        globals.extend_from_slice(&calls.globals);
         Self {
-            globals: Self::counters().into_iter().chain(globals).collect(),
-            before,
-            after,
+            globals,
+            before: receiving(stream, calls),
+            after: sending(stream, calls),
             ..Self::of_steps(steps)
         }
     }
@@ -155,76 +176,87 @@ fn registers(list: &str, count: usize, incoming: bool) -> [String; 3] {
     ]
 }
 
-/// The variables of one who puts records together; `count` is the type of a number of bytes.
-pub(super) fn incoming(stream: &Stream<'_>, count: &'static str) -> [Variable; 5] {
-    let [bytes, _] = stream.bytes;
-    [
-        variable("Incoming", Kind::Array(2 * bytes.div_ceil(2), "BYTE")),
-        variable("Filled", Kind::Basic(count)),
-        variable("Number", Kind::Basic("UINT")),
-        variable("Is_new", Kind::Basic("BOOL")),
-        variable("Silence", Kind::Block("TON")),
-    ]
-}
-
-/// What begins with the assembly of records.
-pub(super) fn assembly(stream: &Stream<'_>) -> [String; 2] {
-    let [bytes, _] = stream.bytes;
-    [
-        format!("(* A record is complete with {bytes} bytes, however TCP cuts the stream. *)"),
-        "Is_new := FALSE;".to_owned(),
-    ]
-}
-
-/// What takes a record that has come as a whole, so many spaces in.
-pub(super) fn taken(stream: &Stream<'_>, indent: usize) -> Vec<String> {
+/// Makes the connection, and puts records together from what it receives.
+fn receiving(stream: &Stream<'_>, calls: &Calls<'_>) -> Part {
     let Stream {
         list,
         bytes: [bytes, _],
         ..
     } = stream;
-    let indent = " ".repeat(indent);
-    let mut lines = vec![
+    let Part {
+        mut locals,
+        mut lines,
+    } = calls.connection.clone();
+    if *bytes == 0 {
+        lines.push(format!("{list}.Alive := {list}.{};", calls.connected));
+        return Part { locals, lines };
+    }
+    locals.extend_from_slice(&calls.receiver);
+    locals.extend([
+        variable("Incoming", Kind::Array(2 * bytes.div_ceil(2), "BYTE")),
+        variable("Filled", Kind::Basic(calls.count)),
+        variable("Number", Kind::Basic("UINT")),
+        variable("Is_new", Kind::Basic("BOOL")),
+        variable("Silence", Kind::Block("TON")),
+    ]);
+    let [before, after] = calls.receive;
+    lines.extend([
+        format!("(* A record is complete with {bytes} bytes, however TCP cuts the stream. *)"),
+        "Is_new := FALSE;".to_owned(),
+    ]);
+    lines.extend(owned(before));
+    let indent = " ".repeat(calls.indent);
+    lines.extend([
         format!("{indent}IF Filled >= {bytes} THEN"),
         format!("{indent}    Filled := 0;"),
         format!("{indent}    Is_new := TRUE;"),
-    ];
+    ]);
     let registers = registers(list, bytes.div_ceil(2), true);
     lines.extend(registers.map(|line| format!("{indent}    {line}")));
     lines.extend([
         format!("{indent}    {list}.Received := {list}.Received + 1;"),
         format!("{indent}END_IF;"),
     ]);
-    lines
+    lines.extend(owned(after));
+    lines.extend(silence(list, stream.max_age));
+    Part { locals, lines }
 }
 
-/// The variables of one who sends records by the block `block`.
-pub(super) fn outgoing(stream: &Stream<'_>, block: Variable) -> Vec<Variable> {
-    let [_, bytes] = stream.bytes;
-    vec![
-        block,
-        variable("Outgoing", Kind::Array(2 * bytes.div_ceil(2), "BYTE")),
-        variable("Number", Kind::Basic("UINT")),
-        variable("Is_sending", Kind::Basic("BOOL")),
-        variable("Sent_at", Kind::Basic("TIME")),
-    ]
-}
-
-/// What begins to send a record when it is time, while the PLC is `connected`; the condition stays open.
-pub(super) fn sending(stream: &Stream<'_>, connected: &str) -> Vec<String> {
+/// Makes and sends a record when it is time.
+fn sending(stream: &Stream<'_>, calls: &Calls<'_>) -> Part {
     let Stream {
         list,
         bytes: [_, bytes],
         ..
     } = stream;
+    if *bytes == 0 {
+        return Part::default();
+    }
     let cycle = time(stream.cycle);
-    let mut lines = vec![
+    let [before, after] = calls.send;
+    let mut lines = owned(before);
+    lines.extend([
         "(* A record goes out in each cycle; none is made up for. *)".to_owned(),
-        format!("IF {connected} AND NOT Is_sending AND TIME() - Sent_at >= {cycle} THEN"),
+        format!(
+            "IF {list}.{} AND NOT Is_sending AND TIME() - Sent_at >= {cycle} THEN",
+            calls.connected
+        ),
         format!("    Sent_at := Sent_at + {cycle};"),
         format!("    IF TIME() - Sent_at >= {cycle} THEN Sent_at := TIME(); END_IF;"),
-    ];
+    ]);
     let registers = registers(list, bytes.div_ceil(2), false);
     lines.extend(registers.map(|line| format!("    {line}")));
-    lines
+    lines.extend(owned(after));
+    let locals = vec![
+        calls.sender.clone(),
+        variable("Outgoing", Kind::Array(2 * bytes.div_ceil(2), "BYTE")),
+        variable("Number", Kind::Basic("UINT")),
+        variable("Is_sending", Kind::Basic("BOOL")),
+        variable("Sent_at", Kind::Basic("TIME")),
+    ];
+    Part { locals, lines }
+}
+
+fn owned(lines: &[&str]) -> Vec<String> {
+    lines.iter().map(|&line| line.to_owned()).collect()
 }

@@ -6,8 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use tickbus::signal::{Area, ByteOrder, DataType, Plan, Scale, Signal, SignalTable, Slot, Station};
-use tickbus::time::Nanos;
+use tickbus::signal::{Area, DataType, Plan, Scale, Signal, SignalTable, Slot};
 
 /// How the signals of the two areas are ordered in the table.
 #[derive(Clone, Copy)]
@@ -51,20 +50,9 @@ impl Device {
         }
         let bytes = byte + usize::from(bit > 0);
         let signal = |area, (byte, bit, data_type)| Signal {
-            name: format!("{area:?} {byte}.{bit}"),
-            station: 0,
-            area,
-            byte,
             bit,
-            data_type,
-            order: ByteOrder::Abcd,
             scale: scale.filter(|_| data_type != DataType::Bool),
-            unit: None,
-            latch: None,
-            hold: Nanos::default(),
-            fail_safe: Slot::default(),
-            dead_band: 0.0,
-            range: None,
+            ..Signal::new(format!("{area:?} {byte}.{bit}"), area, byte, data_type)
         };
         let signals: Vec<Signal> = match files {
             Files::AreaByArea => [Area::Input, Area::Output]
@@ -75,19 +63,11 @@ impl Device {
                 .flat_map(|place| [Area::Input, Area::Output].map(|area| signal(area, *place)))
                 .collect(),
         };
-        let station = Station {
-            name: String::new(),
-            input_bytes: bytes,
-            output_bytes: bytes,
-        };
         let values = [0.0, 1.0, 1.0, 0.0, 1.0];
         let slots = (values.iter().cycle().take(signals.len()))
             .map(|value| Slot::from_real(*value))
             .collect();
-        let table = SignalTable {
-            stations: vec![station],
-            signals,
-        };
+        let table = SignalTable::of_one_station(bytes, bytes, signals);
         Self {
             inputs: Plan::new(&table, 0, Area::Input),
             outputs: Plan::new(&table, 0, Area::Output),

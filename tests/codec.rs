@@ -9,7 +9,6 @@ use proptest::prelude::*;
 use tickbus::signal::{
     Area, ByteOrder, Conversions, DataType, Plan, Scale, Signal, SignalTable, Slot, Station,
 };
-use tickbus::time::Nanos;
 
 const ORDERS: [ByteOrder; 4] = [
     ByteOrder::Abcd,
@@ -38,20 +37,8 @@ const TYPES: [DataType; 15] = [
 
 fn signal(data_type: DataType, area: Area, byte: usize, bit: u8) -> Signal {
     Signal {
-        name: format!("{area:?} {byte}.{bit}"),
-        station: 0,
-        area,
-        byte,
         bit,
-        data_type,
-        order: ByteOrder::Abcd,
-        scale: None,
-        unit: None,
-        latch: None,
-        hold: Nanos::default(),
-        fail_safe: Slot::default(),
-        dead_band: 0.0,
-        range: None,
+        ..Signal::new(format!("{area:?} {byte}.{bit}"), area, byte, data_type)
     }
 }
 

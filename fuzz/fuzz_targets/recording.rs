@@ -8,7 +8,7 @@ use std::io::Cursor;
 
 use libfuzzer_sys::fuzz_target;
 use tickbus_record::{Format, Recording, Tick};
-use tickbus_image::signal::{Area, ByteOrder, DataType, Signal, SignalTable, Slot, Station};
+use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 use tickbus_base::time::Nanos;
 
 fuzz_target!(|data: &[u8]| {
@@ -39,33 +39,12 @@ fuzz_target!(|data: &[u8]| {
 
 /// The signals in the seeds.
 fn table() -> SignalTable {
-    let signal = |name: &str, data_type: DataType, byte| Signal {
-        name: name.to_owned(),
-        station: 0,
-        area: Area::Output,
-        byte,
-        bit: 0,
-        data_type,
-        order: ByteOrder::Abcd,
-        scale: None,
-        unit: None,
-        latch: None,
-        dead_band: 0.0,
-        range: None,
-        hold: Nanos::ZERO,
-        fail_safe: Slot::default(),
-    };
-    SignalTable {
-        stations: vec![Station {
-            name: String::new(),
-            input_bytes: 0,
-            output_bytes: 32,
-        }],
-        signals: vec![
+    let signal = |name: &str, data_type, byte| Signal::new(name, Area::Output, byte, data_type);
+    let signals = vec![
             signal("run", DataType::Bool, 0),
             signal("speed", DataType::Real, 4),
             signal("count", DataType::Lint, 8),
             signal("word", DataType::Lword, 16),
-        ],
-    }
+    ];
+    SignalTable::of_one_station(0, 32, signals)
 }

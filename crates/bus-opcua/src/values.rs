@@ -170,33 +170,15 @@ pub(super) fn bits(data_type: DataType, value: &Variant) -> Option<Slot> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_base::time::Nanos;
-    use tickbus_image::signal::{ByteOrder, Station};
+    use tickbus_image::signal::ByteOrder;
 
     fn table(data_type: DataType, order: ByteOrder) -> SignalTable {
-        SignalTable {
-            stations: vec![Station {
-                name: String::new(),
-                input_bytes: 0,
-                output_bytes: 8,
-            }],
-            signals: vec![Signal {
-                name: "a".to_owned(),
-                station: 0,
-                area: Area::Output,
-                byte: 0,
-                bit: 0,
-                data_type,
-                order,
-                scale: tickbus_image::signal::Scale::through([0.0, 1.0], [5.0, 7.0]),
-                unit: None,
-                latch: None,
-                hold: Nanos::ZERO,
-                fail_safe: Slot::default(),
-                dead_band: 0.0,
-                range: None,
-            }],
-        }
+        let signal = Signal {
+            order,
+            scale: tickbus_image::signal::Scale::through([0.0, 1.0], [5.0, 7.0]),
+            ..Signal::new("a", Area::Output, 0, data_type)
+        };
+        SignalTable::of_one_station(0, 8, vec![signal])
     }
 
     #[test]

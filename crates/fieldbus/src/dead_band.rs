@@ -120,37 +120,17 @@ impl Band {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_base::time::Nanos;
-    use tickbus_image::signal::{ByteOrder, DataType, Scale, Station};
+    use tickbus_image::signal::{DataType, Scale};
 
     fn signal(byte: usize, data_type: DataType, dead_band: f64) -> Signal {
         Signal {
-            name: format!("at {byte}"),
-            station: 0,
-            area: Area::Input,
-            byte,
-            bit: 0,
-            data_type,
-            order: ByteOrder::Abcd,
-            scale: None,
-            unit: None,
-            latch: None,
-            hold: Nanos::ZERO,
-            fail_safe: Slot::default(),
             dead_band,
-            range: None,
+            ..Signal::new(format!("at {byte}"), Area::Input, byte, data_type)
         }
     }
 
     fn dead_bands(signals: Vec<Signal>) -> DeadBands {
-        let table = SignalTable {
-            stations: vec![Station {
-                name: String::new(),
-                input_bytes: 16,
-                output_bytes: 0,
-            }],
-            signals,
-        };
+        let table = SignalTable::of_one_station(16, 0, signals);
         DeadBands::new(&table, 0, Area::Input)
     }
 

@@ -513,7 +513,7 @@ mod tests {
 
     /// Signals of a table: station, area, byte, bit, and whether it is latched.
     fn table(signals: &[(usize, Area, usize, u8, bool)]) -> SignalTable {
-        use crate::signal::{ByteOrder, DataType, Signal, Slot, Station};
+        use crate::signal::{DataType, Signal, Station};
 
         let station = || Station {
             name: String::new(),
@@ -523,20 +523,10 @@ mod tests {
         let signals = signals
             .iter()
             .map(|&(station, area, byte, bit, latched)| Signal {
-                name: String::new(),
                 station,
-                area,
-                byte,
                 bit,
-                data_type: DataType::Bool,
-                order: ByteOrder::Abcd,
-                scale: None,
-                range: None,
-                unit: None,
                 latch: latched.then_some(Latch::Rising),
-                hold: Nanos::ZERO,
-                fail_safe: Slot::default(),
-                dead_band: 0.0,
+                ..Signal::new("", area, byte, DataType::Bool)
             });
         SignalTable {
             stations: vec![station(), station()],

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use super::file::tests::SmallDisc;
 use super::*;
 use tickbus_base::time::Nanos;
-use tickbus_image::signal::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot, Station};
+use tickbus_image::signal::{Area, DataType, Scale, Signal, SignalTable, Slot, Station};
 use tickbus_test_log as logged;
 
 /// A signal of each type, in both areas, with names that are difficult for VCD and CSV.
@@ -20,21 +20,13 @@ fn table(stations: &[&str]) -> SignalTable {
                 if scaled && data_type == DataType::Bool {
                     continue;
                 }
+                let name = format!("{station} \"{data_type}\", $end {scaled} \\u{{41}} Ü  x=\"1\"");
+                let area = [Area::Input, Area::Output][number % 2];
                 signals.push(Signal {
-                    name: format!("{station} \"{data_type}\", $end {scaled} \\u{{41}} Ü  x=\"1\""),
                     station,
-                    area: [Area::Input, Area::Output][number % 2],
-                    byte: 8 * number,
-                    bit: 0,
-                    data_type,
-                    order: ByteOrder::Abcd,
                     scale: scaled.then(|| Scale::through([0.0, 2.0], [0.0, 1.0]).expect("a scale")),
                     unit: scaled.then(|| "m/s \"$".to_owned()),
-                    latch: None,
-                    dead_band: 0.0,
-                    range: None,
-                    hold: Nanos::ZERO,
-                    fail_safe: Slot::default(),
+                    ..Signal::new(name, area, 8 * number, data_type)
                 });
             }
         }

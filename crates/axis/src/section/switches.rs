@@ -2,10 +2,9 @@
 
 use super::{LIST_LIMIT, check_within};
 use crate::Switch;
-use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 use tickbus_image::signal::section::{Section, Structure, address_of, name_of};
-use tickbus_image::signal::{Addressing, Area, ByteOrder, DataType, Signal, Slot, Width};
+use tickbus_image::signal::{Addressing, Area, DataType, Signal, Width};
 
 /// The remedy where a trip point is expected.
 const POSITION: &str = "write a position in the unit of the axis, such as 395.0";
@@ -96,20 +95,8 @@ fn read_switch(
         slot: 0,
     };
     let signal = Signal {
-        name: name.to_owned(),
-        station: 0,
-        area: place.area,
-        byte: place.byte,
         bit: place.bit,
-        data_type: DataType::Bool,
-        order: ByteOrder::Abcd,
-        scale: None,
-        unit: None,
-        latch: None,
-        hold: Nanos::ZERO,
-        fail_safe: Slot::default(),
-        dead_band: 0.0,
-        range: None,
+        ..Signal::new(name, place.area, place.byte, DataType::Bool)
     };
     let section = Section {
         signal,

@@ -126,32 +126,11 @@ mod tests {
     use super::*;
     use crate::faults::{Condition, Effect, SignalEffect};
     use tickbus_base::time::Nanos;
-    use tickbus_image::signal::{Area, ByteOrder, DataType, Signal, SignalTable, Station};
+    use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
     fn table() -> SignalTable {
-        SignalTable {
-            stations: vec![Station {
-                name: String::new(),
-                input_bytes: 1,
-                output_bytes: 0,
-            }],
-            signals: vec![Signal {
-                name: "a".to_owned(),
-                station: 0,
-                area: Area::Input,
-                byte: 0,
-                bit: 0,
-                data_type: DataType::Bool,
-                order: ByteOrder::Abcd,
-                scale: None,
-                unit: None,
-                latch: None,
-                hold: Nanos::ZERO,
-                fail_safe: Slot::default(),
-                dead_band: 0.0,
-                range: None,
-            }],
-        }
+        let signal = Signal::new("a", Area::Input, 0, DataType::Bool);
+        SignalTable::of_one_station(1, 0, vec![signal])
     }
 
     fn when() -> Condition {

@@ -8,49 +8,26 @@ use proptest::prelude::*;
 use super::*;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
-use tickbus_image::signal::{
-    Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Slot, Station,
-};
+use tickbus_image::signal::{Area, DataType, Latch, Scale, Signal, SignalTable, Slot};
 
 /// A machine writes `run` and `level` and reads the others.
 pub(super) fn table() -> SignalTable {
-    let signal = |name: &str, area, byte, data_type| Signal {
-        name: name.to_owned(),
-        station: 0,
-        area,
-        byte,
-        bit: 0,
-        data_type,
-        order: ByteOrder::Abcd,
-        scale: None,
-        unit: None,
-        latch: None,
-        hold: Nanos::ZERO,
-        fail_safe: Slot::default(),
-        dead_band: 0.0,
-        range: None,
-    };
-    SignalTable {
-        stations: vec![Station {
-            name: String::new(),
-            input_bytes: 4,
-            output_bytes: 16,
-        }],
-        signals: vec![
-            signal("run", Area::Input, 0, DataType::Bool),
-            Signal {
-                scale: Scale::through([0.0, 27_648.0], [0.0, 250.0]),
-                unit: Some("mm".to_owned()),
-                ..signal("level", Area::Input, 2, DataType::Int)
-            },
-            Signal {
-                latch: Some(Latch::Rising),
-                ..signal("a = b > c", Area::Output, 0, DataType::Bool)
-            },
-            signal("whole", Area::Output, 8, DataType::Lint),
-            signal("word", Area::Output, 2, DataType::Word),
-        ],
-    }
+    let signal = Signal::new;
+    let signals = vec![
+        signal("run", Area::Input, 0, DataType::Bool),
+        Signal {
+            scale: Scale::through([0.0, 27_648.0], [0.0, 250.0]),
+            unit: Some("mm".to_owned()),
+            ..signal("level", Area::Input, 2, DataType::Int)
+        },
+        Signal {
+            latch: Some(Latch::Rising),
+            ..signal("a = b > c", Area::Output, 0, DataType::Bool)
+        },
+        signal("whole", Area::Output, 8, DataType::Lint),
+        signal("word", Area::Output, 2, DataType::Word),
+    ];
+    SignalTable::of_one_station(4, 16, signals)
 }
 
 const SIGNALS: usize = 5;

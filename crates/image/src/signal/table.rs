@@ -52,6 +52,26 @@ pub struct Signal {
 }
 
 impl Signal {
+    /// A signal of the first station as its name, place and type alone make it: unscaled, without a latch.
+    pub fn new(name: impl Into<String>, area: Area, byte: usize, data_type: DataType) -> Self {
+        Self {
+            name: name.into(),
+            station: 0,
+            area,
+            byte,
+            bit: 0,
+            data_type,
+            order: ByteOrder::Abcd,
+            scale: None,
+            unit: None,
+            latch: None,
+            hold: Nanos::ZERO,
+            fail_safe: Slot::default(),
+            dead_band: 0.0,
+            range: None,
+        }
+    }
+
     /// Whether its slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.
     pub const fn is_integer_slot(&self) -> bool {
         self.scale.is_none()
@@ -103,6 +123,18 @@ impl Station {
 }
 
 impl SignalTable {
+    /// The signals of one station without a name, whose areas have these numbers of bytes.
+    pub fn of_one_station(input_bytes: usize, output_bytes: usize, signals: Vec<Signal>) -> Self {
+        Self {
+            stations: vec![Station {
+                name: String::new(),
+                input_bytes,
+                output_bytes,
+            }],
+            signals,
+        }
+    }
+
     /// Index of the signal with this name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.signals.iter().position(|signal| signal.name == name)

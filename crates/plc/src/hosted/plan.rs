@@ -296,8 +296,7 @@ fn place(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_base::time::Nanos;
-    use tickbus_image::signal::{Signal, Slot, Station};
+    use tickbus_image::signal::Signal;
 
     fn variable(data_type: &str, address: &str, bytes: usize) -> Declared {
         let numbers = address[3..].split('.');
@@ -416,30 +415,18 @@ mod tests {
     fn table(declared: &[Declared]) -> SignalTable {
         let plan = plan(declared, &Settings::default()).expect("a plan");
         let all = plan.inputs.iter().chain(&plan.outputs);
-        let signals = all.map(|place| Signal {
-            name: format!("S{}", place.variable),
-            station: 0,
-            area: place.address.area,
-            byte: place.address.byte,
-            bit: place.address.bit,
-            data_type: declared[place.variable].data_type.parse().expect("a type"),
-            order: ByteOrder::Dcba,
-            scale: None,
-            unit: None,
-            latch: None,
-            hold: Nanos::ZERO,
-            dead_band: 0.0,
-            range: None,
-            fail_safe: Slot::default(),
+        let signals = all.map(|place| {
+            let data_type = declared[place.variable].data_type.parse().expect("a type");
+            let Address {
+                area, byte, bit, ..
+            } = place.address;
+            Signal {
+                bit,
+                order: ByteOrder::Dcba,
+                ..Signal::new(format!("S{}", place.variable), area, byte, data_type)
+            }
         });
-        SignalTable {
-            signals: signals.collect(),
-            stations: vec![Station {
-                name: String::new(),
-                input_bytes: 4,
-                output_bytes: 4,
-            }],
-        }
+        SignalTable::of_one_station(4, 4, signals.collect())
     }
 
     #[test]

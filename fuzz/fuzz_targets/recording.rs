@@ -41,10 +41,10 @@ fuzz_target!(|data: &[u8]| {
 fn table() -> SignalTable {
     let signal = |name: &str, data_type, byte| Signal::new(name, Area::Output, byte, data_type);
     let signals = vec![
-            signal("run", DataType::Bool, 0),
-            signal("speed", DataType::Real, 4),
-            signal("count", DataType::Lint, 8),
-            signal("word", DataType::Lword, 16),
+        signal("run", DataType::Bool, 0),
+        signal("speed", DataType::Real, 4),
+        signal("count", DataType::Lint, 8),
+        signal("word", DataType::Lword, 16),
     ];
     SignalTable::of_one_station(0, 32, signals)
 }

@@ -5,18 +5,18 @@
 
 use std::path::Path;
 
+use peeler::{Charger, Lathe};
 use tickbus_plc::{HostedProgram, Program, ProgramError};
 
 mod drum;
 mod mirror;
+mod peeler;
 mod reaction;
 
-pub mod peeler;
 pub mod rig;
 
 pub use drum::Drum;
 pub use mirror::Mirror;
-pub use peeler::{Charger, Lathe};
 pub use reaction::Reaction;
 pub use rig::{La1Code, Rig};
 

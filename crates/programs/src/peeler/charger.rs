@@ -8,17 +8,16 @@
 //! | centring | the linear feeder brings a block; its two ends are measured; the spindles rise to its axis, grip it, lift it and bring it to the transfer arm |
 //! | transfer | the clamps take it; the arm brings it to the lathe once that is ready, lets go when the lathe holds it, and comes back |
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use super::io::{Axis, Io, SignalIndex, tally};
+use super::io::{Axis, Io, SignalIndex};
 use super::options::Options;
 use super::report::PeelerCounters;
-use tickbus_axis::{AxisKind, Mode, Motion};
+use super::sequence::{Find, LIMIT, SETTLE, Sequence, Sequenced, squeeze, to};
+use tickbus_axis::{AxisKind, Mode};
 use tickbus_base::time::Nanos;
-use tickbus_image::signal::{Addressing, SignalTable};
+use tickbus_plc::ProgramError;
 use tickbus_plc::blocks::{AxisCommand, Simulation, SimulationTime, Ton};
-use tickbus_plc::{Program, ProgramError, Report, Scan};
 
 /// The axes, in the program's own order.
 const AXES: [(&str, AxisKind); 12] = [
@@ -63,12 +62,6 @@ const SENSOR_HEIGHT: f64 = 800.0;
 const CLAMP_TORQUE: f64 = 60.0;
 const GATE_TORQUE: f64 = 30.0;
 
-/// The time limit of a step, except for those that wait for a block or for the lathe.
-const LIMIT: Nanos = Nanos::from_secs(30);
-/// How long all axes must be healthy before the program starts over.
-const WELL: Nanos = Nanos::from_secs(1);
-/// How long a clamp must stand still before its position is taken as final.
-const SETTLE: Nanos = Nanos::from_millis(100);
 /// A simulation whose time stands still for this long has stopped.
 const FROZEN: Nanos = Nanos::from_secs(1);
 
@@ -149,52 +142,20 @@ struct Signals {
     lathe_holds: SignalIndex,
 }
 
-/// The charger's program, described at the [module](self).
-#[derive(Debug)]
-pub struct Charger {
-    options: Options,
-    io: Option<Io>,
+/// The charger's program, described at the [module](self). Its options are `hold` and `blocks`.
+pub(crate) type Charger = Sequenced<Chains>;
+
+/// Its three chains.
+#[derive(Debug, Default)]
+pub(crate) struct Chains {
     places: Signals,
-    tally: Arc<PeelerCounters>,
     time: SimulationTime,
-    /// A fault has occurred, and no axis is enabled.
-    failed: bool,
-    well: Ton,
     clamped: Ton,
     feeding: Chain<Feeding>,
     centring: Chain<Centring>,
     transfer: Chain<Transfer>,
     /// Heights of the block's axis at its two ends.
     heights: [f64; 2],
-}
-
-/// A move to `position` at the highest speed of the charger's axes.
-const fn to(position: f64) -> AxisCommand {
-    AxisCommand {
-        mode: Mode::Position,
-        motion: Motion {
-            position,
-            speed: 400.0,
-            acceleration: 1_500.0,
-            deceleration: 1_500.0,
-            torque: 0.0,
-        },
-        number: 0,
-    }
-}
-
-const fn squeeze(mode: Mode, torque: f64) -> AxisCommand {
-    AxisCommand {
-        mode,
-        motion: Motion {
-            position: 0.0,
-            speed: 0.0,
-            acceleration: 0.0,
-            deceleration: 0.0,
-            torque,
-        },
-        number: 0,
-    }
 }
 
 /// The height of a block's axis above the V, from the sensor's distance to its top.
@@ -204,59 +165,7 @@ fn axis_height(distance: f64) -> f64 {
     (radius * root).clamp(0.0, LIFTED)
 }
 
-impl Charger {
-    /// Its name in [`program`](crate::program).
-    pub const NAME: &'static str = "charger";
-
-    /// The program with its options: `hold` and `blocks`.
-    ///
-    /// # Errors
-    ///
-    /// The option does not exist, or does not accept the value.
-    pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
-        let options = Options::read(Self::NAME, &Options::CHARGER, options)?;
-        let tally = tally(&AXES);
-        tally.asked.store(options.blocks.unwrap_or(0), Relaxed);
-        Ok(Self {
-            options,
-            io: None,
-            places: Signals::default(),
-            tally,
-            time: SimulationTime::default(),
-            failed: false,
-            well: Ton::default(),
-            clamped: Ton::default(),
-            feeding: Chain::default(),
-            centring: Chain::default(),
-            transfer: Chain::default(),
-            heights: [0.0; 2],
-        })
-    }
-
-    /// Starts over with the state that the sensors show.
-    fn restart(&mut self, io: &mut Io) {
-        io.forget();
-        let on = |block: usize| io.is_on(self.places.blocks[block]);
-        let held = on(5);
-        let clamped = on(6);
-        let at_lathe = io.axes[ARM].inputs.position < 1.0;
-        self.feeding.go(Feeding::Rest);
-        // At the clamps' position both hold the same block; anywhere else the spindles hold another one.
-        let with_clamps = clamped
-            && X.into_iter()
-                .all(|axis| io.axes[axis].inputs.position < 1.0);
-        self.centring.go(if held && !with_clamps {
-            Centring::Lift
-        } else {
-            Centring::Release
-        });
-        self.transfer.go(match (clamped, at_lathe) {
-            (true, true) => Transfer::ToLathe,
-            (true, false) => Transfer::Return,
-            (false, _) => Transfer::Home,
-        });
-    }
-
+impl Chains {
     fn feed(&mut self, io: &mut Io, now: Nanos) -> Nanos {
         let on = |block: usize| io.is_on(self.places.blocks[block]);
         let (first, last, next) = (on(0), on(3), on(7));
@@ -372,7 +281,7 @@ impl Charger {
         lasts
     }
 
-    fn hand_over(&mut self, io: &mut Io, now: Nanos) -> Nanos {
+    fn hand_over(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Nanos {
         let clamped = io.is_on(self.places.blocks[6]);
         let (ready, holds) = (
             io.is_on(self.places.lathe_ready),
@@ -436,7 +345,7 @@ impl Charger {
                 Some(Transfer::Open)
             }
             Transfer::Open => (stand && opened).then(|| {
-                self.tally.blocks.fetch_add(1, Relaxed);
+                tally.blocks.fetch_add(1, Relaxed);
                 Transfer::Home
             }),
         };
@@ -448,107 +357,94 @@ impl Charger {
         }
         lasts
     }
+}
 
-    fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
+impl Sequence for Chains {
+    const NAME: &'static str = "charger";
+    const AXES: &'static [(&'static str, AxisKind)] = &AXES;
+    const OPTIONS: &'static [&'static str] = &Options::CHARGER;
+
+    fn new(_: Options) -> Self {
+        Self::default()
+    }
+
+    fn fit(&mut self, find: &Find<'_>) -> Result<(), ProgramError> {
+        let places = &mut self.places;
+        for (number, block) in places.blocks.iter_mut().enumerate() {
+            *block = find(&format!("block at feeder step {}", number + 1))?;
+        }
+        places.distances = [
+            find("pre-centring distance 1")?,
+            find("pre-centring distance 2")?,
+        ];
+        places.time = find("simulation time")?;
+        places.presented = find("block presented")?;
+        places.clear = find("transfer clear")?;
+        places.lathe_ready = find("lathe ready")?;
+        places.lathe_holds = find("lathe holds block")?;
+        Ok(())
+    }
+
+    fn begins_anew(&mut self, io: &Io, now: Nanos, alive: bool, tally: &PeelerCounters) -> bool {
         let time = alive.then(|| io.value(self.places.time));
         let simulation = self.time.call(now, time, FROZEN);
         if self.time.restarted {
-            self.tally.restarts.fetch_add(1, Relaxed);
+            tally.restarts.fetch_add(1, Relaxed);
             log::info!("charger: the simulation was started again; beginning anew");
         }
-        let well = self.well.call(now, alive && io.all_healthy(), WELL);
-        if !alive || self.failed || self.time.restarted || simulation == Simulation::Unknown {
-            self.failed = !alive || !well || self.time.restarted;
-            if !self.failed {
-                self.restart(io);
-            }
-            return false;
-        }
-        if !io.all_healthy() {
-            self.fail("an axis is not healthy");
-            return false;
-        }
-        if simulation == Simulation::Stopped {
+        self.time.restarted || simulation == Simulation::Unknown
+    }
+
+    /// Starts over with the state that the sensors show.
+    fn restart(&mut self, io: &mut Io) {
+        io.forget();
+        let on = |block: usize| io.is_on(self.places.blocks[block]);
+        let held = on(5);
+        let clamped = on(6);
+        let at_lathe = io.axes[ARM].inputs.position < 1.0;
+        self.feeding.go(Feeding::Rest);
+        // At the clamps' position both hold the same block; anywhere else the spindles hold another one.
+        let with_clamps = clamped
+            && X.into_iter()
+                .all(|axis| io.axes[axis].inputs.position < 1.0);
+        self.centring.go(if held && !with_clamps {
+            Centring::Lift
+        } else {
+            Centring::Release
+        });
+        self.transfer.go(match (clamped, at_lathe) {
+            (true, true) => Transfer::ToLathe,
+            (true, false) => Transfer::Return,
+            (false, _) => Transfer::Home,
+        });
+    }
+
+    fn step(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Result<(), String> {
+        if self.time.state == Simulation::Stopped {
             // No chain progresses, but that is not a time-out.
             self.feeding.since = None;
             self.centring.since = None;
             self.transfer.since = None;
-            return true;
+            return Ok(());
         }
         let spans = [
             self.feed(io, now),
             self.centre(io, now),
-            self.hand_over(io, now),
+            self.hand_over(io, now, tally),
         ];
         if spans.into_iter().any(|span| span > LIMIT) {
-            let what = format!(
+            return Err(format!(
                 "a step takes too long: {:?}, {:?}, {:?}",
                 self.feeding.step, self.centring.step, self.transfer.step
-            );
-            self.fail(&what);
-            return false;
+            ));
         }
-        true
-    }
-
-    fn fail(&mut self, why: &str) {
-        log::warn!("charger: {why}; all axes stop, and the sequence begins anew");
-        self.failed = true;
-        self.well = Ton::default();
-        self.tally.faults.fetch_add(1, Relaxed);
-    }
-}
-
-impl Program for Charger {
-    fn name(&self) -> &str {
-        Self::NAME
-    }
-
-    fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
-        let place = |name: &str| Io::place(Self::NAME, table, name);
-        let mut places = Signals::default();
-        for (number, block) in places.blocks.iter_mut().enumerate() {
-            *block = place(&format!("block at feeder step {}", number + 1))?;
-        }
-        places.distances = [
-            place("pre-centring distance 1")?,
-            place("pre-centring distance 2")?,
-        ];
-        places.time = place("simulation time")?;
-        places.presented = place("block presented")?;
-        places.clear = place("transfer clear")?;
-        places.lathe_ready = place("lathe ready")?;
-        places.lathe_holds = place("lathe holds block")?;
-        self.places = places;
-        self.io = Some(Io::new(Self::NAME, table, &AXES, self.options.hold)?);
         Ok(())
     }
 
-    fn input_bytes(&self) -> usize {
-        self.io.as_ref().map_or(0, |io| io.input_bytes)
-    }
-
-    fn output_bytes(&self) -> usize {
-        self.io.as_ref().map_or(0, |io| io.output_bytes)
-    }
-
-    fn scan(&mut self, scan: &mut Scan<'_>) {
-        let Some(mut io) = self.io.take() else {
-            return;
-        };
-        if io.begin(scan) {
-            let enable = self.solve(&mut io, scan.now, scan.alive);
-            let shown =
-                enable && matches!(self.transfer.step, Transfer::Presented | Transfer::Open);
-            let clear = enable && io.axes[ARM].inputs.position > ARM_CLEAR;
-            io.switch(self.places.presented, shown);
-            io.switch(self.places.clear, clear);
-            io.end(scan, enable, &self.tally);
-        }
-        self.io = Some(io);
-    }
-
-    fn report(&self) -> Option<Arc<dyn Report>> {
-        Some(Arc::clone(&self.tally) as _)
+    fn show(&self, io: &mut Io, enable: bool) {
+        let shown = enable && matches!(self.transfer.step, Transfer::Presented | Transfer::Open);
+        let clear = enable && io.axes[ARM].inputs.position > ARM_CLEAR;
+        io.switch(self.places.presented, shown);
+        io.switch(self.places.clear, clear);
     }
 }

@@ -1,7 +1,5 @@
 //! The process image by name: axes with their blocks, and single signals.
 
-use std::sync::Arc;
-
 use super::report::PeelerCounters;
 use tickbus_axis::{AxisKind, Field, Motion};
 use tickbus_base::Mistake;
@@ -12,7 +10,7 @@ use tickbus_plc::{ProgramError, Scan};
 
 /// The decoded images, and the axes in them.
 #[derive(Debug)]
-pub(super) struct Io {
+pub(crate) struct Io {
     decode: Plan,
     encode: Plan,
     slots: Vec<Slot>,
@@ -36,7 +34,7 @@ const NOWHERE: usize = usize::MAX;
 
 /// A signal of the table.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SignalIndex(usize);
+pub(crate) struct SignalIndex(usize);
 
 /// The fields that every axis must have.
 const NEEDED: [Field; 13] = [
@@ -248,9 +246,4 @@ fn missing(program: &str, signal: &str) -> ProgramError {
             },
         ),
     }
-}
-
-/// The report's counters for the axes with these names.
-pub(super) fn tally(axes: &[(&'static str, AxisKind)]) -> Arc<PeelerCounters> {
-    Arc::new(PeelerCounters::new(axes.iter().map(|(name, _)| *name)))
 }

@@ -16,17 +16,16 @@
 //! knife's position: a new command whenever the speed is off by more than 1 %, as often as `Execute` permits.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
-use super::io::{Axis, Io, SignalIndex, tally};
+use super::io::{Axis, Io, SignalIndex};
 use super::options::Options;
 use super::report::PeelerCounters;
+use super::sequence::{Find, LIMIT, SETTLE, Sequence, Sequenced, WELL, motion, squeeze, to};
 use tickbus_axis::{AxisKind, Mode, Motion};
 use tickbus_base::time::Nanos;
-use tickbus_image::signal::{Addressing, SignalTable};
+use tickbus_plc::ProgramError;
 use tickbus_plc::blocks::{AxisCommand, Ton};
-use tickbus_plc::{Program, ProgramError, Report, Scan};
 
 /// The axes, in the program's own order.
 const AXES: [(&str, AxisKind); 13] = [
@@ -87,10 +86,7 @@ const MOST_TURNS: f64 = 12.0;
 /// The relative deviation from which on the speed is corrected.
 const SPEED_BAND: f64 = 0.01;
 
-const LIMIT: Nanos = Nanos::from_secs(30);
 const PEEL_LIMIT: Nanos = Nanos::from_secs(90);
-const WELL: Nanos = Nanos::from_secs(1);
-const SETTLE: Nanos = Nanos::from_millis(100);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Step {
@@ -115,15 +111,15 @@ struct Signals {
     clear: SignalIndex,
 }
 
-/// The lathe's program, described at the [module](self).
-#[derive(Debug)]
-pub struct Lathe {
+/// The lathe's program, described at the [module](self). Its options are `hold`, `blocks`, `peeling_speed` and
+/// `thickness`.
+pub(crate) type Lathe = Sequenced<Steps>;
+
+/// Its chain of steps.
+#[derive(Debug, Default)]
+pub(crate) struct Steps {
     options: Options,
-    io: Option<Io>,
     places: Signals,
-    tally: Arc<PeelerCounters>,
-    failed: bool,
-    well: Ton,
     clamped: Ton,
     step: Step,
     since: Option<Nanos>,
@@ -133,43 +129,11 @@ pub struct Lathe {
     turns: f64,
 }
 
-const fn motion(position: f64, torque: f64) -> Motion<f64> {
-    Motion {
-        position,
-        speed: 400.0,
-        acceleration: 1_500.0,
-        deceleration: 1_500.0,
-        torque,
-    }
-}
-
-const fn to(position: f64) -> AxisCommand {
-    AxisCommand {
-        mode: Mode::Position,
-        motion: motion(position, 0.0),
-        number: 0,
-    }
-}
-
 /// Tracking with this offset; the meaning of `torque` depends on the axis.
 const fn track(offset: f64, torque: f64) -> AxisCommand {
     AxisCommand {
         mode: Mode::Tracking,
         motion: motion(offset, torque),
-        number: 0,
-    }
-}
-
-const fn squeeze(mode: Mode, torque: f64) -> AxisCommand {
-    AxisCommand {
-        mode,
-        motion: Motion {
-            position: 0.0,
-            speed: 0.0,
-            acceleration: 0.0,
-            deceleration: 0.0,
-            torque,
-        },
         number: 0,
     }
 }
@@ -194,55 +158,10 @@ fn gate(axes: &mut [Axis], axis: usize, open: bool) {
     axes[axis].want(squeeze(mode, GATE_TORQUE));
 }
 
-impl Lathe {
-    /// Its name in [`program`](crate::program).
-    pub const NAME: &'static str = "lathe";
-
-    /// The program with its options: `hold`, `blocks`, `peeling_speed` and `thickness`.
-    ///
-    /// # Errors
-    ///
-    /// The option does not exist, or does not accept the value.
-    pub fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
-        let options = Options::read(Self::NAME, &Options::LATHE, options)?;
-        let tally = tally(&AXES);
-        tally.asked.store(options.blocks.unwrap_or(0), Relaxed);
-        Ok(Self {
-            options,
-            io: None,
-            places: Signals::default(),
-            tally,
-            failed: false,
-            well: Ton::default(),
-            clamped: Ton::default(),
-            step: Step::default(),
-            since: None,
-            holds: false,
-            turns: 0.0,
-        })
-    }
-
+impl Steps {
     fn go(&mut self, step: Step) {
         self.step = step;
         self.since = None;
-    }
-
-    /// Starts over. If the charger presents what is between the spindles, it is clamped again; otherwise it
-    /// counts as a core. In that case it is not reported as held, so that a charger that also holds it keeps
-    /// it.
-    fn restart(&mut self, io: &mut Io) {
-        io.forget();
-        self.turns = 0.0;
-        self.holds = false;
-        let on_block = SPINDLES
-            .into_iter()
-            .all(|axis| ON_BLOCK.contains(&io.axes[axis].inputs.position));
-        let presented = io.is_on(self.places.presented);
-        self.go(match (on_block, presented) {
-            (true, true) => Step::Clamp,
-            (true, false) => Step::Retract,
-            (false, _) => Step::Home,
-        });
     }
 
     /// The turns per second at which the veneer has its speed, given the knife's position.
@@ -252,8 +171,7 @@ impl Lathe {
     }
 
     /// Corrects the speed of the veneer.
-    fn keep_speed(&mut self, axes: &mut [Axis]) {
-        let wanted = self.wanted_turns(axes);
+    fn keep_speed(&mut self, axes: &mut [Axis], wanted: f64) {
         let off = (wanted - self.turns).abs() > SPEED_BAND * wanted;
         if off && axes[ROTATION].control.is_ready() {
             self.turns = wanted;
@@ -308,7 +226,7 @@ impl Lathe {
     }
 
     /// One scan of the sequence; returns how long the step has lasted, if that is limited, and its limit.
-    fn sequence(&mut self, io: &mut Io, now: Nanos) -> (Nanos, Nanos) {
+    fn sequence(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> (Nanos, Nanos) {
         let lasts = now - *self.since.get_or_insert(now);
         let (presented, clear) = (io.is_on(self.places.presented), io.is_on(self.places.clear));
         let axes = &mut io.axes;
@@ -324,6 +242,7 @@ impl Lathe {
                 axes[axis].want(squeeze(mode, torque));
             }
         };
+        let wanted = self.wanted_turns(axes);
         let clamping = self.step == Step::Clamp && stand && on_block;
         let clamped = self.clamped.call(now, clamping, SETTLE);
         let next = match self.step {
@@ -356,7 +275,7 @@ impl Lathe {
             }
             Step::Approach => Self::begin_to_peel(axes).then_some(Step::RoundUp),
             Step::RoundUp => {
-                self.keep_speed(axes);
+                self.keep_speed(axes, wanted);
                 (axes[KNIFE].inputs.position <= ROUND).then(|| {
                     gate(axes, VENEER_GATE, true);
                     gate(axes, ROUND_UP_GATE, false);
@@ -365,13 +284,10 @@ impl Lathe {
                 })
             }
             Step::Peel => {
-                self.keep_speed(axes);
-                let wanted = self.wanted_turns(axes);
+                self.keep_speed(axes, wanted);
                 // During the first turns the drive is still accelerating.
                 if lasts > WELL && wanted < MOST_TURNS {
-                    self.tally
-                        .kept
-                        .sample(axes[ROTATION].inputs.speed.abs(), wanted);
+                    tally.kept.sample(axes[ROTATION].inputs.speed.abs(), wanted);
                 }
                 (axes[KNIFE].inputs.position <= CORE).then_some(Step::Retract)
             }
@@ -385,7 +301,7 @@ impl Lathe {
                 }
                 (open && stand).then(|| {
                     self.holds = false;
-                    self.tally.blocks.fetch_add(1, Relaxed);
+                    tally.blocks.fetch_add(1, Relaxed);
                     Step::Home
                 })
             }
@@ -400,75 +316,59 @@ impl Lathe {
         }
         (lasts, most)
     }
-
-    fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
-        let well = self.well.call(now, alive && io.all_healthy(), WELL);
-        if !alive || self.failed {
-            self.failed = !well;
-            if !self.failed {
-                self.restart(io);
-            }
-            return false;
-        }
-        let wrong = if io.all_healthy() {
-            let step = self.step;
-            let (lasts, most) = self.sequence(io, now);
-            (lasts > most).then(|| format!("the step {step:?} takes too long"))
-        } else {
-            Some("an axis is not healthy".to_owned())
-        };
-        let Some(wrong) = wrong else {
-            return true;
-        };
-        log::warn!("lathe: {wrong}; all axes stop, and the sequence begins anew");
-        self.failed = true;
-        self.well = Ton::default();
-        self.tally.faults.fetch_add(1, Relaxed);
-        false
-    }
 }
 
-impl Program for Lathe {
-    fn name(&self) -> &str {
-        Self::NAME
+impl Sequence for Steps {
+    const NAME: &'static str = "lathe";
+    const AXES: &'static [(&'static str, AxisKind)] = &AXES;
+    const OPTIONS: &'static [&'static str] = &Options::LATHE;
+
+    fn new(options: Options) -> Self {
+        Self {
+            options,
+            ..Self::default()
+        }
     }
 
-    fn fit(&mut self, table: &SignalTable, _: Addressing) -> Result<(), ProgramError> {
-        let place = |name: &str| Io::place(Self::NAME, table, name);
+    fn fit(&mut self, find: &Find<'_>) -> Result<(), ProgramError> {
         self.places = Signals {
-            ready: place("lathe ready")?,
-            holds: place("lathe holds block")?,
-            presented: place("block presented")?,
-            clear: place("transfer clear")?,
+            ready: find("lathe ready")?,
+            holds: find("lathe holds block")?,
+            presented: find("block presented")?,
+            clear: find("transfer clear")?,
         };
-        self.io = Some(Io::new(Self::NAME, table, &AXES, self.options.hold)?);
-        // Until the machine has been heard from, its health is unknown.
-        self.failed = true;
         Ok(())
     }
 
-    fn input_bytes(&self) -> usize {
-        self.io.as_ref().map_or(0, |io| io.input_bytes)
+    /// Starts over. If the charger presents what is between the spindles, it is clamped again; otherwise it
+    /// counts as a core. In that case it is not reported as held, so that a charger that also holds it keeps
+    /// it.
+    fn restart(&mut self, io: &mut Io) {
+        io.forget();
+        self.turns = 0.0;
+        self.holds = false;
+        let on_block = SPINDLES
+            .into_iter()
+            .all(|axis| ON_BLOCK.contains(&io.axes[axis].inputs.position));
+        let presented = io.is_on(self.places.presented);
+        self.go(match (on_block, presented) {
+            (true, true) => Step::Clamp,
+            (true, false) => Step::Retract,
+            (false, _) => Step::Home,
+        });
     }
 
-    fn output_bytes(&self) -> usize {
-        self.io.as_ref().map_or(0, |io| io.output_bytes)
-    }
-
-    fn scan(&mut self, scan: &mut Scan<'_>) {
-        let Some(mut io) = self.io.take() else {
-            return;
-        };
-        if io.begin(scan) {
-            let enable = self.solve(&mut io, scan.now, scan.alive);
-            io.switch(self.places.ready, enable && self.step == Step::Ready);
-            io.switch(self.places.holds, self.holds);
-            io.end(scan, enable, &self.tally);
+    fn step(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Result<(), String> {
+        let step = self.step;
+        let (lasts, most) = self.sequence(io, now, tally);
+        if lasts > most {
+            return Err(format!("the step {step:?} takes too long"));
         }
-        self.io = Some(io);
+        Ok(())
     }
 
-    fn report(&self) -> Option<Arc<dyn Report>> {
-        Some(Arc::clone(&self.tally) as _)
+    fn show(&self, io: &mut Io, enable: bool) {
+        io.switch(self.places.ready, enable && self.step == Step::Ready);
+        io.switch(self.places.holds, self.holds);
     }
 }

@@ -6,12 +6,12 @@
 //! Both start over, with the state that the sensors show, when the link returns, an axis has recovered from a
 //! fault, a step has timed out, or the simulation was restarted.
 
+mod charger;
 mod io;
+mod lathe;
 mod options;
 mod report;
+mod sequence;
 
-pub mod charger;
-pub mod lathe;
-
-pub use charger::Charger;
-pub use lathe::Lathe;
+pub(super) use charger::Charger;
+pub(super) use lathe::Lathe;

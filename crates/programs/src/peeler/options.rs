@@ -4,8 +4,8 @@ use tickbus_base::time::Nanos;
 use tickbus_plc::ProgramError;
 
 /// The options that a user may give to either program.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Options {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Options {
     /// How long `Execute` stays on; `None` waits for the machine's acknowledge.
     pub(super) hold: Option<Nanos>,
     /// The program is done after this many blocks; `None` for never.

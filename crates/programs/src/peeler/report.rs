@@ -11,7 +11,7 @@ const SECOND: i64 = 1_000_000_000;
 
 /// What a program has done so far. Written by its scans, which never wait; read by its host.
 #[derive(Debug)]
-pub(super) struct PeelerCounters {
+pub(crate) struct PeelerCounters {
     axes: Box<[AxisTally]>,
     /// Blocks passed on.
     pub(super) blocks: AtomicU64,

@@ -145,12 +145,7 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
         rig.controller.tick();
         rig.controller.get("position") == 77.0
     });
-    let Rig {
-        clock,
-        mut device,
-        controller,
-    } = rig;
-    controller.driver.close();
+    let (clock, mut device) = rig.alone();
     await_that("the data are stale", || {
         pass(&clock, 1);
         let found = device.receive();
@@ -167,12 +162,7 @@ pub fn keeps_events_in_order(bus: &impl Bus) {
     let mut events = vec![tickbus_image::Event::default(); 64];
     rig.device.driver.poll_events(&mut events);
     for value in [5.0, 6.0, 7.0] {
-        rig.controller.set("speed", value);
-        rig.until("the value arrives", |rig| {
-            rig.controller.tick();
-            rig.device.tick();
-            rig.device.get("speed") == value
-        });
+        rig.send_speed(value);
     }
     let count = rig.device.driver.poll_events(&mut events);
     let values: Vec<_> = events[..count]
@@ -199,31 +189,15 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
         "fail-safe before the first contact"
     );
     assert_ne!(device.link().state, LinkState::Running);
-    let controller = End::open(&config(bus, "controller", ""), &clock);
-    let mut rig = Rig {
-        clock,
-        device,
-        controller,
-    };
-    rig.connect();
-    rig.controller.set("speed", 10.0);
-    rig.until("a value arrives", |rig| {
-        rig.controller.tick();
-        rig.device.tick();
-        rig.device.get("speed") == 10.0
-    });
+    let mut rig = Rig::around(bus, clock, device);
+    rig.send_speed(10.0);
     let link = rig.device.link();
     assert_eq!(
         (link.state, link.cause),
         (LinkState::Running, Cause::Running)
     );
 
-    let Rig {
-        clock,
-        mut device,
-        controller,
-    } = rig;
-    controller.driver.close();
+    let (clock, mut device) = rig.alone();
     await_that("the device is stale", || {
         pass(&clock, 1);
         device.tick().code == Code::Stale
@@ -243,19 +217,8 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     let before = runs(&device).expect("a count");
     assert_ne!(before, 0, "it ran");
 
-    let controller = End::open(&config(bus, "controller", ""), &clock);
-    let mut rig = Rig {
-        clock,
-        device,
-        controller,
-    };
-    rig.connect();
-    rig.controller.set("speed", 11.0);
-    rig.until("values arrive again", |rig| {
-        rig.controller.tick();
-        rig.device.tick();
-        rig.device.get("speed") == 11.0
-    });
+    let mut rig = Rig::around(bus, clock, device);
+    rig.send_speed(11.0);
     rig.until("the line runs", |rig| {
         rig.controller.tick();
         rig.device.tick();
@@ -279,13 +242,7 @@ pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
         link.cause.name() == liar.cause && link.reason.contains(liar.words)
     });
     drop(liar);
-    let controller = End::open(&config(bus, "controller", ""), &clock);
-    let mut rig = Rig {
-        clock,
-        device,
-        controller,
-    };
-    rig.connect();
+    Rig::around(bus, clock, device);
 }
 
 /// The simulation stops ticking: the PLC gets the fail-safe values, and the true ones when it ticks again.
@@ -414,14 +371,8 @@ pub fn keeps_several_instances_apart(bus: &impl Bus, other: &impl Bus) {
     let (mut one, mut two) = (Rig::new(bus), Rig::new(other));
     one.connect();
     two.connect();
-    one.controller.set("speed", 1.0);
-    two.controller.set("speed", 2.0);
     for (rig, speed) in [(&mut one, 1.0), (&mut two, 2.0)] {
-        rig.until("its own value arrives", |rig| {
-            rig.controller.tick();
-            rig.device.tick();
-            rig.device.get("speed") == speed
-        });
+        rig.send_speed(speed);
     }
 }
 

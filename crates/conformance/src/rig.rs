@@ -182,6 +182,36 @@ impl Rig {
         }
     }
 
+    /// A device that is open already, and a controller that connects to it.
+    #[track_caller]
+    pub fn around(bus: &impl Bus, clock: Arc<Manual>, device: End) -> Self {
+        let controller = End::open(&config(bus, "controller", ""), &clock);
+        let mut rig = Self {
+            clock,
+            device,
+            controller,
+        };
+        rig.connect();
+        rig
+    }
+
+    /// Closes the controller: the device is alone again.
+    pub fn alone(self) -> (Arc<Manual>, End) {
+        self.controller.driver.close();
+        (self.clock, self.device)
+    }
+
+    /// Lets the controller send a speed, and cycles pass until it arrives.
+    #[track_caller]
+    pub fn send_speed(&mut self, speed: f64) {
+        self.controller.set("speed", speed);
+        self.until(&format!("the speed {speed} arrives"), |rig| {
+            rig.controller.tick();
+            rig.device.tick();
+            rig.device.get("speed") == speed
+        });
+    }
+
     /// Lets cycles pass until `done` holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {

@@ -18,34 +18,30 @@ use super::faults::FrameFaults;
 
 /// A program with the tick's end of its process image: a PLC without its bus.
 pub(super) struct Cpu {
-    pub(super) program: Box<dyn Program>,
+    /// The program, and further instances of it for the other stations.
+    pub(super) units: Vec<Unit>,
     tick: TickEnd,
-    pub(super) inputs: Inputs,
-    outputs: Box<[u8]>,
-    outputs_before: Box<[u8]>,
     max_age: Nanos,
     /// The areas that it writes and reads.
     pub(super) areas: (Area, Area),
     pub(super) tally: Arc<ScanCounters>,
-    /// The faults injected at this end.
+    /// The faults injected at this end, into the first station.
     pub(super) faults: Option<FrameFaults>,
+    /// The recording of the first station.
     pub(super) tape: Option<ScanRecorder>,
-    beats: FrameBeats,
-    /// The other stations, each with its own instance of the program.
-    others: Vec<Other>,
 }
 
-/// A further station of a driver: the program and its process image.
-struct Other {
-    program: Box<dyn Program>,
+/// The program of one station, and what it reads and writes.
+pub(super) struct Unit {
+    pub(super) program: Box<dyn Program>,
     station: usize,
-    inputs: Inputs,
+    pub(super) inputs: Inputs,
     outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
     beats: FrameBeats,
 }
 
-impl Other {
+impl Unit {
     fn new(program: Box<dyn Program>, config: &Config, role: Role, station: usize) -> Self {
         let (writes, reads) = role.areas();
         let outputs = frame(config, station, writes);
@@ -59,13 +55,15 @@ impl Other {
         }
     }
 
-    /// One scan; returns the age of its data, and whether they are valid.
+    /// Inputs, program, outputs; returns the age of its data, and whether they are valid.
     fn scan(
         &mut self,
-        (now, max_age): (Nanos, Nanos),
+        (now, in_time, max_age): (Nanos, bool, Nanos),
         image: &mut TickStation,
         tally: &ScanCounters,
         (writes, reads): (Area, Area),
+        mut faults: Option<&mut FrameFaults>,
+        mut tape: Option<&mut ScanRecorder>,
     ) -> (Nanos, bool) {
         let Self {
             program,
@@ -76,12 +74,22 @@ impl Other {
             beats,
         } = self;
         tally.keep((*station, reads), &mut inputs.before, &inputs.bytes);
+        if let Some(faults) = &mut faults {
+            faults.begin_scan(now, &mut inputs.bytes, outputs);
+        }
         let valid = image.is_valid();
-        let arrival = image.read(now, &mut Taking { inputs, tape: None });
+        let mut taking = Taking {
+            inputs,
+            tape: tape.as_deref_mut(),
+        };
+        let arrival = image.read(now, &mut taking);
+        if let Some(faults) = &mut faults {
+            faults.received(&mut inputs.bytes);
+        }
         tally.count((*station, reads), &inputs.before, &inputs.bytes);
         // The PLC may have stopped between the check and the read, and the frame may be from after that:
         // checked again.
-        let alive = valid && image.is_valid() && arrival.age <= max_age;
+        let alive = in_time && valid && image.is_valid() && arrival.age <= max_age;
         tally.keep((*station, writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
@@ -92,7 +100,20 @@ impl Other {
         });
         beats.beat(now, outputs);
         tally.count((*station, writes), outputs_before, outputs);
-        image.write(now, |frame| frame.copy_from_slice(outputs));
+        image.write(now, |frame| {
+            frame.copy_from_slice(outputs);
+            if let Some(faults) = faults {
+                faults.sending(frame);
+            }
+        });
+        if let Some(tape) = tape {
+            let code = match arrival.fresh {
+                _ if !alive => Code::Stale,
+                true => Code::Fresh,
+                false => Code::Unchanged,
+            };
+            tape.scan(now, code, &inputs.bytes, outputs);
+        }
         (arrival.age, alive)
     }
 }
@@ -139,70 +160,17 @@ impl Cpu {
     /// has received fail-safe values in the meantime: the program must then start over as after a broken
     /// line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {
-        let Self {
-            program,
-            tick,
-            inputs,
-            outputs,
-            outputs_before,
-            max_age,
-            areas: (writes, reads),
-            tally,
-            faults,
-            tape,
-            beats,
-            others,
-        } = self;
-        let (station, further) = tick.stations.split_first_mut().expect("at least one");
-        tally.keep((0, *reads), &mut inputs.before, &inputs.bytes);
-        if let Some(faults) = faults {
-            faults.begin_scan(now, &mut inputs.bytes, outputs);
-        }
-        let valid = station.is_valid();
-        let arrival = station.read(
-            now,
-            &mut Taking {
-                inputs,
-                tape: tape.as_mut(),
-            },
-        );
-        if let Some(faults) = faults {
-            faults.received(&mut inputs.bytes);
-        }
-        tally.count((0, *reads), &inputs.before, &inputs.bytes);
-        // Checked twice as for the other stations, see `scan` above.
-        let alive = in_time && valid && station.is_valid() && arrival.age <= *max_age;
-        tally.keep((0, *writes), outputs_before, outputs);
-        program.scan(&mut Scan {
-            now,
-            alive,
-            cycle: arrival.sequence,
-            inputs: &inputs.bytes,
-            outputs,
-        });
-        beats.beat(now, outputs);
-        tally.count((0, *writes), outputs_before, outputs);
-        station.write(now, |frame| {
-            frame.copy_from_slice(outputs);
-            if let Some(faults) = faults {
-                faults.sending(frame);
-            }
-        });
-        let (mut age, mut all_alive) = (arrival.age, alive);
-        for (other, image) in others.iter_mut().zip(further) {
-            let found = other.scan((now, *max_age), image, tally, (*writes, *reads));
+        let (mut age, mut alive) = (Nanos::ZERO, true);
+        for (unit, image) in self.units.iter_mut().zip(&mut self.tick.stations) {
+            let is_first = unit.station == 0;
+            let faults = self.faults.as_mut().filter(|_| is_first);
+            let tape = self.tape.as_mut().filter(|_| is_first);
+            let time = (now, in_time, self.max_age);
+            let found = unit.scan(time, image, &self.tally, self.areas, faults, tape);
             age = age.max(found.0);
-            all_alive &= found.1;
+            alive &= found.1;
         }
-        tally.scanned(age, all_alive);
-        if let Some(tape) = tape {
-            let code = match arrival.fresh {
-                _ if !alive => Code::Stale,
-                true => Code::Fresh,
-                false => Code::Unchanged,
-            };
-            tape.scan(now, code, &inputs.bytes, outputs);
-        }
+        self.tally.scanned(age, alive);
     }
 }
 
@@ -212,31 +180,20 @@ pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (C
     let table = &config.table;
     let tally = Arc::new(ScanCounters::new(table));
     let (tick, bus) = image(directions(table, role));
-    let (writes, reads) = role.areas();
-    let (inputs, outputs) = (frame(config, 0, reads), frame(config, 0, writes));
     let others = (1..table.stations.len())
-        .filter_map(|station| {
-            Some(Other::new(
-                program.for_another_station()?,
-                config,
-                role,
-                station,
-            ))
-        })
-        .collect();
+        .filter_map(|station| Some((program.for_another_station()?, station)))
+        .collect::<Vec<_>>();
+    let units = std::iter::once((program, 0)).chain(others);
     let cpu = Cpu {
-        program,
+        units: units
+            .map(|(program, station)| Unit::new(program, config, role, station))
+            .collect(),
         tick,
-        inputs: Inputs::new(inputs),
-        outputs_before: outputs.clone(),
-        outputs,
         max_age: config.timing.max_age,
-        areas: (writes, reads),
+        areas: role.areas(),
         tally,
         faults: None,
         tape: None,
-        beats: FrameBeats::new(config, role, 0),
-        others,
     };
     (cpu, bus)
 }
@@ -247,7 +204,7 @@ mod tests {
     use std::sync::Mutex;
     use tickbus_plc::Program;
 
-    /// Records what each scan is told.
+    /// Records what each scan is told, at each station.
     struct Witness(Arc<Mutex<Vec<bool>>>);
 
     impl Program for Witness {
@@ -263,6 +220,10 @@ mod tests {
             1
         }
 
+        fn for_another_station(&self) -> Option<Box<dyn Program>> {
+            Some(Box::new(Self(Arc::clone(&self.0))))
+        }
+
         fn scan(&mut self, scan: &mut Scan<'_>) {
             self.0.lock().expect("no panic").push(scan.alive);
         }
@@ -270,19 +231,33 @@ mod tests {
 
     #[test]
     fn a_scan_that_comes_too_late_is_told_that_the_line_was_broken() {
-        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
-                    [[signal]]\nname = \"in\"\naddress = \"%IB0\"\n[[signal]]\nname = \"out\"\naddress = \"%QB0\"\n";
-        let config = tickbus_driver_cfg::Config::parse("driver.cfg", text).expect("right");
+        let mut text =
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                        [[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n"
+                .to_owned();
+        for address in ["%IB0", "%QB0"] {
+            for station in ["A", "B"] {
+                text += &format!(
+                    "[[signal]]\nname = \"{station} {address}\"\naddress = \"{address}\"\nstation = \"{station}\"\n"
+                );
+            }
+        }
+        let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text).expect("right");
         let told = Arc::new(Mutex::new(Vec::new()));
         let program = Box::new(Witness(Arc::clone(&told)));
         let (mut cpu, mut bus) = half(program, &config, Role::Controller);
         for (millis, in_time) in [(10, true), (500, false), (510, true)] {
             let now = Nanos::from_millis(millis);
             // The peer is faster than the delayed scan.
-            bus.stations[0].received(now, &[1]);
+            for station in &mut bus.stations {
+                station.received(now, &[1]);
+            }
             cpu.scan(now, in_time);
         }
-        assert_eq!(*told.lock().expect("no panic"), [true, false, true]);
+        assert_eq!(
+            *told.lock().expect("no panic"),
+            [[true; 2], [false; 2], [true; 2]].concat()
+        );
     }
 
     #[test]

@@ -37,7 +37,7 @@ impl SteppedHost {
         let max_age = config.timing.max_age;
         let (cpu, bus) = half(program, config, Role::Controller);
         let tally = Arc::clone(&cpu.tally);
-        let status = LinkStatus::new(cpu.program.name(), max_age);
+        let status = LinkStatus::new(cpu.units[0].program.name(), max_age);
         let watches = config
             .life_signs
             .watches(&config.table, Role::Controller, max_age);

@@ -103,7 +103,7 @@ impl HostThread {
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
         if role == config.role {
             let (faults, board) = (&config.faults, Arc::clone(&board));
-            let inputs = &cpu.inputs.bytes;
+            let inputs = &cpu.units[0].inputs.bytes;
             cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
         }
         let port = Port::new(bus_end, now, role, limit, status.clone())

@@ -29,6 +29,7 @@
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
 pub mod cli;
+pub mod fieldbus;
 mod jni;
 
 pub use tickbus_axis as axis;
@@ -45,13 +46,3 @@ pub use tickbus_programs as programs;
 pub use tickbus_record as record;
 pub use tickbus_report as report;
 pub use tickbus_testing as testing;
-
-/// The bus traits, the port, faults, and one room per bus.
-pub mod fieldbus {
-    pub use tickbus_bus_modbus as modbus;
-    pub use tickbus_bus_opcua as opcua;
-    pub use tickbus_bus_plugin as plugin;
-    pub use tickbus_bus_s7 as s7;
-    pub use tickbus_bus_socket as socket;
-    pub use tickbus_fieldbus::*;
-}

@@ -5,44 +5,47 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::rules::File;
 use super::source::{Token, texts, tokens};
 
-/// The names of a path, from the crate's root.
-type Path = Vec<String>;
+/// The names of a path, from the crate's own on.
+pub(crate) type Path = Vec<String>;
 
 /// What one file says of others.
-struct Module {
+pub(crate) struct Module<'a> {
     /// Names that it imports, and what they stand for.
-    imports: BTreeMap<String, Path>,
+    pub(crate) imports: BTreeMap<String, Path>,
     /// Every path in it, with its line.
     uses: Vec<(usize, Path)>,
-    file: String,
+    pub(crate) file: File<'a>,
 }
 
 /// A tie from one module to its sibling: where it is.
 type Ties = BTreeMap<(Path, String), BTreeMap<String, String>>;
 
-/// The circles among the modules of one crate, each as a line; `root` is the folder of its `lib.rs`.
+/// The modules in these files of all crates, but for those of tests.
+pub(crate) fn modules<'a>(files: &[File<'a>]) -> BTreeMap<Path, Module<'a>> {
+    let paths = files.iter().map(|file| (module(file.path), *file));
+    let own = paths.filter(|(path, _)| !path.iter().any(|name| name == "tests"));
+    own.map(|(path, file)| (path.clone(), read(file, &path)))
+        .collect()
+}
+
+/// The circles among the modules of each crate, each as a line.
 ///
 /// Modules of one parent are compared with each other: what a module uses of its parent, or a parent of its
 /// children, is no circle. Tests do not count, and neither do macros.
-pub(crate) fn circles(root: &str, files: &[File<'_>]) -> Vec<String> {
-    let mut modules = BTreeMap::new();
-    for file in files {
-        let Some(inner) = file.path.strip_prefix(root) else {
-            continue;
-        };
-        let path = module(inner);
-        if !path.iter().any(|name| name == "tests") {
-            modules.insert(path.clone(), read(file, &path));
-        }
-    }
+pub(crate) fn circles(files: &[File<'_>]) -> Vec<String> {
+    let modules = modules(files);
     let mut ties = Ties::new();
     for (from, module) in &modules {
         for (line, path) in &module.uses {
-            let to = resolve(&modules, path);
+            let (to, _) = resolve(&modules, path);
+            // The compiler looks after those among crates.
+            if to.first() != from.first() {
+                continue;
+            }
             let shared = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
             if let (Some(a), Some(b)) = (from.get(shared), to.get(shared)) {
                 let key = (from[..shared].to_vec(), a.clone());
-                let place = format!("{}:{line}", module.file);
+                let place = format!("{}:{line}", module.file.path);
                 ties.entry(key)
                     .or_default()
                     .entry(b.clone())
@@ -58,23 +61,26 @@ pub(crate) fn circles(root: &str, files: &[File<'_>]) -> Vec<String> {
     found
 }
 
-/// The module that a file is: `a/b.rs` and `a/b/mod.rs` are `a::b`.
-fn module(inner: &str) -> Path {
-    let inner = inner.trim_start_matches('/').trim_end_matches(".rs");
-    let mut path: Path = inner.split('/').map(str::to_owned).collect();
-    if ["mod", "lib", "main"].contains(&path.last().map_or("", String::as_str)) {
+/// The module that a file is: `crates/a/src/b/c.rs` and `crates/a/src/b/c/mod.rs` are `tickbus_a::b::c`.
+fn module(file: &str) -> Path {
+    let (folder, inner) = file.split_once("src/").unwrap_or(("", file));
+    let folder = folder.trim_start_matches("crates/").trim_end_matches('/');
+    let name = format!("tickbus_{}", folder.replace('-', "_"));
+    let mut path = vec![name.trim_end_matches('_').to_owned()];
+    path.extend(inner.trim_end_matches(".rs").split('/').map(str::to_owned));
+    if ["mod", "lib"].contains(&path.last().map_or("", String::as_str)) {
         path.pop();
     }
     path
 }
 
-fn read(file: &File<'_>, module: &Path) -> Module {
+fn read<'a>(file: File<'a>, module: &Path) -> Module<'a> {
     let all = tokens(file.text);
     let tokens = without_tests(&all);
     let mut read = Module {
         imports: BTreeMap::new(),
         uses: Vec::new(),
-        file: file.path.to_owned(),
+        file,
     };
     let mut at = 0;
     while at < tokens.len() {
@@ -157,13 +163,17 @@ fn tree(
     at
 }
 
-/// A path as seen from the crate's root. One that begins with another name is relative, or of another crate: then
+/// A path with the name of its crate. One that begins with another name is relative, or of a crate that is not ours: then
 /// it leads to no module.
 fn absolute(path: &[String], module: &Path) -> Path {
     let mut base = module.clone();
     let mut rest = path;
     match path.first().map(String::as_str) {
-        Some("crate") => return path[1..].to_vec(),
+        Some("crate") => {
+            base.truncate(1);
+            rest = &path[1..];
+        }
+        Some(name) if name.starts_with("tickbus_") => return path.to_vec(),
         Some("self") => rest = &path[1..],
         _ => {
             while rest.first().is_some_and(|name| name == "super") {
@@ -176,19 +186,18 @@ fn absolute(path: &[String], module: &Path) -> Path {
     base
 }
 
-/// The module in which the last name of `path` is, imports followed.
-fn resolve(modules: &BTreeMap<Path, Module>, path: &Path) -> Path {
+/// The module in which the last name of `path` is, imports followed, and what of the path lies in it.
+pub(crate) fn resolve(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> (Path, Path) {
     let mut path = path.clone();
     for _ in 0..8 {
         let deepest = (0..=path.len())
             .rev()
             .find(|length| modules.contains_key(&path[..*length]));
         let Some(length) = deepest else {
-            return Vec::new();
+            break;
         };
-        let import = path
-            .get(length)
-            .and_then(|name| modules[&path[..length]].imports.get(name));
+        let imports = &modules[&path[..length]].imports;
+        let import = path.get(length).and_then(|name| imports.get(name));
         match import {
             Some(target) if *target != path => {
                 let mut next = target.clone();
@@ -196,12 +205,12 @@ fn resolve(modules: &BTreeMap<Path, Module>, path: &Path) -> Path {
                 path = next;
             }
             _ => {
-                path.truncate(length);
-                return path;
+                let rest = path.split_off(length);
+                return (path, rest);
             }
         }
     }
-    Vec::new()
+    (Vec::new(), path)
 }
 
 /// The rings among the children of `parent`, each told once, with a place for each of its ties.

@@ -1,10 +1,12 @@
-//! The glossary of docs/ARCHITECTURE.md names only what is public in the sources.
+//! The glossary of docs/ARCHITECTURE.md names what there is, by its path in the crate `tickbus`.
 
+use std::collections::{BTreeMap, HashSet};
+
+use super::circles::{Module, Path, resolve};
 use super::source::{texts, tokens};
 
-/// The names in the last column of the glossary's table that no source defines; `sources` are the texts of all.
-pub(crate) fn unknown(text: &str, sources: &[String]) -> Vec<String> {
-    let defined = definitions(sources);
+/// The paths in the last column of the glossary's table that lead nowhere.
+pub(crate) fn unknown(text: &str, modules: &BTreeMap<Path, Module<'_>>) -> Vec<String> {
     let table = text.split_once("## Glossary").map_or("", |(_, rest)| rest);
     let rows = table.lines().filter(|line| line.starts_with("| "));
     let cells = rows.filter_map(|row| row.trim_end_matches([' ', '|']).rsplit(" | ").next());
@@ -12,40 +14,64 @@ pub(crate) fn unknown(text: &str, sources: &[String]) -> Vec<String> {
     paths
         .filter(|path| path.contains("::"))
         .filter(|path| {
-            let mut names = path.rsplit("::");
-            names.next().is_none_or(|name| !defined.contains(name))
+            let names = format!("tickbus::{path}");
+            !leads_somewhere(modules, &names.split("::").map(str::to_owned).collect())
         })
         .map(str::to_owned)
         .collect()
 }
 
-/// Every name that is defined for others: items, fields, and variants of enums.
-fn definitions(sources: &[String]) -> std::collections::HashSet<String> {
-    const KINDS: [&str; 8] = [
-        "struct", "enum", "trait", "fn", "const", "type", "mod", "as",
-    ];
-    let mut found = std::collections::HashSet::new();
-    for source in sources {
-        let tokens = tokens(source);
-        for (at, token) in tokens.iter().enumerate() {
-            let next = &tokens[at + 1..];
-            let is_item = KINDS.contains(&token.text) && !next.is_empty();
-            if is_item {
-                found.insert(next[0].text.to_owned());
-            }
-            let is_field = token.text == "pub" && next.len() > 1 && texts(&next[1..], &[":"]);
-            if is_field {
-                found.insert(next[0].text.to_owned());
-            }
-            // A variant stands behind `{` or `,` and begins with a capital.
-            let is_behind = ["{", ","].contains(&token.text);
-            if is_behind
-                && next
-                    .first()
-                    .is_some_and(|n| n.text.starts_with(char::is_uppercase))
-            {
-                found.insert(next[0].text.to_owned());
-            }
+/// Whether a path leads to a module, to something that a module defines, or to a member of that.
+fn leads_somewhere(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> bool {
+    let (at, rest) = resolve(modules, path);
+    let Some(module) = modules.get(&at) else {
+        return false;
+    };
+    let is_here = |name: &String| definitions(module.file.text).contains(name.as_str());
+    let is_found = match &*rest {
+        [] => true,
+        [name] => is_here(name),
+        // Its `impl` may stand in another file of the crate.
+        [of, member] => {
+            let mut own = modules.iter().filter(|(path, _)| path[0] == at[0]);
+            is_here(of) && own.any(|(_, module)| has_member(module.file.text, of, member))
+        }
+        _ => false,
+    };
+    // Or to what the module exports from another one as a whole.
+    is_found
+        || module.imports.get("*").is_some_and(|all| {
+            let path = [&all[..all.len() - 1], &rest].concat();
+            leads_somewhere(modules, &path)
+        })
+}
+
+/// Whether a file with the definition or an `impl` of `of` defines `member`.
+fn has_member(text: &str, of: &str, member: &str) -> bool {
+    let tokens = tokens(text);
+    let begins = |word: &str| ["struct", "enum", "trait", "impl", ">"].contains(&word);
+    let mut pairs = tokens.windows(2);
+    pairs.any(|pair| begins(pair[0].text) && pair[1].text == of)
+        && definitions(text).contains(member)
+}
+
+/// Every name that a file defines: items, public fields, and variants of enums.
+fn definitions(text: &str) -> HashSet<&str> {
+    const KINDS: [&str; 7] = ["struct", "enum", "trait", "fn", "const", "type", "mod"];
+    let mut found = HashSet::new();
+    let tokens = tokens(text);
+    for (at, token) in tokens.iter().enumerate() {
+        let next = &tokens[at + 1..];
+        let Some(name) = next.first().map(|name| name.text) else {
+            break;
+        };
+        let is_item = KINDS.contains(&token.text);
+        let is_field = token.text == "pub" && texts(&next[1..], &[":"]);
+        // A variant stands behind `{`, `,` or an attribute, and begins with a capital.
+        let is_variant =
+            ["{", ",", "]"].contains(&token.text) && name.starts_with(char::is_uppercase);
+        if is_item || is_field || is_variant {
+            found.insert(name);
         }
     }
     found

@@ -1,11 +1,13 @@
 //! Enforces the project's structure: rooms use only rooms above them, unsafe code and reading the system's
-//! clocks are confined to certain files, and no file grows without limit.
+//! clocks are confined to certain files, no file grows without limit, and docs/ARCHITECTURE.md shows what there is.
 
 mod circles;
 mod glossary;
+mod picture;
 mod rules;
 mod source;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -30,6 +32,25 @@ fn sources(directory: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// The sources of all crates, each by its path from the project's root.
+fn all_sources() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files = crates(root)
+        .into_iter()
+        .flat_map(|folder| sources(&root.join(folder)));
+    let read = |file: PathBuf| {
+        let path = file.strip_prefix(root).expect("it is below the root");
+        let path = path.to_str().expect("names are UTF-8").replace('\\', "/");
+        (path, fs::read_to_string(&file).expect("sources are UTF-8"))
+    };
+    files.map(read).collect()
+}
+
+fn files(sources: &[(String, String)]) -> Vec<File<'_>> {
+    let files = sources.iter().map(|(path, text)| File { path, text });
+    files.collect()
+}
+
 /// The folders with the sources of a crate, from the project's root.
 fn crates(root: &Path) -> Vec<String> {
     let entries = fs::read_dir(root.join("crates")).expect("there are crates");
@@ -44,26 +65,11 @@ fn crates(root: &Path) -> Vec<String> {
 
 #[test]
 fn the_house_is_in_order() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (mut found, mut count) = (Vec::new(), 0);
-    for folder in crates(root) {
-        let sources = sources(&root.join(&folder));
-        count += sources.len();
-        let texts: Vec<(String, String)> = sources
-            .iter()
-            .map(|source| {
-                let path = source.strip_prefix(root).expect("it is below the root");
-                let path = path.to_str().expect("names are UTF-8").replace('\\', "/");
-                (path, fs::read_to_string(source).expect("sources are UTF-8"))
-            })
-            .collect();
-        let files: Vec<File<'_>> = (texts.iter())
-            .map(|(path, text)| File { path, text })
-            .collect();
-        found.extend(files.iter().flat_map(|file| mistakes(*file)));
-        found.extend(circles(&folder, &files));
-    }
-    assert!(count > 40, "only {count} sources found");
+    let sources = all_sources();
+    let files = files(&sources);
+    assert!(files.len() > 40, "only {} sources found", files.len());
+    let mut found: Vec<String> = files.iter().flat_map(|file| mistakes(*file)).collect();
+    found.extend(circles(&files));
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
@@ -78,19 +84,81 @@ fn every_crate_has_its_row_in_the_table_of_rooms() {
 }
 
 #[test]
+fn the_picture_of_the_rooms_is_that_of_their_manifests() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifests: BTreeMap<String, String> = (crates(root).iter())
+        .map(|folder| {
+            let folder = folder.trim_end_matches("src");
+            let manifest = fs::read_to_string(root.join(folder).join("Cargo.toml"));
+            let name = folder.trim_start_matches("crates/").trim_end_matches('/');
+            let name = if name.is_empty() { "src" } else { name };
+            (name.to_owned(), manifest.expect("a crate has a manifest"))
+        })
+        .collect();
+    let file = root.join("docs/ARCHITECTURE.md");
+    let text = fs::read_to_string(&file).expect("it is there");
+    let right = picture::redrawn(&text, &manifests);
+    if std::env::var_os("TICKBUS_UPDATE").is_some() {
+        fs::write(&file, &right).expect("it can be written");
+    } else {
+        assert!(
+            text == right,
+            "the picture in docs/ARCHITECTURE.md is out of date; TICKBUS_UPDATE=1 draws it anew"
+        );
+    }
+}
+
+#[test]
+fn an_arrow_that_others_imply_is_not_drawn() {
+    let manifest = |uses: &[&str]| {
+        let lines: String = uses
+            .iter()
+            .map(|name| format!("tickbus-{name}.workspace = true\n"))
+            .collect();
+        format!(
+            "[package]\n[dependencies]\nlog = 1\n{lines}[dev-dependencies]\ntickbus-top.workspace = true\n"
+        )
+    };
+    let crates = [
+        ("a", &[][..]),
+        ("b", &["a"]),
+        ("c", &["b", "a"]),
+        ("top", &["a", "c", "elsewhere"]),
+    ];
+    let manifests = crates.map(|(name, uses)| (name.to_owned(), manifest(uses)));
+    assert_eq!(
+        picture::picture(&BTreeMap::from(manifests)),
+        "```mermaid\ngraph TD\n    b --> a\n    c --> b\n    top --> c\n```\n"
+    );
+}
+
+#[test]
 fn the_glossary_names_what_there_is() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(root.join("docs/ARCHITECTURE.md")).expect("it is there");
-    let files = crates(root)
-        .into_iter()
-        .flat_map(|folder| sources(&root.join(folder)));
-    let sources = files.map(|file| fs::read_to_string(file).expect("sources are UTF-8"));
-    // build.rs makes an enum of the table of status codes.
-    let codes = "enum Code { Fresh, Unchanged, Stale }".to_owned();
-    let sources: Vec<String> = sources.chain([codes]).collect();
-    assert_eq!(unknown(&text, &sources), Vec::<String>::new());
-    let wrong = "## Glossary\n| a | b | `driver::Driver`, `x::Nobody` |\n";
-    assert_eq!(unknown(wrong, &sources), ["x::Nobody"]);
+    let mut sources = all_sources();
+    // build.rs makes this enum of the table of status codes.
+    let codes = sources
+        .iter_mut()
+        .find(|(path, _)| path == "crates/driver/src/status.rs");
+    codes.expect("it is there").1 += "pub enum Code { Fresh, Unchanged, Stale }";
+    let modules = circles::modules(&files(&sources));
+    assert_eq!(unknown(&text, &modules), Vec::<String>::new());
+    for (path, is_known) in [
+        ("driver::Driver", true),
+        ("driver::Driver::exchange", true),
+        ("fieldbus::Port::log", true),
+        ("fieldbus::modbus::mbap", true),
+        ("driver::Driver::nothing", false),
+        ("driver::Nobody", false),
+        // Both names exist, but not there.
+        ("image::Driver::exchange", false),
+        ("driver::Driver::address", false),
+        ("nowhere::Driver", false),
+    ] {
+        let text = format!("## Glossary\n| a | b | `{path}` |\n");
+        assert_eq!(unknown(&text, &modules).is_empty(), is_known, "{path}");
+    }
 }
 
 /// Checks that exactly these lines of an imaginary file are complained about, each with a word of the
@@ -112,7 +180,7 @@ fn finds_circles(files: &[(&str, &str)], expected: &[&str]) {
         .iter()
         .map(|&(path, text)| File { path, text })
         .collect();
-    let found = circles("src", &files);
+    let found = circles(&files);
     assert_eq!(found.len(), expected.len(), "{found:#?}");
     for (found, words) in found.iter().zip(expected) {
         assert!(found.starts_with(words), "expected {words}…, found {found}");

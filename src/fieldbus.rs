@@ -1,0 +1,8 @@
+//! The bus traits, the port, faults, and one room per bus.
+
+pub use tickbus_bus_modbus as modbus;
+pub use tickbus_bus_opcua as opcua;
+pub use tickbus_bus_plugin as plugin;
+pub use tickbus_bus_s7 as s7;
+pub use tickbus_bus_socket as socket;
+pub use tickbus_fieldbus::*;

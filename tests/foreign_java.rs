@@ -12,11 +12,11 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use foreign::Absent;
-use foreign::machine::Machine;
+use foreign::machine::{Machine, SIGNALS};
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -32,37 +32,6 @@ fn main() -> ExitCode {
 }
 
 /// A JVM that has just started pauses longer than the 250 ms after which data are stale.
-const SIGNALS: &str = r#"
-[[signal]]
-name    = "run"
-address = "%QX0.0"
-
-[[signal]]
-name      = "speed"
-address   = "%QW2"
-type      = "INT"
-fail_safe = -1
-
-[[signal]]
-name    = "torque"
-address = "%QD4"
-type    = "REAL"
-
-[[signal]]
-name    = "sensor"
-address = "%IX0.0"
-
-[[signal]]
-name    = "position"
-address = "%IW2"
-type    = "INT"
-
-[[signal]]
-name    = "pressure"
-address = "%ID4"
-type    = "REAL"
-"#;
-
 fn open(fieldbus: &str) -> Machine {
     Machine::open(&format!(
         "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\n{fieldbus}\nmax_age = \"3s\"\nreconnect = [\"50ms\"]\n{SIGNALS}"
@@ -150,14 +119,14 @@ impl Drop for Peer {
     fn drop(&mut self) {
         // It ends with its stdin; if it hangs, the test must not hang as well.
         drop(self.stdin.take());
-        let limit = Instant::now() + Duration::from_secs(10);
-        while Instant::now() < limit {
-            if matches!(self.child.try_wait(), Ok(Some(_))) {
-                return;
+        let end = loop {
+            if let Err(end) = self.lines.recv_timeout(Duration::from_secs(10)) {
+                break end;
             }
-            std::thread::sleep(Duration::from_millis(10));
+        };
+        if end == RecvTimeoutError::Timeout {
+            let _ = self.child.kill();
         }
-        let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }

@@ -13,9 +13,9 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
 use std::process::{Child, ChildStdout, Command, ExitCode, Stdio};
 
-use foreign::machine::Machine;
+use foreign::machine::{Machine, SIGNALS};
 use foreign::{Absent, pcap};
-use tickbus_test_log as logged;
+use tickbus_conformance::rig::logged;
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -45,38 +45,6 @@ fn main() -> ExitCode {
         ),
     ])
 }
-
-const SIGNALS: &str = r#"
-[[signal]]
-name    = "run"
-address = "%QX0.0"
-latch   = "rising"
-
-[[signal]]
-name      = "speed"
-address   = "%QW2"
-type      = "INT"
-fail_safe = -1
-
-[[signal]]
-name    = "setpoint"
-address = "%QD4"
-type    = "REAL"
-
-[[signal]]
-name    = "sensor"
-address = "%IX0.0"
-
-[[signal]]
-name    = "position"
-address = "%IW2"
-type    = "INT"
-
-[[signal]]
-name    = "pressure"
-address = "%ID4"
-type    = "REAL"
-"#;
 
 fn open(fieldbus: &str) -> Machine {
     open_with(fieldbus, "")
@@ -114,7 +82,7 @@ fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
     assert!(told.contains("snap7_client: ok\n"), "{told}");
     end.tick();
     assert_eq!(
-        (end.get("run"), end.get("speed"), end.get("setpoint")),
+        (end.get("run"), end.get("speed"), end.get("torque")),
         (1.0, 1234.0, 2.5)
     );
     Ok(())
@@ -204,15 +172,17 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             .as_str();
     }
     let last = &*further;
+    logged::expect("nothing is written into the PLC");
+    logged::expect("does not say whether it is in RUN");
     let mut end = open_with(&fieldbus(""), last);
     end.set("position", 70.0);
     end.until("it reads", |end| end.get("speed") == 1.0);
-    assert_eq!(end.statistic("identity").as_deref(), Some(who));
-    assert_eq!(end.statistic("writes").as_deref(), Some("blocked"));
+    assert_eq!(end.statistic("identity"), who);
+    assert_eq!(end.statistic("writes"), "blocked");
     let cycles = end.statistic("bus_cycles");
     end.until("more is read", |end| end.statistic("bus_cycles") != cycles);
     assert_eq!(end.get("speed"), 1.0, "nothing was written");
-    end.driver.close();
+    end.end.driver.close();
 
     let mut end = open_with(&fieldbus(&format!("write_to = \"{who}\"")), last);
     for value in [70.0, 71.0, 72.0] {
@@ -222,8 +192,8 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             (end.get("speed"), end.get("last back")) == (value + 1.0, value + 101.0)
         });
     }
-    assert_eq!(end.statistic("writes").as_deref(), Some("allowed"));
-    end.driver.close();
+    assert_eq!(end.statistic("writes"), "allowed");
+    end.end.driver.close();
 
     let gone = fieldbus("").replace("\"DB1\"", "\"DB7\"");
     let mut end = open_with(&gone, last);
@@ -255,7 +225,7 @@ fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
     assert!(told.contains("snap7c_client: ok\n"), "{told}");
     end.tick();
     assert_eq!(
-        (end.get("run"), end.get("speed"), end.get("setpoint")),
+        (end.get("run"), end.get("speed"), end.get("torque")),
         (1.0, 1234.0, 2.5)
     );
     Ok(())
@@ -272,11 +242,12 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
             cpu.port
         )
     };
+    logged::expect("nothing is written into the PLC");
     let mut end = open(&fieldbus(""));
     // What its data block holds before anybody has written, plus 1.
     end.until("it reads", |end| end.get("speed") == 28_399.0);
-    let who = end.statistic("identity").expect("it was met");
-    end.driver.close();
+    let who = end.statistic("identity");
+    end.end.driver.close();
 
     let mut end = open(&fieldbus(&format!("write_to = \"{who}\"")));
     for value in [70.0, 71.0] {
@@ -285,15 +256,15 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
         end.set("sensor", 1.0);
         end.until("it comes back", |end| end.get("speed") == value + 1.0);
     }
-    assert_eq!(end.statistic("cpu").as_deref(), Some("run"));
+    assert_eq!(end.statistic("cpu"), "run");
     cpu.tell("stop");
     end.until("it is in STOP", |end| {
         end.driver.link().cause.name() == "stopped" && end.get("speed") == -1.0
     });
-    assert_eq!(end.statistic("cpu").as_deref(), Some("stop"));
+    assert_eq!(end.statistic("cpu"), "stop");
     cpu.tell("run");
     end.until("it runs again", |end| end.get("speed") == 72.0);
-    end.driver.close();
+    end.end.driver.close();
     // A WORD, a bit that was 0 in 0xEE, and a REAL of 1.5.
     assert_eq!(cpu.end(), "changed 2 3 20 40 41 42 43\n");
     Ok(())
@@ -358,7 +329,7 @@ fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
         end.tick();
         controller.get("position") == -2.0
     });
-    controller.driver.close();
+    controller.end.driver.close();
 
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s7.pcap");

@@ -15,16 +15,12 @@
 mod common;
 
 use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
-use std::sync::Arc;
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use common::{address, assert_all_explained, count, rest, statistic};
-use socket2::SockRef;
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
-use tickbus::time::{Monotonic, Nanos};
+use common::{address, assert_all_explained, count, eventually, rest, statistic};
+use tickbus::time::Nanos;
 use tickbus_test_log as logged;
 
 const CONFIG: &str = r#"
@@ -89,8 +85,7 @@ impl Death {
 
 /// One life of a peer: flat out for `span`, then its death. Gives how many records were answered.
 fn live(address: SocketAddr, span: Duration, death: Death) -> u64 {
-    let mut stream = TcpStream::connect(address).expect("the device listens");
-    stream.set_nodelay(true).expect("a socket option");
+    let mut stream = common::connect(address);
     let end = Instant::now() + span;
     let mut record = [0; RECORD];
     let mut answer = [0; ANSWER];
@@ -103,12 +98,7 @@ fn live(address: SocketAddr, span: Duration, death: Death) -> u64 {
     }
     match death {
         Death::Close => {}
-        Death::Reset => {
-            // Unread bytes would also cause a reset; this does it at once.
-            let socket = SockRef::from(&stream);
-            let linger = Some(Duration::ZERO);
-            socket.set_linger(linger).expect("a socket option");
-        }
+        Death::Reset => common::reset(&stream),
         Death::Half => stream
             .write_all(&record[..RECORD / 2])
             .expect("the device reads"),
@@ -125,9 +115,7 @@ fn live(address: SocketAddr, span: Duration, death: Death) -> u64 {
 fn a_device_outlives_all_peers() {
     let end = common::end();
     let _logged = logged::Watch::new();
-    let clock = Monotonic::shared();
-    let config = Config::parse("soak.cfg", CONFIG).unwrap_or_else(|why| panic!("{why}"));
-    let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+    let driver = common::open(CONFIG);
     let mut slots = driver.initial_slots();
     let address = address(&driver);
 
@@ -169,11 +157,9 @@ fn a_device_outlives_all_peers() {
     println!("soak: lives {lives:?}, records {answered}, before {before:?}, after {after:?}");
     assert_eq!(before, Some(after), "something piles up");
 
-    let limit = Instant::now() + Duration::from_secs(10);
-    while statistic(&driver, "state").as_deref() != Some("opening") {
-        assert!(Instant::now() < limit, "{}", driver.statistics());
-        std::thread::yield_now();
-    }
+    eventually("the last peer is noticed to be gone", || {
+        statistic(&driver, "state").filter(|state| state == "opening")
+    });
     println!("{}", driver.statistics());
     let total: u64 = lives.iter().sum();
     assert_eq!(

@@ -16,17 +16,14 @@
 mod common;
 
 use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
-use std::sync::Arc;
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use common::{address, assert_all_explained, rest};
-use socket2::SockRef;
+use common::{address, assert_all_explained, eventually, rest};
 use tickbus::driver::{Code, Driver};
-use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
-use tickbus::time::{Monotonic, Nanos};
+use tickbus::time::Nanos;
 
 const SIGNALS: &str = r#"
 [[signal]]
@@ -52,9 +49,7 @@ fn open(fieldbus: &str) -> (Driver, Vec<Slot>) {
     let text = format!(
         "[driver]\nid = 1\nname = \"soak\"\n[fieldbus]\n{fieldbus}\nmax_age = \"500ms\"\n{SIGNALS}"
     );
-    let config = Config::parse("soak.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared();
-    let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+    let driver = common::open(&text);
     let slots = driver.initial_slots();
     (driver, slots)
 }
@@ -72,10 +67,7 @@ const DEATHS: [Death; 4] = [Death::Close, Death::Reset, Death::Half, Death::Nons
 
 /// A connection that sends `telegram`, receives at least one byte if `answered`, and dies.
 fn say(address: SocketAddr, telegram: &[u8], answered: bool, death: Death) {
-    let mut stream = TcpStream::connect(address).expect("the server listens");
-    stream.set_nodelay(true).expect("a socket option");
-    let limit = Some(Duration::from_secs(20));
-    stream.set_read_timeout(limit).expect("a socket option");
+    let mut stream = common::connect(address);
     stream.write_all(telegram).expect("the server reads");
     if answered {
         let heard = stream.read(&mut [0; 1024]).expect("the server answers");
@@ -83,11 +75,7 @@ fn say(address: SocketAddr, telegram: &[u8], answered: bool, death: Death) {
     }
     match death {
         Death::Close => {}
-        Death::Reset => {
-            let linger = Some(Duration::ZERO);
-            let socket = SockRef::from(&stream);
-            socket.set_linger(linger).expect("a socket option");
-        }
+        Death::Reset => common::reset(&stream),
         // Sending may fail if the server has already disconnected it.
         Death::Half => drop(stream.write_all(&telegram[..telegram.len() / 2])),
         Death::Nonsense => drop(stream.write_all(&[0xA5; 300])),
@@ -110,11 +98,9 @@ fn modbus_clients(address: SocketAddr) {
 
 /// Exchanges until a client of ours has fresh data from its server.
 fn until_fresh(client: &mut Driver, slots: &mut [Slot]) {
-    let limit = Instant::now() + Duration::from_secs(30);
-    while client.exchange(Nanos::ZERO, slots).code != Code::Fresh {
-        assert!(Instant::now() < limit, "{}", client.statistics());
-        std::thread::sleep(Duration::from_millis(1));
-    }
+    eventually("the client has fresh data", || {
+        (client.exchange(Nanos::ZERO, slots).code == Code::Fresh).then_some(())
+    });
 }
 
 /// A COTP connect request to rack 0, slot 1.

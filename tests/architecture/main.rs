@@ -111,12 +111,11 @@ fn the_picture_of_the_rooms_is_that_of_their_manifests() {
 #[test]
 fn an_arrow_that_others_imply_is_not_drawn() {
     let manifest = |uses: &[&str]| {
-        let lines: String = uses
-            .iter()
-            .map(|name| format!("tickbus-{name}.workspace = true\n"))
-            .collect();
+        let uses = uses.iter().fold(String::new(), |lines, name| {
+            lines + "tickbus-" + name + ".workspace = true\n"
+        });
         format!(
-            "[package]\n[dependencies]\nlog = 1\n{lines}[dev-dependencies]\ntickbus-top.workspace = true\n"
+            "[package]\n[dependencies]\nlog = 1\n{uses}[dev-dependencies]\ntickbus-top.workspace = true\n"
         )
     };
     let crates = [

@@ -1,114 +1,109 @@
-//! The machine in front of a program that somebody else wrote: a driver with its signals by name.
+//! The machine in front of a program that somebody else wrote: a driver in real time, with its signals by name.
 
 use std::io::Read;
 use std::net::SocketAddr;
+use std::ops::{Deref, DerefMut};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
-use tickbus::signal::Slot;
-use tickbus::time::{Clock, Monotonic, Nanos};
-use tickbus_test_log as logged;
+use tickbus::time::{Clock, Monotonic};
+use tickbus_conformance::rig::{End, PATIENCE, patiently};
 
 use super::recorder::Recorder;
 
-/// Programs that start slowly, such as a JVM on a busy machine, are waited for so long.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// The signals at both ends of most tests.
+pub const SIGNALS: &str = r#"
+[[signal]]
+name    = "run"
+address = "%QX0.0"
+latch   = "rising"
 
-/// An open driver.
+[[signal]]
+name      = "speed"
+address   = "%QW2"
+type      = "INT"
+fail_safe = -1
+
+[[signal]]
+name    = "torque"
+address = "%QD4"
+type    = "REAL"
+
+[[signal]]
+name    = "sensor"
+address = "%IX0.0"
+
+[[signal]]
+name    = "position"
+address = "%IW2"
+type    = "INT"
+
+[[signal]]
+name    = "pressure"
+address = "%ID4"
+type    = "REAL"
+"#;
+
+/// A driver, and what takes down its sessions.
 pub struct Machine {
-    pub driver: Driver,
-    pub slots: Vec<Slot>,
+    pub end: End,
     text: String,
     recorder: Option<Recorder>,
-    _logged: logged::Watch,
+}
+
+impl Deref for Machine {
+    type Target = End;
+
+    fn deref(&self) -> &End {
+        &self.end
+    }
+}
+
+impl DerefMut for Machine {
+    fn deref_mut(&mut self) -> &mut End {
+        &mut self.end
+    }
 }
 
 impl Machine {
     /// Opens the driver of a driver.cfg, in real time.
     #[track_caller]
     pub fn open(text: &str) -> Self {
-        Self::open_on(Monotonic::shared(), text)
+        Self::open_on(&Monotonic::shared(), text)
     }
 
     #[track_caller]
-    pub fn open_on<C: Clock + 'static>(clock: Arc<C>, text: &str) -> Self {
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
-        let logged = logged::Watch::new();
-        let driver = Driver::open(config, clock as _).expect("opens");
-        let slots = driver.initial_slots();
+    pub fn open_on<C: Clock + 'static>(clock: &Arc<C>, text: &str) -> Self {
         Self {
-            driver,
-            slots,
+            end: End::open(text, clock),
             text: text.to_owned(),
             recorder: None,
-            _logged: logged,
         }
     }
 
-    #[track_caller]
-    fn index(&self, name: &str) -> usize {
-        let found = self.driver.config().table.position(name);
-        found.unwrap_or_else(|| panic!("no signal {name}"))
-    }
-
-    #[track_caller]
-    pub fn get(&self, name: &str) -> f64 {
-        self.slots[self.index(name)].real()
-    }
-
-    #[track_caller]
-    pub fn set(&mut self, name: &str, value: f64) {
-        let index = self.index(name);
-        self.slots[index] = Slot::from_real(value);
-    }
-
     pub fn tick(&mut self) {
-        self.driver.exchange(Nanos::ZERO, &mut self.slots);
+        self.end.tick();
         if let Some(recorder) = &self.recorder {
-            recorder.ticked(&self.slots);
+            recorder.ticked(&self.end.slots);
         }
     }
 
     /// Ticks until `done` gives something.
     #[track_caller]
     pub fn until_some<T>(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> Option<T>) -> T {
-        let limit = Instant::now() + PATIENCE;
-        loop {
+        let found = patiently(|| {
             self.tick();
-            if let Some(found) = done(self) {
-                return found;
-            }
-            assert!(
-                Instant::now() < limit,
-                "waited in vain until {what}\n{}",
-                self.driver.statistics()
-            );
-            std::thread::sleep(Duration::from_millis(1));
-        }
+            done(self)
+        });
+        found.unwrap_or_else(|| panic!("in vain until {what}\n{}", self.driver.statistics()))
     }
 
     /// Ticks until `done` holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
         self.until_some(what, |machine| done(machine).then_some(()));
-    }
-
-    pub fn statistic(&self, key: &str) -> Option<String> {
-        let text = self.driver.statistics();
-        let mut lines = text.lines();
-        lines.find_map(|line| line.strip_prefix(&format!("{key}=")).map(str::to_owned))
-    }
-
-    /// Where it listens.
-    #[track_caller]
-    pub fn address(&mut self) -> SocketAddr {
-        self.until_some("it listens", |machine| {
-            let address = machine.statistic("address")?;
-            Some(address.parse().expect("an address"))
-        })
     }
 
     /// Where a foreign client finds it: where it listens, or a tap before that which takes down the session `name`
@@ -139,26 +134,31 @@ impl Machine {
             .stderr(Stdio::piped())
             .spawn()
             .expect("it starts");
-        let limit = Instant::now() + PATIENCE;
-        let status = loop {
-            if let Some(status) = child.try_wait().expect("it is ours") {
-                break status;
+        let out: Box<dyn Read + Send> = Box::new(child.stdout.take().expect("a pipe"));
+        let errors: Box<dyn Read + Send> = Box::new(child.stderr.take().expect("a pipe"));
+        let (sender, output) = channel();
+        for mut pipe in [out, errors] {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                let mut text = String::new();
+                let _ = pipe.read_to_string(&mut text);
+                let _ = sender.send(text);
+            });
+        }
+        drop(sender);
+        let (mut told, limit) = (String::new(), Instant::now() + PATIENCE);
+        // Both pipes are closed when it ends.
+        loop {
+            match output.recv_timeout(Duration::from_millis(1)) {
+                Ok(text) => told += &text,
+                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout) if Instant::now() > limit => drop(child.kill()),
+                Err(RecvTimeoutError::Timeout) => step(self),
             }
-            if Instant::now() > limit {
-                let _ = child.kill();
-            }
-            step(self);
-            std::thread::sleep(Duration::from_millis(1));
-        };
-        let mut told = String::new();
-        let (out, errors) = (child.stdout.take(), child.stderr.take());
-        let _ = out.expect("a pipe").read_to_string(&mut told);
-        let _ = errors.expect("a pipe").read_to_string(&mut told);
-        assert!(
-            status.success(),
-            "{status}: {told}\n{}",
-            self.driver.statistics()
-        );
+        }
+        let status = child.wait().expect("it is ours");
+        let statistics = self.driver.statistics();
+        assert!(status.success(), "{status}: {told}\n{statistics}");
         told
     }
 }

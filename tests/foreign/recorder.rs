@@ -2,8 +2,8 @@
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::time::Duration;
 
 use tickbus::fieldbus::Role;
 use tickbus::signal::{Area, Slot};
@@ -15,8 +15,7 @@ use super::session::{Session, Step};
 /// The variable that names the folder for sessions.
 const VARIABLE: &str = "TICKBUS_RECORD_SESSIONS";
 
-/// So many ticks after a request came, the machine has finished the turn in which it came, and has made another one:
-/// it has seen what was written before, and has answered to it. So an answer does not hang on how fast anybody was.
+/// After this many ticks the machine has finished the turn in which a request came, and has made another one: it has seen what was written before, and has answered to it. So an answer does not hang on how fast anybody was.
 const TICKS: u64 = 4;
 
 /// A recorder; the session is written when it is dropped, unless the test has failed.
@@ -24,7 +23,13 @@ pub struct Recorder {
     file: PathBuf,
     client: String,
     config: String,
-    heard: Arc<Mutex<Notes>>,
+    heard: Arc<Shared>,
+}
+
+/// What the threads of the tap and the machine write.
+struct Shared {
+    notes: Mutex<Notes>,
+    ticked: Condvar,
 }
 
 struct Notes {
@@ -62,25 +67,27 @@ impl Recorder {
             let value = slot.real();
             (signal.name.clone(), signal.area == own, value, value)
         });
-        let heard = Arc::new(Mutex::new(Notes {
-            steps: Vec::new(),
-            signals: signals.collect(),
-            ticks: 0,
-        }));
+        let heard = Arc::new(Shared {
+            notes: Mutex::new(Notes {
+                steps: Vec::new(),
+                signals: signals.collect(),
+                ticks: 0,
+            }),
+            ticked: Condvar::new(),
+        });
         let notes = Arc::clone(&heard);
         let address = listen_before(server, move |connection, it| match it {
             Heard::Said(From::Client, bytes) => {
-                wait(&notes);
-                let mut notes = notes.lock().expect("nobody panics");
+                let mut notes = notes.lock_after_ticks();
                 notes.look();
                 notes.hear(connection, From::Client, bytes);
             }
             Heard::Said(From::Server, bytes) => {
-                let mut notes = notes.lock().expect("nobody panics");
+                let mut notes = notes.lock();
                 notes.hear(connection, From::Server, bytes);
             }
             Heard::Left => {
-                let mut notes = notes.lock().expect("nobody panics");
+                let mut notes = notes.lock();
                 notes.steps.push(Step::Leaves(connection));
             }
         });
@@ -95,20 +102,29 @@ impl Recorder {
 
     /// The machine has ticked, with these values.
     pub fn ticked(&self, slots: &[Slot]) {
-        let mut notes = self.heard.lock().expect("nobody panics");
+        let mut notes = self.heard.lock();
         notes.ticks += 1;
         for ((_, _, value, _), slot) in notes.signals.iter_mut().zip(slots) {
             *value = slot.real();
         }
+        self.heard.ticked.notify_all();
     }
 }
 
-/// Waits until the machine has ticked often enough; not for ever, as it may have been closed.
-fn wait(notes: &Mutex<Notes>) {
-    let ticks = || notes.lock().expect("nobody panics").ticks;
-    let (enough, limit) = (ticks() + TICKS, Instant::now() + Duration::from_secs(2));
-    while ticks() < enough && Instant::now() < limit {
-        std::thread::sleep(Duration::from_micros(200));
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Notes> {
+        self.notes.lock().expect("nobody panics")
+    }
+
+    /// Waits until the machine has ticked often enough; not for ever, as it may have been closed.
+    fn lock_after_ticks(&self) -> MutexGuard<'_, Notes> {
+        let notes = self.lock();
+        let enough = notes.ticks + TICKS;
+        let limit = Duration::from_secs(2);
+        let waited = self
+            .ticked
+            .wait_timeout_while(notes, limit, |notes| notes.ticks < enough);
+        waited.expect("nobody panics").0
     }
 }
 
@@ -147,7 +163,7 @@ impl Drop for Recorder {
         if std::thread::panicking() {
             return;
         }
-        let mut notes = self.heard.lock().expect("nobody panics");
+        let mut notes = self.heard.lock();
         notes.look();
         let mut steps = std::mem::take(&mut notes.steps);
         for step in &mut steps {

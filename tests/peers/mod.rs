@@ -86,16 +86,9 @@ impl Alone {
         Self { clock, end }
     }
 
-    /// The address that it listens on, from its statistics.
+    /// Where it listens.
     pub fn address(&self) -> SocketAddr {
-        let mut address = None;
-        await_that("it listens", || {
-            let text = self.end.driver.statistics();
-            let line = text.lines().find_map(|line| line.strip_prefix("address="));
-            address = line.map(|line| line.parse().expect("an address"));
-            address.is_some()
-        });
-        address.expect("it was waited for")
+        self.end.address()
     }
 
     /// Lets cycles pass, and ticks, until `done` holds.

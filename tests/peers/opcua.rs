@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tickbus::time::Monotonic;
 
-use crate::conformance::rig::{End, await_that, logged};
+use crate::conformance::rig::{End, logged, patiently};
 use crate::foreign::{self, Absent};
 
 pub const SIGNALS: &str = r#"
@@ -185,18 +185,20 @@ impl Device {
         self.folder.path().join("pki")
     }
 
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.end.address()
+    }
+
+    /// Ticks until `done` holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
-        let mut reason = String::new();
-        let waited = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            await_that(what, || {
-                self.end.tick();
-                reason = self.end.link().reason;
-                std::thread::sleep(std::time::Duration::from_millis(1));
-                done(&mut self.end)
-            });
-        }));
-        assert!(waited.is_ok(), "in vain until {what}: {reason}");
+        let found = patiently(|| {
+            self.end.tick();
+            done(&mut self.end).then_some(())
+        });
+        let reason = || self.end.link().reason;
+        found.unwrap_or_else(|| panic!("in vain until {what}: {}", reason()));
     }
 
     #[track_caller]
@@ -211,16 +213,5 @@ impl Device {
             said
         });
         all
-    }
-
-    pub fn address(&self) -> SocketAddr {
-        let mut address = None;
-        await_that("it listens", || {
-            let text = self.end.driver.statistics();
-            let line = text.lines().find_map(|line| line.strip_prefix("address="));
-            address = line.map(|line| line.parse().expect("an address"));
-            address.is_some()
-        });
-        address.expect("it was waited for")
     }
 }

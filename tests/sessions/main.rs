@@ -36,7 +36,7 @@ fn sessions() -> Vec<(String, Session)> {
 
 /// Says what the client said, on a clock that stands still.
 fn replay(session: &Session) -> Result<(), String> {
-    let mut machine = Machine::open_on(Manual::new(), &session.config);
+    let mut machine = Machine::open_on(&Manual::new(), &session.config);
     let address = machine.address();
     let mut clients = BTreeMap::new();
     for (number, step) in session.steps.iter().enumerate() {

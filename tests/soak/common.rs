@@ -1,10 +1,15 @@
 //! What the soaks share: how long they last, what they ask a driver, and what must not have happened to it.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use socket2::SockRef;
 use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
+use tickbus::time::Monotonic;
 pub use tickbus_conformance::resources::Resources;
+pub use tickbus_conformance::rig::{address, eventually, statistic};
 
 /// When it is over: some seconds from now, or what `make soak` asks for.
 pub fn end() -> Instant {
@@ -14,36 +19,38 @@ pub fn end() -> Instant {
     Instant::now() + Duration::from_secs(seconds)
 }
 
-pub fn statistic(driver: &Driver, key: &str) -> Option<String> {
-    let text = driver.statistics();
-    let found = text
-        .lines()
-        .find_map(|line| line.strip_prefix(&format!("{key}=")));
-    found.map(str::to_owned)
+/// Opens the driver of a driver.cfg, in real time.
+pub fn open(text: &str) -> Driver {
+    let config = Config::parse("soak.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    Driver::open(config, Monotonic::shared() as Arc<Monotonic>).expect("opens")
+}
+
+/// A connection as the peer of a driver.
+pub fn connect(address: SocketAddr) -> TcpStream {
+    let stream = TcpStream::connect(address).expect("it listens");
+    stream.set_nodelay(true).expect("a socket option");
+    let limit = Some(Duration::from_secs(20));
+    stream.set_read_timeout(limit).expect("a socket option");
+    stream
+}
+
+/// Lets a connection end by a reset; unread bytes would cause one as well, but not at once.
+pub fn reset(stream: &TcpStream) {
+    let socket = SockRef::from(stream);
+    let at_once = Some(Duration::ZERO);
+    socket.set_linger(at_once).expect("a socket option");
 }
 
 pub fn count(driver: &Driver, key: &str) -> u64 {
     statistic(driver, key).map_or(0, |text| text.parse().expect("a count"))
 }
 
-/// Where it listens.
-pub fn address(driver: &Driver) -> SocketAddr {
-    let limit = Instant::now() + Duration::from_secs(20);
-    loop {
-        if let Some(address) = statistic(driver, "address") {
-            return address.parse().expect("an address");
-        }
-        assert!(Instant::now() < limit, "{}", driver.statistics());
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
-
 /// What the process holds when the last peer is forgotten.
 pub fn rest() -> Resources {
-    Resources::settled(|| std::thread::sleep(Duration::from_millis(5)))
+    Resources::settled(|| {})
 }
 
-/// A sign of life for whoever watches a soak of hours.
+/// A sign of life in a soak of hours.
 pub struct Told(Instant);
 
 impl Told {

@@ -2,6 +2,7 @@
 
 pub use tickbus_test_log as logged;
 
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -105,19 +106,34 @@ impl End {
 
     #[track_caller]
     pub fn statistic(&self, key: &str) -> String {
-        let text = self.driver.statistics();
-        let found = text
-            .lines()
-            .find_map(|line| line.strip_prefix(&format!("{key}=")));
-        found
-            .unwrap_or_else(|| panic!("no {key} in {text}"))
-            .to_owned()
+        let found = statistic(&self.driver, key);
+        found.unwrap_or_else(|| panic!("no {key} in {}", self.driver.statistics()))
+    }
+
+    /// Where it listens.
+    #[track_caller]
+    pub fn address(&self) -> SocketAddr {
+        address(&self.driver)
     }
 
     /// State, cause and reason of the line.
     pub fn link(&self) -> Link {
         self.driver.link()
     }
+}
+
+/// What the statistics of a driver say under `key`.
+pub fn statistic(driver: &Driver, key: &str) -> Option<String> {
+    let text = driver.statistics();
+    let mut lines = text.lines();
+    lines.find_map(|line| line.strip_prefix(&format!("{key}=")).map(str::to_owned))
+}
+
+/// Where a driver listens, once it does.
+#[track_caller]
+pub fn address(driver: &Driver) -> SocketAddr {
+    let address = eventually("it listens", || statistic(driver, "address"));
+    address.parse().expect("an address")
 }
 
 /// A bus, with everything the suite needs to know about it.
@@ -251,4 +267,26 @@ pub fn await_that(what: &str, mut done: impl FnMut() -> bool) {
         assert!(Instant::now() < limit, "waited 20 s in vain until {what}");
         std::thread::yield_now();
     }
+}
+
+/// How long [`patiently`] waits: programs may start slowly, such as a JVM on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Polls every millisecond until `done` gives something, or in vain: for real time, and for what another process does
+/// without an event that this one could wait for.
+pub fn patiently<T>(mut done: impl FnMut() -> Option<T>) -> Option<T> {
+    let limit = Instant::now() + PATIENCE;
+    loop {
+        let found = done();
+        if found.is_some() || Instant::now() > limit {
+            return found;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// The same; in vain is a failure, which says `what` it waited for.
+#[track_caller]
+pub fn eventually<T>(what: &str, done: impl FnMut() -> Option<T>) -> T {
+    patiently(done).unwrap_or_else(|| panic!("waited {PATIENCE:?} in vain until {what}"))
 }

@@ -90,7 +90,7 @@ extern "C" {
 #define TICKBUS_E_REFUSED (-3)
 /* The options in the driver.cfg are wrong; say in last_error which one, and what would be right. */
 #define TICKBUS_E_CONFIG (-4)
-/* The library cannot do what is asked for: this role, these sizes, so many stations. */
+/* The library cannot do what is asked for: this role, these sizes, this number of stations. */
 #define TICKBUS_E_UNSUPPORTED (-5)
 /* tickbus_exchange only: the peer took its leave in good order. This one error leaves the bus open: people
  * are told, and the host goes on exchanging until the next peer comes. */

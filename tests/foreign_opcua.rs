@@ -67,7 +67,7 @@ fn main() -> std::process::ExitCode {
             served::ages_apart,
         ),
         (
-            "a_client_that_reads_stays_connected_whoever_leaves",
+            "a_client_that_reads_stays_connected_when_another_leaves",
             served::undisturbed,
         ),
         (

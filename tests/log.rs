@@ -92,7 +92,10 @@ fn ticks_statistics_and_closing_go_on_though_nobody_reads_stderr() {
         if let Some(status) = child.0.try_wait().expect("it was started") {
             break status;
         }
-        assert!(Instant::now() < limit, "it waits for whoever reads stderr");
+        assert!(
+            Instant::now() < limit,
+            "it is held up by a stderr that nobody reads"
+        );
         std::thread::yield_now();
     };
     let mut told = String::new();

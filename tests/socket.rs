@@ -96,7 +96,7 @@ fn a_peer_that_leaves_within_a_record_is_told_by_its_bytes() {
     leave(peer);
     let cause = device.until_reason("left in the middle of a record: 4 of 6 bytes had come");
     assert_eq!(cause, "protocol");
-    assert_eq!(device.end.get("speed"), 7.0, "half a record is none");
+    assert_eq!(device.end.get("speed"), 7.0, "half a record does not count");
     assert_eq!(device.end.link().state, LinkState::Opening);
 }
 

@@ -46,7 +46,7 @@ struct tickbus_bus {
     uint32_t out_size;
     /* The session of the requests: the controller's own, or that of the controller last heard. */
     uint32_t session;
-    /* The newest request: sent by the controller, or received by the device. 0 is none. */
+    /* The newest request: sent by the controller, or received by the device. 0 before the first. */
     uint32_t sequence;
     /* Controller: the newest answer that came. Device: the request that first got the present image. */
     uint32_t settled;
@@ -211,7 +211,7 @@ static int32_t receive(tickbus_bus *bus, uint32_t kind, struct sockaddr_in *from
                 return NOTHING;
             return fail(bus->error, TICKBUS_E_LINK, "the socket cannot be read: %s", strerror(errno));
         }
-        /* Anybody may send to a UDP port; what is not of this protocol is none of our business. */
+        /* Anybody may send to a UDP port; datagrams of other protocols are ignored. */
         if (got < HEADER || word(bus->receiving, 0) != MAGIC)
             continue;
         if (word(bus->receiving, 1) == BYE && word(bus->receiving, 2) == bus->session && bus->sequence != 0) {

@@ -1,7 +1,7 @@
 /* What a shared object with a PLC program shows to tickbus: one table, under one name.
  *
- * tickbus_plc.c fills it for a program that the IEC 61131-3 compiler iec2c has made. Whoever writes a program
- * in another language can fill it by hand. All times are nanoseconds unless the name says otherwise.
+ * tickbus_plc.c fills it for a program that the IEC 61131-3 compiler iec2c has made; programs
+ * in other languages can fill it by hand. All times are nanoseconds unless the name says otherwise.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */

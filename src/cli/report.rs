@@ -25,7 +25,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
 
-    /// The signal whose values are numbers of steps; 0 is none.
+    /// The signal whose values are numbers of steps; 0 means no step.
     #[arg(long, value_name = "SIGNAL")]
     steps: Option<String>,
 

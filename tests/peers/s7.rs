@@ -118,7 +118,7 @@ impl Bus for Pair {
             ),
             (
                 "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%M\" }]",
-                "is none of the areas",
+                "is not one of the areas",
             ),
             (
                 "kind = \"s7-server\"\ndb = [{ number = 1, area = \"%Q\", offset = 1 }]",

@@ -3,7 +3,7 @@
  * It is an echo: `out` is `in`, as far as both reach. The rest is misbehaviour:
  *
  *   open, exchange, close = WHAT    what that function does instead; see misbehave()
- *   good    = N       so many exchanges are good before that
+ *   good    = N       the first N exchanges are good
  *   once    = PATH    misbehaves only if it can make this file, so once
  *   text    = WHAT    last_error: "null", "empty", "invalid" (no UTF-8), "lines", "long", or itself
  *   release = PATH    a hung call returns when this file is there

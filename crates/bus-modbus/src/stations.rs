@@ -31,7 +31,7 @@ pub struct Stations {
     units: Units,
     /// The keys in `[fieldbus]`.
     common: Keys,
-    /// The keys in the `[[station]]` tables, with their offsets; empty if there are none.
+    /// The keys in the `[[station]]` tables, with their offsets; empty without such tables.
     own: Vec<(Keys, usize)>,
 }
 

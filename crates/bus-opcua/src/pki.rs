@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! pki/own/tickbus-4711.der      the certificate of the driver with id 4711: for peers to trust
-//! pki/private/tickbus-4711.pem  its key: for nobody else
+//! pki/private/tickbus-4711.pem  its key, readable by its owner alone
 //! pki/trusted/                  certificates of peers that are trusted
 //! pki/rejected/                 those that are not; move one to trusted to trust it
 //! ```
@@ -155,7 +155,9 @@ impl Pki {
         let refused = |text: String| Err(BusError::Refused(text));
         let certificate = match X509::from_byte_string(certificate) {
             Ok(certificate) => certificate,
-            Err(error) => return refused(format!("the server's certificate is none ({error})")),
+            Err(error) => {
+                return refused(format!("the server's certificate cannot be read ({error})"));
+            }
         };
         let mut store = CertificateStore::new(&self.folder);
         store.set_trust_unknown_certs(self.trust == Trust::Any);

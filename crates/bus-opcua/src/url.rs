@@ -17,7 +17,7 @@ const SCHEME: &str = "opc.tcp://";
 pub struct Url {
     /// Host and port.
     pub address: Address,
-    /// The path with its slash; empty if there is none.
+    /// The path with its slash; empty for a URL without a path.
     pub path: String,
 }
 

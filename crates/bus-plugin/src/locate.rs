@@ -9,7 +9,7 @@ use tickbus_base::os;
 /// The variable that names the command.
 const VARIABLE: &str = "TICKBUS_HELPER";
 
-/// A place to look in: its description, and the file, or why there is none.
+/// Where the command may be: a description, and its path, or why there is no path.
 type Candidate = (&'static str, Result<PathBuf, String>);
 
 /// The tickbus command.

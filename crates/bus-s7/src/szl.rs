@@ -47,7 +47,7 @@ impl Identity {
 /// The contents of a server's lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Facts {
-    /// Who it is.
+    /// How it identifies itself.
     pub identity: Identity,
     /// The longest unit that it agrees to.
     pub pdu: u16,

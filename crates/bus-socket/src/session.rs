@@ -33,9 +33,9 @@ pub struct SessionParameters {
     pub min_interval: Nanos,
     /// Data older than this are stale. Positive.
     pub max_age: Nanos,
-    /// Size of an incoming record, in bytes; 0 if there are none.
+    /// Size of an incoming record, in bytes; 0 if none come in.
     pub receives: usize,
-    /// Size of an outgoing record, in bytes; 0 if there are none.
+    /// Size of an outgoing record, in bytes; 0 if none go out.
     pub sends: usize,
 }
 
@@ -232,7 +232,7 @@ impl Session {
         }
     }
 
-    /// The bytes to be written; empty if there are none.
+    /// The bytes to be written, if any.
     pub fn to_write(&self) -> &[u8] {
         match self.outbox.waiting_since {
             Some(_) => &self.outbox.record[self.outbox.written..],
@@ -357,7 +357,7 @@ impl Session {
         now - self.inbox.heard.unwrap_or(self.began)
     }
 
-    /// Whether the peer has been silent for so long that its data are stale.
+    /// Whether the peer has been silent for longer than `max_age`, so that its data are stale.
     pub fn is_stale(&self, now: Nanos) -> bool {
         self.silence(now) > self.terms.max_age
     }

@@ -140,11 +140,14 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
         });
     }
     assert_eq!((run, sensor), (10.0, 10.0));
-    rig.until("who only receives lets the watchdog bite", |rig| {
-        rig.device.receive();
-        rig.controller.tick();
-        rig.controller.get("position") == 77.0
-    });
+    rig.until(
+        "the watchdog trips although the simulation receives",
+        |rig| {
+            rig.device.receive();
+            rig.controller.tick();
+            rig.controller.get("position") == 77.0
+        },
+    );
     let (clock, mut device) = rig.alone();
     await_that("the data are stale", || {
         pass(&clock, 1);

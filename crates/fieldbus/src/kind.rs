@@ -54,7 +54,7 @@ pub trait BusOptions {
     ///
     /// # Errors
     ///
-    /// The driver.cfg asks for what is not there, or not in this build.
+    /// The driver.cfg asks for something that does not exist, or is not in this build.
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError>;
 
     /// The default bus cycle; `None` for a bus whose peer sets the cycle.

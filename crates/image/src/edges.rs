@@ -288,8 +288,8 @@ impl PulseShaper {
     /// [`pass`](Self::pass).
     #[inline]
     pub fn needs_shaping(&self, edges: &[u32]) -> bool {
-        // Where there are none, nothing is compared: to compare no bytes at all is a look at an address that nobody has,
-        // and takes longer than all else in a tick on processors with masked loads.
+        // Without latched signals nothing is compared: comparing zero bytes reads at a dangling address, and on processors
+        // with masked loads that takes longer than the rest of a tick.
         self.busy || (!self.words.is_empty() && *edges != *self.counts)
     }
 

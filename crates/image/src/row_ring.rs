@@ -105,8 +105,8 @@ impl RowWriter {
 }
 
 impl RowReader {
-    /// Copies the oldest row into `words`, which must be one row long, and frees its place; false if there
-    /// is none.
+    /// Copies the oldest row into `words`, which must be one row long, and frees its place; false if the ring is
+    /// empty.
     pub fn take(&mut self, words: &mut [u64]) -> bool {
         let shared = &*self.shared;
         let taken = shared.taken.load(Ordering::Relaxed);

@@ -246,7 +246,7 @@ fn damage_is_told_with_its_place() {
             Format::Vcd,
             "#1000000\n",
             "#1000000\nr1 !\n",
-            "the value of \"!\" is none of its kind",
+            "the value of \"!\" does not fit its type",
         ),
         (
             Format::Vcd,

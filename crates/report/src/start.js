@@ -101,7 +101,7 @@ function begin() {
   want(run.signals.map((_, number) => number));
 }
 
-/** For whoever wants the data: a signal's name, times in nanoseconds of simulation time, and values. */
+/** The data, for other programs: a signal's name, times in nanoseconds of simulation time, and values. */
 window.tickbusReport = {
   signals: run.signals.map(({ name }) => name),
   async changes(number) {

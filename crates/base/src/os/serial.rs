@@ -146,8 +146,8 @@ mod unix {
     }
 
     impl Read for SerialPort {
-        /// Reads the bytes received so far; [`WouldBlock`](io::ErrorKind::WouldBlock) when there are none, 0
-        /// when the port is gone.
+        /// Reads what has arrived. Fails with [`WouldBlock`](io::ErrorKind::WouldBlock) if nothing has; returns 0 once
+        /// the port is gone.
         fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
             self.0.read(bytes)
         }

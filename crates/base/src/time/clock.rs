@@ -111,7 +111,7 @@ impl Manual {
     /// Sets the clock to `now`; a clock never runs backwards, so an earlier time changes nothing.
     pub fn set(&self, now: Nanos) {
         let now = Nanos(now.0.max(self.now.fetch_max(now.0, Ordering::SeqCst)));
-        // Whoever waits is counted before it looks at the time: it sees this one, or is seen here.
+        // A waiter adds itself to `waiting` before it reads `now`. So it either reads the new time, or is counted here.
         if self.waiting.load(Ordering::SeqCst) > 0 {
             self.wake(now);
         }

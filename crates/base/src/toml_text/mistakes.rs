@@ -39,7 +39,7 @@ impl Mistakes {
 
     /// These mistakes of `file`, in the order given. The list must not be empty.
     pub fn of_list(file: &str, list: Vec<PlacedMistake>) -> Self {
-        debug_assert!(!list.is_empty(), "no mistakes are none");
+        debug_assert!(!list.is_empty(), "the list is empty");
         Self {
             file: file.to_owned(),
             list,

@@ -371,7 +371,7 @@ impl<'a> Value<'a> {
             .map(|(_, chosen)| *chosen);
         if chosen.is_none() {
             self.wrong(
-                format!("\"{}\" is none of the {kinds}", shown(text)),
+                format!("\"{}\" is not one of the {kinds}", shown(text)),
                 did_you_mean(text, kinds, &names),
             );
         }

@@ -168,7 +168,7 @@ impl ClientSession {
         self.ask_list(now, STATE);
     }
 
-    /// The bytes to be written; empty if there are none.
+    /// The bytes to be written, if any.
     pub fn to_write(&self) -> &[u8] {
         &self.outbox
     }
@@ -390,7 +390,7 @@ impl ClientSession {
         Ok(Some(self.meet(Some(identity))))
     }
 
-    /// Starts the job with this index; returns news if there is none.
+    /// Starts the job with this index; after the last one, returns the event that the cycle is over.
     fn work(&mut self, now: Nanos, index: usize) -> Option<SessionEvent> {
         if index == self.traffic.jobs.len() {
             self.phase = Phase::Idle;

@@ -8,7 +8,7 @@ use tickbus_image::signal::Signal;
 pub(super) fn split(text: &str) -> Option<(f64, &str)> {
     const LONGEST: usize = 64;
     let text = text.trim();
-    // The longest prefix that is a number: in `2e3 mm` the `e` belongs to it, in `2 mm` there is none.
+    // The longest prefix that is a number: in `2e3 mm` the `e` belongs to it, in `2 mm` the unit follows the 2.
     let ends = text.char_indices().map(|(at, c)| at + c.len_utf8());
     let ends: Vec<usize> = ends.take(LONGEST).collect();
     let begins = |end: &usize| {

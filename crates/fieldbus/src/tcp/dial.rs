@@ -42,7 +42,7 @@ pub trait Caller {
     /// The connection may not go on.
     fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError>;
 
-    /// The bytes to be written at `now`; empty if there are none.
+    /// The bytes to be written at `now`, if any.
     fn to_write(&self, now: Nanos) -> &[u8];
 
     /// The system has accepted the first `count` bytes of [`to_write`](Self::to_write), at least one. More

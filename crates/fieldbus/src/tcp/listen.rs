@@ -42,7 +42,7 @@ pub fn listen(
     let bound = listener.local_addr().map_err(cannot)?;
     port.tell("address", &bound.to_string());
     if !bound.ip().is_loopback() {
-        log::info!("listening on {bound}: whoever reaches this machine there can be the peer");
+        log::info!("listening on {bound}: any computer that reaches this port can act as the peer");
     }
     Ok(Some((listener, bound)))
 }

@@ -26,7 +26,7 @@ pub fn close_gracefully(mut stream: &TcpStream) {
     }
 }
 
-/// Whether this is no failure, and the call has to be repeated when the socket is ready.
+/// Whether the call has not failed, but has to be repeated when the socket is ready.
 pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }

@@ -136,7 +136,7 @@ impl<R: BufRead> VcdReader<R> {
         };
         let wrong = || {
             ReadError::new(
-                format!("the value of \"{id}\" is none of its kind"),
+                format!("the value of \"{id}\" does not fit its type"),
                 RECORD_AGAIN,
             )
         };

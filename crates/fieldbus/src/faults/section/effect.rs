@@ -63,7 +63,10 @@ fn read_chance(keys: &Keys<'_>, usual: Option<f64>) -> Option<f64> {
     if chance > 0.0 && chance <= 1.0 {
         return Some(chance);
     }
-    value.wrong(format!("a chance of {} is none", value.written()), RIGHT);
+    value.wrong(
+        format!("a chance of {} is out of range", value.written()),
+        RIGHT,
+    );
     None
 }
 
@@ -219,7 +222,10 @@ fn read_noise(
     let amplitude = measure::of_value(value, signal)?;
     if amplitude <= 0.0 {
         value.wrong(
-            format!("an amplitude of {} is none", short_number(amplitude)),
+            format!(
+                "an amplitude of {} is out of range",
+                short_number(amplitude)
+            ),
             "write a number above 0",
         );
         return None;

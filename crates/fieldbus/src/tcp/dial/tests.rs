@@ -291,7 +291,7 @@ fn a_deadline_in_the_past_means_at_once() {
 }
 
 #[test]
-fn dialling_reaches_whoever_listens_and_says_who_that_is() {
+fn dialling_connects_and_tells_the_address_reached() {
     let (mut port, clock, status) = port();
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let bound = listener.local_addr().expect("it is bound");

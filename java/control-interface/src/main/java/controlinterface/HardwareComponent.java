@@ -8,7 +8,7 @@ import java.util.Objects;
  * @param name unique among the driver's components, never blank
  * @param direction who writes the value
  * @param type the value's type in the driver's own terms, such as {@code BOOL} or {@code INT}
- * @param unit physical unit, empty if there is none
+ * @param unit physical unit; empty for a number without a unit
  */
 public record HardwareComponent(String name, Direction direction, String type, String unit) {
     /**

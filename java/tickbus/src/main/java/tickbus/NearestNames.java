@@ -12,7 +12,7 @@ final class NearestNames {
     private NearestNames() {
     }
 
-    /** Text for a message: the most similar names, or nothing if there are none. */
+    /** Text for a message: the most similar names; empty if no name is similar. */
     static String hint(String wrong, List<String> names) {
         int tolerated = Math.max(2, wrong.length() / 3);
         List<String> near = names.stream()

@@ -205,7 +205,7 @@ public final class Signal {
     /**
      * The engineering unit.
      *
-     * @return empty if there is none
+     * @return empty for a signal without one
      */
     public String unit() {
         return entry.unit();

@@ -99,8 +99,8 @@ public final class Tickbus implements AutoCloseable {
     private int nextEvent;
     private int endOfEvents;
     /**
-     * The thread that the slots belong to; null if there is none. If a thread reads its own name here it has put it
-     * there itself, so that a plain comparison suffices on every tick except a thread's first.
+     * The thread that the slots belong to; null before the first tick and after a release. A thread that reads its own
+     * name here has put it there itself, so a plain comparison suffices on every tick except a thread's first.
      */
     private Thread ticker;
     private volatile boolean closed;
@@ -464,7 +464,7 @@ public final class Tickbus implements AutoCloseable {
         return total;
     }
 
-    /** Fetches events; false if there are none. */
+    /** Fetches events; false if nothing has happened. */
     private boolean takeEvents() {
         if (events == null) {
             events = new long[EVENTS * EVENT_WORDS];

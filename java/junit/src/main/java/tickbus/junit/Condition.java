@@ -208,7 +208,7 @@ public abstract class Condition {
         };
     }
 
-    /** Finds the signals; throws {@link IllegalArgumentException} with the nearest names if there are none. */
+    /** Finds the signals; throws {@link IllegalArgumentException} with the nearest names if one does not exist. */
     abstract Bound bind(Plc plc);
 
     private static Condition value(String signal, String expected, DoublePredicate holds) {

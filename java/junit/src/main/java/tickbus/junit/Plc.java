@@ -76,7 +76,7 @@ public final class Plc {
      *
      * @param name as in driver.cfg
      * @return always the same object
-     * @throws IllegalArgumentException if there is none; the message has the nearest names
+     * @throws IllegalArgumentException if no signal has that name; the message has the nearest ones
      */
     public Signal signal(String name) {
         return watch(name).signal();

@@ -70,7 +70,7 @@ final class EdgeAudit {
         final DoubleSupplier edges;
         private boolean high;
         private long count;
-        /** Rises of a signal to the PLC while there is none, and when the last one was. */
+        /** Rises of a signal to the PLC while the PLC is down, and when the last one was. */
         private int pending;
         private long pendingAt;
 

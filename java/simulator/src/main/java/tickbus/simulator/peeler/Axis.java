@@ -48,7 +48,7 @@ final class Axis {
     private double torque;
     private double deceleration = 1;
     private int direction;
-    /** The position of an obstacle below; the lower end if there is none. */
+    /** The position of an obstacle below; the lower end if the way is clear. */
     private double obstacle;
     private boolean met;
     /** The speed of a motion that is not the drive's own. */

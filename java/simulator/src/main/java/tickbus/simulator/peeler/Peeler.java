@@ -165,7 +165,7 @@ public final class Peeler implements Machine {
      * The block in a place.
      *
      * @param place the place
-     * @return its number from 1 on, 0 if there is none
+     * @return its number from 1 on; 0 if the place is empty
      */
     public int blockAt(Place place) {
         Block block = block(place);
@@ -176,7 +176,7 @@ public final class Peeler implements Machine {
      * The shape of the block in a place.
      *
      * @param place the place
-     * @return such as {@code cylinder}; empty if there is none
+     * @return such as {@code cylinder}; empty if the place is
      */
     public String shapeAt(Place place) {
         Block block = block(place);
@@ -215,7 +215,7 @@ public final class Peeler implements Machine {
     /**
      * The remaining volume of the block in the lathe.
      *
-     * @return cubic metres; 0 if there is none
+     * @return cubic metres; 0 without a block
      */
     public double held() {
         return lathe.held() == null ? 0 : lathe.held().volume() / 1e9;

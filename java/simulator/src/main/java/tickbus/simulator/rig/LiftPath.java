@@ -23,7 +23,7 @@ final class LiftPath {
     /**
      * A lift's path.
      *
-     * @param upper the wheel at the top of the path, or null if there is none
+     * @param upper the wheel at the top of the path, or null
      */
     LiftPath(Lift lift, LiftDrive drive, SuctionCup cup, Beam beam, Seat lower, Seat upper, Faults faults) {
         this.lift = lift;
@@ -66,7 +66,7 @@ final class LiftPath {
         jamArmed = true;
     }
 
-    /** The operator takes the bottle off the cup or out of the guide; null if there is none. */
+    /** The operator takes the bottle off the cup or out of the guide; null if both are empty. */
     Bottle takeAway() {
         if (stuck != null) {
             Bottle bottle = stuck;

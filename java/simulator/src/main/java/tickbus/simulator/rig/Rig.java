@@ -131,7 +131,7 @@ public final class Rig implements Machine {
     /**
      * Why Not OK is on.
      *
-     * @return one sentence per cause, empty if there is none
+     * @return one sentence per cause; empty without a fault
      */
     public List<String> faults() {
         return cell.faults().texts();

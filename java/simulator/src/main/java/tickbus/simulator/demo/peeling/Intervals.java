@@ -50,7 +50,7 @@ record Intervals(long count, double mean, double max, double min, double varianc
     /**
      * Reads them from the statistics of the receiving end.
      *
-     * @throws DemoFailure if there are none
+     * @throws DemoFailure if nothing was measured
      */
     static Intervals of(Map<String, String> statistics, Direction direction) {
         long count = (long) number(statistics, "count", direction);

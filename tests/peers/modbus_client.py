@@ -97,6 +97,7 @@ def main():
         client = ModbusSerialClient(sys.argv[2], baudrate=115200, parity="N", stopbits=1, retries=0)
         check("open", client.connect(), True)
         client.write_register(20, 4711, device_id=0, no_response_expected=True)
+        # The turnaround delay that the specification asks of a client after a broadcast.
         time.sleep(0.1)
         check("broadcast", client.read_holding_registers(20, count=1).registers, [4711])
     functions(client)

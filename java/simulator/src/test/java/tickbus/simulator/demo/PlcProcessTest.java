@@ -13,13 +13,12 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.concurrent.TimeUnit;
-import java.util.concurrent.locks.LockSupport;
-import java.util.function.BooleanSupplier;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
 import org.junit.jupiter.api.condition.DisabledOnOs;
 import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
+import tickbus.simulator.Eventually;
 
 /** The PLC's process, replaced by shell scripts. */
 @DisabledOnOs(value = OS.WINDOWS, disabledReason = "the processes of this test are shell scripts")
@@ -32,12 +31,6 @@ class PlcProcessTest {
 
     private PlcProcess process(String script) {
         return new PlcProcess(() -> List.of("sh", "-c", script), 100_000_000L, folder.resolve("demo/plc.log"));
-    }
-
-    private static void await(BooleanSupplier so) {
-        while (!so.getAsBoolean()) {
-            LockSupport.parkNanos(1_000_000);
-        }
     }
 
     private static boolean isAlive(PlcProcess plc) {
@@ -58,7 +51,7 @@ class PlcProcessTest {
                 """ + LIVES_ON)) {
             assertEquals(Plc.Counts.NONE, plc.counts());
             plc.start();
-            await(() -> plc.counts().scans() == 9);
+            Eventually.is("its statistics", () -> plc.counts().scans() == 9);
             assertEquals(Map.of("LA1 run", 4L, "a=b", 5L), plc.counts().rises());
             assertTrue(plc.counts().nanoTime() - System.nanoTime() <= 0);
             assertEquals(List.of("plc: opening: a=b"), plc.news());
@@ -71,7 +64,7 @@ class PlcProcessTest {
     void aKilledProcessIsDeadAtOnceAndItsNextLifeKnowsNothing() {
         try (PlcProcess plc = process("trap '' TERM INT; printf 'plc.scans=1\\n\\n'; " + LIVES_ON)) {
             plc.start();
-            await(() -> plc.counts().scans() == 1);
+            Eventually.is("its statistics", () -> plc.counts().scans() == 1);
             String first = plc.name();
             plc.kill();
             assertFalse(isAlive(first));
@@ -79,18 +72,18 @@ class PlcProcessTest {
             assertEquals(1, plc.counts().scans(), "its last counts stay known");
             plc.start();
             assertFalse(plc.name().equals(first));
-            await(() -> plc.counts().scans() == 1);
+            Eventually.is("its statistics", () -> plc.counts().scans() == 1);
             assertTrue(isAlive(plc));
         }
     }
 
     @Test
     void whatItPrintsJustBeforeItDiesIsKnownWhenItIsDead() {
+        Path printed = folder.resolve("printed");
         try (PlcProcess plc = process("printf 'plc.scans=1\\n\\n'; for i in 2 3 4; do printf \"plc.scans=$i\\n\\n\"; done; "
-                + LIVES_ON)) {
+                + "touch '" + printed + "'; " + LIVES_ON)) {
             plc.start();
-            await(() -> plc.counts().scans() >= 1);
-            LockSupport.parkNanos(200_000_000);
+            Eventually.is("all that it prints", () -> Files.exists(printed));
             plc.kill();
             assertEquals(4, plc.counts().scans());
         }
@@ -100,14 +93,14 @@ class PlcProcessTest {
     void oneThatEndsByItselfFailsWithItsLastWords() {
         try (PlcProcess plc = process("for i in 1 2 3 4 5 6 7; do echo \"word $i\" >&2; done; exit 3")) {
             plc.start();
-            await(() -> !isAlive(plc));
+            Eventually.is("its end", () -> !isAlive(plc));
             String reason = assertThrows(DemoFailure.class, plc::check).getMessage();
             assertTrue(reason.matches("process \\d+ of the PLC ended by itself with exit code 3; its last words: "
                     + "word 3; word 4; word 5; word 6; word 7"), reason);
         }
         try (PlcProcess plc = process("exit 0")) {
             plc.start();
-            await(() -> !isAlive(plc));
+            Eventually.is("its end", () -> !isAlive(plc));
             String reason = assertThrows(DemoFailure.class, plc::check).getMessage();
             assertTrue(reason.endsWith("exit code 0; it said nothing on standard error"), reason);
         }
@@ -139,12 +132,13 @@ class PlcProcessTest {
         private Forgetful() {
         }
 
-        public static void main(String[] args) throws InterruptedException {
+        public static void main(String[] args) throws IOException {
             @SuppressWarnings("resource")
             PlcProcess plc = new PlcProcess(() -> List.of("sh", "-c", LIVES_ON), 1, Path.of(args[0]));
             plc.start();
             System.out.println(plc.name());
-            Thread.sleep(60_000);
+            // Until it is killed, or the test is gone.
+            System.in.read();
         }
     }
 
@@ -158,7 +152,7 @@ class PlcProcessTest {
             assertTrue(isAlive(name));
             jvm.toHandle().destroy();
             assertTrue(jvm.waitFor(30, TimeUnit.SECONDS));
-            await(() -> !isAlive(name));
+            Eventually.is("its end", () -> !isAlive(name));
         } finally {
             jvm.destroyForcibly();
         }

@@ -11,7 +11,6 @@ import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.TimeUnit;
-import java.util.concurrent.locks.LockSupport;
 import java.util.function.BooleanSupplier;
 import java.util.function.DoubleSupplier;
 import org.junit.jupiter.api.Tag;
@@ -21,6 +20,7 @@ import org.junit.jupiter.api.condition.DisabledOnOs;
 import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.simulator.DriverSet;
+import tickbus.simulator.Eventually;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.TickMode;
 import tickbus.simulator.TimeSource;
@@ -84,12 +84,7 @@ class PyrungTest {
     }
 
     private String address() {
-        String address = driver.statistics().get("address");
-        while (address == null) {
-            LockSupport.parkNanos(5_000_000);
-            address = driver.statistics().get("address");
-        }
-        return address;
+        return Eventually.get("an address", () -> driver.statistics().get("address"));
     }
 
     @Test

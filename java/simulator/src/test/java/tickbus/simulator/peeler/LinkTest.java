@@ -10,13 +10,13 @@ import java.net.InetAddress;
 import java.net.Socket;
 import java.nio.ByteBuffer;
 import java.nio.file.Path;
-import java.util.concurrent.locks.LockSupport;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.DriverFolder;
+import tickbus.simulator.Eventually;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.TickMode;
 import tickbus.simulator.TimeSource;
@@ -44,11 +44,7 @@ class LinkTest {
     }
 
     private static Socket connect(ControlInterfaceDeviceDriver driver) throws IOException {
-        String address;
-        do {
-            LockSupport.parkNanos(1_000_000);
-            address = driver.statistics().get("address");
-        } while (address == null);
+        String address = Eventually.get("an address", () -> driver.statistics().get("address"));
         return new Socket(InetAddress.getLoopbackAddress(),
                 Integer.parseInt(address.substring(address.lastIndexOf(':') + 1)));
     }

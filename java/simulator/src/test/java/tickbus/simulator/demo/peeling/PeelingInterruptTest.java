@@ -7,7 +7,6 @@ import java.io.BufferedReader;
 import java.nio.file.Path;
 import java.util.List;
 import java.util.concurrent.TimeUnit;
-import java.util.concurrent.locks.LockSupport;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
@@ -42,8 +41,8 @@ class PeelingInterruptTest {
             List<String> rest = out.lines().toList();
             assertEquals("demo-peeler: failed reason=interrupted", rest.get(rest.size() - 1));
             assertTrue(demo.waitFor(30, TimeUnit.SECONDS));
-            while (plcs.stream().anyMatch(ProcessHandle::isAlive)) {
-                LockSupport.parkNanos(1_000_000);
+            for (ProcessHandle plc : plcs) {
+                plc.onExit().get(30, TimeUnit.SECONDS);
             }
         } finally {
             demo.destroyForcibly();

@@ -1,0 +1,32 @@
+package tickbus.simulator;
+
+import java.util.concurrent.locks.LockSupport;
+import java.util.function.BooleanSupplier;
+import java.util.function.Supplier;
+
+/** Polls for what a process or a thread does without an event that a test could wait for. */
+public final class Eventually {
+    private static final long PATIENCE = 30_000_000_000L;
+
+    private Eventually() {
+    }
+
+    /** The value, once there is one; a failure says what it was. */
+    public static <T> T get(String what, Supplier<T> value) {
+        long begin = System.nanoTime();
+        T found = value.get();
+        while (found == null) {
+            if (System.nanoTime() - begin > PATIENCE) {
+                throw new AssertionError("waited 30 s in vain for " + what);
+            }
+            LockSupport.parkNanos(1_000_000);
+            found = value.get();
+        }
+        return found;
+    }
+
+    /** Returns once this is true. */
+    public static void is(String what, BooleanSupplier reached) {
+        get(what, () -> reached.getAsBoolean() ? true : null);
+    }
+}

@@ -3,7 +3,7 @@
 
     rig_ladder.py --address 127.0.0.1:1502
 
-plc/rig/rig.st is the same program in Structured Text, and crates/programs/src/rig/mod.rs tells what it is for. The PLC reads the
+crates/programs/src/rig/mod.rs says what the program does, and docs/ARCHITECTURE.md why it exists in ladder, too. The PLC reads the
 machine's %I as input registers 0 to 3 and writes its %Q as holding registers 0 to 3: with kind = "modbus-server" in
 driver.cfg nothing else is to be set. It runs until it is told to end. Standard output tells each change of its phase.
 """

@@ -40,7 +40,8 @@
 //! abort and initialise, until the lifts are down. A program that was just started knows nothing about the
 //! machine, so it assumes that both cups hold a bottle. (In the rig's `driver.cfg` the fail-safe value of a
 //! cup is on as well, for the time without a program.) The logic is limited to Booleans, timers, edges and
-//! cases, so that it can be rewritten in Structured Text and compared scan by scan.
+//! cases, so that it can be rewritten in Structured Text and compared scan by scan; `docs/ARCHITECTURE.md` tells of all its
+//! versions.
 
 use self::cycle::Cycle;
 use self::guard::{JamGuard, wheel_locked};

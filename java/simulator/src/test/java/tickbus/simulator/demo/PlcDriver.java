@@ -16,8 +16,8 @@ import java.util.Set;
 
 /**
  * A driver whose PLC is this class: it homes, runs, aborts, recovers and parks the rig on simulation time,
- * so that the demo's script is tested without any link. Its components are those that the rig's control
- * table names.
+ * so that the demo's script is tested without any link. It is a stand-in for the rig's program and breaks on demand;
+ * docs/ARCHITECTURE.md tells of the program's versions. Its components are those that the rig's control table names.
  */
 class PlcDriver extends ControlInterfaceDeviceDriver {
     static final int ID = 4711;

@@ -294,6 +294,7 @@ fn our_client_drives_pymodbus() -> Result<(), Absent> {
 fn our_client_writes_only_where_it_may() -> Result<(), Absent> {
     logged::expect("nothing is written into the PLC \"ACME PLC 7 1.2\"");
     let (_server, address) = Server::tcp()?;
+    logged::expect("nothing is written into the PLC \"ACME PLC 7 1.2\"");
     for write_to in ["", "write_to = \"ACME PLC 7\""] {
         let fieldbus = format!(
             "kind = \"modbus-client\"\naddress = \"{address}\"\ninputs = \"offset:0\"\n{write_to}"
@@ -313,6 +314,7 @@ fn our_client_writes_only_where_it_may() -> Result<(), Absent> {
 fn our_client_reads_inputs() -> Result<(), Absent> {
     logged::expect("nothing is written into the PLC \"ACME PLC 7 1.2\"");
     let (_server, address) = Server::tcp()?;
+    logged::expect("nothing is written into the PLC \"ACME PLC 7 1.2\"");
     let client =
         format!("kind = \"modbus-client\"\nrole = \"controller\"\naddress = \"{address}\"\n");
     let mut registers = open(&client, &words(300));

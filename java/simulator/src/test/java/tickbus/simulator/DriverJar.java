@@ -14,7 +14,7 @@ import java.util.jar.Manifest;
 import javax.tools.ToolProvider;
 
 /** Compiles drivers into jars that a test puts into a folder. They log what they do in a system property. */
-final class DriverJar {
+public final class DriverJar {
     /** The property. */
     static final String LOG = "tickbus.test.log";
 
@@ -77,7 +77,7 @@ final class DriverJar {
     }
 
     /** Writes a jar with some of the classes; no manifest entry if {@code driverClass} is null. */
-    static void write(Path work, Path jar, String driverClass, String... classes) throws IOException {
+    public static void write(Path work, Path jar, String driverClass, String... classes) throws IOException {
         List<String> arguments = new ArrayList<>(List.of("-d", work.toString(), "-cp",
                 System.getProperty("java.class.path")));
         for (String name : classes) {

@@ -1,0 +1,65 @@
+package tickbus.demo;
+
+import java.nio.file.Path;
+import java.util.List;
+import tickbus.simulator.Arguments;
+import tickbus.simulator.TickMode;
+
+/**
+ * The options of the demo.
+ *
+ * @param drivers the DeviceDriver folder
+ * @param control the control table
+ * @param report where the report goes
+ * @param recording what the driver records, null for no page about it
+ * @param plc the tickbus executable that is the PLC, null if the PLC is started by other means
+ * @param mode how ticks follow one another
+ * @param stepNanos simulation step size
+ * @param cycles cycles to complete
+ * @param timeLimitNanos longest simulation time
+ */
+record DemoOptions(Path drivers, Path control, Path report, Path recording, Path plc, TickMode mode, long stepNanos,
+        int cycles, long timeLimitNanos) {
+    static final String USAGE = """
+            usage: demo --drivers DIR --control FILE --report FILE [options]
+
+            Lets a PLC program run the simulated test rig: homing, some cycles, one jam, recovery, parking.
+            With --plc, the program is a process of its own; half-way it is killed and started again.
+
+              --drivers DIR      the DeviceDriver folder with exactly one driver
+              --control FILE     control table that connects the driver and the rig
+              --report FILE      the report is written here, and rig.svg beside it
+              --recording FILE   what the driver records ([record] in driver.cfg): with --plc, an HTML
+                                 page about it is made beside the report
+              --plc FILE         the tickbus executable: it runs the PLC program, and connects to the
+                                 address that the driver listens at; without it, the driver itself
+                                 hosts the program (kind = "loopback" in driver.cfg)
+              --mode MODE        real-time (default), or best-effort: as fast as possible, for a PLC
+                                 program that runs on simulation time (mode = "stepped" in driver.cfg)
+              --step TIME        simulation step size (default 2ms)
+              --cycles N         cycles to complete (default 3)
+              --time-limit TIME  longest simulation time (default 2min)
+
+            The last line is "demo: ok …" with exit code 0, or "demo: failed reason=…" with exit code 1;
+            2 if the command line was wrong, 130 after Ctrl-C.
+            """;
+
+    static DemoOptions read(String[] args) {
+        Arguments arguments = new Arguments(args, List.of("--drivers", "--control", "--report", "--recording", "--plc",
+                "--mode", "--step", "--cycles", "--time-limit"), List.of());
+        return new DemoOptions(arguments.path("--drivers"), arguments.path("--control"), arguments.path("--report"),
+                arguments.has("--recording") ? arguments.path("--recording") : null,
+                arguments.has("--plc") ? arguments.path("--plc") : null, arguments.choice("--mode", Arguments.MODES, "real-time"), arguments.duration("--step", "2ms"),
+                arguments.count("--cycles", 3), arguments.duration("--time-limit", "2min"));
+    }
+
+    /** The cycle in which the PLC is killed: the one in the middle. */
+    int killCycle() {
+        return (cycles + 1) / 2;
+    }
+
+    /** The cycle in which a bottle jams: the one before, or the only one. */
+    int jamCycle() {
+        return Math.max(1, killCycle() - 1);
+    }
+}

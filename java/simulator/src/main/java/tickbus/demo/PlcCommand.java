@@ -1,0 +1,79 @@
+package tickbus.demo;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import java.nio.file.Path;
+import java.util.List;
+import java.util.concurrent.locks.LockSupport;
+import tickbus.simulator.DeviceDriverFolder;
+import tickbus.simulator.text.Durations;
+
+/** Runs a PLC program as a process: which command, and where it connects to. */
+public final class PlcCommand {
+    private static final String PROGRAM = "rig";
+
+    /** How often the process reports its counts. */
+    private static final long STATISTICS_NANOS = 100_000_000L;
+
+    /** After this time the process ends on its own, in case nothing is left to end it. */
+    private static final String LONGEST = "30min";
+
+    /** How long it may take until the driver listens. */
+    private static final long LISTENING_NANOS = 10_000_000_000L;
+
+    private PlcCommand() {
+    }
+
+    /** The PLC program of the rig as a process that connects to a driver, which must be listening. */
+    static Plc process(DemoOptions options, ControlInterfaceDeviceDriver driver) {
+        Path cfg = DeviceDriverFolder.scan(options.drivers()).configurations().get(driver.id());
+        Path log = options.report().resolveSibling("plc.log");
+        return process(options.plc(), PROGRAM, cfg, driver, log);
+    }
+
+    /**
+     * A PLC program as a process that connects to a driver.
+     *
+     * @param executable the tickbus command
+     * @param program the program's name
+     * @param cfg the driver's configuration file, which serves both ends
+     * @param driver the driver, which must be listening when the process starts
+     * @param log gets the process's standard error
+     * @return the process, not started yet
+     */
+    public static PlcProcess process(Path executable, String program, Path cfg, ControlInterfaceDeviceDriver driver,
+            Path log) {
+        return new PlcProcess(() -> command(executable, program, cfg, address(driver)), STATISTICS_NANOS, log);
+    }
+
+    private static List<String> command(Path executable, String program, Path cfg, String address) {
+        return List.of(executable.toString(), "plc", program, "--config", cfg.toString(), "--address", address,
+                "--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
+    }
+
+    /** The address on which a driver listens; its driver.cfg may leave the port to the system. */
+    private static String address(ControlInterfaceDeviceDriver driver) {
+        long limit = System.nanoTime() + LISTENING_NANOS;
+        while (true) {
+            var statistics = driver.statistics();
+            String address = statistics.get("address");
+            if (address != null) {
+                return address;
+            }
+            if (System.nanoTime() - limit > 0 || statistics.getOrDefault("state", "").equals("failed")) {
+                throw new DemoFailure("the driver does not listen at any address, so no PLC process can connect to it;"
+                        + " its driver.cfg needs kind = \"socket\". The driver says: "
+                        + statistics.getOrDefault("reason", "nothing"));
+            }
+            LockSupport.parkNanos(5_000_000);
+        }
+    }
+
+    /** The age at which a driver's data are stale. */
+    static long maxAgeNanos(ControlInterfaceDeviceDriver driver) {
+        String text = driver.statistics().get("max_age");
+        if (text == null) {
+            throw new DemoFailure("the driver's statistics do not tell its max_age");
+        }
+        return Durations.parse(text);
+    }
+}

@@ -1,0 +1,252 @@
+package tickbus.demo;
+
+import java.io.BufferedReader;
+import java.io.File;
+import java.io.IOException;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.LinkedHashMap;
+import java.util.List;
+import java.util.Map;
+import java.util.Queue;
+import java.util.concurrent.ConcurrentLinkedQueue;
+import java.util.concurrent.TimeUnit;
+import java.util.function.Supplier;
+import java.util.regex.Matcher;
+import java.util.regex.Pattern;
+
+/**
+ * A PLC as a separate process, such as {@code tickbus plc}: started, killed, restarted, and reliably ended.
+ *
+ * <p>It regularly prints its statistics as lines {@code key=value}, followed by an empty line; a thread reads these,
+ * so that the tick never waits for the process. Every other line is output for people. Its standard error goes to a
+ * file.
+ *
+ * <p>The process ends with {@link #close}; with the JVM, however that is told to end; and, if the JVM itself is
+ * killed, after the time given on its own command line.
+ */
+public final class PlcProcess implements Plc {
+    private static final long SECONDS_TO_DIE = 5;
+    private static final int LAST_WORDS = 5;
+
+    /** The prefix of lines for people. */
+    private static final String WORDS = "plc: ";
+    /** A key, in which a backslash stands before each = and backslash, and its value. */
+    private static final Pattern STATISTIC = Pattern.compile("([^=\\\\]++(?:\\\\.[^=\\\\]*+)*+)=(.*)");
+
+    private final Supplier<List<String>> command;
+    private final Path log;
+    private final Thread hook = new Thread(this::destroy, "end of the PLC process");
+    private final Queue<String> news = new ConcurrentLinkedQueue<>();
+    private final long intervalNanos;
+    private volatile Life life;
+    private volatile long longestSilence;
+
+    /** One run of the process, and its output. */
+    private final class Life {
+        final Process process;
+        final Thread reader;
+        volatile boolean killed;
+        private volatile Map<String, String> block = Map.of();
+        private volatile long blockTime;
+
+        Life(Process process) {
+            this.process = process;
+            reader = new Thread(this::read, "output of PLC process " + process.pid());
+            reader.setDaemon(true);
+            reader.start();
+        }
+
+        private void read() {
+            Map<String, String> lines = new LinkedHashMap<>();
+            try (BufferedReader out = process.inputReader(StandardCharsets.UTF_8)) {
+                for (String line = out.readLine(); line != null; line = out.readLine()) {
+                    Matcher entry = STATISTIC.matcher(line);
+                    if (line.isEmpty() && !lines.isEmpty()) {
+                        long now = System.nanoTime();
+                        if (!block.isEmpty()) {
+                            longestSilence = Math.max(longestSilence, now - blockTime - intervalNanos);
+                        }
+                        blockTime = now;
+                        block = Map.copyOf(lines);
+                        lines.clear();
+                    } else if (!line.startsWith(WORDS) && entry.matches()) {
+                        lines.put(entry.group(1).replaceAll("\\\\(.)", "$1"), entry.group(2));
+                    } else if (!line.isEmpty()) {
+                        news.add(line);
+                    }
+                }
+            } catch (IOException e) {
+                // The process was killed while writing.
+            }
+        }
+
+        Counts counts() {
+            Map<String, String> now = block;
+            return now.isEmpty() ? Counts.NONE : HostedPlc.counts(now, blockTime);
+        }
+
+        void await(String complaint) {
+            try {
+                if (!process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
+                    throw new DemoFailure(name() + " of the PLC " + complaint);
+                }
+                reader.join(TimeUnit.SECONDS.toMillis(SECONDS_TO_DIE));
+            } catch (InterruptedException e) {
+                Thread.currentThread().interrupt();
+                throw new DemoFailure("interrupted");
+            }
+        }
+    }
+
+    /**
+     * A process that is not started yet.
+     *
+     * @param command gives the executable and its arguments for the next life
+     * @param intervalNanos how often it prints its statistics
+     * @param log gets its standard error; truncated now, appended to by each life
+     */
+    public PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
+        this.command = command;
+        this.intervalNanos = intervalNanos;
+        this.log = log;
+        try {
+            Files.createDirectories(log.toAbsolutePath().getParent());
+            Files.writeString(log, "");
+        } catch (IOException e) {
+            throw new DemoFailure("the PLC's log cannot be written: " + e);
+        }
+        Runtime.getRuntime().addShutdownHook(hook);
+    }
+
+    @Override
+    public boolean restartable() {
+        return true;
+    }
+
+    @Override
+    public void start() {
+        ProcessBuilder builder = new ProcessBuilder(command.get())
+                .redirectInput(ProcessBuilder.Redirect.from(nothing()))
+                .redirectError(ProcessBuilder.Redirect.appendTo(log.toFile()));
+        // Its log is a file, so it may contain more than errors.
+        builder.environment().put("TICKBUS_LOG", "info");
+        Process process;
+        try {
+            process = builder.start();
+        } catch (IOException e) {
+            throw new DemoFailure("the PLC cannot be started: " + e.getMessage()
+                    + "; build it (make build), or name the tickbus executable by --plc");
+        }
+        life = new Life(process);
+    }
+
+    private static File nothing() {
+        return new File(System.getProperty("os.name").startsWith("Windows") ? "NUL" : "/dev/null");
+    }
+
+    @Override
+    public void kill() {
+        Life now = life;
+        now.killed = true;
+        now.process.destroyForcibly();
+        now.await("was not dead " + SECONDS_TO_DIE + " s after it was killed");
+    }
+
+    @Override
+    public Counts counts() {
+        Life now = life;
+        return now == null ? Counts.NONE : now.counts();
+    }
+
+    /**
+     * The statistics that it printed last in its current life.
+     *
+     * @return keys and values; empty if it has printed none yet
+     */
+    public Map<String, String> statistics() {
+        Life now = life;
+        return now == null ? Map.of() : now.block;
+    }
+
+    @Override
+    public List<String> news() {
+        if (news.isEmpty()) {
+            return List.of();
+        }
+        List<String> taken = new ArrayList<>();
+        for (String line = news.poll(); line != null; line = news.poll()) {
+            taken.add(line);
+        }
+        return taken;
+    }
+
+    @Override
+    public long longestSilenceNanos() {
+        return longestSilence;
+    }
+
+    @Override
+    public String name() {
+        Life now = life;
+        return now == null ? "no process" : "process " + now.process.pid();
+    }
+
+    @Override
+    public void check() {
+        Life now = life;
+        if (now == null || now.killed || now.process.isAlive()) {
+            return;
+        }
+        now.await("hangs at its end");
+        throw new DemoFailure(name() + " of the PLC ended by itself with exit code " + now.process.exitValue()
+                + lastWords());
+    }
+
+    private String lastWords() {
+        try {
+            List<String> lines = Files.readAllLines(log);
+            if (!lines.isEmpty()) {
+                List<String> last = lines.subList(Math.max(0, lines.size() - LAST_WORDS), lines.size());
+                return "; its last words: " + String.join("; ", last);
+            }
+        } catch (IOException e) {
+            // The exception is about the process, not about its log.
+        }
+        return "; it said nothing on standard error";
+    }
+
+    @Override
+    public void close() {
+        Life now = life;
+        if (now != null && now.process.isAlive()) {
+            now.killed = true;
+            // Terminated first, so that its last lines get into its log.
+            now.process.destroy();
+            try {
+                if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
+                    destroy();
+                    // Killing takes effect only after a moment.
+                    now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS);
+                }
+            } catch (InterruptedException e) {
+                destroy();
+                Thread.currentThread().interrupt();
+            }
+        }
+        try {
+            Runtime.getRuntime().removeShutdownHook(hook);
+        } catch (IllegalStateException e) {
+            // The JVM is ending, and the hook runs already.
+        }
+    }
+
+    private void destroy() {
+        Life now = life;
+        if (now != null) {
+            now.process.destroyForcibly();
+        }
+    }
+}

@@ -1,0 +1,317 @@
+package tickbus.demo.peeling;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import java.io.IOException;
+import java.io.PrintStream;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.EnumMap;
+import java.util.List;
+import java.util.Locale;
+import java.util.Map;
+import tickbus.demo.DemoFailure;
+import tickbus.demo.HtmlPage;
+import tickbus.demo.Screen;
+import tickbus.demo.Stalls;
+import tickbus.demo.Timeline;
+import tickbus.demo.peeler.AxisName;
+import tickbus.demo.peeler.LathePicture;
+import tickbus.demo.peeler.Peeler;
+import tickbus.demo.peeler.Place;
+import tickbus.simulator.Arguments;
+import tickbus.simulator.DeviceDriverFolder;
+import tickbus.simulator.ShutdownGuard;
+import tickbus.simulator.Simulator;
+import tickbus.simulator.TickMode;
+import tickbus.simulator.TimeSource;
+import tickbus.simulator.text.Durations;
+
+/**
+ * The demo's command line; see {@code --help} for what it takes.
+ *
+ * <p>Its last line on standard output is the verdict, {@code demo-peeler: ok …} or {@code demo-peeler: failed reason=…}.
+ * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
+ */
+public final class PeelingDemo {
+    private static final int OK = 0;
+    private static final int FAILED = 1;
+    private static final int USAGE = 2;
+    private static final int INTERRUPTED = 130;
+
+    private static final String OK_BEGINS = "demo-peeler: ok ";
+    private static final String FAILED_BEGINS = "demo-peeler: failed reason=";
+
+    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
+    private static final int ATTEMPTS = 3;
+
+    /** The position of the knife at which the picture of a block that is not round shows most. */
+    private static final double PICTURE_MM = 138;
+
+    /** How long it may take until this process is told of a Ctrl-C. */
+    private static final long INTERRUPTION_MILLIS = 500;
+
+    /** Need not be written: the driver acknowledges by itself, and without a jerk there are no S-curves. */
+    private static final List<String> LEFT_OUT = List.of(".Acknowledge", ".Jerk");
+
+    /** How often the PLCs are checked. */
+    private static final int TICKS_PER_LOOK_AT_PLCS = 25;
+
+    private final PeelingOptions options;
+    private final PrintStream out;
+    private final LineDisplay display;
+    private final Timeline timeline;
+    private final Peeler line = new Peeler();
+    private final CommandRate rate = new CommandRate(line);
+    private final Stalls stalls;
+    private LineWatcher watcher;
+    private String tables = "";
+    private boolean pictured;
+
+    private PeelingDemo(PeelingOptions options, PrintStream out, List<String> notes) {
+        this.options = options;
+        this.out = out;
+        display = new LineDisplay(out, out == System.out && Screen.fits(), options.logs());
+        timeline = new Timeline(display::event);
+        stalls = new Stalls(TimeSource.system(), options.stepNanos());
+        notes.forEach(note -> timeline.add(0, "note", note));
+    }
+
+    /**
+     * Runs the demo and ends the JVM with its exit code.
+     *
+     * @param args the command line
+     */
+    public static void main(String[] args) {
+        System.exit(run(args, System.out, System.err));
+    }
+
+    /**
+     * Runs the demo.
+     *
+     * @param args the command line
+     * @param out gets what happens and, last, the verdict
+     * @param err gets complaints about the command line, and what unexpected exceptions say
+     * @return the exit code
+     */
+    public static int run(String[] args, PrintStream out, PrintStream err) {
+        if (List.of(args).contains("--help")) {
+            out.print(PeelingOptions.USAGE);
+            return OK;
+        }
+        PeelingOptions options;
+        try {
+            options = PeelingOptions.read(args);
+        } catch (Arguments.UsageException e) {
+            err.println(e.getMessage() + "\n");
+            err.print(PeelingOptions.USAGE);
+            out.println(failed(e.getMessage()));
+            return USAGE;
+        }
+        // The guard is closed last, so that the verdict is printed even after Ctrl-C.
+        try (ShutdownGuard guard = new ShutdownGuard()) {
+            PeelingDemo demo = new PeelingDemo(options, out, List.of());
+            String verdict = demo.play(guard, err);
+            List<String> notes = new ArrayList<>();
+            while (!verdict.startsWith(OK_BEGINS) && !guard.triggered() && demo.stalls.longestNanos() > 0) {
+                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
+                        + demo.stalls.longestNanos() / 1_000_000 + " ms: " + verdict);
+                if (notes.size() == ATTEMPTS) {
+                    verdict = failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, so nothing"
+                            + " can be said; the last attempt ended: " + reason(verdict));
+                    break;
+                }
+                demo = new PeelingDemo(options, out, List.copyOf(notes));
+                verdict = demo.play(guard, err);
+            }
+            out.print(demo.tables);
+            String trouble = demo.pages();
+            if (trouble != null && verdict.startsWith(OK_BEGINS)) {
+                verdict = failed(trouble);
+            }
+            out.println(verdict);
+            out.flush();
+            return guard.triggered() ? INTERRUPTED : verdict.startsWith(OK_BEGINS) ? OK : FAILED;
+        }
+    }
+
+    /** Everything from opening the drivers to writing the report. */
+    private String play(ShutdownGuard guard, PrintStream err) {
+        String verdict;
+        try (Simulator simulator = new Simulator(DeviceDriverFolder.scan(options.drivers()).open(), line,
+                options.control(), options.stepNanos(), TimeSource.system())) {
+            verdict = verdict(simulator, guard, err);
+            display.end(watcher, rate);
+            verdict = report(verdict);
+        } catch (RuntimeException | Error e) {
+            // The drivers or the control table did not open, or the drivers did not close.
+            verdict = report(failure(e, err));
+        }
+        return verdict;
+    }
+
+    private String verdict(Simulator simulator, ShutdownGuard guard, PrintStream err) {
+        watcher = new LineWatcher(simulator, line, timeline);
+        try (Plcs plcs = new Plcs(options, simulator.drivers())) {
+            operate(simulator, plcs, guard);
+            Map<Intervals.Direction, Intervals> intervals = intervals(simulator.drivers(), plcs);
+            tables = PeelingReport.tables(intervals, rate);
+            LineCheck.check(watcher, options.logs());
+            double mean = intervals.values().stream().mapToDouble(Intervals::mean).max().orElse(0);
+            return String.format(Locale.ROOT,
+                    "%slogs=%d veneer_m=%.1f commands_per_s=%.2f busiest_per_s=%.2f busiest_in_1s=%d mean_ms=%.2f report=%s",
+                    OK_BEGINS, line.wood().coreCount(), line.wood().ribbon(), rate.mean(), rate.mean(rate.busiest()),
+                    rate.most(rate.busiest()), mean, options.report());
+        } catch (RuntimeException | Error e) {
+            return failure(e, err);
+        }
+    }
+
+    private void operate(Simulator simulator, Plcs plcs, ShutdownGuard guard) {
+        for (String name : simulator.unconnected()) {
+            if (LEFT_OUT.stream().noneMatch(name::endsWith)) {
+                timeline.add(0, "note", "no row of the control table writes " + name);
+            }
+        }
+        simulator.run(TickMode.REAL_TIME, () -> {
+            if (guard.triggered()) {
+                throw new DemoFailure("interrupted");
+            }
+            if (simulator.ticks() > 0) {
+                stalls.look();
+                stalls.silent(plcs.longestSilenceNanos());
+                rate.look(simulator.simulationNanos());
+                watcher.look();
+                lookAtLinks(plcs, guard);
+                if (simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
+                    plcs.listen(simulator.simulationNanos(), timeline);
+                    check(plcs, guard);
+                }
+                display.tick(watcher, rate);
+                picture();
+            }
+            if (line.wood().coreCount() < options.logs() && simulator.simulationNanos() >= options.timeLimitNanos()) {
+                throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
+                        + " of simulation time is over with " + line.wood().coreCount() + " of " + options.logs()
+                        + " blocks peeled");
+            }
+            return line.wood().coreCount() < options.logs();
+        });
+        if (line.wood().coreCount() < options.logs()) {
+            throw new DemoFailure("interrupted");
+        }
+    }
+
+    /**
+     * If a link breaks because its PLC has died, that is reported; if because the computer stalled, it does not
+     * count.
+     */
+    private void lookAtLinks(Plcs plcs, ShutdownGuard guard) {
+        if (watcher.broken() == null) {
+            return;
+        }
+        if (guard.triggers(INTERRUPTION_MILLIS)) {
+            throw new DemoFailure("interrupted");
+        }
+        plcs.check();
+        stalls.silent(watcher.silentNanos());
+        throw new DemoFailure(watcher.broken());
+    }
+
+    /** A picture of a block that is being rounded, once. */
+    private void picture() {
+        boolean tells = line.blockAt(Place.LATHE) > 1 && !line.round()
+                && line.position(AxisName.KNIFE_CARRIAGE) < PICTURE_MM;
+        if (pictured || !tells) {
+            return;
+        }
+        pictured = true;
+        try {
+            Files.createDirectories(options.report().toAbsolutePath().getParent());
+            LathePicture.write(line, beside("lathe.svg"));
+        } catch (IOException e) {
+            throw new DemoFailure("the lathe's picture cannot be written: " + e);
+        }
+    }
+
+    private static void check(Plcs plcs, ShutdownGuard guard) {
+        try {
+            plcs.check();
+        } catch (DemoFailure e) {
+            // Ctrl-C in a terminal reaches all of its processes, and a PLC may have been faster.
+            if (guard.triggers(INTERRUPTION_MILLIS)) {
+                throw new DemoFailure("interrupted");
+            }
+            throw e;
+        }
+    }
+
+    private static Map<Intervals.Direction, Intervals> intervals(List<ControlInterfaceDeviceDriver> drivers, Plcs plcs) {
+        Map<Intervals.Direction, Intervals> intervals = new EnumMap<>(Intervals.Direction.class);
+        for (Intervals.Direction direction : Intervals.Direction.values()) {
+            boolean charger = direction.name().contains("CHARGER");
+            Map<String, String> statistics = direction.name().startsWith("SIMULATION")
+                    ? plcs.statistics(Plcs.PROGRAMS.get(charger ? 0 : 1))
+                    : drivers.get(charger ? 0 : 1).statistics();
+            intervals.put(direction, Intervals.of(statistics, direction));
+        }
+        return intervals;
+    }
+
+    private static String failure(Throwable e, PrintStream err) {
+        boolean told = e instanceof DemoFailure || e.getMessage() != null;
+        if (!(e instanceof DemoFailure)) {
+            err.println(told ? e.getMessage() : e.toString());
+        }
+        return failed(told ? e.getMessage() : e.toString());
+    }
+
+    private static String failed(String reason) {
+        String line = reason.strip().replaceAll("\\s*\\R\\s*", "; ").replace('"', '\'');
+        return FAILED_BEGINS + (line.matches("[\\w.-]+") ? line : "\"" + line + "\"");
+    }
+
+    private static String reason(String verdict) {
+        return verdict.substring(FAILED_BEGINS.length()).replace("\"", "");
+    }
+
+    private String report(String verdict) {
+        try {
+            Files.createDirectories(options.report().toAbsolutePath().getParent());
+            if (watcher != null) {
+                for (ControlInterfaceDeviceDriver driver : watcher.simulator().drivers()) {
+                    HtmlPage.keepStatistics(beside(driver.name().toLowerCase(Locale.ROOT) + ".statistics.txt"),
+                            driver.statistics());
+                }
+            }
+            Files.writeString(options.report(),
+                    PeelingReport.write(options, verdict, timeline, watcher, tables, rate));
+            return verdict;
+        } catch (IOException e) {
+            return verdict.startsWith(OK_BEGINS) ? failed("the report cannot be written: " + e) : verdict;
+        }
+    }
+
+    private Path beside(String name) {
+        return options.report().resolveSibling(name);
+    }
+
+    /** An HTML page for each driver's recording; returns what went wrong, or null. */
+    private String pages() {
+        if (options.recordings() == null) {
+            return null;
+        }
+        for (String program : Plcs.PROGRAMS) {
+            Path recording = options.recordings().resolve(program + ".vcd");
+            Path page = beside(program + ".html");
+            List<String> arguments = new ArrayList<>(List.of(recording.toString(), "--out", page.toString(), "--stats",
+                    beside(program + ".statistics.txt").toString(), "--text", options.report().toString()));
+            String trouble = HtmlPage.make(options.plc(), arguments);
+            if (trouble != null) {
+                return trouble;
+            }
+            out.println("demo-peeler: page=" + page);
+        }
+        return null;
+    }
+}

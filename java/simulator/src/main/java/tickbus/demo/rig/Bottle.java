@@ -1,0 +1,109 @@
+package tickbus.demo.rig;
+
+/**
+ * A bottle in the rig.
+ *
+ * <p>The rig reuses a fixed set of these, so that motion allocates nothing: read a bottle between two steps and do
+ * not keep it.
+ */
+public final class Bottle {
+    /** What carries a bottle. */
+    public enum Place {
+        /** Nothing: the bottle is not in the rig. */
+        AWAY,
+        /** A pocket of index wheel 1. */
+        POCKET,
+        /** The suction cup of lift 1. */
+        CUP1,
+        /** A sleeve of the chamber wheel. */
+        SLEEVE,
+        /** The suction cup of lift 2. */
+        CUP2,
+        /** Wedged in the guide of lift 1, released by its cup. */
+        STUCK1,
+        /** Wedged in the guide of lift 2, released by its cup. */
+        STUCK2
+    }
+
+    private int id;
+    private Place place = Place.AWAY;
+    private int slot;
+    private double height;
+    private boolean treated;
+    private boolean back;
+
+    Bottle() {}
+
+    /**
+     * Its number.
+     *
+     * @return 1 for the first bottle ever fed
+     */
+    public int id() {
+        return id;
+    }
+
+    /**
+     * What carries it.
+     *
+     * @return the place
+     */
+    public Place place() {
+        return place;
+    }
+
+    /**
+     * Which pocket (0 to 3) or sleeve (0 or 1) carries it.
+     *
+     * @return the number; 0 in other places
+     */
+    public int slot() {
+        return slot;
+    }
+
+    /**
+     * Height of its base above the pockets' floor.
+     *
+     * @return millimetres
+     */
+    public double height() {
+        return height;
+    }
+
+    /**
+     * Whether it has been at the lamp.
+     *
+     * @return true once it has
+     */
+    public boolean treated() {
+        return treated;
+    }
+
+    /** Numbers a new bottle. */
+    void number(int newId) {
+        id = newId;
+        treated = false;
+        back = false;
+    }
+
+    void put(Place newPlace, int newSlot, double newHeight) {
+        place = newPlace;
+        slot = newSlot;
+        height = newHeight;
+    }
+
+    void raise(double newHeight) {
+        height = newHeight;
+    }
+
+    void treat() {
+        treated = true;
+    }
+
+    /** It is in a pocket again; returns whether it was treated, the first time only. */
+    boolean comesBack() {
+        boolean first = treated && !back;
+        back |= first;
+        return first;
+    }
+}

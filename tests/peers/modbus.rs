@@ -141,7 +141,7 @@ impl Bus for Tcp {
             ),
             (
                 "kind = \"modbus-server\"\ndevice = \"/dev/ttyS0\"\nparity = \"mark\"",
-                "none of the parities",
+                "not one of the parities",
             ),
             (
                 "kind = \"modbus-server\"\nevents = \"all\"",

@@ -447,6 +447,7 @@ fn a_file_that_takes_nothing_does_not_keep_its_recorder_from_closing() {
 
 #[test]
 fn time_that_goes_back_is_recorded_as_standing_still() {
+    logged::expect("simulation time went back");
     let table = table(&[""]);
     let columns = columns(&table);
     let disc = SmallDisc::new(usize::MAX);

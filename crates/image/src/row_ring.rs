@@ -151,19 +151,21 @@ mod tests {
                 .count()
         });
         let (mut words, mut seen, mut last) = ([0; 5], 0, None);
-        loop {
-            let ended = pushing.is_finished();
+        let mut take_all = || {
             while reader.take(&mut words) {
                 assert_eq!(words, [words[0]; 5]);
                 assert!(last < Some(words[0]));
                 last = Some(words[0]);
                 seen += 1;
             }
-            if ended {
-                break;
-            }
+        };
+        while !pushing.is_finished() {
+            take_all();
         }
-        assert_eq!(pushing.join().expect("no panic"), seen);
+        // Only joining makes the last rows visible for certain.
+        let pushed = pushing.join().expect("no panic");
+        take_all();
+        assert_eq!(pushed, seen);
     }
 }
 

@@ -8,6 +8,7 @@ use tickbus_fieldbus::{Port, Stepped};
 use super::supervise::BusThread;
 
 /// How the bus runs.
+#[expect(clippy::large_enum_variant, reason = "there is one in a driver")]
 pub(super) enum BusHandle {
     /// On its own thread; dropping this ends it.
     #[expect(dead_code, reason = "kept for its drop")]

@@ -237,9 +237,8 @@ mod tests {
                 .to_owned();
         for address in ["%IB0", "%QB0"] {
             for station in ["A", "B"] {
-                text += &format!(
-                    "[[signal]]\nname = \"{station} {address}\"\naddress = \"{address}\"\nstation = \"{station}\"\n"
-                );
+                let signal = format!("name = \"{station} {address}\"\naddress = \"{address}\"");
+                text.extend(["[[signal]]\n", &signal, "\nstation = \"", station, "\"\n"]);
             }
         }
         let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text).expect("right");

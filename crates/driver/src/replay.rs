@@ -25,7 +25,7 @@ const NAMED: usize = 5;
 
 /// The results of a replay so far; readable from any thread.
 #[derive(Debug, Default)]
-pub(super) struct ReplayTally {
+pub(super) struct ReplayCounters {
     file: String,
     /// Recorded ticks that were replayed.
     ticks: AtomicU64,
@@ -37,7 +37,7 @@ pub(super) struct ReplayTally {
     ended: AtomicBool,
 }
 
-impl ReplayTally {
+impl ReplayCounters {
     /// Adds the results.
     pub(super) fn write(&self, statistics: &mut Statistics) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
@@ -82,7 +82,7 @@ pub(super) struct Replay {
     offset: Option<Nanos>,
     max_age: Nanos,
     differences: Differences,
-    tally: Arc<ReplayTally>,
+    tally: Arc<ReplayCounters>,
     /// Keeps recorders of this process from writing to the file.
     _place: FileClaim,
 }
@@ -96,7 +96,7 @@ impl Replay {
     pub(super) fn open(
         config: &Config,
         path: &Path,
-    ) -> Result<(Self, Arc<ReplayTally>), DriverError> {
+    ) -> Result<(Self, Arc<ReplayCounters>), DriverError> {
         let place = FileClaim::to_replay(path)?;
         let mut recording = Recording::open(path, Some(&config.table))?;
         let map = Map::new(config, recording.columns()).map_err(|what| {
@@ -122,10 +122,10 @@ impl Replay {
         }
         let mut next = Tick::new(recording.columns());
         let more = recording.next(&mut next)?;
-        let tally = Arc::new(ReplayTally {
+        let tally = Arc::new(ReplayCounters {
             file: path.display().to_string(),
             unknown: unknown.len() as u64,
-            ..ReplayTally::default()
+            ..ReplayCounters::default()
         });
         let mut slots = vec![Slot::default(); config.table.signals.len()];
         for (slot, signal) in slots.iter_mut().zip(&config.table.signals) {
@@ -235,13 +235,11 @@ const STALE: i32 = 2;
 
 impl Stepped for Replay {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        if let Some(mut frames) = port.take_all(now) {
-            for (index, station) in self.stations.iter_mut().enumerate() {
-                station.sees(frames.frame(index));
-            }
-            if let Some(receipt) = frames.send() {
-                port.sent(&receipt);
-            }
+        let frames = port.take_all(now);
+        let sent = frames
+            .and_then(|frames| frames.send_to(|index, frame| self.stations[index].sees(frame)));
+        if let Some(receipt) = &sent {
+            port.sent(receipt);
         }
         self.sent = Some(now);
         self.compare(now);

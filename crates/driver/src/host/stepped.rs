@@ -21,9 +21,6 @@ pub(crate) struct SteppedHost {
     interval: Nanos,
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
-    /// The frames from and to the machine, on their way.
-    inputs: Vec<Box<[u8]>>,
-    outputs: Vec<Box<[u8]>>,
     /// Whether the program was sent the machine's latest values.
     is_delivered: bool,
 }
@@ -43,19 +40,12 @@ impl SteppedHost {
             .watches(&config.table, Role::Controller, max_age);
         let port =
             Port::new(bus, Manual::new(), Role::Controller, None, status).with_life_signs(watches);
-        let frames = |sizes: fn((usize, usize)) -> usize| {
-            let sizes = (0..port.stations()).map(|station| sizes(port.sizes(station)));
-            sizes.map(|size| vec![0; size].into()).collect()
-        };
-        let (inputs, outputs) = (frames(|sizes| sizes.1), frames(|sizes| sizes.0));
         (
             Self {
                 cpu,
                 port,
                 interval,
                 due: None,
-                inputs,
-                outputs,
                 is_delivered: false,
             },
             tally,
@@ -64,27 +54,20 @@ impl SteppedHost {
 }
 
 /// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
-fn carry(from: &mut Port, to: &mut Port, on_the_way: &mut [Box<[u8]>], now: Nanos) -> bool {
-    let Some(mut frames) = from.take_all(now) else {
-        return false;
-    };
-    for (station, space) in on_the_way.iter_mut().enumerate() {
-        space.copy_from_slice(frames.frame(station));
+fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
+    let frames = from.take_all(now);
+    let sent =
+        frames.and_then(|frames| frames.send_to(|station, frame| to.received(station, now, frame)));
+    if let Some(receipt) = &sent {
+        from.sent(receipt);
     }
-    let Some(receipt) = frames.send() else {
-        return false;
-    };
-    for (station, frame) in on_the_way.iter().enumerate() {
-        to.received(station, now, frame);
-    }
-    from.sent(&receipt);
-    true
+    sent.is_some()
 }
 
 impl Stepped for SteppedHost {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
-        self.is_delivered = carry(port, &mut self.port, &mut self.inputs, now);
+        self.is_delivered = carry(port, &mut self.port, now);
         Ok(())
     }
 
@@ -117,7 +100,7 @@ impl Stepped for SteppedHost {
         }
         self.due = Some(due);
         if port.is_up(now) {
-            carry(&mut self.port, port, &mut self.outputs, now);
+            carry(&mut self.port, port, now);
         }
         Ok(due)
     }

@@ -46,8 +46,6 @@ fn other(role: Role) -> Role {
 pub struct End {
     line: Arc<Mutex<SharedLanes>>,
     role: Role,
-    /// The frames to offer next, while they are filled in.
-    next: Vec<Vec<u8>>,
     /// The receipt for the frames that the other end may have taken.
     offered: Option<Receipt>,
     /// Whether the other end has been present.
@@ -111,8 +109,7 @@ impl End {
                 role.name(),
             )));
         }
-        let frames: Vec<Vec<u8>> = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
-        let next = frames.clone();
+        let frames = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
         locked.lanes[lane(role)] = Lane {
             attached: true,
             sizes,
@@ -123,7 +120,6 @@ impl End {
         Ok(Self {
             line: Arc::clone(line),
             role,
-            next,
             offered: None,
             met: false,
         })
@@ -166,15 +162,13 @@ impl End {
         {
             port.sent(&receipt);
         }
-        if let Some(mut frames) = port.take_all(now) {
-            for (station, frame) in self.next.iter_mut().enumerate() {
-                frame.copy_from_slice(frames.frame(station));
-            }
-            if let Some(receipt) = frames.send() {
-                std::mem::swap(&mut mine.frames, &mut self.next);
-                mine.waiting = true;
-                self.offered = Some(receipt);
-            }
+        let frames = port.take_all(now);
+        let sent = frames.and_then(|frames| {
+            frames.send_to(|station, frame| mine.frames[station].copy_from_slice(frame))
+        });
+        if sent.is_some() {
+            mine.waiting = true;
+            self.offered = sent;
         }
     }
 

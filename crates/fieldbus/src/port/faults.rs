@@ -111,6 +111,7 @@ impl FaultLayer {
     }
 
     /// The bytes that a station sends at `now`.
+    #[inline]
     pub(super) fn outgoing<'a>(
         &'a mut self,
         station: usize,
@@ -131,6 +132,7 @@ impl FaultLayer {
     }
 
     /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
+    #[inline]
     pub(super) fn sent(
         &mut self,
         station: usize,
@@ -144,6 +146,7 @@ impl FaultLayer {
     }
 
     /// A whole frame arrived.
+    #[inline]
     pub(super) fn received(
         &mut self,
         station: usize,
@@ -151,11 +154,11 @@ impl FaultLayer {
         bytes: &[u8],
         port: &mut ImagePort,
     ) {
-        let fate = match &mut self.line {
-            None => Fate::Passes(1),
-            Some(line) => line.arrives(station, now, bytes),
+        let Some(line) = &mut self.line else {
+            port.received(station, now, bytes);
+            return;
         };
-        match fate {
+        match line.arrives(station, now, bytes) {
             Fate::Passes(times) => {
                 for _ in 0..times {
                     port.received(station, now, bytes);
@@ -171,6 +174,7 @@ impl FaultLayer {
     }
 
     /// The peer of a station was alive.
+    #[inline]
     pub(super) fn touch(&mut self, station: usize, now: Nanos, port: &mut ImagePort) {
         // While frames are held back, the peer must not seem more alive than the data that have arrived.
         let is_hidden = |line: &LineFaults| line.is_cut(station) || line.holds_back(station);

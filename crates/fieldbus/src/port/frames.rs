@@ -32,19 +32,31 @@ impl Frames<'_> {
     }
 
     /// They go out now. `None`: they are lost on the way, so nothing is to be transmitted in this cycle.
-    pub fn send(mut self) -> Option<Receipt> {
+    pub fn send(self) -> Option<Receipt> {
         let is_lost = self.port.loses_cycle();
-        if is_lost {
-            // This end believes that it has sent them.
-            for station in self.stations() {
-                self.frame(station);
+        self.end(is_lost)
+    }
+
+    /// As [`send`](Self::send), and hands each station's frame to `deliver` if it arrives: for a line within this
+    /// process.
+    pub fn send_to(mut self, mut deliver: impl FnMut(usize, &[u8])) -> Option<Receipt> {
+        let is_lost = self.port.loses_cycle();
+        for station in self.stations() {
+            let frame = self.frame(station);
+            if !is_lost {
+                deliver(station, frame);
             }
         }
+        self.end(is_lost)
+    }
+
+    fn end(self, is_lost: bool) -> Option<Receipt> {
         let receipt = Receipt {
             stations: self.stations,
             bits: None,
         };
         if is_lost {
+            // This end believes that it has sent them.
             self.port.sent(&receipt);
             return None;
         }

@@ -22,16 +22,19 @@ pub(super) struct ImagePort {
 }
 
 impl ImagePort {
+    #[inline]
     pub(super) fn stations(&self) -> usize {
         self.image.stations.len()
     }
 
     /// The bytes that a station sends at `now`.
+    #[inline]
     pub(super) fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
         self.image.stations[station].outgoing(now, self.watchdog)
     }
 
     /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
+    #[inline]
     pub(super) fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) {
         let station = &mut self.image.stations[station];
         match bits {
@@ -64,6 +67,7 @@ impl ImagePort {
     }
 
     /// The peer of a station was alive.
+    #[inline]
     pub(super) fn touch(&mut self, station: usize, now: Nanos) {
         self.image.stations[station].touch(now);
         if self.validity.heard(station) {

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
+//! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
 //! | [`axis`] | axes: their command and feedback structures, motion profiles, what a command means |
@@ -17,8 +18,10 @@
 //! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
 //! | [`report`] | one HTML page about one run |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
+//! | [`programs`] | the PLC programs of demos and measurements |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
-//! | [`driver`] | one device: configuration, open, exchange, statistics, close |
+//! | [`driver_cfg`] | what a driver.cfg says, with the list of bus kinds |
+//! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |

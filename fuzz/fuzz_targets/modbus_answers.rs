@@ -1,7 +1,7 @@
 //! The client's half of the Modbus codec: addresses as people write them, requests planned for signals
 //! anywhere, and arbitrary answers to them.
 //!
-//! The first bytes are the device's abilities and the number of signals, each of which has five bytes; then
+//! The first bytes are the device's capabilities and the number of signals, each of which has five bytes; then
 //! come answers, each preceded by its length. The same input is also read as the text of an address.
 
 #![no_main]

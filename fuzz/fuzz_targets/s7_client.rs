@@ -9,7 +9,7 @@ use libfuzzer_sys::fuzz_target;
 use tickbus_driver_cfg::Config;
 use tickbus_bus_s7::item;
 use tickbus_bus_s7::pdu::{Pdu, function};
-use tickbus_bus_s7::{Frames, SessionEvent, ConnectionParameters, Tsap, transport};
+use tickbus_bus_s7::{FrameFields, SessionEvent, ConnectionParameters, Tsap, transport};
 use tickbus_driver_cfg::Options;
 use tickbus_fieldbus::Role;
 use tickbus_base::time::Nanos;
@@ -23,12 +23,12 @@ const CONFIG: &str = "[driver]\nid = 1\nname = \"fuzz\"\n[fieldbus]\nkind = \"s7
     type = \"LREAL\"\n";
 
 thread_local! {
-    static FRAMES: Frames = {
+    static FRAMES: FrameFields = {
         let config = Config::parse("fuzz.cfg", CONFIG).expect("a right file");
         let Options::S7Client(options) = &config.bus else {
             panic!("its bus is a client");
         };
-        Frames::new(options, &config.table, Role::Device)
+        FrameFields::new(options, &config.table, Role::Device)
     };
 }
 
@@ -43,7 +43,7 @@ fuzz_target!(|data: &[u8]| {
         patience: Nanos(1000),
         asks_who: choice & 1 == 0,
     };
-    let mut dialog = FRAMES.with(|frames| frames.dialog(terms, Nanos::ZERO));
+    let mut session = FRAMES.with(|frames| frames.session(terms, Nanos::ZERO));
     let mut now = Nanos::ZERO;
     while let Some((length, rest)) = pieces.split_first() {
         let (piece, rest) = rest.split_at(usize::from(*length).min(rest.len()));
@@ -51,15 +51,15 @@ fuzz_target!(|data: &[u8]| {
         now = now + Nanos(1);
         let mut bytes = piece;
         loop {
-            match dialog.hear(now, bytes) {
+            match session.hear(now, bytes) {
                 Ok(None) => break,
-                Ok(Some(SessionEvent::Met(..))) => dialog.allow(choice & 2 == 0),
+                Ok(Some(SessionEvent::Met(..))) => session.allow(choice & 2 == 0),
                 Ok(Some(SessionEvent::Done)) => {
-                    assert!(dialog.is_idle());
-                    let is_refused = dialog.refusal(0).is_some();
-                    dialog.suspend(0, is_refused);
+                    assert!(session.is_idle());
+                    let is_refused = session.refusal(0).is_some();
+                    session.suspend(0, is_refused);
                 }
-                Ok(Some(SessionEvent::State(_))) => assert!(dialog.is_idle()),
+                Ok(Some(SessionEvent::State(_))) => assert!(session.is_idle()),
                 Err(end) => {
                     assert!(!end.into_error("peer").to_string().is_empty());
                     return;
@@ -67,17 +67,17 @@ fuzz_target!(|data: &[u8]| {
             }
             bytes = &[];
         }
-        if dialog.is_idle() && choice & 4 != 0 && now.0 % 3 == 0 {
-            dialog.ask_state(now);
-        } else if dialog.is_idle() && dialog.begin(now).is_some() {
+        if session.is_idle() && choice & 4 != 0 && now.0 % 3 == 0 {
+            session.ask_state(now);
+        } else if session.is_idle() && session.begin(now).is_some() {
             // Everything was left out.
-            dialog.suspend(0, false);
+            session.suspend(0, false);
         }
-        check(dialog.to_write());
-        let count = dialog.to_write().len();
-        dialog.wrote(count);
-        assert!(dialog.check(now).is_ok());
-        assert!(dialog.deadline() > now);
+        check(session.to_write());
+        let count = session.to_write().len();
+        session.wrote(count);
+        assert!(session.check(now).is_ok());
+        assert!(session.deadline() > now);
     }
 });
 

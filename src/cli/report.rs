@@ -7,7 +7,7 @@ use super::Outcome;
 use tickbus_base::toml_text::nearest;
 use tickbus_record::Recording;
 use tickbus_report as report;
-use tickbus_report::{Contents, DEFAULT_BUDGET, Run, Statistics};
+use tickbus_report::{Contents, DEFAULT_BUDGET, Run, RunStatistics};
 
 /// Make an HTML page from a recording: chart, steps, faults, states of the line, distributions.
 ///
@@ -33,7 +33,7 @@ pub(super) struct Arguments {
     #[arg(long = "fault", value_name = "SIGNAL")]
     faults: Vec<String>,
 
-    /// Statistics, as a driver or `tickbus plc --stats` writes them; other lines in the file do no harm.
+    /// RunStatistics, as a driver or `tickbus plc --stats` writes them; other lines in the file do no harm.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
 
@@ -64,7 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
 
 /// What the page shows in addition to the recording.
 struct Beside {
-    statistics: Option<Statistics>,
+    statistics: Option<RunStatistics>,
     /// Each with its file name.
     texts: Vec<(String, String)>,
 }
@@ -83,7 +83,7 @@ impl Beside {
                 .map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
         };
         let statistics = arguments.stats.as_deref().and_then(&mut text);
-        let statistics = statistics.map(|text| Statistics::read(&text));
+        let statistics = statistics.map(|text| RunStatistics::read(&text));
         let texts = arguments.texts.iter();
         let texts = texts
             .filter_map(|path| Some((file_name(path), text(path)?)))

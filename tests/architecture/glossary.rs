@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use super::circles::{Module, Path, resolve};
-use super::source::{texts, tokens};
+use super::source::{Token, texts, tokens};
 
 /// The paths in the last column of the glossary's table that lead nowhere.
 pub(crate) fn unknown(text: &str, modules: &BTreeMap<Path, Module<'_>>) -> Vec<String> {
@@ -46,20 +46,36 @@ fn leads_somewhere(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> bool {
         })
 }
 
-/// Whether a file with the definition or an `impl` of `of` defines `member`.
+/// Whether the definition of `of` or an `impl` of it in this file has `member`.
 fn has_member(text: &str, of: &str, member: &str) -> bool {
     let tokens = tokens(text);
-    let begins = |word: &str| ["struct", "enum", "trait", "impl", ">"].contains(&word);
-    let mut pairs = tokens.windows(2);
-    pairs.any(|pair| begins(pair[0].text) && pair[1].text == of)
-        && definitions(text).contains(member)
+    let begins = |word: &str| ["struct", "enum", "trait", "impl", ">", "for"].contains(&word);
+    let mut found = (1..tokens.len())
+        .filter(|&at| begins(tokens[at - 1].text) && tokens[at].text == of)
+        .map(|at| braces(&tokens[at..]));
+    found.any(|body| names(body).contains(member))
+}
+
+/// What stands in the first pair of braces.
+fn braces<'a, 'b>(tokens: &'b [Token<'a>]) -> &'b [Token<'a>] {
+    let begin = tokens.iter().position(|token| token.text == "{");
+    let tokens = &tokens[begin.unwrap_or(tokens.len())..];
+    let mut depth = 0;
+    let end = tokens.iter().position(|token| {
+        depth += i32::from(token.text == "{") - i32::from(token.text == "}");
+        depth == 0
+    });
+    &tokens[..end.unwrap_or(tokens.len())]
 }
 
 /// Every name that a file defines: items, public fields, and variants of enums.
 fn definitions(text: &str) -> HashSet<&str> {
+    names(&tokens(text))
+}
+
+fn names<'a>(tokens: &[Token<'a>]) -> HashSet<&'a str> {
     const KINDS: [&str; 7] = ["struct", "enum", "trait", "fn", "const", "type", "mod"];
     let mut found = HashSet::new();
-    let tokens = tokens(text);
     for (at, token) in tokens.iter().enumerate() {
         let next = &tokens[at + 1..];
         let Some(name) = next.first().map(|name| name.text) else {

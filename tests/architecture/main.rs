@@ -1,4 +1,4 @@
-//! Enforces the project's structure: rooms use only rooms above them, unsafe code and reading the system's
+//! Enforces the project's structure: unsafe code and reading the system's
 //! clocks are confined to certain files, no file grows without limit, and docs/ARCHITECTURE.md shows what there is.
 
 mod circles;
@@ -153,6 +153,8 @@ fn the_glossary_names_what_there_is() {
         // Both names exist, but not there.
         ("image::Driver::exchange", false),
         ("driver::Driver::address", false),
+        // A member of its neighbour in the same file.
+        ("image::Arrival::cycles", false),
         ("nowhere::Driver", false),
     ] {
         let text = format!("## Glossary\n| a | b | `{path}` |\n");

@@ -6,95 +6,46 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use crate::os::one_line;
 use crate::time::{Nanos, TimeHistogram};
 
-/// What an entry is about, if it is not the driver as a whole.
+/// The key of an entry: words with dots between them, and the name of a station or signal among them.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Subject {
-    /// The station with this name.
-    Station(String),
-    /// The signal with this name.
-    Signal(String),
-}
-
-impl Subject {
-    /// Its name.
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Station(name) | Self::Signal(name) => name,
-        }
-    }
-}
-
-/// The key of an entry: words with dots between them, and the name of its subject among them.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Key {
-    head: Cow<'static, str>,
-    subject: Option<Subject>,
-    tail: &'static str,
-}
+pub struct Key(Cow<'static, str>);
 
 impl Key {
-    /// `head.<station>`, and `.tail` unless that is empty.
-    pub fn of_station(head: &'static str, station: &str, tail: &'static str) -> Self {
-        Self {
-            subject: Some(Subject::Station(station.to_owned())),
-            tail,
-            ..Self::from(head)
+    /// `head.<name>`, of a station or signal, and `.tail` unless that is empty.
+    pub fn of(head: &'static str, name: &str, tail: &'static str) -> Self {
+        let mut key = format!("{head}.");
+        for c in name.chars() {
+            if matches!(c, '=' | '\\') {
+                key.push('\\');
+            }
+            key.push(c);
         }
-    }
-
-    /// `head.<signal>`.
-    pub fn of_signal(head: &'static str, signal: &str) -> Self {
-        Self {
-            subject: Some(Subject::Signal(signal.to_owned())),
-            ..Self::from(head)
+        if !tail.is_empty() {
+            key.push('.');
+            key.push_str(tail);
         }
-    }
-
-    /// What it is about.
-    pub fn subject(&self) -> Option<&Subject> {
-        self.subject.as_ref()
+        Self(key.into())
     }
 }
 
 impl From<&'static str> for Key {
-    fn from(head: &'static str) -> Self {
-        Self {
-            head: head.into(),
-            subject: None,
-            tail: "",
-        }
+    fn from(key: &'static str) -> Self {
+        Self(key.into())
     }
 }
 
 impl From<String> for Key {
-    fn from(head: String) -> Self {
-        Self {
-            head: head.into(),
-            ..Self::from("")
-        }
+    fn from(key: String) -> Self {
+        Self(key.into())
     }
 }
 
 /// Writes it as it stands before the `=` of its line.
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.head)?;
-        if let Some(subject) = &self.subject {
-            f.write_str(".")?;
-            for c in subject.name().chars() {
-                if matches!(c, '=' | '\\') {
-                    f.write_str("\\")?;
-                }
-                write!(f, "{c}")?;
-            }
-        }
-        if !self.tail.is_empty() {
-            write!(f, ".{}", self.tail)?;
-        }
-        Ok(())
+        f.write_str(&self.0)
     }
 }
 
@@ -103,7 +54,7 @@ impl fmt::Display for Key {
 pub enum Value {
     /// How many.
     Count(u64),
-    /// A number in the unit that the key names, and how many digits behind the point are shown.
+    /// A number in the unit that the key names, and how many decimal places are shown.
     Number(f64, usize),
     /// A time, shown with its unit.
     Time(Nanos),
@@ -127,17 +78,12 @@ impl fmt::Display for Value {
 pub struct Statistics(Vec<(Key, Value)>);
 
 impl Statistics {
-    /// All entries.
-    pub fn iter(&self) -> impl Iterator<Item = &(Key, Value)> {
-        self.0.iter()
-    }
-
     /// Adds a count.
     pub fn count(&mut self, key: impl Into<Key>, count: u64) {
         self.0.push((key.into(), Value::Count(count)));
     }
 
-    /// Adds a number, shown with this many `digits` behind the point.
+    /// Adds a number, shown with this many decimal places.
     pub fn number(&mut self, key: impl Into<Key>, number: f64, digits: usize) {
         self.0.push((key.into(), Value::Number(number, digits)));
     }
@@ -147,9 +93,11 @@ impl Statistics {
         self.0.push((key.into(), Value::Time(time)));
     }
 
-    /// Adds words.
+    /// Adds words; what would end their line is replaced by a space.
     pub fn text(&mut self, key: impl Into<Key>, text: &str) {
-        self.0.push((key.into(), Value::Text(one_line(text))));
+        let ends_line = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+        let text = text.replace(ends_line, " ");
+        self.0.push((key.into(), Value::Text(text)));
     }
 
     /// Adds `key.count` and, unless it is zero, `key.p50_us`, `p90`, `p99`, `max`, `mean`, `min` and `stdev`, in
@@ -195,7 +143,7 @@ pub fn entries(text: &str) -> impl Iterator<Item = (String, &str)> {
 }
 
 fn entry(line: &str) -> Option<(String, &str)> {
-    // A key begins with a word, behind which a dot or the value follows. A sentence of the log or a command does not.
+    // A key begins with a word, followed by a dot or an equals sign. A sentence of the log or a command does not.
     let word = line.find(|c: char| !c.is_ascii_alphanumeric() && c != '_')?;
     if word == 0 || !line[word..].starts_with(['.', '=']) {
         return None;
@@ -223,12 +171,12 @@ mod tests {
         statistics.number("state.for_s", 1.0, 3);
         statistics.time("max_age", Nanos::from_millis(250));
         statistics.text("reason", "left: 1\n right = 2");
-        statistics.count(Key::of_signal("plc.rises", "a = b: c\\"), 7);
-        statistics.text(Key::of_station("station", "x=y", "stale"), "true");
+        statistics.count(Key::of("plc.rises", "a = b: c\\", ""), 7);
+        statistics.text(Key::of("station", "x=y", "stale"), "true");
         let text = statistics.to_string();
         assert_eq!(
             text,
-            "ticks=5\nstate.for_s=1.000\nmax_age=250ms\nreason=left: 1 right = 2\n\
+            "ticks=5\nstate.for_s=1.000\nmax_age=250ms\nreason=left: 1  right = 2\n\
              plc.rises.a \\= b: c\\\\=7\nstation.x\\=y.stale=true\n"
         );
         let read: Vec<_> = entries(&text).collect();
@@ -242,7 +190,7 @@ mod tests {
                 ("ticks", "5"),
                 ("state.for_s", "1.000"),
                 ("max_age", "250ms"),
-                ("reason", "left: 1 right = 2"),
+                ("reason", "left: 1  right = 2"),
                 ("plc.rises.a = b: c\\", "7"),
                 ("station.x=y.stale", "true"),
             ]

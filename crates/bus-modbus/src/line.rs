@@ -59,11 +59,11 @@ impl Serial {
 }
 
 impl Line {
-    /// Replaces the address of the driver.cfg, if `check` accepts the new one.
+    /// Replaces the address or the serial line of the driver.cfg, if `check` accepts the new address.
     ///
     /// # Errors
     ///
-    /// The line is a serial one, or what is wrong with the address.
+    /// What is wrong with the address.
     pub fn set_address(
         &mut self,
         address: &str,

@@ -7,7 +7,7 @@ const IDENTITY_LIMIT: usize = 1000;
 
 /// The range of unit numbers on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Units {
+pub(super) enum UnitRange {
     /// All that fit into a byte.
     Tcp,
     /// On a serial line 0 is the broadcast, and numbers above 247 are reserved.
@@ -28,7 +28,7 @@ pub(super) struct Keys {
 /// The units of a driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stations {
-    units: Units,
+    units: UnitRange,
     /// The keys in `[fieldbus]`.
     common: Keys,
     /// The keys in the `[[station]]` tables, with their offsets; empty without such tables.
@@ -37,14 +37,14 @@ pub struct Stations {
 
 impl Stations {
     /// Reads the unit in `[fieldbus]`.
-    pub(super) fn read(units: Units, unit: Option<&Value<'_>>) -> Option<Self> {
+    pub(super) fn read(units: UnitRange, unit: Option<&Value<'_>>) -> Option<Self> {
         let stated = unit.map(|value| read_unit(units, value));
         let unit = match stated {
             None => None,
             Some(stated) => Some(stated?),
         };
         // The lowest number of a unit.
-        let unit = unit.or((units == Units::ServedOnSerial).then_some(1));
+        let unit = unit.or((units == UnitRange::ServedOnSerial).then_some(1));
         Some(Self {
             units,
             common: Keys {
@@ -116,10 +116,10 @@ impl Stations {
     }
 }
 
-fn read_unit(units: Units, value: &Value<'_>) -> Option<u8> {
+fn read_unit(units: UnitRange, value: &Value<'_>) -> Option<u8> {
     let range = match units {
-        Units::Tcp => 0..=255,
-        Units::Serial | Units::ServedOnSerial => 1..=247,
+        UnitRange::Tcp => 0..=255,
+        UnitRange::Serial | UnitRange::ServedOnSerial => 1..=247,
     };
     value.whole(range).and_then(|unit| u8::try_from(unit).ok())
 }

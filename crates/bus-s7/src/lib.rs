@@ -74,7 +74,7 @@ mod userdata;
 mod variable;
 
 pub use client::{
-    ClientOptions, ClientSession, ConnectionParameters, End, Frames, Refusal, S7Client,
+    ClientOptions, ClientSession, ConnectionParameters, End, FrameFields, Refusal, S7Client,
     SessionEvent,
 };
 pub use place::Start;

@@ -95,8 +95,7 @@ fn open_hosted(
         Role::Controller,
         bus_of_program,
         clock,
-    )
-    .map_err(DriverError::no_thread)?;
+    )?;
     Ok((
         Bus::Free(bus(device)),
         Some(Program::Thread(Box::new(host))),

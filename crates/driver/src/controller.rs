@@ -60,9 +60,7 @@ impl Host {
             interval,
             tape: ScanRecorder::start(config, role)?,
         };
-        HostThread::start(hosted, title, config, role, bus, clock)
-            .map(Self)
-            .map_err(DriverError::no_thread)
+        HostThread::start(hosted, title, config, role, bus, clock).map(Self)
     }
 
     /// The state of the line.

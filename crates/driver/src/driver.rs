@@ -97,7 +97,7 @@ impl Driver {
             record: self
                 .recorder
                 .as_ref()
-                .map(|recorder| Arc::clone(recorder.tally())),
+                .map(|recorder| Arc::clone(recorder.counters())),
         }
     }
 

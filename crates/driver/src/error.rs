@@ -70,9 +70,8 @@ impl From<RecorderError> for DriverError {
 }
 
 impl DriverError {
-    /// The system refused the thread of the bus.
-    pub(crate) fn no_thread(source: std::io::Error) -> Self {
-        let what = "the bus";
+    /// The system refused the thread of this part.
+    pub(crate) fn no_thread(what: &'static str, source: std::io::Error) -> Self {
         Self::System { what, source }
     }
 

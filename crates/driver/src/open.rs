@@ -26,7 +26,7 @@ impl Driver {
     ///
     /// # Errors
     ///
-    /// The hosted program and the signal table do not fit, or the system refused a thread.
+    /// See [`DriverError`].
     pub fn open(config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
         let (tx, rx) = config.role.areas();
         let directions = directions(&config.table, config.role);
@@ -68,7 +68,7 @@ impl Driver {
             Bus::Free(bus) => {
                 let reconnect = config.timing.reconnect.clone();
                 let thread = BusThread::start(bus, port, reconnect, status.clone(), &config.name);
-                BusHandle::Free(thread.map_err(DriverError::no_thread)?)
+                BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
             }
             Bus::Stepped(bus) => BusHandle::Stepped {
                 bus,

@@ -78,7 +78,7 @@ impl ScanRecorder {
     }
 
     /// The recorder's counters.
-    pub(super) fn tally(&self) -> Arc<RecorderCounters> {
-        Arc::clone(self.recorder.tally())
+    pub(super) fn counters(&self) -> Arc<RecorderCounters> {
+        Arc::clone(self.recorder.counters())
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use super::Code;
-use super::host::ProgramTally;
+use super::host::ProgramCounters;
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, TimeHistogram};
@@ -107,7 +107,7 @@ pub struct Snapshot {
     pub(super) samples: TickTimes,
     pub(super) status: LinkStatus,
     pub(super) board: Arc<FaultBoard>,
-    pub(super) program: Option<ProgramTally>,
+    pub(super) program: Option<ProgramCounters>,
     pub(super) record: Option<Arc<RecorderCounters>>,
 }
 
@@ -144,7 +144,7 @@ impl Snapshot {
         }
         let sections = &self.config.table.stations;
         for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
-            let key = |tail| Key::of_station("station", &section.name, tail);
+            let key = |tail| Key::of("station", &section.name, tail);
             let is_stale = *age > self.config.timing.max_age || !is_valid;
             statistics.text(key("stale"), if is_stale { "true" } else { "false" });
             if *age != Nanos::MAX {

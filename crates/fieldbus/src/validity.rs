@@ -180,9 +180,7 @@ impl Validity {
         };
         let mut facts = vec![("cpu".into(), all.name())];
         if self.stations.len() > 1 {
-            facts.extend(
-                known().map(|(name, state)| (Key::of_station("cpu", name, ""), state.name())),
-            );
+            facts.extend(known().map(|(name, state)| (Key::of("cpu", name, ""), state.name())));
         }
         facts
     }

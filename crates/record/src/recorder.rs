@@ -327,7 +327,7 @@ impl Recorder {
     }
 
     /// Its counters.
-    pub fn tally(&self) -> &Arc<RecorderCounters> {
+    pub fn counters(&self) -> &Arc<RecorderCounters> {
         &self.tally
     }
 }

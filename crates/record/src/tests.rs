@@ -333,7 +333,7 @@ fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String,
         let time = Nanos::from_millis(i64::try_from(number).expect("small"));
         recorder.record(number, time, 0, std::iter::empty(), &slots);
     }
-    let tally = recorder.tally().clone();
+    let tally = recorder.counters().clone();
     let mut statistics = tickbus_base::statistics::Statistics::default();
     tally.write(&mut statistics);
     let mut text = statistics.to_string();

@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::{Contents, DEFAULT_BUDGET, Statistics, read, write};
+use super::{Contents, DEFAULT_BUDGET, RunStatistics, read, write};
 use tickbus_record::Recording;
 
 /// Writes a page to a temporary file first: an old page stays until the new one is complete. Returns its
@@ -46,7 +46,7 @@ pub fn page_beside(
     let mut read_from = Recording::open(recording, None).map_err(|error| error.to_string())?;
     // What precedes a damaged place in the recording is worth a page.
     let (run, _) = read(&mut read_from, DEFAULT_BUDGET);
-    let statistics = statistics.map(Statistics::read);
+    let statistics = statistics.map(RunStatistics::read);
     let file = recording.file_name().unwrap_or(recording.as_os_str());
     let contents = Contents {
         title,

@@ -23,4 +23,4 @@ pub use file::{page_beside, write_file};
 pub use from::read;
 pub use page::{Contents, write};
 pub use run::{Change, DEFAULT_BUDGET, Mark, MarkKind, Run, Signal, SignalKind};
-pub use statistics::Statistics;
+pub use statistics::RunStatistics;

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use super::html::{Json, count, counted, digits, printable, span};
 use super::spans::{self, Span};
 use super::tables::{self, Scale};
-use super::{MarkKind, Run, SignalKind, Statistics, code, figures};
+use super::{MarkKind, Run, RunStatistics, SignalKind, code, figures};
 use tickbus_base::time::Nanos;
 
 const TEMPLATE: &str = include_str!("template.html");
@@ -40,8 +40,8 @@ pub struct Contents<'a> {
     pub steps: Option<usize>,
     /// Signals that report a fault while they are on.
     pub faults: &'a [usize],
-    /// Statistics of a driver or a PLC program.
-    pub statistics: Option<&'a Statistics>,
+    /// RunStatistics of a driver or a PLC program.
+    pub statistics: Option<&'a RunStatistics>,
     /// Texts to be shown verbatim, each under its heading.
     pub texts: &'a [(String, String)],
 }
@@ -211,7 +211,7 @@ fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> Markup {
         .collect();
     events.sort_by_key(|(_, event)| event.from);
     let states = of("link");
-    let distributions = contents.statistics.map(Statistics::distributions);
+    let distributions = contents.statistics.map(RunStatistics::distributions);
     let distributions = distributions.filter(|distributions| !distributions.is_empty());
     html! {
         @if !steps.is_empty() { (section("steps", "Steps", &tables::steps(&steps, scale))) }
@@ -254,7 +254,7 @@ fn section(id: &str, heading: &str, inner: &Markup) -> Markup {
 }
 
 /// The final state of the line according to the statistics.
-fn line(statistics: &Statistics) -> Markup {
+fn line(statistics: &RunStatistics) -> Markup {
     let Some(state) = statistics.get("state") else {
         return Markup::default();
     };

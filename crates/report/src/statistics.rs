@@ -2,9 +2,9 @@
 
 use tickbus_base::statistics::entries;
 
-/// Statistics of a driver or of a PLC program. If a key occurs more than once, its last value counts.
+/// RunStatistics of a driver or of a PLC program. If a key occurs more than once, its last value counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Statistics(Vec<(String, String)>);
+pub struct RunStatistics(Vec<(String, String)>);
 
 /// One distribution of the statistics.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ const VALUES: [&str; 5] = ["p50", "p90", "p99", "max", "mean"];
 /// The units of distributions: as the suffix of a key, and as shown to people.
 const UNITS: [(&str, &str); 2] = [("_us", "µs"), ("", "")];
 
-impl Statistics {
+impl RunStatistics {
     /// Reads the statistics in a text; other lines are skipped, so that the complete output of a command may
     /// be given.
     pub fn read(text: &str) -> Self {
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn the_last_value_of_each_key_counts() {
-        let statistics = Statistics::read(TEXT);
+        let statistics = RunStatistics::read(TEXT);
         let get = |key| statistics.get(key);
         assert_eq!((get("state"), get("ticks")), (Some("running"), Some("5")));
         assert_eq!(
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn distributions_are_found_with_their_unit() {
-        let found = Statistics::read(TEXT).distributions();
+        let found = RunStatistics::read(TEXT).distributions();
         let [age, cycles] = &*found else {
             panic!("{found:?}")
         };
@@ -128,7 +128,7 @@ mod tests {
         let text = TEXT
             .replace("p99_us=3", "p99_us=NaN")
             .replace("p99=2", "p99=");
-        assert_eq!(Statistics::read(&text).distributions(), []);
-        assert!(Statistics::read("nothing here").is_empty());
+        assert_eq!(RunStatistics::read(&text).distributions(), []);
+        assert!(RunStatistics::read("nothing here").is_empty());
     }
 }

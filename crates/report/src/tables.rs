@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::html::{count, counted, digits, seconds, span};
 use super::spans::{Span, state_class};
 use super::statistics::Distribution;
-use super::{Run, Signal, SignalKind, Statistics, figures};
+use super::{Run, RunStatistics, Signal, SignalKind, figures};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 
@@ -196,7 +196,7 @@ pub(super) fn distributions(distributions: &[Distribution]) -> Markup {
 }
 
 /// All keys and values.
-pub(super) fn statistics(statistics: &Statistics) -> Markup {
+pub(super) fn statistics(statistics: &RunStatistics) -> Markup {
     let rows = html! {
         @for (key, value) in statistics.all() {
             tr { th scope="row" class="name" { (key) } td { (value) } }

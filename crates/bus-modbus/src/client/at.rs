@@ -23,7 +23,7 @@ impl ClientOptions {
                     continue;
                 }
             };
-            if let Err(mistake) = Piece::of_spot(signal, spot) {
+            if let Err(mistake) = Piece::of_tag(signal, spot) {
                 line.refuse(mistake);
                 continue;
             }
@@ -46,7 +46,7 @@ impl ClientOptions {
         let is_placed = |signal: &Signal| self.at.contains_key(&signal.name);
         both_ways(table, writes, is_placed, |signal| {
             let pieces = if let Some(spot) = self.at.get(&signal.name) {
-                Piece::of_spot(signal, *spot).into_iter().collect()
+                Piece::of_tag(signal, *spot).into_iter().collect()
             } else {
                 let bytes = table.stations[signal.station].bytes(signal.area);
                 let blocks = self.blocks(signal.area, bytes).unwrap_or_default();
@@ -78,7 +78,7 @@ impl ClientOptions {
                 continue;
             }
             if let Some(spot) = self.at.get(&signal.name) {
-                let piece = Piece::of_spot(signal, *spot).ok();
+                let piece = Piece::of_tag(signal, *spot).ok();
                 claims.extend(piece.map(|piece| (piece, index)));
             } else {
                 let parts = blocks.iter();

@@ -66,7 +66,7 @@ impl ModbusClient {
         }
     }
 
-    fn poll(
+    fn session(
         &mut self,
         framing: Framing,
         peer: String,
@@ -78,7 +78,7 @@ impl ModbusClient {
             &mut self.stations,
             &mut self.guards,
             framing,
-            self.options.abilities(),
+            self.options.capabilities(),
             (self.cycle, timeout),
             peer,
             now,
@@ -101,8 +101,8 @@ impl Free for ModbusClient {
                     transaction: 0,
                     inbox: Vec::new(),
                 };
-                let mut poll = self.poll(framing, peer.to_string(), port, port.clock().now());
-                call.run(&mut poll, port, stop)
+                let mut session = self.session(framing, peer.to_string(), port, port.clock().now());
+                call.run(&mut session, port, stop)
             }
             #[cfg(unix)]
             Line::Serial(line) => {
@@ -117,8 +117,8 @@ impl Free for ModbusClient {
                     quiet_until: now + line.silence,
                     echo: line.new_echo(),
                 };
-                let mut poll = self.poll(framing, line.device, port, now);
-                call.run(&mut poll, port, stop)
+                let mut session = self.session(framing, line.device, port, now);
+                call.run(&mut session, port, stop)
             }
             #[cfg(not(unix))]
             Line::Serial(_) => Err(super::no_serial_port()),

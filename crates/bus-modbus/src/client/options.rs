@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::line::Line;
-use crate::stations::{Stations, Units, read_write_to};
+use crate::stations::{Stations, UnitRange, read_write_to};
 use crate::table::Table as OfTable;
 use crate::{ElementAddress, INPUTS, TagAddress};
 use tickbus_base::Mistake;
@@ -68,8 +68,8 @@ impl ClientOptions {
         let write_to = table.take("write_to");
 
         let units = match &line {
-            Some(Line::Serial(_)) => Units::Serial,
-            _ => Units::Tcp,
+            Some(Line::Serial(_)) => UnitRange::Serial,
+            _ => UnitRange::Tcp,
         };
         let stations = Stations::read(units, unit.as_ref());
         let write_to = write_to.as_ref().map(read_write_to);
@@ -118,14 +118,14 @@ impl ClientOptions {
                     }
                 });
                 if let Err(mistake) = fits {
-                    collector.collect(self.lie(area).at, mistake);
+                    collector.collect(self.mapping(area).at, mistake);
                     break;
                 }
             }
         }
     }
 
-    fn lie(&self, area: Area) -> &AreaMapping {
+    fn mapping(&self, area: Area) -> &AreaMapping {
         match area {
             Area::Input => &self.inputs,
             Area::Output => &self.outputs,
@@ -140,7 +140,7 @@ impl ClientOptions {
 
     /// The first elements of the parts of an area.
     pub(crate) fn places(&self, area: Area) -> impl Iterator<Item = ElementAddress> {
-        self.lie(area).places()
+        self.mapping(area).places()
     }
 
     /// The unit of a station.
@@ -166,7 +166,7 @@ impl ClientOptions {
     ///
     /// It does not fit: what is wrong, and what would be right.
     pub fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, Mistake> {
-        self.lie(area).blocks(area, bytes)
+        self.mapping(area).blocks(area, bytes)
     }
 
     /// The pieces of the signals in a station's area.
@@ -180,7 +180,7 @@ impl ClientOptions {
                 continue;
             }
             if let Some(spot) = self.at.get(&signal.name) {
-                pieces.extend(Piece::of_spot(signal, *spot));
+                pieces.extend(Piece::of_tag(signal, *spot));
             } else {
                 let parts = blocks.iter();
                 pieces.extend(parts.filter_map(|block| Piece::of_block(signal, block)));
@@ -189,8 +189,8 @@ impl ClientOptions {
         pieces
     }
 
-    /// The abilities assumed of a device at the start of a connection.
-    pub(super) fn abilities(&self) -> Capabilities {
+    /// The capabilities assumed of a device at the start of a connection.
+    pub(super) fn capabilities(&self) -> Capabilities {
         let gap = match self.line {
             Line::Tcp(_) => usize::MAX,
             Line::Serial(_) => SERIAL_GAP,
@@ -202,7 +202,7 @@ impl ClientOptions {
     pub fn requests(&self, table: &SignalTable, station: usize) -> Vec<Request> {
         let (writes, reads) = self.role.areas();
         let pieces = |area| self.pieces(table, station, area);
-        queries(&pieces(reads), &pieces(writes), &self.abilities())
+        queries(&pieces(reads), &pieces(writes), &self.capabilities())
     }
 }
 

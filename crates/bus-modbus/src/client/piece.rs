@@ -80,7 +80,7 @@ impl Piece {
     /// # Errors
     ///
     /// It does not fit there: what is wrong, and what would be right.
-    pub(super) fn of_spot(signal: &Signal, spot: TagAddress) -> Result<Self, Mistake> {
+    pub(super) fn of_tag(signal: &Signal, spot: TagAddress) -> Result<Self, Mistake> {
         let ElementAddress { table, offset } = spot.place;
         let data_type = signal.data_type;
         if let Some(stated) = spot.data_type

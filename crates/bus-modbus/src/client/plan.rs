@@ -10,7 +10,7 @@ use crate::table::{Span, Table};
 use super::Piece;
 use super::request::{Region, Request};
 
-/// The abilities of a device, which decide how requests are made.
+/// The capabilities of a device, which decide how requests are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capabilities {
     /// One request can write and read holding registers: function 23.
@@ -24,7 +24,7 @@ pub struct Capabilities {
 }
 
 impl Capabilities {
-    /// The abilities assumed of an unknown device.
+    /// The capabilities assumed of an unknown device.
     pub const fn new(combine: bool, gap: usize) -> Self {
         Self {
             combine,

@@ -12,13 +12,13 @@ use tickbus_fieldbus::{BusError, BusSetup, Free, Port, tcp as many};
 use super::Line;
 pub use options::ServerOptions;
 use tcp::TcpService;
-use units::Units;
+use units::ServedUnits;
 
 /// The bus of kind `modbus-server`.
 #[derive(Debug)]
 pub struct ModbusServer {
     options: ServerOptions,
-    units: Units,
+    units: ServedUnits,
 }
 
 impl ModbusServer {
@@ -26,7 +26,7 @@ impl ModbusServer {
     pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
         Self {
             options: options.clone(),
-            units: Units::new(options, setup),
+            units: ServedUnits::new(options, setup),
         }
     }
 }

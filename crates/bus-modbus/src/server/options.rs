@@ -1,7 +1,7 @@
 //! The options of the bus `modbus-server` in a driver.cfg.
 
 use crate::line::Line;
-use crate::stations::{Stations, Units};
+use crate::stations::{Stations, UnitRange};
 use crate::{ElementAddress, INPUTS, Map, Side, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
@@ -40,8 +40,8 @@ impl ServerOptions {
         let clients = table.take("clients");
 
         let units = match &line {
-            Some(Line::Serial(_)) => Units::ServedOnSerial,
-            _ => Units::Tcp,
+            Some(Line::Serial(_)) => UnitRange::ServedOnSerial,
+            _ => UnitRange::Tcp,
         };
         let stations = Stations::read(units, unit.as_ref());
         let window = match &inputs {

@@ -11,7 +11,7 @@ use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Carried, Units};
+use super::units::{Carried, ServedUnits};
 
 /// The unit number that addresses all units.
 const BROADCAST: u8 = 0;
@@ -27,7 +27,7 @@ const ECHOES: u32 = 20;
 /// The serial port does not exist, or is gone.
 pub(super) fn serve(
     line: &Serial,
-    units: &mut Units,
+    units: &mut ServedUnits,
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
@@ -51,7 +51,7 @@ pub(super) fn serve(
 
 struct Server<'a> {
     line: &'a Serial,
-    units: &'a mut Units,
+    units: &'a mut ServedUnits,
     /// The stations that the client has written to.
     writes: Box<[bool]>,
     framer: Framer,

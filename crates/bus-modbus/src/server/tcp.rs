@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Carried, Units};
+use super::units::{Carried, ServedUnits};
 
 /// The most unconfirmed answers remembered per client.
 const REMEMBERED: usize = 64;
@@ -14,7 +14,7 @@ const REMEMBERED: usize = 64;
 /// Modbus TCP as a service for many clients.
 #[derive(Debug)]
 pub(super) struct TcpService<'a> {
-    pub(super) units: &'a mut Units,
+    pub(super) units: &'a mut ServedUnits,
     pub(super) clients: usize,
     pub(super) patience: Nanos,
 }

@@ -9,7 +9,7 @@ use crate::{Done, Exception, Function, Identification, Map, Tables, answer};
 
 /// The units of a server, and the values that clients have written to them.
 #[derive(Debug)]
-pub(super) struct Units {
+pub(super) struct ServedUnits {
     identification: Identification,
     /// Whether a write is an event even if it changes nothing.
     every_write: bool,
@@ -40,7 +40,7 @@ pub(super) struct Carried {
     receipt: Receipt,
 }
 
-impl Units {
+impl ServedUnits {
     pub(super) fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
         let table = setup.table;
         let (sent, held) = setup.role.areas();

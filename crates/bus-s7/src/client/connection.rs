@@ -1,4 +1,4 @@
-//! One connection without its socket: the dialog, and what it transfers to and from the port.
+//! One connection without its socket: the session, and what it transfers to and from the port.
 
 use std::io;
 use std::net::SocketAddr;
@@ -24,7 +24,7 @@ const RETRY: Nanos = Nanos::from_secs(1);
 pub(super) struct Connection<'a> {
     bus: &'a mut S7Client,
     peer: SocketAddr,
-    dialog: ClientSession,
+    session: ClientSession,
     pace: Pace,
     has_identity: bool,
     /// When to ask the CPU for its operating state next; `None` if it does not report it.
@@ -59,7 +59,7 @@ impl<'a> Connection<'a> {
             ..StationCycle::default()
         };
         Self {
-            dialog: bus.frames.dialog(terms, now),
+            session: bus.frames.session(terms, now),
             pace: Pace::new(now, bus.cycle),
             has_identity: false,
             state: None,
@@ -73,9 +73,9 @@ impl<'a> Connection<'a> {
 
     /// The connection has ended with an error.
     pub(super) fn end(&mut self) {
-        if self.dialog.asks_who() {
+        if self.session.asks_who() {
             self.bus.identity.unanswered += 1;
-        } else if self.dialog.asks_state() {
+        } else if self.session.asks_state() {
             self.bus.state.unanswered += 1;
         }
     }
@@ -97,7 +97,7 @@ impl<'a> Connection<'a> {
             line
         };
         let may_write = self.bus.guard.meet(port, &line);
-        self.dialog.allow(may_write);
+        self.session.allow(may_write);
         self.has_identity = true;
         port.tell("pdu", &length.to_string());
         port.running(&format!("connected with {}, {line}", self.peer));
@@ -107,9 +107,9 @@ impl<'a> Connection<'a> {
 
     /// Asks for the operating state if that is due, between two cycles.
     fn ask_state(&mut self, now: Nanos) {
-        if self.dialog.is_idle() && self.state.is_some_and(|due| due <= now) {
+        if self.session.is_idle() && self.state.is_some_and(|due| due <= now) {
             self.state = Some(now + STATE);
-            self.dialog.ask_state(now);
+            self.session.ask_state(now);
         }
     }
 
@@ -161,11 +161,11 @@ impl<'a> Connection<'a> {
 
     /// A cycle is due.
     fn cycle(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        if self.dialog.asks_state() {
+        if self.session.asks_state() {
             self.is_due = true;
             return Ok(());
         }
-        if !self.dialog.is_idle() {
+        if !self.session.is_idle() {
             port.count("s7.skipped");
             return Ok(());
         }
@@ -175,18 +175,18 @@ impl<'a> Connection<'a> {
         for (index, station) in self.stations.iter_mut().enumerate() {
             if station.resume.is_some_and(|resume| resume <= now) {
                 station.resume = None;
-                self.dialog.suspend(index, false);
+                self.session.suspend(index, false);
             }
             if self.bus.guard.may_write() && station.has[0] && station.resume.is_none() {
                 let frame = frames.frame(index);
-                self.dialog.frame_to_write(index).copy_from_slice(frame);
+                self.session.frame_to_write(index).copy_from_slice(frame);
             }
         }
         self.receipt = frames.send();
         if self.receipt.is_none() {
             return Ok(());
         }
-        match self.dialog.begin(now) {
+        match self.session.begin(now) {
             Some(SessionEvent::Done) => self.done(now, port),
             _ => Ok(()),
         }
@@ -204,7 +204,7 @@ impl<'a> Connection<'a> {
             if station.resume.is_some() {
                 continue;
             }
-            if let Some(refusal) = self.dialog.refusal(index) {
+            if let Some(refusal) = self.session.refusal(index) {
                 port.count("s7.refused");
                 station.resume = Some(now + RETRY);
                 station.refusal = Some(refusal.clone());
@@ -212,7 +212,7 @@ impl<'a> Connection<'a> {
             }
             let [is_written, is_read] = station.has;
             if is_read {
-                port.received(index, now, self.dialog.frame_read(index));
+                port.received(index, now, self.session.frame_read(index));
             } else if is_heard {
                 port.touch(index, now);
             }
@@ -249,7 +249,7 @@ impl<'a> Connection<'a> {
             if !is_any_served {
                 return Err(refusal.clone().into_error(self.peer));
             }
-            self.dialog.suspend(index, true);
+            self.session.suspend(index, true);
             let name = &self.bus.names[index];
             let text = format!("station \"{name}\": {} {refusal}", self.peer);
             let told = &mut self.bus.told_refusals[index];
@@ -269,7 +269,7 @@ impl Caller for Connection<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         let mut bytes = bytes;
         loop {
-            let news = self.dialog.hear(now, bytes);
+            let news = self.session.hear(now, bytes);
             bytes = &[];
             match news.map_err(|end| end.into_error(self.peer))? {
                 None => return Ok(()),
@@ -293,24 +293,24 @@ impl Caller for Connection<'_> {
     }
 
     fn to_write(&self, _now: Nanos) -> &[u8] {
-        self.dialog.to_write()
+        self.session.to_write()
     }
 
     fn wrote(&mut self, _now: Nanos, count: usize, _port: &mut Port) {
-        self.dialog.wrote(count);
+        self.session.wrote(count);
     }
 
     fn check(&mut self, now: Nanos, _port: &mut Port) -> Result<(), BusError> {
-        let checked = self.dialog.check(now);
+        let checked = self.session.check(now);
         checked.map_err(|end| end.into_error(self.peer))
     }
 
     fn deadline(&self, _port: &Port) -> Nanos {
-        let mut deadline = self.dialog.deadline();
+        let mut deadline = self.session.deadline();
         if self.has_identity {
             deadline = deadline.min(self.pace.due());
         }
-        if let (Some(state), true) = (self.state, self.dialog.is_idle()) {
+        if let (Some(state), true) = (self.state, self.session.is_idle()) {
             deadline = deadline.min(state);
         }
         deadline

@@ -11,14 +11,14 @@ use tickbus_image::signal::SignalTable;
 
 /// What is written to a CPU and read from it, and where.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Frames {
+pub struct FrameFields {
     pub(super) written: Vec<Field>,
     pub(super) read: Vec<Field>,
     /// Sizes of each station's frames in bytes: the written one and the read one.
     pub(super) lengths: Vec<[usize; 2]>,
 }
 
-impl Frames {
+impl FrameFields {
     /// The frames of the end with `role`.
     pub fn new(options: &ClientOptions, table: &SignalTable, role: Role) -> Self {
         let (sends, receives) = role.areas();
@@ -85,7 +85,7 @@ impl Frames {
 impl ClientOptions {
     /// What is written and read in one cycle, for people.
     pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
-        let frames = Frames::new(self, table, self.role);
+        let frames = FrameFields::new(self, table, self.role);
         let writes = match self.write_to {
             Some(_) => "writes",
             None => "would write",

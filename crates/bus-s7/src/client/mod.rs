@@ -16,7 +16,7 @@ use tickbus_fieldbus::{BusError, CYCLE, Free, PlcState, Port, Role, WriteGuard};
 use tickbus_image::signal::SignalTable;
 
 use connection::Connection;
-pub use frames::Frames;
+pub use frames::FrameFields;
 pub use options::ClientOptions;
 pub use parameters::{ConnectionParameters, End, SessionEvent};
 pub use refusal::Refusal;
@@ -30,7 +30,7 @@ const PATIENCE: Nanos = Nanos::from_secs(2);
 pub struct S7Client {
     options: ClientOptions,
     cycle: Nanos,
-    frames: Frames,
+    frames: FrameFields,
     /// The stations' names, for messages.
     names: Vec<String>,
     guard: WriteGuard,
@@ -76,7 +76,7 @@ impl S7Client {
     ) -> Self {
         let names = table.stations.iter().map(|station| station.name.clone());
         Self {
-            frames: Frames::new(options, table, role),
+            frames: FrameFields::new(options, table, role),
             names: names.collect(),
             guard: WriteGuard::new(options.write_to.as_deref()),
             cycle: cycle.unwrap_or(CYCLE),

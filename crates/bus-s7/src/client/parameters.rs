@@ -1,4 +1,4 @@
-//! The parameters of a dialog, its news, and how it ends.
+//! The parameters of a session, its news, and how it ends.
 
 use std::fmt;
 
@@ -56,7 +56,7 @@ impl From<ProtocolError> for End {
     }
 }
 
-/// What the owner of a dialog must handle.
+/// What the owner of a session must handle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SessionEvent {
     /// The connection is up, with PDUs of at most this length, and with the CPU's identity if it was asked

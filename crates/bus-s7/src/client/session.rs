@@ -3,7 +3,7 @@
 
 use super::plan::{Job, JobDirection};
 use super::traffic::{Traffic, function_of, write_data};
-use super::{ConnectionParameters, End, Frames, Refusal, SessionEvent};
+use super::{ConnectionParameters, End, FrameFields, Refusal, SessionEvent};
 use crate::ProtocolError;
 use crate::item::{self, Data, ReturnCode};
 use crate::length::{LONGEST, SHORTEST};
@@ -32,7 +32,7 @@ const STATE: usize = 2;
 /// The owner of the socket passes what it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write),
 /// reports how much the system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to see
 /// whether the connection may go on. After [`SessionEvent::Met`] it starts a cycle by [`begin`](Self::begin), or asks
-/// for the operating state by [`ask_state`](Self::ask_state), whenever the dialog [is idle](Self::is_idle);
+/// for the operating state by [`ask_state`](Self::ask_state), whenever the session [is idle](Self::is_idle);
 /// [`SessionEvent::Done`] ends the cycle, [`SessionEvent::State`] the question.
 #[derive(Debug)]
 pub struct ClientSession {
@@ -69,17 +69,17 @@ enum Phase {
     Working(usize),
 }
 
-impl Frames {
-    /// A dialog that transfers them.
-    pub fn dialog(&self, terms: ConnectionParameters, now: Nanos) -> ClientSession {
+impl FrameFields {
+    /// A session that transfers them.
+    pub fn session(&self, terms: ConnectionParameters, now: Nanos) -> ClientSession {
         ClientSession::new(terms, now, self.clone())
     }
 }
 
 impl ClientSession {
-    /// A dialog that starts at `now` and transfers these frames.
-    fn new(terms: ConnectionParameters, now: Nanos, frames: Frames) -> Self {
-        let mut dialog = Self {
+    /// A session that starts at `now` and transfers these frames.
+    fn new(terms: ConnectionParameters, now: Nanos, frames: FrameFields) -> Self {
+        let mut session = Self {
             phase: Phase::Connecting,
             inbox: Vec::new(),
             pieces: Vec::new(),
@@ -97,20 +97,20 @@ impl ClientSession {
             source: REFERENCE,
             destination: 0,
             size: Some(TPDU),
-            calling: dialog.terms.calling.as_bytes(),
-            called: dialog.terms.called.as_bytes(),
+            calling: session.terms.calling.as_bytes(),
+            called: session.terms.called.as_bytes(),
         };
-        transport::write_request(&connect, &mut dialog.outbox);
-        dialog
+        transport::write_request(&connect, &mut session.outbox);
+        session
     }
 
-    /// Allows or forbids writing frames from now on. The dialog must be idle.
+    /// Allows or forbids writing frames from now on. The session must be idle.
     pub fn allow(&mut self, may_write: bool) {
         self.traffic.may_write = may_write;
         self.traffic.plan(usize::from(self.pdu));
     }
 
-    /// Excludes a station from the cycles, or includes it again. The dialog must be idle.
+    /// Excludes a station from the cycles, or includes it again. The session must be idle.
     pub fn suspend(&mut self, station: usize, is_out: bool) {
         if std::mem::replace(&mut self.traffic.suspended[station], is_out) != is_out {
             self.traffic.plan(usize::from(self.pdu));
@@ -151,7 +151,7 @@ impl ClientSession {
     ///
     /// # Panics
     ///
-    /// When the dialog is not idle.
+    /// When the session is not idle.
     pub fn begin(&mut self, now: Nanos) -> Option<SessionEvent> {
         assert!(self.is_idle(), "one cycle at a time");
         self.traffic.refused.fill(None);
@@ -162,7 +162,7 @@ impl ClientSession {
     ///
     /// # Panics
     ///
-    /// When the dialog is not idle.
+    /// When the session is not idle.
     pub fn ask_state(&mut self, now: Nanos) {
         assert!(self.is_idle(), "one question at a time");
         self.ask_list(now, STATE);

@@ -1,14 +1,14 @@
 //! The frames of all stations, and the jobs that transfer them.
 
 use super::plan::{self, Field, Job, JobDirection, Piece};
-use super::{Frames, Refusal};
+use super::{FrameFields, Refusal};
 use crate::item::{self, ReturnCode};
 use crate::pdu::function;
 
 /// The frames of all stations, and the jobs that transfer them.
 #[derive(Debug)]
 pub(super) struct Traffic {
-    fields: Frames,
+    fields: FrameFields,
     pub(super) jobs: Vec<Job>,
     /// The frames of this cycle by station: those to be written, and those read.
     pub(super) out: Vec<Box<[u8]>>,
@@ -21,7 +21,7 @@ pub(super) struct Traffic {
 }
 
 impl Traffic {
-    pub(super) fn new(fields: Frames) -> Self {
+    pub(super) fn new(fields: FrameFields) -> Self {
         let frames = |side: usize| {
             let lengths = fields.lengths.iter();
             lengths.map(|length| vec![0; length[side]].into()).collect()

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tickbus_base::statistics::Statistics;
 
-use crate::replay::ReplayTally;
+use crate::replay::ReplayCounters;
 
 use super::{HostCounters, HostThread, ScanCounters};
 
@@ -13,28 +13,28 @@ use super::{HostCounters, HostThread, ScanCounters};
 pub(crate) enum Program {
     Thread(Box<HostThread>),
     Stepped(Arc<ScanCounters>),
-    Replay(Arc<ReplayTally>),
+    Replay(Arc<ReplayCounters>),
 }
 
 /// The counters of such a program, readable from any thread.
 #[derive(Clone, Debug)]
-pub(crate) enum ProgramTally {
+pub(crate) enum ProgramCounters {
     Thread(HostCounters),
     Stepped(Arc<ScanCounters>),
-    Replay(Arc<ReplayTally>),
+    Replay(Arc<ReplayCounters>),
 }
 
 impl Program {
-    pub(crate) fn tally(&self) -> ProgramTally {
+    pub(crate) fn tally(&self) -> ProgramCounters {
         match self {
-            Self::Thread(host) => ProgramTally::Thread(host.told.clone()),
-            Self::Stepped(tally) => ProgramTally::Stepped(Arc::clone(tally)),
-            Self::Replay(tally) => ProgramTally::Replay(Arc::clone(tally)),
+            Self::Thread(host) => ProgramCounters::Thread(host.told.clone()),
+            Self::Stepped(tally) => ProgramCounters::Stepped(Arc::clone(tally)),
+            Self::Replay(tally) => ProgramCounters::Replay(Arc::clone(tally)),
         }
     }
 }
 
-impl ProgramTally {
+impl ProgramCounters {
     /// Adds the counters.
     pub(crate) fn write(&self, statistics: &mut Statistics) {
         match self {

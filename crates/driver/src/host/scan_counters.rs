@@ -156,7 +156,7 @@ impl ScanCounters {
         statistics.distribution("plc.age", &self.lock_age());
         for bit in &self.bits {
             let rises = bit.rises.load(Ordering::Relaxed);
-            statistics.count(Key::of_signal("plc.rises", &bit.name), rises);
+            statistics.count(Key::of("plc.rises", &bit.name, ""), rises);
         }
     }
 }

@@ -6,6 +6,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+use crate::DriverError;
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
 use tickbus_base::os::wake_on_time;
@@ -88,13 +89,13 @@ impl HostThread {
         role: Role,
         bus: Box<dyn Free>,
         clock: Arc<dyn Clock>,
-    ) -> std::io::Result<Self> {
+    ) -> Result<Self, DriverError> {
         let max_age = config.timing.max_age;
         let interval = hosted.interval;
         let report = hosted.program.report();
         let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
-        let record = cpu.tape.as_ref().map(ScanRecorder::tally);
+        let record = cpu.tape.as_ref().map(ScanRecorder::counters);
         let status = LinkStatus::new(&name, max_age);
         // A CPU whose program has died must not keep its last outputs on the bus.
         let watchdog = (interval + interval).max(max_age);
@@ -111,12 +112,13 @@ impl HostThread {
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
         let reconnect = config.timing.reconnect.clone();
-        let bus = BusThread::start(bus, port, reconnect, status.clone(), &name)?;
+        let bus = BusThread::start(bus, port, reconnect, status.clone(), &name);
+        let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
         let (tally, stop) = (Arc::clone(&cpu.tally), Stop::new());
         let fault = Arc::new(Mutex::new(None));
         let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
         let (end, ended) = mpsc::channel();
-        let thread = std::thread::Builder::new().name(name).spawn({
+        let spawned = std::thread::Builder::new().name(name).spawn({
             let (stop, fault, clock) = (stop.clone(), Arc::clone(&fault), Arc::clone(&clock));
             let scanning = Arc::clone(&scanning);
             move || {
@@ -132,7 +134,8 @@ impl HostThread {
                     *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
                 }
             }
-        })?;
+        });
+        let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
             told: HostCounters {
                 tally,

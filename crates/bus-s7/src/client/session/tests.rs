@@ -7,7 +7,7 @@ use tickbus_fieldbus::PlcState;
 const PATIENCE: Nanos = Nanos::from_millis(100);
 
 /// Station 0 writes 2 bytes at DB 1 byte 2 and reads 4 at DB 1 byte 0, as in the captured conversation.
-fn dialog(asks_who: bool) -> ClientSession {
+fn session(asks_who: bool) -> ClientSession {
     let field = |byte: usize, length: usize| Field {
         station: 0,
         frame: 0,
@@ -22,28 +22,28 @@ fn dialog(asks_who: bool) -> ClientSession {
         patience: PATIENCE,
         asks_who,
     };
-    let frames = Frames {
+    let frames = FrameFields {
         written: vec![field(2, 2)],
         read: vec![field(0, 4)],
         lengths: vec![[2, 4]],
     };
-    frames.dialog(terms, Nanos::ZERO)
+    frames.session(terms, Nanos::ZERO)
 }
 
-/// The bytes that the dialog sends.
-fn said(dialog: &mut ClientSession) -> Vec<u8> {
-    let said = dialog.to_write().to_vec();
-    dialog.wrote(said.len());
+/// The bytes that the session sends.
+fn said(session: &mut ClientSession) -> Vec<u8> {
+    let said = session.to_write().to_vec();
+    session.wrote(said.len());
     said
 }
 
 #[track_caller]
-fn says(dialog: &mut ClientSession, expected: &str) {
-    assert_eq!(said(dialog), hex(expected));
+fn says(session: &mut ClientSession, expected: &str) {
+    assert_eq!(said(session), hex(expected));
 }
 
-fn hears(dialog: &mut ClientSession, text: &str) -> Result<Option<SessionEvent>, End> {
-    dialog.hear(Nanos::ZERO, &hex(text))
+fn hears(session: &mut ClientSession, text: &str) -> Result<Option<SessionEvent>, End> {
+    session.hear(Nanos::ZERO, &hex(text))
 }
 
 const CONFIRM: &str = "03 00 00 16 11 d0 0001 0001 00 c0 01 0a c1 02 0100 c2 02 0101";
@@ -51,125 +51,125 @@ const AGREED: &str = "03 00 00 1b 02 f0 80 32 03 0000 0001 0008 0000 00 00 f0 00
 const WRITTEN: &str = "03 00 00 16 02 f0 80 32 03 0000 0002 0002 0001 00 00 05 01 ff";
 const READ: &str = "03 00 00 1d 02 f0 80 32 03 0000 0003 0002 0008 00 00 04 01 ff 04 0020 01020304";
 
-/// A dialog that may write, before its first cycle.
+/// A session that may write, before its first cycle.
 fn met() -> ClientSession {
-    let mut dialog = dialog(false);
-    said(&mut dialog);
-    assert_eq!(hears(&mut dialog, CONFIRM), Ok(None));
-    said(&mut dialog);
+    let mut session = session(false);
+    said(&mut session);
+    assert_eq!(hears(&mut session, CONFIRM), Ok(None));
+    said(&mut session);
     assert_eq!(
-        hears(&mut dialog, AGREED),
+        hears(&mut session, AGREED),
         Ok(Some(SessionEvent::Met(480, None)))
     );
-    dialog.allow(true);
-    dialog
+    session.allow(true);
+    session
 }
 
 #[test]
 fn the_captured_conversation_goes_as_it_went() {
-    let mut dialog = dialog(false);
+    let mut session = session(false);
     says(
-        &mut dialog,
+        &mut session,
         "03 00 00 16 11 e0 0000 0001 00 c1 02 0100 c2 02 0101 c0 01 0a",
     );
-    assert_eq!(hears(&mut dialog, CONFIRM), Ok(None));
+    assert_eq!(hears(&mut session, CONFIRM), Ok(None));
     says(
-        &mut dialog,
+        &mut session,
         "03 00 00 19 02 f0 80 32 01 0000 0001 0008 0000 f0 00 0001 0001 01e0",
     );
     assert_eq!(
-        hears(&mut dialog, AGREED),
+        hears(&mut session, AGREED),
         Ok(Some(SessionEvent::Met(480, None)))
     );
-    dialog.allow(true);
-    dialog.frame_to_write(0).copy_from_slice(&[0xAA, 0xBB]);
-    assert_eq!(dialog.begin(Nanos::ZERO), None);
+    session.allow(true);
+    session.frame_to_write(0).copy_from_slice(&[0xAA, 0xBB]);
+    assert_eq!(session.begin(Nanos::ZERO), None);
     says(
-        &mut dialog,
+        &mut session,
         "03 00 00 25 02 f0 80 32 01 0000 0002 000e 0006 05 01 12 0a 10 02 0002 0001 84 000010 \
          00 04 0010 aa bb",
     );
-    assert_eq!(hears(&mut dialog, WRITTEN), Ok(None));
+    assert_eq!(hears(&mut session, WRITTEN), Ok(None));
     says(
-        &mut dialog,
+        &mut session,
         "03 00 00 1f 02 f0 80 32 01 0000 0003 000e 0000 04 01 12 0a 10 02 0004 0001 84 000000",
     );
-    assert_eq!(hears(&mut dialog, READ), Ok(Some(SessionEvent::Done)));
-    assert_eq!(dialog.frame_read(0), [1, 2, 3, 4]);
-    assert!(dialog.is_idle() && dialog.to_write().is_empty());
+    assert_eq!(hears(&mut session, READ), Ok(Some(SessionEvent::Done)));
+    assert_eq!(session.frame_read(0), [1, 2, 3, 4]);
+    assert!(session.is_idle() && session.to_write().is_empty());
 }
 
 #[test]
 fn answers_come_in_any_pieces() {
     let whole = [hex(WRITTEN), hex(READ)].concat();
     for cut in 0..=whole.len() {
-        let mut dialog = met();
-        dialog.begin(Nanos::ZERO);
+        let mut session = met();
+        session.begin(Nanos::ZERO);
         // The second answer arrives before its request was written, which does not matter here.
-        let mut news = dialog.hear(Nanos::ZERO, &whole[..cut]).expect("right");
+        let mut news = session.hear(Nanos::ZERO, &whole[..cut]).expect("right");
         if news.is_none() {
-            news = dialog.hear(Nanos::ZERO, &whole[cut..]).expect("right");
+            news = session.hear(Nanos::ZERO, &whole[cut..]).expect("right");
         }
         assert_eq!(news, Some(SessionEvent::Done), "{cut}");
     }
-    let mut dialog = met();
-    dialog.begin(Nanos::ZERO);
+    let mut session = met();
+    session.begin(Nanos::ZERO);
     let (first, second) = (hex(WRITTEN)[7..].to_vec(), hex(READ)[7..].to_vec());
     for message in [first, second] {
         for (index, byte) in message.iter().enumerate() {
             let last = index + 1 == message.len();
             let end = if last { 0x80 } else { 0 };
-            let news = dialog.hear(Nanos::ZERO, &[3, 0, 0, 8, 2, 0xF0, end, *byte]);
+            let news = session.hear(Nanos::ZERO, &[3, 0, 0, 8, 2, 0xF0, end, *byte]);
             assert!(news.is_ok(), "{news:?}");
         }
     }
-    assert!(dialog.is_idle());
+    assert!(session.is_idle());
 }
 
 #[test]
 fn nothing_is_written_until_it_is_allowed() {
-    let mut dialog = met();
-    dialog.allow(false);
-    dialog.begin(Nanos::ZERO);
-    let job = said(&mut dialog);
+    let mut session = met();
+    session.allow(false);
+    session.begin(Nanos::ZERO);
+    let job = said(&mut session);
     assert_eq!(job[7 + 10], function::READ);
 }
 
 #[test]
 fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
-    let mut dialog = dialog(true);
-    said(&mut dialog);
-    hears(&mut dialog, CONFIRM).expect("right");
-    said(&mut dialog);
-    assert_eq!(hears(&mut dialog, AGREED), Ok(None));
-    assert!(dialog.asks_who());
+    let mut session = session(true);
+    said(&mut session);
+    hears(&mut session, CONFIRM).expect("right");
+    said(&mut session);
+    assert_eq!(hears(&mut session, AGREED), Ok(None));
+    assert!(session.asks_who());
     says(
-        &mut dialog,
+        &mut session,
         "03 00 00 21 02 f0 80 32 07 0000 0002 0008 0008 0001120411440100 ff 09 0004 0011 0000",
     );
     // It arrives in two PDUs; the first has the order number.
     let order = "0011 0000 001c 0001 0001 36455337203531352d32414d30312d3041423020";
     hears(
-        &mut dialog,
+        &mut session,
         &format!(
             "03 00 00 3f 02 f0 80 32 07 0000 0002 000c 0022 0001120812840101 07 01 0000 ff 09 001e {order}"
         ),
     )
     .expect("right");
     says(
-        &mut dialog,
+        &mut session,
         "03 00 00 21 02 f0 80 32 07 0000 0003 000c 0004 0001120812440101 00000000 0a 00 0000",
     );
     hears(
-        &mut dialog,
+        &mut session,
         "03 00 00 27 02 f0 80 32 07 0000 0003 000c 000a 0001120812840101 07 00 0000 ff 09 0006 000000000000",
     )
     .expect("right");
     // The CPU does not have the other one.
     let news = {
-        said(&mut dialog);
+        said(&mut session);
         hears(
-            &mut dialog,
+            &mut session,
             "03 00 00 21 02 f0 80 32 07 0000 0004 000c 0004 0001120812840101 00 00 d401 0a 00 0000",
         )
     };
@@ -181,11 +181,11 @@ fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
 
 #[test]
 fn a_refusal_ends_the_connection_and_is_told() {
-    let refused = |dialog: &mut ClientSession, text: &str| match hears(dialog, text) {
+    let refused = |session: &mut ClientSession, text: &str| match hears(session, text) {
         Err(End::Refused(refusal)) => refusal,
         other => panic!("{other:?}"),
     };
-    let mut early = dialog(false);
+    let mut early = session(false);
     assert_eq!(
         refused(&mut early, "03 00 00 0b 06 80 0000 0001 03"),
         Refusal::Connection(3)
@@ -203,19 +203,19 @@ fn a_refusal_ends_the_connection_and_is_told() {
 
 #[test]
 fn an_item_that_is_refused_is_told_and_the_rest_of_the_cycle_is_done() {
-    let mut dialog = met();
-    dialog.begin(Nanos::ZERO);
+    let mut session = met();
+    session.begin(Nanos::ZERO);
     hears(
-        &mut dialog,
+        &mut session,
         "03 00 00 16 02 f0 80 32 03 0000 0002 0002 0001 00 00 05 01 0a",
     )
     .expect("right");
-    assert_eq!(hears(&mut dialog, READ), Ok(Some(SessionEvent::Done)));
+    assert_eq!(hears(&mut session, READ), Ok(Some(SessionEvent::Done)));
     let Some(Refusal::Item {
         written,
         item,
         code,
-    }) = dialog.refusal(0)
+    }) = session.refusal(0)
     else {
         panic!("an item was refused");
     };
@@ -223,15 +223,15 @@ fn an_item_that_is_refused_is_told_and_the_rest_of_the_cycle_is_done() {
         (*written, item.range(), *code),
         (true, 2..4, ReturnCode::MISSING)
     );
-    assert_eq!(dialog.frame_read(0), [1, 2, 3, 4]);
+    assert_eq!(session.frame_read(0), [1, 2, 3, 4]);
 
-    let mut dialog = met();
-    dialog.begin(Nanos::ZERO);
-    hears(&mut dialog, WRITTEN).expect("right");
+    let mut session = met();
+    session.begin(Nanos::ZERO);
+    hears(&mut session, WRITTEN).expect("right");
     let refused = "03 00 00 19 02 f0 80 32 03 0000 0003 0002 0004 00 00 04 01 05 00 0000";
-    assert_eq!(hears(&mut dialog, refused), Ok(Some(SessionEvent::Done)));
+    assert_eq!(hears(&mut session, refused), Ok(Some(SessionEvent::Done)));
     assert!(matches!(
-        dialog.refusal(0),
+        session.refusal(0),
         Some(Refusal::Item {
             written: false,
             code: ReturnCode::ADDRESS,
@@ -239,11 +239,11 @@ fn an_item_that_is_refused_is_told_and_the_rest_of_the_cycle_is_done() {
         })
     ));
     // While excluded there is nothing to transfer; included again, it is as before.
-    dialog.suspend(0, true);
-    assert_eq!(dialog.begin(Nanos::ZERO), Some(SessionEvent::Done));
-    assert_eq!(dialog.refusal(0), None);
-    dialog.suspend(0, false);
-    assert_eq!(dialog.begin(Nanos::ZERO), None);
+    session.suspend(0, true);
+    assert_eq!(session.begin(Nanos::ZERO), Some(SessionEvent::Done));
+    assert_eq!(session.refusal(0), None);
+    session.suspend(0, false);
+    assert_eq!(session.begin(Nanos::ZERO), None);
 }
 
 const RUNS: &str = "03 00 00 3d 02 f0 80 32 07 0000 0002 000c 0020 0001120812840100 00 00 0000 \
@@ -252,15 +252,15 @@ const RUNS: &str = "03 00 00 3d 02 f0 80 32 07 0000 0002 000c 0020 0001120812840
 #[test]
 fn a_cpu_is_asked_whether_it_runs() {
     let ask = |answer: &str| {
-        let mut dialog = met();
-        dialog.ask_state(Nanos::ZERO);
-        assert!(dialog.asks_state() && !dialog.asks_who() && !dialog.is_idle());
+        let mut session = met();
+        session.ask_state(Nanos::ZERO);
+        assert!(session.asks_state() && !session.asks_who() && !session.is_idle());
         says(
-            &mut dialog,
+            &mut session,
             "03 00 00 21 02 f0 80 32 07 0000 0002 0008 0008 0001120411440100 ff 09 0004 0424 0000",
         );
-        let news = hears(&mut dialog, answer);
-        assert!(dialog.is_idle());
+        let news = hears(&mut session, answer);
+        assert!(session.is_idle());
         news
     };
     assert_eq!(
@@ -295,16 +295,16 @@ fn what_is_no_answer_to_what_was_asked_ends_the_connection() {
         "03 00 00 0b 06 80 0000 0001 00",
         "47 45 54",
     ] {
-        let mut dialog = met();
-        dialog.begin(Nanos::ZERO);
-        let Err(End::Broken(fault)) = hears(&mut dialog, text) else {
+        let mut session = met();
+        session.begin(Nanos::ZERO);
+        let Err(End::Broken(fault)) = hears(&mut session, text) else {
             panic!("{text} was taken");
         };
         assert!(!fault.to_string().is_empty());
     }
-    let mut dialog = met();
+    let mut session = met();
     assert_eq!(
-        hears(&mut dialog, WRITTEN),
+        hears(&mut session, WRITTEN),
         Err(End::Broken(ProtocolError::NotAsked))
     );
     for (length, right) in [
@@ -313,20 +313,23 @@ fn what_is_no_answer_to_what_was_asked_ends_the_connection() {
         ("03c1", false),
         ("ffff", false),
     ] {
-        let mut dialog = self::dialog(false);
-        hears(&mut dialog, CONFIRM).expect("right");
+        let mut session = self::session(false);
+        hears(&mut session, CONFIRM).expect("right");
         let text = AGREED.replace("01e0", length);
-        assert_eq!(hears(&mut dialog, &text).is_ok(), right, "{length}");
+        assert_eq!(hears(&mut session, &text).is_ok(), right, "{length}");
     }
 }
 
 #[test]
 fn an_answer_that_takes_too_long_is_not_waited_for() {
-    let mut dialog = met();
-    assert_eq!(dialog.deadline(), Nanos::MAX);
+    let mut session = met();
+    assert_eq!(session.deadline(), Nanos::MAX);
     let begin = Nanos::from_secs(7);
-    dialog.begin(begin);
-    assert_eq!(dialog.deadline(), begin + PATIENCE + Nanos(1));
-    assert_eq!(dialog.check(begin + PATIENCE), Ok(()));
-    assert_eq!(dialog.check(dialog.deadline()), Err(End::Silent(PATIENCE)));
+    session.begin(begin);
+    assert_eq!(session.deadline(), begin + PATIENCE + Nanos(1));
+    assert_eq!(session.check(begin + PATIENCE), Ok(()));
+    assert_eq!(
+        session.check(session.deadline()),
+        Err(End::Silent(PATIENCE))
+    );
 }

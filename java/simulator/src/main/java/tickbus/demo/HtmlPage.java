@@ -8,7 +8,6 @@ import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
-import java.util.stream.Collectors;
 
 /** The page about the run, made by {@code tickbus report} from the driver's recording once that is complete. */
 public final class HtmlPage {
@@ -34,11 +33,7 @@ public final class HtmlPage {
      * @throws IOException if the file cannot be written
      */
     public static void keepStatistics(Path file, Map<String, String> statistics) throws IOException {
-        // As the command writes them: a backslash before each = and backslash in a key.
-        String lines = statistics.entrySet().stream()
-                .map(entry -> entry.getKey().replaceAll("[=\\\\]", "\\\\$0") + "=" + entry.getValue() + "\n")
-                .collect(Collectors.joining());
-        Files.writeString(file, lines);
+        Files.writeString(file, StatisticsLines.write(statistics));
     }
 
     /**

@@ -10,12 +10,11 @@ import java.util.ArrayList;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import java.util.Optional;
 import java.util.Queue;
 import java.util.concurrent.ConcurrentLinkedQueue;
 import java.util.concurrent.TimeUnit;
 import java.util.function.Supplier;
-import java.util.regex.Matcher;
-import java.util.regex.Pattern;
 
 /**
  * A PLC as a separate process, such as {@code tickbus plc}: started, killed, restarted, and reliably ended.
@@ -33,8 +32,6 @@ public final class PlcProcess implements Plc {
 
     /** The prefix of lines for people. */
     private static final String WORDS = "plc: ";
-    /** A key, in which a backslash stands before each = and backslash, and its value. */
-    private static final Pattern STATISTIC = Pattern.compile("([^=\\\\]++(?:\\\\.[^=\\\\]*+)*+)=(.*)");
 
     private final Supplier<List<String>> command;
     private final Path log;
@@ -63,7 +60,7 @@ public final class PlcProcess implements Plc {
             Map<String, String> lines = new LinkedHashMap<>();
             try (BufferedReader out = process.inputReader(StandardCharsets.UTF_8)) {
                 for (String line = out.readLine(); line != null; line = out.readLine()) {
-                    Matcher entry = STATISTIC.matcher(line);
+                    Optional<Map.Entry<String, String>> entry = StatisticsLines.read(line);
                     if (line.isEmpty() && !lines.isEmpty()) {
                         long now = System.nanoTime();
                         if (!block.isEmpty()) {
@@ -72,8 +69,8 @@ public final class PlcProcess implements Plc {
                         blockTime = now;
                         block = Map.copyOf(lines);
                         lines.clear();
-                    } else if (!line.startsWith(WORDS) && entry.matches()) {
-                        lines.put(entry.group(1).replaceAll("\\\\(.)", "$1"), entry.group(2));
+                    } else if (!line.startsWith(WORDS) && entry.isPresent()) {
+                        lines.put(entry.get().getKey(), entry.get().getValue());
                     } else if (!line.isEmpty()) {
                         news.add(line);
                     }

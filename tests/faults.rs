@@ -436,6 +436,17 @@ fn a_cycle_that_comes_twice_counts_twice_and_changes_nothing() {
 }
 
 #[test]
+fn a_lost_cycle_is_decided_on_once_whatever_else_is_injected() {
+    let mut bus = Stepped::new(
+        "[[fault]]\nkind = \"duplicate\"\ndirection = \"out\"\ntick = 1\nticks = 10\n\
+         [[fault]]\nkind = \"drop\"\nchance = 1\ndirection = \"out\"\ntick = 1\nticks = 10\n",
+    );
+    bus.count(20);
+    let numbers = ["fault.dropped", "fault.duplicated"].map(|key| bus.end.statistic(key));
+    assert_eq!(numbers, ["10", "10"]);
+}
+
+#[test]
 fn one_station_of_two_is_gone() {
     let link = Link::new();
     let text = |role: &str| {

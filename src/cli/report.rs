@@ -33,7 +33,7 @@ pub(super) struct Arguments {
     #[arg(long = "fault", value_name = "SIGNAL")]
     faults: Vec<String>,
 
-    /// RunStatistics, as a driver or `tickbus plc --stats` writes them; other lines in the file do no harm.
+    /// Statistics, as a driver or `tickbus plc --stats` writes them; other lines in the file do no harm.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
 

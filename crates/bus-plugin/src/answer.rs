@@ -12,8 +12,7 @@ const TEXT_LIMIT: usize = 8000;
 /// A message from a helper to its host.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Answer {
-    /// It is there. Sent first, without a request. The first variant in every version, so that other versions are
-    /// told apart.
+    /// It is there. Sent first, without a request. What else comes first is from another version.
     Hello {
         /// The version of its tickbus; both ends must have the same.
         version: String,

@@ -67,7 +67,7 @@ fn fill(mut space: &mut [u8], now: Nanos, port: &mut Port) -> Option<Receipt> {
         frame.copy_from_slice(bytes);
         space = after;
     }
-    frames.send()
+    Some(frames.receipt())
 }
 
 /// Makes the exchange for which the frames of `receipt` were filled in.

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::Caller;
-use tickbus_fieldbus::{BusError, Frames, Port, Receipt};
+use tickbus_fieldbus::{BusError, Port, Receipt};
 
 use super::connection_states::ConnectionStates;
 use super::{ConnectionFrames, Session, SessionParameters};
@@ -67,13 +67,18 @@ impl Transfer<'_> {
     fn make(&mut self, now: Nanos, port: &mut Port) {
         let session = &mut self.connection.session;
         if let Some(space) = session.due(now) {
-            let mut frames = port.take(self.frames.stations(), now);
-            if let Some(frames) = &mut frames {
-                self.frames.fill(space, frames);
-            }
+            let stations = self.frames.stations();
+            let Some(mut frames) = port.look(stations.clone(), now) else {
+                // The line is down: the record stays as it is, and what has changed is sent when the line is back.
+                session.made(now, |_, _| false);
+                session.withdraw();
+                return;
+            };
+            self.frames.fill(space, &mut frames);
             // A check that sends nothing cannot be lost.
             if session.made(now, |before, now| self.frames.differ(before, now)) {
-                self.connection.receipt = frames.and_then(Frames::send);
+                let taken = port.take(stations, now);
+                self.connection.receipt = taken.map(|frames| frames.receipt());
                 if self.connection.receipt.is_none() {
                     session.lost();
                 }

@@ -226,10 +226,15 @@ impl Session {
 
     /// The record last [made](Self::made) is lost on purpose: it counts as sent, but the peer never gets it.
     pub fn lost(&mut self) {
-        let outbox = &mut self.outbox;
-        if outbox.written == 0 && outbox.waiting_since.take().is_some() && !outbox.last.is_empty() {
-            outbox.last.copy_from_slice(&outbox.record);
+        if self.withdraw() && !self.outbox.last.is_empty() {
+            self.outbox.last.copy_from_slice(&self.outbox.record);
         }
+    }
+
+    /// The record last [made](Self::made) is not sent after all; whether there was one of which nothing was written.
+    pub fn withdraw(&mut self) -> bool {
+        let outbox = &mut self.outbox;
+        outbox.written == 0 && outbox.waiting_since.take().is_some()
     }
 
     /// The bytes to be written, if any.

@@ -235,11 +235,12 @@ const STALE: i32 = 2;
 
 impl Stepped for Replay {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let frames = port.take_all(now);
-        let sent = frames
-            .and_then(|frames| frames.send_to(|index, frame| self.stations[index].sees(frame)));
-        if let Some(receipt) = &sent {
-            port.sent(receipt);
+        if let Some(mut frames) = port.take_all(now) {
+            for (index, station) in self.stations.iter_mut().enumerate() {
+                station.sees(frames.frame(index));
+            }
+            let receipt = frames.receipt();
+            port.sent(&receipt);
         }
         self.sent = Some(now);
         self.compare(now);

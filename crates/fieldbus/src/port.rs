@@ -1,7 +1,7 @@
 //! A bus's view of its driver.
 //!
 //! The order of calls is in the types: a driver gives the [`Port`] its faults and watchers before the bus gets
-//! it; a bus [takes](Port::take) the [`Frames`] of a cycle, and only sending them gives the [`Receipt`] by which
+//! it; a bus [takes](Port::take) the [`Frames`] of a cycle, and only these give the [`Receipt`] by which
 //! [`sent`](Port::sent) learns what the peer has.
 
 mod calls;
@@ -126,12 +126,24 @@ impl Port {
         !self.faults.is_down()
     }
 
-    /// The frames that these stations send in a cycle at `now`; `None` while the line is not [up](Self::is_up).
+    /// The frames that these stations send in a cycle at `now`. `None`: nothing is to be sent in this cycle, because
+    /// the line is not [up](Self::is_up) or loses them.
     pub fn take(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
-        if !self.is_up(now) {
+        if self.is_up(now) && self.faults.loses_cycle() {
+            // This end believes that it has sent them.
+            for station in stations {
+                self.outgoing(station, now);
+                self.faults.sent(station, None, &mut self.image);
+            }
             return None;
         }
-        Some(Frames {
+        self.look(stations, now)
+    }
+
+    /// The frames of these stations at `now`, to see whether there is anything to send, or for a peer that reads
+    /// whenever it likes; `None` while the line is not [up](Self::is_up).
+    pub fn look(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
+        self.is_up(now).then_some(Frames {
             port: self,
             stations,
             now,
@@ -141,10 +153,6 @@ impl Port {
     /// As [`take`](Self::take), of all stations.
     pub fn take_all(&mut self, now: Nanos) -> Option<Frames<'_>> {
         self.take(0..self.stations(), now)
-    }
-
-    fn loses_cycle(&mut self) -> bool {
-        self.faults.loses_cycle()
     }
 
     fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {

@@ -40,7 +40,7 @@ pub struct Contents<'a> {
     pub steps: Option<usize>,
     /// Signals that report a fault while they are on.
     pub faults: &'a [usize],
-    /// RunStatistics of a driver or a PLC program.
+    /// Statistics of a driver or a PLC program.
     pub statistics: Option<&'a RunStatistics>,
     /// Texts to be shown verbatim, each under its heading.
     pub texts: &'a [(String, String)],

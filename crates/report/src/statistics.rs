@@ -2,7 +2,7 @@
 
 use tickbus_base::statistics::entries;
 
-/// RunStatistics of a driver or of a PLC program. If a key occurs more than once, its last value counts.
+/// Statistics of a driver or of a PLC program. If a key occurs more than once, its last value counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunStatistics(Vec<(String, String)>);
 

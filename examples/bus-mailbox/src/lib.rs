@@ -95,11 +95,9 @@ impl Mailbox {
                     for station in frames.stations() {
                         own.image.extend_from_slice(frames.frame(station));
                     }
-                    receipt = frames.send();
-                    if receipt.is_some() {
-                        own.sequence += 1;
-                        own.confirmed = false;
-                    }
+                    receipt = Some(frames.receipt());
+                    own.sequence += 1;
+                    own.confirmed = false;
                 }
                 self.write(&own)?;
             }

@@ -145,8 +145,6 @@ mod watch {
     /// Sockets reported by one wait; further ones are reported by the next.
     const MOST: usize = 256;
 
-    const MILLISECOND: Duration = Duration::from_millis(1);
-
     pub(super) struct Watch {
         epoll: OwnedFd,
         events: Vec<Event>,
@@ -206,16 +204,13 @@ mod watch {
             ready: &mut Vec<Ready>,
         ) -> io::Result<()> {
             let patience = match patience {
-                // epoll counts whole milliseconds. The wait is rounded down, and what remains is waited for
-                // by `ppoll`, which has a finer resolution.
-                Some(span) if span < MILLISECOND && !span.is_zero() => {
-                    let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
-                    poll_once(&mut epoll, Some(span))?;
-                    Some(Duration::ZERO)
-                }
+                // epoll counts whole milliseconds; `ppoll`, which waits for it, has a finer resolution.
                 Some(span) => {
-                    let rest = Duration::from_nanos(u64::from(span.subsec_nanos() % 1_000_000));
-                    Some(span.saturating_sub(rest))
+                    if !span.is_zero() {
+                        let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
+                        poll_once(&mut epoll, Some(span))?;
+                    }
+                    Some(Duration::ZERO)
                 }
                 None => None,
             };

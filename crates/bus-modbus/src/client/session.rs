@@ -163,7 +163,7 @@ impl Caller for ClientSession<'_> {
         self.looked = now;
         match &self.asking {
             Some(asking) if now >= asking.limit => self.give_up(now, port),
-            None if self.pace.take(now) => self.begin(0, now, port),
+            None if self.pace.take(now) && port.take_all(now).is_some() => self.begin(0, now, port),
             _ => Ok(()),
         }
     }
@@ -356,23 +356,19 @@ impl ClientSession<'_> {
 
     /// Begins with the first station, from this one on, that is not resting in this cycle, or ends the cycle.
     fn begin(&mut self, station: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        for next in station..self.stations.len() {
-            let polled = &mut self.stations[next];
-            if polled.rests(now) {
-                continue;
-            }
-            let Some(mut frames) = port.take(next..next + 1, now) else {
-                return Ok(());
-            };
-            polled.prepare(self.guards[next].may_write());
-            polled.sends.clear();
-            polled.sends.extend_from_slice(frames.frame(next));
-            if let Some(receipt) = frames.send() {
-                polled.receipt = Some(receipt);
-                return self.go_on(next, 0, now, port);
-            }
-        }
-        Ok(())
+        let mut rest = station..self.stations.len();
+        let Some(next) = rest.find(|station| !self.stations[*station].rests(now)) else {
+            return Ok(());
+        };
+        let Some(mut frames) = port.look(next..next + 1, now) else {
+            return Ok(());
+        };
+        let polled = &mut self.stations[next];
+        polled.prepare(self.guards[next].may_write());
+        polled.sends.clear();
+        polled.sends.extend_from_slice(frames.frame(next));
+        polled.receipt = Some(frames.receipt());
+        self.go_on(next, 0, now, port)
     }
 
     /// Sends the request with this index, or ends the station's part of the cycle after the last one.

@@ -95,13 +95,13 @@ impl ServedUnits {
         let receipt = if writes_only {
             None
         } else {
-            port.take(station..station + 1, now).and_then(|mut frames| {
+            port.take(station..station + 1, now).map(|mut frames| {
                 let frame = frames.frame(station);
                 if *frame != *unit.shown {
                     unit.generation += 1;
                     unit.shown.copy_from_slice(frame);
                 }
-                frames.send()
+                frames.receipt()
             })
         };
         let is_lost = !writes_only && receipt.is_none();

@@ -9,7 +9,7 @@ use opcua::types::{DataValue, NodeId, StatusCode, Variant};
 use crate::pki::date;
 use crate::values::{self, Values};
 use tickbus_base::time::{Nanos, WallClock};
-use tickbus_fieldbus::{Port, Receipt, Role};
+use tickbus_fieldbus::{Frames, Port, Receipt, Role};
 use tickbus_image::Event;
 use tickbus_image::signal::{Plan, Scale, Signal, SignalTable, Slot};
 
@@ -181,7 +181,9 @@ impl Image {
 
     /// Updates all nodes. Pulses that every subscriber has had time to see count as sent.
     pub(super) fn show(&mut self, port: &mut Port, now: Nanos) {
-        if let Some(receipt) = self.show_what_is_sent(port, now) {
+        let taken = port.take_all(now);
+        if let Some(receipt) = taken.map(|frames| self.take(frames)) {
+            self.show_what_is_sent(port, now);
             for (index, signal) in self.table.signals.iter().enumerate() {
                 let is_sent = signal.area == self.role.areas().0;
                 if is_sent
@@ -209,9 +211,12 @@ impl Image {
 
     /// Updates the nodes of these signals for a client that is reading them: their pulses count as sent.
     pub(super) fn show_to_reader(&mut self, port: &mut Port, now: Nanos, signals: &[usize]) {
-        let Some(receipt) = self.show_what_is_sent(port, now) else {
+        // What a client reads is not sent in a cycle, which a fault could lose.
+        let all = 0..port.stations();
+        let Some(receipt) = port.look(all, now).map(|frames| self.take(frames)) else {
             return;
         };
+        self.show_what_is_sent(port, now);
         for &index in signals {
             let signal = &self.table.signals[index];
             if signal.area == self.role.areas().0 {
@@ -220,12 +225,15 @@ impl Image {
         }
     }
 
-    fn show_what_is_sent(&mut self, port: &mut Port, now: Nanos) -> Option<Receipt> {
-        let mut frames = port.take_all(now)?;
+    /// Takes over what is sent.
+    fn take(&mut self, mut frames: Frames<'_>) -> Receipt {
         for station in frames.stations() {
             self.sends.take(station, frames.frame(station));
         }
-        let receipt = frames.send()?;
+        frames.receipt()
+    }
+
+    fn show_what_is_sent(&mut self, port: &Port, now: Nanos) {
         for station in 0..self.frames.len() {
             let status = quality(port, station, now);
             for at in 0..self.sends.signals(station).len() {
@@ -233,7 +241,6 @@ impl Image {
                 self.put(now, index, self.sends.bits(index), status);
             }
         }
-        Some(receipt)
     }
 
     /// Sets the nodes of a signal if the value is new, and reports it to subscribers.

@@ -182,10 +182,7 @@ impl<'a> Connection<'a> {
                 self.session.frame_to_write(index).copy_from_slice(frame);
             }
         }
-        self.receipt = frames.send();
-        if self.receipt.is_none() {
-            return Ok(());
-        }
+        self.receipt = Some(frames.receipt());
         match self.session.begin(now) {
             Some(SessionEvent::Done) => self.done(now, port),
             _ => Ok(()),

@@ -268,11 +268,11 @@ impl Jobs<'_> {
             station.is_taken = true;
             let only = place.station..place.station + 1;
             let frames = self.port.take(only, self.now);
-            station.receipt = frames.and_then(|mut frames| {
+            station.receipt = frames.map(|mut frames| {
                 station
                     .outgoing
                     .copy_from_slice(frames.frame(place.station));
-                frames.send()
+                frames.receipt()
             });
         }
         match &station.receipt {

@@ -398,3 +398,15 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_change_that_is_withdrawn_is_sent_when_the_line_is_back() {
+    let mut session = session(Sending::OnChange);
+    assert_eq!(session.speak(0, 1, usize::MAX).1, 1);
+    session.due(Nanos(10)).expect("a look is due").fill(2);
+    // Held back while the line goes down; a sign of life is due meanwhile.
+    assert!(session.made(Nanos(10), |_, _| true));
+    assert!(session.withdraw(), "nothing of it was written");
+    let (record, _) = session.speak(20, 2, usize::MAX);
+    assert_eq!(record, [2, 2], "the change still has to be sent");
+}

@@ -55,13 +55,15 @@ impl SteppedHost {
 
 /// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
 fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
-    let frames = from.take_all(now);
-    let sent =
-        frames.and_then(|frames| frames.send_to(|station, frame| to.received(station, now, frame)));
-    if let Some(receipt) = &sent {
-        from.sent(receipt);
+    let Some(mut frames) = from.take_all(now) else {
+        return false;
+    };
+    for station in frames.stations() {
+        to.received(station, now, frames.frame(station));
     }
-    sent.is_some()
+    let receipt = frames.receipt();
+    from.sent(&receipt);
+    true
 }
 
 impl Stepped for SteppedHost {

@@ -162,13 +162,12 @@ impl End {
         {
             port.sent(&receipt);
         }
-        let frames = port.take_all(now);
-        let sent = frames.and_then(|frames| {
-            frames.send_to(|station, frame| mine.frames[station].copy_from_slice(frame))
-        });
-        if sent.is_some() {
+        if let Some(mut frames) = port.take_all(now) {
+            for (station, frame) in mine.frames.iter_mut().enumerate() {
+                frame.copy_from_slice(frames.frame(station));
+            }
             mine.waiting = true;
-            self.offered = sent;
+            self.offered = Some(frames.receipt());
         }
     }
 

@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 
 use super::Port;
 
-/// The frames to send in one bus cycle, from [`Port::take`].
+/// Frames to send, from [`Port::take`] or [`Port::look`].
 #[derive(Debug)]
 pub struct Frames<'a> {
     pub(super) port: &'a mut Port,
@@ -31,36 +31,12 @@ impl Frames<'_> {
         self.stations.clone()
     }
 
-    /// They go out now. `None`: they are lost on the way, so nothing is to be transmitted in this cycle.
-    pub fn send(self) -> Option<Receipt> {
-        let is_lost = self.port.loses_cycle();
-        self.end(is_lost)
-    }
-
-    /// As [`send`](Self::send), and hands each station's frame to `deliver` if it arrives: for a line within this
-    /// process.
-    pub fn send_to(mut self, mut deliver: impl FnMut(usize, &[u8])) -> Option<Receipt> {
-        let is_lost = self.port.loses_cycle();
-        for station in self.stations() {
-            let frame = self.frame(station);
-            if !is_lost {
-                deliver(station, frame);
-            }
-        }
-        self.end(is_lost)
-    }
-
-    fn end(self, is_lost: bool) -> Option<Receipt> {
-        let receipt = Receipt {
-            stations: self.stations,
+    /// The receipt for all of them.
+    pub fn receipt(&self) -> Receipt {
+        Receipt {
+            stations: self.stations.clone(),
             bits: None,
-        };
-        if is_lost {
-            // This end believes that it has sent them.
-            self.port.sent(&receipt);
-            return None;
         }
-        Some(receipt)
     }
 }
 

@@ -129,7 +129,10 @@ impl Port {
     /// The frames that these stations send in a cycle at `now`. `None`: nothing is to be sent in this cycle, because
     /// the line is not [up](Self::is_up) or loses them.
     pub fn take(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
-        if self.is_up(now) && self.faults.loses_cycle() {
+        if !self.is_up(now) {
+            return None;
+        }
+        if self.faults.loses_cycle() {
             // This end believes that it has sent them.
             for station in stations {
                 self.outgoing(station, now);
@@ -137,7 +140,11 @@ impl Port {
             }
             return None;
         }
-        self.look(stations, now)
+        Some(Frames {
+            port: self,
+            stations,
+            now,
+        })
     }
 
     /// The frames of these stations at `now`, to see whether there is anything to send, or for a peer that reads
@@ -155,6 +162,7 @@ impl Port {
         self.take(0..self.stations(), now)
     }
 
+    #[inline]
     fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
         if station == 0 {
             self.observe(now);
@@ -164,6 +172,7 @@ impl Port {
 
     /// The peer has received this, or will unless the line breaks: for a stream this is when the system has accepted all
     /// of it. Data in transit when a line breaks are lost, pulses included.
+    #[inline]
     pub fn sent(&mut self, receipt: &Receipt) {
         for station in receipt.stations.clone() {
             let bits = receipt.bits.as_ref();

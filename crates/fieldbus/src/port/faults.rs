@@ -100,11 +100,13 @@ impl FaultLayer {
     }
 
     /// Whether nothing goes out and nothing comes in.
+    #[inline]
     pub(super) fn is_down(&self) -> bool {
         self.line.as_ref().is_some_and(|line| line.is_down())
     }
 
     /// Decides at random whether the next outgoing frames are lost.
+    #[inline]
     pub(super) fn loses_cycle(&mut self) -> bool {
         let line = self.line.as_mut();
         line.is_some_and(|line| line.loses_cycle())

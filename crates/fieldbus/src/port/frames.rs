@@ -21,6 +21,7 @@ impl Frames<'_> {
     /// # Panics
     ///
     /// When the station was not taken.
+    #[inline]
     pub fn frame(&mut self, station: usize) -> &[u8] {
         assert!(self.stations.contains(&station), "it was not taken");
         self.port.outgoing(station, self.now)
@@ -32,6 +33,7 @@ impl Frames<'_> {
     }
 
     /// The receipt for all of them.
+    #[inline]
     pub fn receipt(&self) -> Receipt {
         Receipt {
             stations: self.stations.clone(),

@@ -92,7 +92,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     if let Some(address) = &arguments.address
         && let Err(error) = config.bus.set_address(address)
     {
-        eprintln!("--address, for the bus \"{}\": {error}", config.bus.kind());
+        eprintln!("--address: {error} (the bus is \"{}\")", config.bus.kind());
         return Outcome::WrongInput;
     }
     if let Some(file) = &arguments.faults

@@ -12,7 +12,7 @@ const TEXT_LIMIT: usize = 8000;
 /// A message from a helper to its host.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Answer {
-    /// It is there. Sent first, without a request. What else comes first is from another version.
+    /// It is there. Sent first, without a request. Another version is told apart by it.
     Hello {
         /// The version of its tickbus; both ends must have the same.
         version: String,

@@ -125,7 +125,7 @@ impl Exchange for OpenBus<'_> {
 }
 
 /// What the host is waiting for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Waiting {
     /// For the helper to start.
     ForHello,
@@ -181,21 +181,19 @@ impl Helper {
         })
     }
 
-    fn other_version(&self, version: &str) -> BusError {
-        BusError::Refused(format!(
-            "the helper {} is tickbus {version}, and this is tickbus {VERSION}; name the right one as `helper` in the \
-             driver.cfg",
-            self.program.display()
-        ))
-    }
-
     /// Makes it load the library and open the bus; `false` if it was stopped meanwhile.
     fn open(&mut self, bus: &Isolated, stop: &Stop) -> Result<bool, BusError> {
         let limit = bus.limits.open;
         match self.ask(None, Waiting::ForHello, limit, stop)? {
             None => return Ok(false),
             Some(Answer::Hello { version }) if version == VERSION => {}
-            Some(Answer::Hello { version }) => return Err(self.other_version(&version)),
+            Some(Answer::Hello { version }) => {
+                return Err(BusError::Refused(format!(
+                    "the helper {} is tickbus {version}, and this is tickbus {VERSION}; name the right one as \
+                     `helper` in the driver.cfg",
+                    self.program.display()
+                )));
+            }
             Some(other) => return Err(self.out_of_turn(&other)),
         }
         let what = Waiting::For("tickbus_open");
@@ -228,10 +226,6 @@ impl Helper {
                 Ok(None) => {}
                 Ok(Some(Answer::Failed(error))) => return Err(error),
                 Ok(answer) => return Ok(answer),
-                // No library is loaded yet.
-                Err(_) if what == Waiting::ForHello => {
-                    return Err(self.other_version("of another version"));
-                }
                 Err(error) => {
                     return Err(BusError::Protocol(format!(
                         "{}: the helper process answered with {error}; the library has damaged it: tell the \

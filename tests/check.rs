@@ -212,3 +212,20 @@ fn files_beside_a_driver_cfg_are_found_in_a_folder_whose_name_is_no_utf_8() {
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
 }
+
+/// Every example in the documentation, on the rig that it is about.
+#[test]
+fn the_faults_of_the_documentation_are_right() {
+    let rig = tickbus::driver_cfg::Config::load(&repository().join("driver.cfg"))
+        .unwrap_or_else(|why| panic!("{why}"));
+    let text = fs::read_to_string(repository().join("docs/faults.md")).expect("the documentation");
+    let blocks = text.split("```toml\n").skip(1);
+    let blocks = blocks.filter_map(|block| block.split("```").next());
+    let blocks: Vec<&str> = blocks.collect();
+    assert!(blocks.len() >= 5, "{}", blocks.len());
+    for block in blocks {
+        let faults = tickbus::faults::read_file("faults.md", block, &rig.table);
+        let faults = faults.unwrap_or_else(|why| panic!("{why}\n{block}"));
+        assert!(!faults.is_empty(), "{block}");
+    }
+}

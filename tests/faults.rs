@@ -690,20 +690,3 @@ fn a_program_of_its_own_takes_faults_from_its_command_line() {
     );
     assert!(err.ends_with("plc: failed mistakes=2\n"), "{err}");
 }
-
-/// Every example in the documentation, on the rig that it is about.
-#[test]
-fn the_examples_of_the_documentation_are_right() {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let rig = Config::load(&root.join("driver.cfg")).unwrap_or_else(|why| panic!("{why}"));
-    let text = std::fs::read_to_string(root.join("docs/faults.md")).expect("the documentation");
-    let blocks = text.split("```toml\n").skip(1);
-    let blocks = blocks.filter_map(|block| block.split("```").next());
-    let blocks: Vec<&str> = blocks.collect();
-    assert!(blocks.len() >= 5, "{}", blocks.len());
-    for block in blocks {
-        let faults = tickbus::faults::read_file("faults.md", block, &rig.table);
-        let faults = faults.unwrap_or_else(|why| panic!("{why}\n{block}"));
-        assert!(!faults.is_empty(), "{block}");
-    }
-}

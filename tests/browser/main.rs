@@ -11,7 +11,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use tickbus::report::{self, Contents, MarkKind, Run, SignalKind, Statistics};
+use tickbus::report::{self, Contents, MarkKind, Run, RunStatistics, SignalKind};
 use tickbus::time::Nanos;
 use webdriver::Browser;
 
@@ -200,7 +200,7 @@ fn names_and_texts_are_shown_and_never_run() {
     ] {
         run.mark(samples::mark(0, None, kind, attack));
     }
-    let statistics = Statistics::read(&format!(
+    let statistics = RunStatistics::read(&format!(
         "state=running\nreason={attack}\nplc.rises.{}=1",
         attack.replace('=', "-")
     ));
@@ -457,7 +457,7 @@ fn paper_gets_every_row_in_light_colours() {
 fn screenshots_are_taken_at_every_size() {
     let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
     let run = samples::machine(20_000, 1_000_000);
-    let statistics = Statistics::read(include_str!("statistics.txt"));
+    let statistics = RunStatistics::read(include_str!("statistics.txt"));
     let texts = [(
         "A text".to_owned(),
         "demo: ok cycles=3\n  as it is".to_owned(),

@@ -55,6 +55,25 @@ pub fn exchanges_whole_images_only(bus: &impl Bus) {
     });
 }
 
+/// What one end has seen of a pulse.
+#[derive(Default)]
+struct Pulse {
+    /// The edges counted.
+    edges: f64,
+    was_high: bool,
+    is_over: bool,
+}
+
+impl Pulse {
+    /// Looks at a signal after a tick.
+    fn watch(&mut self, end: &End, signal: &str) {
+        let is_high = end.get(signal) == 1.0;
+        self.edges += end.edges(signal);
+        self.was_high |= is_high;
+        self.is_over = self.was_high && !is_high;
+    }
+}
+
 /// Pulses of one tick arrive, with any ratio of tick to cycle: several ticks per cycle, or several cycles per
 /// tick.
 pub fn keeps_edges_both_ways(bus: &impl Bus) {
@@ -62,34 +81,29 @@ pub fn keeps_edges_both_ways(bus: &impl Bus) {
         let mut rig = Rig::new(bus);
         rig.connect();
         for pulse in 1..=20 {
+            let (mut run, mut sensor) = (Pulse::default(), Pulse::default());
+            // Every tick is watched: the bus threads may carry the pulse at once.
+            let mut tick = |rig: &mut Rig| {
+                rig.controller.tick();
+                sensor.watch(&rig.controller, "sensor");
+                rig.device.tick();
+                run.watch(&rig.device, "run");
+                run.is_over && sensor.is_over
+            };
             for level in [1.0, 0.0] {
                 rig.controller.set("run", level);
                 rig.device.set("sensor", level);
-                rig.controller.tick();
-                rig.device.tick();
+                tick(&mut rig);
             }
-            let (mut run, mut sensor) = (0.0, 0.0);
-            let (mut run_seen, mut sensor_seen) = (false, false);
             rig.until("the pulse is through and gone", |rig| {
                 // One cycle has passed already.
                 for _ in 1..cycles {
                     pass(&rig.clock, 2);
                 }
-                for _ in 0..ticks {
-                    rig.device.tick();
-                    rig.controller.tick();
-                    run += rig.device.edges("run");
-                    sensor += rig.controller.edges("sensor");
-                    run_seen |= rig.device.get("run") == 1.0;
-                    sensor_seen |= rig.controller.get("sensor") == 1.0;
-                }
-                run_seen
-                    && sensor_seen
-                    && rig.device.get("run") == 0.0
-                    && rig.controller.get("sensor") == 0.0
+                (0..ticks).fold(false, |_, _| tick(rig))
             });
             assert_eq!(
-                (run, sensor),
+                (run.edges, sensor.edges),
                 (1.0, 1.0),
                 "pulse {pulse}, {ticks} ticks in {cycles} cycles"
             );
@@ -119,27 +133,24 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
         });
         assert_eq!(rig.controller.get("position"), value);
     }
-    let (mut run, mut sensor) = (0.0, 0.0);
     for _ in 0..10 {
+        let (mut run, mut sensor) = (Pulse::default(), Pulse::default());
         for level in [1.0, 0.0] {
             rig.controller.set("run", level);
             rig.controller.tick();
+            sensor.watch(&rig.controller, "sensor");
         }
-        let (mut there, mut back) = (false, false);
         rig.until("the pulse is answered, and over", |rig| {
             rig.device.receive();
-            run += rig.device.edges("run");
-            let level = rig.device.get("run");
-            there |= level == 1.0;
-            rig.device.set("sensor", level);
+            run.watch(&rig.device, "run");
+            rig.device.set("sensor", rig.device.get("run"));
             rig.device.send();
             rig.controller.tick();
-            sensor += rig.controller.edges("sensor");
-            back |= rig.controller.get("sensor") == 1.0;
-            there && back && level == 0.0 && rig.controller.get("sensor") == 0.0
+            sensor.watch(&rig.controller, "sensor");
+            run.is_over && sensor.is_over
         });
+        assert_eq!((run.edges, sensor.edges), (1.0, 1.0));
     }
-    assert_eq!((run, sensor), (10.0, 10.0));
     rig.until(
         "the watchdog trips although the simulation receives",
         |rig| {

@@ -231,10 +231,20 @@ impl Rig {
     /// Lets cycles pass until `done` holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
-        await_that(what, || {
+        let limit = Instant::now() + VAIN;
+        loop {
             pass(&self.clock, 2);
-            done(self)
-        });
+            if done(self) {
+                return;
+            }
+            assert!(
+                Instant::now() < limit,
+                "waited {VAIN:?} in vain until {what}; the controller:\n{}\nthe device:\n{}",
+                self.controller.driver.statistics(),
+                self.device.driver.statistics(),
+            );
+            std::thread::yield_now();
+        }
     }
 
     /// Lets cycles pass until both ends have fresh data.
@@ -259,12 +269,18 @@ pub fn pass(clock: &Manual, ends: usize) {
     }
 }
 
+/// After this a wait for something that takes milliseconds is in vain.
+const VAIN: Duration = Duration::from_secs(20);
+
 /// Polls until `done` holds, yielding the processor to the bus threads.
 #[track_caller]
 pub fn await_that(what: &str, mut done: impl FnMut() -> bool) {
-    let limit = Instant::now() + Duration::from_secs(20);
+    let limit = Instant::now() + VAIN;
     while !done() {
-        assert!(Instant::now() < limit, "waited 20 s in vain until {what}");
+        assert!(
+            Instant::now() < limit,
+            "waited {VAIN:?} in vain until {what}"
+        );
         std::thread::yield_now();
     }
 }

@@ -1,0 +1,90 @@
+//! What happens to a station, in words.
+
+use std::fmt;
+
+use tickbus_base::time::Nanos;
+
+/// Something that happened to a station, for the state of the line and the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A master has sent the right parameters, and owns the station from now on.
+    Parameterised {
+        /// Its address.
+        master: u8,
+    },
+    /// The configuration is right: data are exchanged from now on.
+    Exchanges {
+        /// The master's address.
+        master: u8,
+    },
+    /// The master no longer sets the outputs: it is in CLEAR.
+    Cleared,
+    /// The master sets the outputs again.
+    Operates,
+    /// The station no longer exchanges data, or never began to: why.
+    Left(Leaving),
+}
+
+/// Why a station no longer exchanges data, or never began to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Leaving {
+    /// The master sent other parameters than those of this device.
+    Parameters {
+        /// Its address.
+        master: u8,
+        /// What was expected, and what was received.
+        why: String,
+    },
+    /// The master expects other modules.
+    Configuration {
+        /// Its address.
+        master: u8,
+        /// What was expected, and what was received.
+        why: String,
+    },
+    /// The master sent another number of outputs than the configuration has.
+    Length {
+        /// What was expected.
+        expected: usize,
+        /// What was received.
+        received: usize,
+    },
+    /// The master has been silent for longer than the watchdog's time, which it had set.
+    Watchdog(Nanos),
+    /// The master released the station.
+    Released {
+        /// Its address.
+        master: u8,
+    },
+}
+
+impl Leaving {
+    /// Whether the master is at fault, or its project, and not merely gone.
+    pub fn is_mistake(&self) -> bool {
+        !matches!(self, Self::Watchdog(_) | Self::Released { .. })
+    }
+}
+
+impl fmt::Display for Leaving {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Parameters { master, why } => write!(
+                f,
+                "master {master} sent parameters of another device: {why}; take the same GSD in both projects"
+            ),
+            Self::Configuration { master, why } => write!(
+                f,
+                "master {master} sent another configuration: {why}; give both projects the same modules"
+            ),
+            Self::Length { expected, received } => write!(
+                f,
+                "the master sent {received} bytes of outputs, expected {expected}; give both projects the same modules"
+            ),
+            Self::Watchdog(time) => write!(
+                f,
+                "the master has been silent for longer than {time}, the watchdog's time in its project"
+            ),
+            Self::Released { master } => write!(f, "master {master} released the station"),
+        }
+    }
+}

@@ -1,0 +1,533 @@
+//! A DP-V0 slave: a function of its state, the time and a request, to an answer.
+
+mod diagnosis;
+
+use tickbus_base::time::Nanos;
+
+use crate::configuration::Configuration;
+use crate::event::{Event, Leaving};
+use crate::parameters::Parameters;
+use crate::telegram::{BROADCAST, Control, Frame, append_short_ack};
+
+/// The service access points of a slave, and that of a master.
+mod sap {
+    pub(super) const RD_INP: u8 = 56;
+    pub(super) const RD_OUTP: u8 = 57;
+    pub(super) const GLOBAL_CONTROL: u8 = 58;
+    pub(super) const GET_CFG: u8 = 59;
+    pub(super) const SLAVE_DIAG: u8 = 60;
+    pub(super) const SET_PRM: u8 = 61;
+    pub(super) const CHK_CFG: u8 = 62;
+    /// Of a master, for all of these.
+    pub(super) const MASTER: u8 = 62;
+}
+
+/// The time in bits before an answer, as long as the master has set no other.
+const MIN_TSDR: u8 = 11;
+
+/// What stands behind a station: the machine.
+pub trait Process {
+    /// Fills in what the station sends now. `false`: it is lost on the way, so nothing is to be sent.
+    fn inputs(&mut self, station: u8, now: Nanos, inputs: &mut [u8]) -> bool;
+
+    /// The master has the inputs of the last [`inputs`](Self::inputs).
+    fn delivered(&mut self, station: u8);
+
+    /// The outputs that a telegram brought.
+    fn outputs(&mut self, station: u8, now: Nanos, outputs: &[u8]);
+
+    /// The master is alive, and the outputs stay as they are.
+    fn alive(&mut self, station: u8, now: Nanos);
+
+    /// What happened to the station.
+    fn tell(&mut self, station: u8, now: Nanos, event: Event);
+}
+
+/// Which device a station is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// The number of its kind, from its GSD file.
+    pub ident: u16,
+    /// Its modules.
+    pub configuration: Configuration,
+    /// Whether it supports SYNC.
+    pub sync: bool,
+    /// Whether it supports FREEZE.
+    pub freeze: bool,
+    /// Whether a master in CLEAR sends it telegrams without outputs.
+    pub fail_safe: bool,
+    /// Whether the first octets of the user's parameters are those of DPV1.
+    pub dpv1: bool,
+}
+
+/// The states of a DP slave; Power_On is before it is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum State {
+    /// It waits for its parameters.
+    WaitPrm,
+    /// It waits for the configuration to be checked.
+    WaitCfg,
+    /// It exchanges data.
+    DataExch,
+}
+
+/// A DP-V0 slave.
+#[derive(Debug)]
+pub struct Station {
+    address: u8,
+    identity: Identity,
+    state: State,
+    /// The master that has set the parameters.
+    owner: Option<u8>,
+    watchdog: Option<Nanos>,
+    /// When the owner was last heard.
+    heard: Nanos,
+    min_tsdr: u8,
+    group: u8,
+    fail_safe: bool,
+    faults: diagnosis::Faults,
+    /// The extended diagnosis that the machine has raised; empty if there is none.
+    extended: Vec<u8>,
+    /// The owner has not read the diagnosis yet.
+    is_news: bool,
+    has_freeze: bool,
+    has_sync: bool,
+    is_frozen: bool,
+    is_synced: bool,
+    clear: Clear,
+    /// The inputs have been frozen and not sent since.
+    is_fresh: bool,
+    inputs: Vec<u8>,
+    outputs: Vec<u8>,
+    /// Outputs that wait for the next SYNC.
+    held: Option<Vec<u8>>,
+    /// The last answer to Data_Exchange has inputs of which the master has not shown that it has them.
+    is_pending: bool,
+    last: Last,
+}
+
+/// The last request and its answer, for a master that repeats it.
+#[derive(Debug, Default)]
+struct Last {
+    request: Vec<u8>,
+    answer: Vec<u8>,
+}
+
+/// How a master shows that it is in CLEAR.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Clear {
+    /// By Global_Control.
+    by_control: bool,
+    /// By telegrams without outputs.
+    by_length: bool,
+}
+
+impl Clear {
+    fn is_on(self) -> bool {
+        self.by_control || self.by_length
+    }
+}
+
+/// An answer without its addresses.
+enum Answer<'a> {
+    /// SC.
+    Acknowledged,
+    /// A telegram.
+    Data(Control, &'a [u8]),
+}
+
+impl Station {
+    /// The station at `address`, after power-on.
+    pub fn new(address: u8, identity: Identity) -> Self {
+        Self {
+            address,
+            state: State::WaitPrm,
+            owner: None,
+            watchdog: None,
+            heard: Nanos(0),
+            min_tsdr: MIN_TSDR,
+            group: 0,
+            fail_safe: false,
+            faults: diagnosis::Faults::default(),
+            extended: Vec::new(),
+            is_news: false,
+            has_freeze: false,
+            has_sync: false,
+            is_frozen: false,
+            is_synced: false,
+            clear: Clear::default(),
+            is_fresh: false,
+            inputs: vec![0; identity.configuration.inputs()],
+            outputs: vec![0; identity.configuration.outputs()],
+            held: None,
+            is_pending: false,
+            last: Last::default(),
+            identity,
+        }
+    }
+
+    /// Its address.
+    pub fn address(&self) -> u8 {
+        self.address
+    }
+
+    /// Its state.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// How long it waits before it answers, in bit times.
+    pub fn min_tsdr(&self) -> u8 {
+        self.min_tsdr
+    }
+
+    /// When it acts by itself: the end of the watchdog's time; [`Nanos::MAX`] for never.
+    pub fn deadline(&self) -> Nanos {
+        match (self.state, self.watchdog) {
+            (State::WaitPrm, _) | (_, None) => Nanos::MAX,
+            (_, Some(time)) => self.heard + time,
+        }
+    }
+
+    /// Does what is due at `now`.
+    pub fn turn(&mut self, now: Nanos, process: &mut impl Process) {
+        if self.deadline() <= now
+            && let Some(time) = self.watchdog
+        {
+            self.leave(now, Leaving::Watchdog(time), process);
+        }
+    }
+
+    /// Raises an extended diagnosis, blocks as the standard has them, or takes it back by an empty one. The master is
+    /// told with the next data that there is something to read.
+    ///
+    /// # Panics
+    ///
+    /// When it is longer than 238 octets.
+    pub fn diagnose(&mut self, blocks: &[u8]) {
+        assert!(blocks.len() <= diagnosis::EXTENDED_LIMIT, "it does not fit");
+        if self.extended != blocks {
+            self.extended = blocks.to_vec();
+            self.is_news = true;
+        }
+    }
+
+    /// Takes a request to this station or to all, and appends its answer, if it has any.
+    pub fn request(
+        &mut self,
+        now: Nanos,
+        request: &Frame<'_>,
+        process: &mut impl Process,
+        reply: &mut Vec<u8>,
+    ) {
+        self.turn(now, process);
+        let is_owner = self.owner == Some(request.source);
+        if is_owner {
+            self.heard = now;
+        }
+        let function = request.control.function();
+        match function {
+            Control::SDN_LOW | Control::SDN_HIGH => {
+                if is_owner && request.dsap == Some(sap::GLOBAL_CONTROL) {
+                    self.control(now, request.data, process);
+                }
+                return;
+            }
+            _ if request.destination == BROADCAST => return,
+            Control::FDL_STATUS => return self.append(request, Control::OK, &[], reply),
+            Control::SRD_LOW | Control::SRD_HIGH => {}
+            _ => return self.append(request, Control::NOT_ACTIVE, &[], reply),
+        }
+        if self.is_repeated(request) {
+            if is_owner && self.state == State::DataExch {
+                process.alive(self.address, now);
+            }
+            reply.extend_from_slice(&self.last.answer);
+            return;
+        }
+        let before = reply.len();
+        self.serve(now, request, process, reply);
+        self.last.request.clear();
+        // The repetition of a request whose answer was lost here is served anew.
+        if reply.len() > before {
+            request.append(&mut self.last.request);
+        }
+        self.last.answer.clear();
+        self.last.answer.extend_from_slice(&reply[before..]);
+    }
+
+    /// Whether the master repeats its last request because it did not get the answer. The frame count bit alone would
+    /// do, but some masters never toggle it: a telegram with new outputs is never taken for a repetition.
+    fn is_repeated(&self, request: &Frame<'_>) -> bool {
+        let mut bytes = Vec::new();
+        request.append(&mut bytes);
+        request.control.counts() && bytes == self.last.request
+    }
+
+    fn serve(
+        &mut self,
+        now: Nanos,
+        request: &Frame<'_>,
+        process: &mut impl Process,
+        reply: &mut Vec<u8>,
+    ) {
+        let Some(dsap) = request.dsap else {
+            return self.exchange(now, request, process, reply);
+        };
+        let exchanges = self.state == State::DataExch;
+        let is_owner = self.owner == Some(request.source);
+        if request.ssap != Some(sap::MASTER) {
+            return self.append(request, Control::NOT_ACTIVE, &[], reply);
+        }
+        let mut data = Vec::new();
+        let answer = match dsap {
+            sap::SLAVE_DIAG => {
+                self.append_diagnosis(&mut data);
+                self.is_news &= !(is_owner || self.owner.is_none());
+                Answer::Data(Control::DATA_LOW, &data)
+            }
+            sap::GET_CFG => Answer::Data(Control::DATA_LOW, self.identity.configuration.bytes()),
+            sap::SET_PRM => {
+                self.parameterise(now, request.source, request.data, process);
+                Answer::Acknowledged
+            }
+            sap::CHK_CFG if is_owner && self.state != State::WaitPrm => {
+                self.check(now, request.source, request.data, process);
+                Answer::Acknowledged
+            }
+            sap::RD_INP if exchanges => Answer::Data(Control::DATA_LOW, &self.inputs),
+            sap::RD_OUTP if exchanges => Answer::Data(Control::DATA_LOW, &self.outputs),
+            _ => Answer::Data(Control::NOT_ACTIVE, &[]),
+        };
+        match answer {
+            Answer::Acknowledged => append_short_ack(reply),
+            Answer::Data(Control::NOT_ACTIVE, _) => {
+                self.append(request, Control::NOT_ACTIVE, &[], reply);
+            }
+            Answer::Data(control, data) => Frame {
+                destination: request.source,
+                source: self.address,
+                control,
+                dsap: request.ssap,
+                ssap: request.dsap,
+                data,
+            }
+            .append(reply),
+        }
+    }
+
+    /// An answer without access points.
+    fn append(&self, request: &Frame<'_>, control: Control, data: &[u8], reply: &mut Vec<u8>) {
+        let answer = Frame {
+            destination: request.source,
+            source: self.address,
+            control,
+            dsap: None,
+            ssap: None,
+            data,
+        };
+        answer.append(reply);
+    }
+
+    /// Set_Prm: it is acknowledged in any case, and the diagnosis tells whether the parameters were right.
+    fn parameterise(&mut self, now: Nanos, master: u8, data: &[u8], process: &mut impl Process) {
+        if self.owner.is_some_and(|owner| owner != master) {
+            return;
+        }
+        let Some(parameters) = Parameters::read(data) else {
+            let why = format!("{} octets, expected at least 7", data.len());
+            return self.refuse(now, master, why, process);
+        };
+        if parameters.unlock {
+            if self.state != State::WaitPrm {
+                self.leave(now, Leaving::Released { master }, process);
+            }
+            return;
+        }
+        if parameters.lock {
+            let own = self.identity.ident;
+            if parameters.ident != own {
+                let why = format!(
+                    "expected ident {own:04X}, received {:04X}",
+                    parameters.ident
+                );
+                return self.refuse(now, master, why, process);
+            }
+            let watchdog = parameters.watchdog(self.identity.dpv1);
+            if watchdog == Some(Nanos(0)) {
+                let why = "the watchdog is on, and its time is 0".to_owned();
+                return self.refuse(now, master, why, process);
+            }
+            let is_unsupported = parameters.sync && !self.identity.sync
+                || parameters.freeze && !self.identity.freeze;
+            self.faults = diagnosis::Faults {
+                not_supported: is_unsupported,
+                ..diagnosis::Faults::default()
+            };
+            if is_unsupported {
+                let why = "SYNC or FREEZE, which its GSD does not have".to_owned();
+                self.leave(now, Leaving::Parameters { master, why }, process);
+                return;
+            }
+            self.has_sync = parameters.sync;
+            self.has_freeze = parameters.freeze;
+            self.group = parameters.group;
+            self.watchdog = watchdog;
+            self.fail_safe = self.identity.fail_safe || parameters.fail_safe(self.identity.dpv1);
+            self.heard = now;
+            if self.state == State::WaitPrm {
+                self.owner = Some(master);
+                self.state = State::WaitCfg;
+                self.is_pending = false;
+                process.tell(self.address, now, Event::Parameterised { master });
+            }
+        }
+        if parameters.min_tsdr != 0 {
+            self.min_tsdr = parameters.min_tsdr;
+        }
+    }
+
+    fn refuse(&mut self, now: Nanos, master: u8, why: String, process: &mut impl Process) {
+        self.leave(now, Leaving::Parameters { master, why }, process);
+        self.faults.parameters = true;
+    }
+
+    /// Chk_Cfg, acknowledged in any case, too.
+    fn check(&mut self, now: Nanos, master: u8, data: &[u8], process: &mut impl Process) {
+        if let Some(why) = self.identity.configuration.difference(data) {
+            self.leave(now, Leaving::Configuration { master, why }, process);
+            self.faults.configuration = true;
+            return;
+        }
+        self.faults.configuration = false;
+        if self.state == State::WaitCfg {
+            self.state = State::DataExch;
+            process.tell(self.address, now, Event::Exchanges { master });
+        }
+    }
+
+    /// Data_Exchange.
+    fn exchange(
+        &mut self,
+        now: Nanos,
+        request: &Frame<'_>,
+        process: &mut impl Process,
+        reply: &mut Vec<u8>,
+    ) {
+        let is_owner = self.owner == Some(request.source);
+        if self.state != State::DataExch || !is_owner {
+            return self.append(request, Control::NOT_ACTIVE, &[], reply);
+        }
+        let (expected, received) = (self.outputs.len(), request.data.len());
+        let is_fail_safe = self.fail_safe && received == 0 && expected > 0;
+        if received != expected && !is_fail_safe {
+            self.leave(now, Leaving::Length { expected, received }, process);
+            return self.append(request, Control::NOT_ACTIVE, &[], reply);
+        }
+        // A master that goes on to the next exchange has the answer to the last one.
+        if std::mem::take(&mut self.is_pending) && request.control.counts() {
+            process.delivered(self.address);
+        }
+        let clear = Clear {
+            by_length: is_fail_safe,
+            ..self.clear
+        };
+        self.set_clear(now, clear, process);
+        if clear.is_on() {
+            process.alive(self.address, now);
+        } else if self.is_synced {
+            self.held = Some(request.data.to_vec());
+            process.alive(self.address, now);
+        } else {
+            self.outputs.copy_from_slice(request.data);
+            process.outputs(self.address, now, &self.outputs);
+        }
+        if self.is_frozen {
+            self.is_pending = std::mem::take(&mut self.is_fresh);
+        } else if !self.inputs.is_empty() {
+            if !process.inputs(self.address, now, &mut self.inputs) {
+                return;
+            }
+            self.is_pending = true;
+        }
+        let control = if self.is_news {
+            Control::DATA_HIGH
+        } else {
+            Control::DATA_LOW
+        };
+        if self.inputs.is_empty() && !self.is_news {
+            append_short_ack(reply);
+        } else {
+            self.append(request, control, &self.inputs, reply);
+        }
+    }
+
+    /// Global_Control, from the owner.
+    fn control(&mut self, now: Nanos, data: &[u8], process: &mut impl Process) {
+        let &[command, groups] = data else { return };
+        if self.state != State::DataExch || groups != 0 && groups & self.group == 0 {
+            return;
+        }
+        let has = |bit: u8| command & (1 << bit) != 0;
+        let clear = Clear {
+            by_control: has(1),
+            ..self.clear
+        };
+        self.set_clear(now, clear, process);
+        if self.has_sync {
+            // Every SYNC lets the outputs through that have waited for it; UNSYNC does so for good.
+            if (has(4) || has(5))
+                && let Some(held) = self.held.take()
+                && !clear.is_on()
+            {
+                self.outputs.copy_from_slice(&held);
+                process.outputs(self.address, now, &self.outputs);
+            }
+            self.is_synced = !has(4) && (has(5) || self.is_synced);
+        }
+        if self.has_freeze {
+            if has(3) && !has(2) {
+                self.is_fresh = process.inputs(self.address, now, &mut self.inputs);
+                self.is_pending = false;
+                self.is_frozen = true;
+            }
+            self.is_frozen &= !has(2);
+        }
+    }
+
+    /// The master goes to CLEAR or leaves it.
+    fn set_clear(&mut self, now: Nanos, clear: Clear, process: &mut impl Process) {
+        let before = std::mem::replace(&mut self.clear, clear);
+        if before.is_on() == clear.is_on() {
+            return;
+        }
+        if clear.is_on() {
+            self.outputs.fill(0);
+            self.held = None;
+            process.tell(self.address, now, Event::Cleared);
+        } else {
+            process.tell(self.address, now, Event::Operates);
+        }
+    }
+
+    /// Back to Wait_Prm, with no master and all outputs 0.
+    fn leave(&mut self, now: Nanos, why: Leaving, process: &mut impl Process) {
+        self.state = State::WaitPrm;
+        self.owner = None;
+        self.watchdog = None;
+        self.group = 0;
+        self.is_frozen = false;
+        self.is_synced = false;
+        self.clear = Clear::default();
+        self.is_fresh = false;
+        self.is_pending = false;
+        self.has_freeze = false;
+        self.has_sync = false;
+        self.held = None;
+        self.outputs.fill(0);
+        process.tell(self.address, now, Event::Left(why));
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,45 @@
+//! What a station answers to `Slave_Diag`.
+
+use super::{State, Station};
+
+/// The octets of the standard's part.
+const STANDARD: usize = 6;
+
+/// The most octets of extended diagnosis.
+pub(super) const EXTENDED_LIMIT: usize = crate::telegram::DATA_LIMIT - STANDARD;
+
+/// What was wrong with the last parameters or configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Faults {
+    pub(super) parameters: bool,
+    pub(super) configuration: bool,
+    pub(super) not_supported: bool,
+}
+
+impl Station {
+    /// Appends the diagnosis as it is now.
+    pub(super) fn append_diagnosis(&self, out: &mut Vec<u8>) {
+        let flag = |bit: u8, is_set: bool| u8::from(is_set) << bit;
+        let waits = self.state == State::WaitPrm;
+        out.push(
+            flag(1, self.state != State::DataExch)
+                | flag(2, self.faults.configuration)
+                | flag(3, !self.extended.is_empty())
+                | flag(4, self.faults.not_supported)
+                | flag(6, self.faults.parameters),
+        );
+        // Bit 2 is always set by a slave.
+        out.push(
+            flag(0, waits)
+                | flag(2, true)
+                | flag(3, self.watchdog.is_some())
+                | flag(4, self.is_frozen)
+                | flag(5, self.is_synced),
+        );
+        out.push(0);
+        // 255: no master.
+        out.push(self.owner.unwrap_or(0xFF));
+        out.extend(self.identity.ident.to_be_bytes());
+        out.extend_from_slice(&self.extended);
+    }
+}

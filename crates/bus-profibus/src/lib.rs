@@ -1,14 +1,19 @@
 //! PROFIBUS DP over a serial line: DP-V0 slaves in software.
 //!
 //! The core knows no port and no image. [`telegram`] reads and writes what is on the line; a [`Station`] is one slave,
-//! a function of its state, the time and a request, to an answer.
+//! a function of its state, the time and a request, to an answer; a [`Segment`] has all stations of a line, and finds the
+//! telegrams among the bytes. [`Gsd`] says from its maker's file which device a station is.
 
 mod configuration;
 mod event;
+mod gsd;
 mod parameters;
+mod segment;
 mod station;
 pub mod telegram;
 
 pub use configuration::Configuration;
 pub use event::{Event, Leaving};
+pub use gsd::{Gsd, GsdError, Module, Slot};
+pub use segment::{Heard, Segment, Taken};
 pub use station::{Identity, Process, State, Station};

@@ -1,0 +1,350 @@
+//! All stations of one line: what of its bytes are telegrams, and for whom.
+
+use tickbus_base::time::Nanos;
+
+use crate::station::{Process, Station};
+use crate::telegram::{BROADCAST, Frame, Telegram};
+
+/// A telegram that is not complete after so long a pause never will be, however late a driver hands over its bytes.
+const PATIENCE: Nanos = Nanos::from_millis(50);
+
+/// The silence, in bit times, that precedes every request.
+const SILENCE: i64 = 33;
+
+/// The stations on a line, and what has arrived of the next telegram.
+#[derive(Debug)]
+pub struct Segment {
+    baud: u32,
+    stations: Vec<(Station, Listening)>,
+    buffer: Vec<u8>,
+    /// When the last bytes arrived.
+    heard: Nanos,
+}
+
+/// Whether an address is known to be free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Listening {
+    /// Nobody has been asked there.
+    Silent,
+    /// Somebody was asked there, and may answer yet.
+    Asked,
+    /// The master has gone on without an answer.
+    Free,
+}
+
+/// What a piece of the line's traffic leads to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// How often bytes were skipped that are no telegram.
+    pub damaged: usize,
+    /// The station that answers, if any does, and how long it has to wait before it does so.
+    pub answer: Option<(u8, Nanos)>,
+}
+
+/// Another device has the address of a station.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// The address.
+    pub address: u8,
+}
+
+impl Segment {
+    /// These stations on a line of `baud` bits per second.
+    ///
+    /// # Panics
+    ///
+    /// When `baud` is 0.
+    pub fn new(baud: u32, stations: Vec<Station>) -> Self {
+        assert_ne!(baud, 0, "a line has a speed");
+        let silent = stations
+            .into_iter()
+            .map(|station| (station, Listening::Silent));
+        Self {
+            baud,
+            stations: silent.collect(),
+            buffer: Vec::new(),
+            heard: Nanos(0),
+        }
+    }
+
+    /// The stations.
+    pub fn stations(&self) -> impl Iterator<Item = &Station> {
+        self.stations.iter().map(|(station, _)| station)
+    }
+
+    /// The station at `address`.
+    pub fn station_mut(&mut self, address: u8) -> Option<&mut Station> {
+        let stations = self.stations.iter_mut().map(|(station, _)| station);
+        stations.into_iter().find(|own| own.address() == address)
+    }
+
+    /// The time of this many bits.
+    pub fn bits(&self, count: i64) -> Nanos {
+        Nanos(count * 1_000_000_000 / i64::from(self.baud))
+    }
+
+    /// When a station acts by itself; [`Nanos::MAX`] for never.
+    pub fn deadline(&self) -> Nanos {
+        let deadlines = self.stations().map(Station::deadline);
+        deadlines.min().unwrap_or(Nanos::MAX)
+    }
+
+    /// Does what is due at `now`.
+    pub fn turn(&mut self, now: Nanos, process: &mut impl Process) {
+        for (station, _) in &mut self.stations {
+            station.turn(now, process);
+        }
+    }
+
+    /// Takes bytes off the line. `reply` becomes the answer to the last telegram; a station whose master has gone on
+    /// no longer answers what came before.
+    ///
+    /// # Errors
+    ///
+    /// Another device answers at the address of a station, before that has ever answered.
+    pub fn hear(
+        &mut self,
+        now: Nanos,
+        bytes: &[u8],
+        process: &mut impl Process,
+        reply: &mut Vec<u8>,
+    ) -> Result<Heard, Taken> {
+        let pause = now - self.heard;
+        self.heard = now;
+        let begins_anew = pause > self.bits(SILENCE)
+            && matches!(Telegram::parse(bytes), Ok(Some((Telegram::Frame(_), _))));
+        let mut heard = Heard::default();
+        if !self.buffer.is_empty() && (pause > PATIENCE || begins_anew) {
+            self.buffer.clear();
+            heard.damaged += 1;
+        }
+        self.buffer.extend_from_slice(bytes);
+        let buffer = std::mem::take(&mut self.buffer);
+        let mut rest = &buffer[..];
+        let mut is_damaged = false;
+        loop {
+            match Telegram::parse(rest) {
+                Ok(None) => break,
+                Ok(Some((telegram, length))) => {
+                    rest = &rest[length..];
+                    is_damaged = false;
+                    reply.clear();
+                    heard.answer = self.telegram(now, &telegram, process, reply)?;
+                }
+                Err(_) => {
+                    heard.damaged += usize::from(!is_damaged);
+                    is_damaged = true;
+                    rest = &rest[1..];
+                }
+            }
+        }
+        let is_read = buffer.len() - rest.len();
+        self.buffer = buffer;
+        self.buffer.drain(..is_read);
+        Ok(heard)
+    }
+
+    fn telegram(
+        &mut self,
+        now: Nanos,
+        telegram: &Telegram<'_>,
+        process: &mut impl Process,
+        reply: &mut Vec<u8>,
+    ) -> Result<Option<(u8, Nanos)>, Taken> {
+        self.listen(telegram)?;
+        let Telegram::Frame(frame) = telegram else {
+            return Ok(None);
+        };
+        if !frame.control.is_request() {
+            return Ok(None);
+        }
+        let mut answer = None;
+        for (station, listening) in &mut self.stations {
+            let address = station.address();
+            if frame.destination == BROADCAST {
+                station.request(now, frame, process, reply);
+            } else if frame.destination == address && *listening != Listening::Free {
+                *listening = Listening::Asked;
+            } else if frame.destination == address {
+                station.request(now, frame, process, reply);
+                answer = Some((address, i64::from(station.min_tsdr())));
+            }
+        }
+        let answer = answer.filter(|_| !reply.is_empty());
+        Ok(answer.map(|(address, bits)| (address, self.bits(bits))))
+    }
+
+    /// Finds out whether the addresses are free: a request to each has to remain without an answer once.
+    fn listen(&mut self, telegram: &Telegram<'_>) -> Result<(), Taken> {
+        for (station, listening) in &mut self.stations {
+            let address = station.address();
+            let is_answered = match telegram {
+                Telegram::Frame(Frame {
+                    source, control, ..
+                }) if !control.is_request() => *source == address,
+                Telegram::ShortAck => *listening == Listening::Asked,
+                _ => {
+                    if *listening == Listening::Asked {
+                        *listening = Listening::Free;
+                    }
+                    false
+                }
+            };
+            // An adapter may echo what is sent here; nothing is before an address is free.
+            if is_answered && *listening != Listening::Free {
+                return Err(Taken { address });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::configuration::Configuration;
+    use crate::event::Event;
+    use crate::station::Identity;
+    use crate::telegram::Control;
+
+    struct Nothing;
+
+    impl Process for Nothing {
+        fn inputs(&mut self, _: u8, _: Nanos, _: &mut [u8]) -> bool {
+            true
+        }
+        fn delivered(&mut self, _: u8) {}
+        fn outputs(&mut self, _: u8, _: Nanos, _: &[u8]) {}
+        fn alive(&mut self, _: u8, _: Nanos) {}
+        fn tell(&mut self, _: u8, _: Nanos, _: Event) {}
+    }
+
+    fn segment(addresses: &[u8]) -> Segment {
+        let station = |address: &u8| {
+            let identity = Identity {
+                ident: 1,
+                configuration: Configuration::of_sizes(1, 1),
+                sync: true,
+                freeze: true,
+                fail_safe: false,
+                dpv1: false,
+            };
+            Station::new(*address, identity)
+        };
+        Segment::new(500_000, addresses.iter().map(station).collect())
+    }
+
+    fn status(to: u8) -> Vec<u8> {
+        frame(to, 2, 0x49, None, &[])
+    }
+
+    fn frame(to: u8, from: u8, control: u8, sap: Option<u8>, data: &[u8]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        Frame {
+            destination: to,
+            source: from,
+            control: Control(control),
+            dsap: sap,
+            ssap: sap.map(|_| 62),
+            data,
+        }
+        .append(&mut bytes);
+        bytes
+    }
+
+    /// Who answers these bytes.
+    fn hear(segment: &mut Segment, now: Nanos, bytes: &[u8]) -> Option<u8> {
+        let mut reply = Vec::new();
+        let heard = segment.hear(now, bytes, &mut Nothing, &mut reply);
+        let answer = heard.expect("free").answer;
+        assert_eq!(answer.is_some(), !reply.is_empty());
+        answer.map(|(address, _)| address)
+    }
+
+    /// After a request to each of its stations has remained without an answer.
+    fn free(addresses: &[u8]) -> Segment {
+        let mut segment = segment(addresses);
+        for address in addresses {
+            assert_eq!(hear(&mut segment, Nanos(0), &status(*address)), None);
+        }
+        assert_eq!(hear(&mut segment, Nanos(0), &[0xDC, 2, 2]), None);
+        segment
+    }
+
+    #[test]
+    fn each_station_answers_its_own_address_alone() {
+        let mut line = free(&[3, 7]);
+        for (address, answers) in [(3, Some(3)), (7, Some(7)), (5, None), (127, None)] {
+            assert_eq!(hear(&mut line, Nanos(0), &status(address)), answers);
+        }
+    }
+
+    #[test]
+    fn bytes_come_in_any_pieces_and_after_any_noise() {
+        let mut line = free(&[3]);
+        let request = status(3);
+        for cut in 1..request.len() {
+            assert_eq!(hear(&mut line, Nanos(0), &request[..cut]), None);
+            assert_eq!(hear(&mut line, Nanos(0), &request[cut..]), Some(3));
+        }
+        let mut noise: Vec<u8> = (0..=255).filter(|byte| *byte != 0xE5).collect();
+        noise.extend_from_slice(&request);
+        let mut reply = Vec::new();
+        let heard = line.hear(Nanos(0), &noise, &mut Nothing, &mut reply);
+        let heard = heard.expect("free");
+        assert!(heard.damaged > 0 && heard.answer.is_some());
+    }
+
+    #[test]
+    fn a_telegram_that_never_ends_does_not_swallow_the_next_one() {
+        let mut line = free(&[3]);
+        // The head of a long telegram, and then silence.
+        let head = [0x68, 200, 200, 0x68, 3, 2, 0x5D];
+        assert_eq!(hear(&mut line, Nanos(0), &head), None);
+        let later = line.bits(SILENCE) + Nanos(1);
+        assert_eq!(hear(&mut line, later, &status(3)), Some(3));
+        // Even in pieces, though not at once.
+        assert_eq!(hear(&mut line, later, &head), None);
+        let much_later = later + PATIENCE + Nanos(1);
+        assert_eq!(hear(&mut line, much_later, &status(3)[..2]), None);
+        assert_eq!(hear(&mut line, much_later, &status(3)[2..]), Some(3));
+    }
+
+    #[test]
+    fn what_the_master_no_longer_waits_for_is_not_answered() {
+        let mut line = free(&[3]);
+        let mut both = status(3);
+        both.extend(status(9));
+        assert_eq!(hear(&mut line, Nanos(0), &both), None);
+        let mut twice = status(9);
+        twice.extend(status(3));
+        assert_eq!(hear(&mut line, Nanos(0), &twice), Some(3));
+    }
+
+    #[test]
+    fn an_address_that_another_device_answers_is_not_used() {
+        let answer = frame(2, 3, 0x00, None, &[]);
+        let mut reply = Vec::new();
+        let mut hears =
+            |line: &mut Segment, bytes: &[u8]| line.hear(Nanos(0), bytes, &mut Nothing, &mut reply);
+        let taken = Err(Taken { address: 3 });
+        let mut line = segment(&[3]);
+        assert_eq!(hears(&mut line, &answer), taken);
+        let mut line = segment(&[3]);
+        assert!(hears(&mut line, &status(3)).is_ok());
+        assert_eq!(hears(&mut line, &[0xE5]), taken, "it has no address");
+        let mut line = segment(&[3]);
+        assert!(hears(&mut line, &status(9)).is_ok());
+        assert!(hears(&mut line, &[0xE5]).is_ok(), "another station's");
+        let mut line = free(&[3]);
+        assert!(hears(&mut line, &answer).is_ok(), "the own echo");
+    }
+
+    #[test]
+    fn the_wait_before_an_answer_is_that_of_the_station_in_bits_of_the_line() {
+        let mut line = free(&[3]);
+        let mut reply = Vec::new();
+        let heard = line.hear(Nanos(0), &status(3), &mut Nothing, &mut reply);
+        assert_eq!(heard.expect("free").answer, Some((3, Nanos(22_000))));
+    }
+}

@@ -40,8 +40,6 @@ mod kind;
 mod line;
 pub mod mbap;
 pub mod rtu;
-#[cfg(unix)]
-mod serial;
 mod server;
 mod shown;
 mod stations;

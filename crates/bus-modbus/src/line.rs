@@ -6,13 +6,10 @@ use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
-use tickbus_fieldbus::BusError;
+use tickbus_fieldbus::serial as serial_port;
 use tickbus_fieldbus::tcp::Address;
 
 use super::rtu;
-
-/// The longest name of a serial port, in characters.
-const DEVICE_LIMIT: usize = 1000;
 
 /// The range of serial speeds, in bits per second.
 const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
@@ -120,16 +117,13 @@ impl Line {
                 "remove one of the two: \"address\" is for Modbus TCP, \"device\" for RTU over a serial port",
             );
         }
-        let device = device.label(
-            DEVICE_LIMIT,
-            "name the serial port, such as \"/dev/ttyUSB0\"",
-        );
+        let device = serial_port::read_device(&device);
         let [baud, parity, stop_bits, silence, echo, rs485] = serial.map(|(_, value)| value);
         let flag = |value: Option<Value<'_>>| value.map_or(Some(false), |value| value.boolean());
         let (echo, rs485) = (flag(echo), flag(rs485));
         let settings = read_settings(baud.as_ref(), parity.as_ref(), stop_bits.as_ref(), rs485);
         let silence = silence.as_ref().map(Value::duration);
-        let (device, settings) = (device?.to_owned(), settings?);
+        let (device, settings) = (device?, settings?);
         let silence = match silence {
             None => rtu::silence(settings.baud),
             Some(stated) => stated?,
@@ -172,11 +166,4 @@ fn read_settings(
         two_stop_bits: two_stop_bits?,
         rs485: rs485?,
     })
-}
-
-/// The serial port `device` is gone.
-pub(super) fn gone(device: &str, why: impl fmt::Display) -> BusError {
-    BusError::Link(format!(
-        "the serial port {device} is gone ({why}); see whether it is still plugged in"
-    ))
 }

@@ -13,6 +13,10 @@ use crate::telegram::DATA_LIMIT;
 
 /// What a GSD file says that a station needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "the standard's own flags, independent of each other"
+)]
 pub struct Gsd {
     /// The maker.
     pub vendor: String,
@@ -340,11 +344,18 @@ impl Gsd {
 mod tests {
     use super::*;
 
-    /// A modular device as GSD files have it: Latin-1, comments, continued lines, texts that look like keywords.
-    const REMOTE_IO: &[u8] = include_bytes!("../../../tests/gsd/remote_io.gsd");
+    /// A modular device: comments, continued lines, texts that look like keywords.
+    const REMOTE_IO: &str = include_str!("../../../tests/gsd/remote_io.gsd");
 
     /// A device of one fixed module.
-    const ENCODER: &[u8] = include_bytes!("../../../tests/gsd/encoder.gsd");
+    const ENCODER: &str = include_str!("../../../tests/gsd/encoder.gsd");
+
+    /// The bytes of a file as most makers write them.
+    fn latin_1(text: &str) -> Vec<u8> {
+        let text = text.replace('\n', "\r\n");
+        let octets = text.chars().map(|c| u8::try_from(c).expect("Latin-1"));
+        octets.collect()
+    }
 
     fn names(names: &[&str]) -> Vec<String> {
         names.iter().map(|name| (*name).to_owned()).collect()
@@ -352,7 +363,8 @@ mod tests {
 
     #[test]
     fn a_modular_device_is_read_with_all_its_modules() {
-        let gsd = Gsd::read(REMOTE_IO).expect("a right file");
+        let gsd = Gsd::read(REMOTE_IO.as_bytes()).expect("a right file");
+        assert_eq!(Gsd::read(&latin_1(REMOTE_IO)), Ok(gsd.clone()));
         assert_eq!((gsd.vendor.as_str(), gsd.ident), ("Prüfstand", 0x0B1C));
         assert_eq!(gsd.model, "Remote I/O; 4 slots");
         assert!(gsd.modular && gsd.sync && gsd.freeze && gsd.dpv1 && !gsd.fail_safe);
@@ -374,7 +386,7 @@ mod tests {
 
     #[test]
     fn a_device_with_fixed_modules_needs_none_to_be_named() {
-        let gsd = Gsd::read(ENCODER).expect("a right file");
+        let gsd = Gsd::read(ENCODER.as_bytes()).expect("a right file");
         let identity = gsd.identity(&[]).expect("its own");
         assert_eq!(identity.configuration.bytes(), [0xF1]);
         assert!(identity.fail_safe);
@@ -382,7 +394,7 @@ mod tests {
 
     #[test]
     fn modules_that_do_not_fit_are_refused_with_what_does() {
-        let gsd = Gsd::read(REMOTE_IO).expect("a right file");
+        let gsd = Gsd::read(REMOTE_IO.as_bytes()).expect("a right file");
         let refused = |modules: &[&str]| gsd.identity(&names(modules)).expect_err("refused");
         assert!(refused(&[]).contains("needs its modules; write modules = [\"Head\", …]"));
         assert!(refused(&["Head", "2 word in"]).contains("did you mean \"2 words in\"?"));
@@ -432,7 +444,7 @@ mod tests {
 
     #[test]
     fn no_piece_of_a_file_makes_it_panic() {
-        for file in [REMOTE_IO, ENCODER] {
+        for file in [REMOTE_IO, ENCODER].map(latin_1) {
             for length in 0..file.len() {
                 let _ = Gsd::read(&file[..length]);
                 let _ = Gsd::read(&file[length..]);

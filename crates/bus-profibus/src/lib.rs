@@ -5,15 +5,20 @@
 //! telegrams among the bytes. [`Gsd`] says from its maker's file which device a station is.
 
 mod configuration;
+mod device;
 mod event;
 mod gsd;
+mod kind;
+mod options;
 mod parameters;
 mod segment;
 mod station;
 pub mod telegram;
 
 pub use configuration::Configuration;
+pub use device::ProfibusDevice;
 pub use event::{Event, Leaving};
 pub use gsd::{Gsd, GsdError, Module, Slot};
+pub use options::{Device, Options, StationOptions};
 pub use segment::{Heard, Segment, Taken};
 pub use station::{Identity, Process, State, Station};

@@ -7,12 +7,16 @@ const HEAD: usize = 7;
 
 /// What `Set_Prm` says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "the standard's own flags, independent of each other"
+)]
 pub(crate) struct Parameters<'a> {
     pub(crate) lock: bool,
     pub(crate) unlock: bool,
     pub(crate) sync: bool,
     pub(crate) freeze: bool,
-    /// WD_On, and the product of the two factors.
+    /// `WD_On`, and the product of the two factors.
     pub(crate) watchdog: Option<i64>,
     /// In bit times; 0 keeps what there is.
     pub(crate) min_tsdr: u8,

@@ -45,6 +45,10 @@ pub trait Process {
 
 /// Which device a station is.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "the standard's own flags, independent of each other"
+)]
 pub struct Identity {
     /// The number of its kind, from its GSD file.
     pub ident: u16,
@@ -60,7 +64,7 @@ pub struct Identity {
     pub dpv1: bool,
 }
 
-/// The states of a DP slave; Power_On is before it is made.
+/// The states of a DP slave; `Power_On` is before it is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
     /// It waits for its parameters.
@@ -73,6 +77,10 @@ pub enum State {
 
 /// A DP-V0 slave.
 #[derive(Debug)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "the standard's own flags, independent of each other"
+)]
 pub struct Station {
     address: u8,
     identity: Identity,
@@ -101,7 +109,7 @@ pub struct Station {
     outputs: Vec<u8>,
     /// Outputs that wait for the next SYNC.
     held: Option<Vec<u8>>,
-    /// The last answer to Data_Exchange has inputs of which the master has not shown that it has them.
+    /// The last answer to `Data_Exchange` has inputs of which the master has not shown that it has them.
     is_pending: bool,
     last: Last,
 }
@@ -116,7 +124,7 @@ struct Last {
 /// How a master shows that it is in CLEAR.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Clear {
-    /// By Global_Control.
+    /// By `Global_Control`.
     by_control: bool,
     /// By telegrams without outputs.
     by_length: bool,
@@ -329,7 +337,7 @@ impl Station {
         answer.append(reply);
     }
 
-    /// Set_Prm: it is acknowledged in any case, and the diagnosis tells whether the parameters were right.
+    /// `Set_Prm`: it is acknowledged in any case, and the diagnosis tells whether the parameters were right.
     fn parameterise(&mut self, now: Nanos, master: u8, data: &[u8], process: &mut impl Process) {
         if self.owner.is_some_and(|owner| owner != master) {
             return;
@@ -392,7 +400,7 @@ impl Station {
         self.faults.parameters = true;
     }
 
-    /// Chk_Cfg, acknowledged in any case, too.
+    /// `Chk_Cfg`, acknowledged in any case, too.
     fn check(&mut self, now: Nanos, master: u8, data: &[u8], process: &mut impl Process) {
         if let Some(why) = self.identity.configuration.difference(data) {
             self.leave(now, Leaving::Configuration { master, why }, process);
@@ -406,7 +414,7 @@ impl Station {
         }
     }
 
-    /// Data_Exchange.
+    /// `Data_Exchange`.
     fn exchange(
         &mut self,
         now: Nanos,
@@ -462,7 +470,7 @@ impl Station {
         }
     }
 
-    /// Global_Control, from the owner.
+    /// `Global_Control`, from the owner.
     fn control(&mut self, now: Nanos, data: &[u8], process: &mut impl Process) {
         let &[command, groups] = data else { return };
         if self.state != State::DataExch || groups != 0 && groups & self.group == 0 {
@@ -510,7 +518,7 @@ impl Station {
         }
     }
 
-    /// Back to Wait_Prm, with no master and all outputs 0.
+    /// Back to `Wait_Prm`, with no master and all outputs 0.
     fn leave(&mut self, now: Nanos, why: Leaving, process: &mut impl Process) {
         self.state = State::WaitPrm;
         self.owner = None;

@@ -8,6 +8,7 @@ use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
 use tickbus_bus_plugin as plugin;
+use tickbus_bus_profibus as profibus;
 use tickbus_bus_s7 as s7;
 use tickbus_bus_socket as socket;
 use tickbus_fieldbus::{At, BusKind, BusOptions, Events, Role};
@@ -114,6 +115,8 @@ kinds! {
     /// `kind = "opcua-server"`: for PLCs that are OPC UA clients.
     OpcuaServer(opcua::ServerOptions),
     by_hand:
+    /// `kind = "profibus-device"`: DP slaves in software on a serial line.
+    ProfibusDevice(profibus::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
     /// `kind = "mailbox"`: the example of `examples/bus-mailbox`.
@@ -122,8 +125,7 @@ kinds! {
 }
 
 /// Bus kinds that a later version will have.
-const PLANNED: [&str; 6] = [
-    "profibus-device",
+const PLANNED: [&str; 5] = [
     "hilscher-cif",
     "hilscher-cifx",
     "interbus-ddi",

@@ -17,6 +17,7 @@ mod write_guard;
 
 pub mod faults;
 pub mod loopback;
+pub mod serial;
 pub mod tcp;
 
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};

@@ -10,10 +10,10 @@ mod session;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::WriteGuard;
-#[cfg(unix)]
-use tickbus_fieldbus::tcp::Call;
 use tickbus_fieldbus::tcp::dial;
 use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
+#[cfg(unix)]
+use tickbus_fieldbus::{serial, tcp::Call};
 use tickbus_image::signal::SignalTable;
 
 use super::Line;
@@ -106,7 +106,7 @@ impl Free for ModbusClient {
             }
             #[cfg(unix)]
             Line::Serial(line) => {
-                let mut call = Call::new(super::serial::open(&line)?);
+                let mut call = Call::new(serial::open(&line.device, line.settings)?);
                 port.tell("device", &line.device);
                 port.opening(&format!("asking on {}", line.device));
                 let now = port.clock().now();

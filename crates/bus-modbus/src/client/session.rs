@@ -9,12 +9,12 @@ use std::io;
 use std::ops::Range;
 
 use crate::function::EXCEPTION_BIT;
-use crate::line::gone;
 use crate::mbap::{self, Telegram};
 use crate::rtu;
 use crate::{Function, Identification};
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::WriteGuard;
+use tickbus_fieldbus::serial::gone;
 use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Port};
 

@@ -4,10 +4,10 @@ use std::io;
 
 use crate::Function;
 use crate::function::EXCEPTION_BIT;
-use crate::line::{Serial, gone};
+use crate::line::Serial;
 use crate::rtu::{self, Echo, Framer};
-use crate::serial::open;
 use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
@@ -31,7 +31,7 @@ pub(super) fn serve(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    let mut call = Call::new(open(line)?);
+    let mut call = Call::new(open(&line.device, line.settings)?);
     port.tell("device", &line.device);
     port.opening(&format!("listening on {}", line.device));
     let mut server = Server {

@@ -79,7 +79,7 @@ impl Rig {
         }
     }
 
-    /// Up to data exchange, with these bits of the first octet of Set_Prm and this watchdog.
+    /// Up to data exchange, with these bits of the first octet of `Set_Prm` and this watchdog.
     fn exchanging(identity: Identity, status: u8, watchdog: u8) -> Self {
         let mut rig = Self::new(identity);
         assert_eq!(rig.parameterise(status | LOCK, watchdog), Came::Short);

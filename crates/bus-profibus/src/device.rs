@@ -1,0 +1,179 @@
+//! The bus: carries bytes between the serial port and the stations, and frames between these and the image.
+
+#[cfg(unix)]
+mod line;
+
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::{BusError, Free, PlcState, Port, Receipt};
+
+use crate::event::{Event, Leaving};
+use crate::options::Options;
+use crate::station::{Identity, Process};
+
+/// What the line says while it has no master.
+const WAITS: &str = "waiting for a master";
+
+/// The bus of kind `profibus-device`.
+#[derive(Debug)]
+pub struct ProfibusDevice {
+    options: Options,
+    identities: Vec<(u8, Identity)>,
+}
+
+impl ProfibusDevice {
+    /// The bus that `options` describe, with the device that each station is, by its address.
+    pub(crate) fn new(options: &Options, identities: Vec<(u8, Identity)>) -> Self {
+        Self {
+            options: options.clone(),
+            identities,
+        }
+    }
+}
+
+impl Free for ProfibusDevice {
+    #[cfg(unix)]
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        line::serve(&self.options, &self.identities, port, stop)
+    }
+
+    #[cfg(not(unix))]
+    fn run(&mut self, _port: &mut Port, _stop: &Stop) -> Result<(), BusError> {
+        Err(BusError::Link(
+            "this version has serial ports on Linux and macOS alone".to_owned(),
+        ))
+    }
+}
+
+/// The driver's side of the stations.
+#[derive(Debug)]
+struct Stations {
+    /// In the order of the signal table.
+    all: Vec<Side>,
+}
+
+#[derive(Debug)]
+struct Side {
+    address: u8,
+    /// For the inputs that the master may have by now.
+    receipt: Option<Receipt>,
+    exchanges: bool,
+}
+
+impl Stations {
+    fn new(addresses: impl Iterator<Item = u8>) -> Self {
+        let side = |address| Side {
+            address,
+            receipt: None,
+            exchanges: false,
+        };
+        Self {
+            all: addresses.map(side).collect(),
+        }
+    }
+
+    /// The addresses of those that exchange data, as text.
+    fn exchanging(&self) -> Option<String> {
+        let exchanging = self.all.iter().filter(|side| side.exchanges);
+        let all: Vec<String> = exchanging.map(|side| side.address.to_string()).collect();
+        let word = if all.len() == 1 {
+            "station"
+        } else {
+            "stations"
+        };
+        (!all.is_empty()).then(|| format!("{word} {}", all.join(", ")))
+    }
+}
+
+/// The stations and the port, while a telegram is served.
+struct Machine<'a> {
+    stations: &'a mut Stations,
+    port: &'a mut Port,
+}
+
+impl Machine<'_> {
+    /// The index of the station in the signal table.
+    fn index(&self, address: u8) -> usize {
+        let all = &self.stations.all;
+        let found = all.iter().position(|side| side.address == address);
+        found.expect("only own stations are served")
+    }
+
+    fn left(&mut self, address: u8, why: &Leaving) {
+        let text = format!("station {address}: {why}");
+        if let Some(others) = self.stations.exchanging() {
+            self.port.log(
+                log::Level::Warn,
+                "station left",
+                format_args!("{text}; {others} go on"),
+            );
+            return;
+        }
+        let error = match why {
+            Leaving::Watchdog(_) => BusError::Link(text),
+            Leaving::Released { .. } => BusError::Left(text),
+            _ => BusError::Refused(text),
+        };
+        self.port.lost(&error, WAITS);
+    }
+}
+
+impl Process for Machine<'_> {
+    fn inputs(&mut self, station: u8, now: Nanos, inputs: &mut [u8]) -> bool {
+        let index = self.index(station);
+        let Some(mut frames) = self.port.take(index..index + 1, now) else {
+            return false;
+        };
+        let frame = frames.frame(index);
+        // Modules may have more bytes than there are signals.
+        inputs[..frame.len()].copy_from_slice(frame);
+        let receipt = frames.send();
+        let is_sent = receipt.is_some();
+        self.stations.all[index].receipt = receipt;
+        is_sent
+    }
+
+    fn delivered(&mut self, station: u8) {
+        let index = self.index(station);
+        if let Some(receipt) = self.stations.all[index].receipt.take() {
+            self.port.sent(&receipt);
+        }
+    }
+
+    fn outputs(&mut self, station: u8, now: Nanos, outputs: &[u8]) {
+        let index = self.index(station);
+        let (_, size) = self.port.sizes(index);
+        self.port.received(index, now, &outputs[..size]);
+    }
+
+    fn alive(&mut self, station: u8, now: Nanos) {
+        let index = self.index(station);
+        self.port.touch(index, now);
+    }
+
+    fn tell(&mut self, station: u8, now: Nanos, event: Event) {
+        let index = self.index(station);
+        match event {
+            Event::Parameterised { master } => {
+                log::debug!("station {station}: parameters of master {master}");
+            }
+            Event::Exchanges { master } => {
+                self.stations.all[index].exchanges = true;
+                self.port.plc_state(index, now, PlcState::Run);
+                if let Some(all) = self.stations.exchanging() {
+                    let reason = format!("master {master} exchanges data with {all}");
+                    self.port.running(&reason);
+                }
+            }
+            Event::Cleared => self.port.plc_state(index, now, PlcState::Stop),
+            Event::Operates => self.port.plc_state(index, now, PlcState::Run),
+            Event::Left(why) => {
+                self.stations.all[index].receipt = None;
+                if std::mem::take(&mut self.stations.all[index].exchanges) {
+                    // The outputs are cleared at once, however recent they are.
+                    self.port.plc_state(index, now, PlcState::Stop);
+                }
+                self.left(station, &why);
+            }
+        }
+    }
+}

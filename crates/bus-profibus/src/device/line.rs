@@ -1,0 +1,138 @@
+//! The stations of a device on a serial line.
+
+use std::io;
+
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::serial::{gone, open};
+use tickbus_fieldbus::tcp::{Call, Caller};
+use tickbus_fieldbus::{BusError, Port};
+
+use super::{Machine, Stations};
+use crate::options::Options;
+use crate::segment::{Segment, Taken};
+use crate::station::{Identity, Station};
+
+/// Serves the stations until `stop`.
+///
+/// # Errors
+///
+/// The serial port does not exist, or is gone, or an address is taken.
+pub(super) fn serve(
+    options: &Options,
+    identities: &[(u8, Identity)],
+    port: &mut Port,
+    stop: &Stop,
+) -> Result<(), BusError> {
+    let mut call = Call::new(open(&options.device, options.settings)?);
+    port.tell("device", &options.device);
+    port.opening(&format!("listening on {}", options.device));
+    let stations = identities
+        .iter()
+        .map(|(address, identity)| Station::new(*address, identity.clone()));
+    let mut line = Line {
+        options,
+        segment: Segment::new(options.settings.baud, stations.collect()),
+        stations: Stations::new(identities.iter().map(|(address, _)| *address)),
+        reply: Vec::new(),
+        written: 0,
+        not_before: Nanos(0),
+        not_after: Nanos(0),
+    };
+    call.run(&mut line, port, stop)
+}
+
+struct Line<'a> {
+    options: &'a Options,
+    segment: Segment,
+    stations: Stations,
+    /// The answer being sent, and how much of it the system has accepted.
+    reply: Vec<u8>,
+    written: usize,
+    /// When its first byte may go out.
+    not_before: Nanos,
+    not_after: Nanos,
+}
+
+impl Line<'_> {
+    fn begins(&self) -> bool {
+        self.written == 0 && !self.reply.is_empty()
+    }
+}
+
+impl Caller for Line<'_> {
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
+        // A line that is down by an injected fault carries nothing.
+        if !port.is_up(now) {
+            return Ok(());
+        }
+        let mut machine = Machine {
+            stations: &mut self.stations,
+            port,
+        };
+        // Whatever it is, nobody waits for the last answer any more.
+        self.reply.clear();
+        self.written = 0;
+        let heard = self.segment.hear(now, bytes, &mut machine, &mut self.reply);
+        let heard = heard.map_err(|Taken { address }| {
+            BusError::Link(format!(
+                "another device on {} answers at address {address}; give the station another address, or take that \
+                 device off the line",
+                self.options.device
+            ))
+        })?;
+        for _ in 0..heard.damaged {
+            port.count("profibus-device.damaged");
+        }
+        if let Some((_, wait)) = heard.answer {
+            self.not_before = now + wait;
+            self.not_after = now + wait.max(self.segment.bits(self.options.max_tsdr.into()));
+        }
+        Ok(())
+    }
+
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        if self.begins() && now > self.not_after {
+            port.count("profibus-device.late");
+            self.reply.clear();
+        }
+        let mut machine = Machine {
+            stations: &mut self.stations,
+            port,
+        };
+        self.segment.turn(now, &mut machine);
+        Ok(())
+    }
+
+    fn to_write(&self, now: Nanos) -> &[u8] {
+        if self.begins() && now < self.not_before {
+            return &[];
+        }
+        &self.reply[self.written..]
+    }
+
+    fn wrote(&mut self, _now: Nanos, count: usize, _port: &mut Port) {
+        self.written += count;
+        if self.written == self.reply.len() {
+            self.reply.clear();
+            self.written = 0;
+        }
+    }
+
+    fn deadline(&self, port: &Port) -> Nanos {
+        let stale = port.stale_at(port.clock().now());
+        let deadline = self.segment.deadline().min(stale);
+        if self.begins() {
+            deadline.min(self.not_before)
+        } else {
+            deadline
+        }
+    }
+
+    fn left(&mut self) -> BusError {
+        gone(&self.options.device, "it was closed")
+    }
+
+    fn broke(&mut self, error: &io::Error) -> BusError {
+        gone(&self.options.device, error)
+    }
+}

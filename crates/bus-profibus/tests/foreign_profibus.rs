@@ -1,0 +1,449 @@
+//! The bus `profibus-device` with profirust, a DP master that somebody else wrote, at the other end of a
+//! pseudo-terminal, in real time.
+#![cfg(unix)]
+#![allow(
+    missing_docs,
+    clippy::float_cmp,
+    reason = "tests; the values are small whole numbers"
+)]
+
+mod peer;
+#[path = "../../../tests/peers/pty.rs"]
+mod pty;
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::time::Duration;
+
+use peer::{Master, Project, SLOT, Seen, Slave};
+use profirust::Baudrate;
+use profirust::dp::PeripheralEvent;
+use tickbus_base::time::{Monotonic, Nanos};
+use tickbus_conformance as conformance;
+use tickbus_conformance::rig::{Bus, End, Liar, await_that, config, logged};
+use tickbus_driver::Code;
+use tickbus_fieldbus::LinkState;
+
+const ADDRESS: u8 = 8;
+const IDENT: u16 = 0x80E0;
+
+/// The kind for the rig, on this port.
+struct OnPort(String);
+
+impl Bus for OnPort {
+    fn fieldbus(&self, _role: &str) -> String {
+        format!(
+            "kind = \"profibus-device\"\ndevice = \"{}\"\nbaud = 500000\nmax_tsdr = {}\n\
+             address = {ADDRESS}\nident = {IDENT:#06x}\nconfig = [0x52, 0x62]",
+            self.0,
+            SLOT - 1000,
+        )
+    }
+
+    fn liar(&self, _clock: &std::sync::Arc<tickbus_base::time::Manual>) -> Liar {
+        unreachable!("a master that lies is met below")
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        vec![
+            (
+                "kind = \"profibus-device\"\ndevice = \"x\"\nbaud = 9601\naddress = 3\nident = 1",
+                "9601 is no rate of PROFIBUS",
+            ),
+            (
+                "kind = \"profibus-device\"\ndevice = \"x\"\naddress = 3\ngsd = \"none.gsd\"",
+                "cannot read the GSD file",
+            ),
+            (
+                "kind = \"profibus-device\"\ndevice = \"x\"\naddress = 3\nident = 1\nconfig = [0x50]",
+                "the signals have 1 bytes of %Q, and the station 0",
+            ),
+        ]
+    }
+}
+
+fn device(line: &pty::Line) -> End {
+    device_at(line, 500_000)
+}
+
+fn device_at(line: &pty::Line, baud: u32) -> End {
+    let bus = OnPort(line.end(0).display().to_string());
+    let text = config(&bus, "device", "");
+    let text = text.replace("baud = 500000", &format!("baud = {baud}"));
+    End::open(&text, &Monotonic::shared())
+}
+
+fn slave() -> Slave {
+    Slave {
+        address: ADDRESS,
+        ident: IDENT,
+        parameters: &[],
+        config: &[0x52, 0x62],
+        inputs: 6,
+        outputs: 6,
+    }
+}
+
+fn project() -> Project {
+    Project {
+        baud: Baudrate::B500000,
+        slot: SLOT,
+        watchdog: Some(profirust::time::Duration::from_millis(500)),
+        slaves: vec![slave()],
+        damages: None,
+    }
+}
+
+/// Ticks until `done` holds.
+#[track_caller]
+fn until(device: &mut End, what: &str, mut done: impl FnMut(&mut End) -> bool) {
+    await_that(what, || {
+        device.tick();
+        std::thread::sleep(Duration::from_micros(500));
+        done(device)
+    });
+}
+
+#[track_caller]
+fn until_exchanging(device: &mut End, master: &Master) {
+    let before = master.first(|seen| seen.exchanges);
+    until(device, "data are exchanged", |device| {
+        let goes = master.first(|seen| seen.exchanges) > before;
+        goes && device.tick().code == Code::Fresh && device.link().state == LinkState::Running
+    });
+}
+
+/// Each end sends a number to the other.
+#[track_caller]
+fn exchange(device: &mut End, master: &Master, number: u8) {
+    device.set("position", f64::from(number));
+    master.first(|seen| seen.outputs[2..4].copy_from_slice(&[0, number]));
+    until(device, "both numbers arrive", |device| {
+        let came = master.first(|seen| seen.inputs.get(2..4) == Some(&[0, number]));
+        came && device.get("speed") == f64::from(number)
+    });
+}
+
+#[test]
+fn it_is_started_up_and_exchanges_both_ways_at_every_rate_of_user_space() {
+    for (baud, rate, slot) in [
+        (Baudrate::B9600, 9_600, 500),
+        (Baudrate::B19200, 19_200, 1_000),
+        (Baudrate::B187500, 187_500, 6_000),
+        (Baudrate::B500000, 500_000, SLOT),
+    ] {
+        let line = pty::Line::new();
+        let mut device = device_at(&line, rate);
+        let project = Project {
+            baud,
+            slot,
+            watchdog: None,
+            ..project()
+        };
+        let master = Master::run(line.end(1), project);
+        until_exchanging(&mut device, &master);
+        let reason = device.link().reason;
+        assert_eq!(reason, "master 2 exchanges data with station 8");
+        for number in 1..=3 {
+            exchange(&mut device, &master, number);
+        }
+        let wrong = [
+            PeripheralEvent::ConfigError,
+            PeripheralEvent::ParameterError,
+        ];
+        master.first(|seen| assert!(!wrong.iter().any(|event| seen.has(*event)), "{seen:?}"));
+    }
+}
+
+#[test]
+fn pulses_of_one_tick_and_of_one_exchange_arrive() {
+    let line = pty::Line::new();
+    let mut device = device(&line);
+    let master = Master::run(line.end(1), project());
+    until_exchanging(&mut device, &master);
+    let before = master.first(|seen| seen.edges);
+    for pulse in 1..=30 {
+        for level in [1.0, 0.0] {
+            device.set("sensor", level);
+            device.tick();
+        }
+        until(&mut device, "the master sees it come and go", |_| {
+            master.first(|seen| seen.edges == before + pulse && seen.inputs[0] & 1 == 0)
+        });
+    }
+    let mut edges = 0.0;
+    for pulse in 1..=30 {
+        for level in [1, 0] {
+            let exchanges = master.first(|seen| {
+                seen.outputs[0] = level;
+                seen.exchanges
+            });
+            // The machine does not tick while the pulse is there. One exchange may be under way already.
+            await_that("it has gone out", || {
+                std::thread::sleep(Duration::from_micros(500));
+                master.first(|seen| seen.exchanges > exchanges + 2)
+            });
+        }
+        device.tick();
+        edges += device.edges("run");
+        until(&mut device, "it is over", |device| {
+            edges += device.edges("run");
+            device.get("run") == 0.0
+        });
+        assert_eq!(edges, f64::from(pulse));
+    }
+}
+
+#[test]
+fn a_slave_that_is_lost_comes_back() {
+    let line = pty::Line::new();
+    let mut first = device(&line);
+    let master = Master::run(line.end(1), project());
+    until_exchanging(&mut first, &master);
+    for number in [1, 2] {
+        exchange(&mut first, &master, number);
+        first.driver.close();
+        await_that("the master has noticed", || {
+            std::thread::sleep(Duration::from_millis(1));
+            master.first(|seen| seen.has(PeripheralEvent::Offline))
+        });
+        master.first(|seen| seen.events.clear());
+        first = device(&line);
+        until_exchanging(&mut first, &master);
+        exchange(&mut first, &master, number + 10);
+    }
+}
+
+#[test]
+fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_back() {
+    let line = pty::Line::new();
+    let bus = OnPort(line.end(0).display().to_string());
+    // So long that only the watchdog can be the reason.
+    let text = config(&bus, "device", "").replace("\"300ms\"", "\"60s\"");
+    let mut device = End::open(&text, &Monotonic::shared());
+    for number in [3, 4] {
+        let master = Master::run(line.end(1), project());
+        until_exchanging(&mut device, &master);
+        exchange(&mut device, &master, number);
+        drop(master);
+        until(&mut device, "the station is stale", |device| {
+            device.tick().code == Code::Stale
+        });
+        assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
+        assert!(
+            device.tick().age < Nanos::from_secs(60),
+            "young, and invalid"
+        );
+        let link = device.link();
+        assert_ne!(link.state, LinkState::Running);
+        let words = "station 8: the master has been silent for longer than 500";
+        assert!(link.reason.contains(words), "{}", link.reason);
+    }
+}
+
+#[test]
+fn a_wrong_ident_and_a_wrong_configuration_are_told_in_words_and_mended() {
+    let _expected = logged::expect("refused: station 8");
+    let line = pty::Line::new();
+    let mut device = device(&line);
+    for (wrong, event, words) in [
+        (
+            Slave {
+                ident: 0x1234,
+                ..slave()
+            },
+            PeripheralEvent::ParameterError,
+            "expected ident 80E0, received 1234",
+        ),
+        (
+            Slave {
+                config: &[0x52, 0x61],
+                ..slave()
+            },
+            PeripheralEvent::ConfigError,
+            "slot 2: expected 62 (6 bytes of outputs), received 61 (4 bytes of outputs)",
+        ),
+    ] {
+        let mistaken = Project {
+            slaves: vec![wrong],
+            ..project()
+        };
+        let master = Master::run(line.end(1), mistaken);
+        until(&mut device, "it is told", |device| {
+            let link = device.link();
+            link.cause.name() == "refused" && link.reason.contains(words)
+        });
+        await_that("the master has read it", || {
+            std::thread::sleep(Duration::from_millis(1));
+            master.first(|seen| seen.has(event))
+        });
+        master.first(|seen| assert_eq!(seen.exchanges, 0));
+        drop(master);
+        let master = Master::run(line.end(1), project());
+        until_exchanging(&mut device, &master);
+    }
+}
+
+#[test]
+fn damaged_and_cut_telegrams_are_repeated_and_never_believed() {
+    let line = pty::Line::new();
+    let mut device = device(&line);
+    let noisy = Project {
+        damages: Some(9),
+        ..project()
+    };
+    let master = Master::run(line.end(1), noisy);
+    until_exchanging(&mut device, &master);
+    let mut last = 0;
+    for number in 1..=60 {
+        // The same number twice, so that a torn or damaged telegram would show.
+        master.first(|seen| seen.outputs[2..6].copy_from_slice(&[0, number, 0, number]));
+        until(&mut device, "it arrives", |device| {
+            let (speed, echo) = (device.get("speed"), device.get("echo"));
+            assert_eq!(speed, echo);
+            assert!([f64::from(last), f64::from(number), -1.0].contains(&speed) || last == 0);
+            speed == f64::from(number)
+        });
+        last = number;
+    }
+    let damaged = device.statistic("profibus-device.damaged");
+    assert_ne!(damaged, "0");
+}
+
+/// Five devices of three kinds, two of them by a GSD file, as one driver on one line.
+#[test]
+fn many_stations_of_different_devices_share_a_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in [
+        (
+            "remote_io.gsd",
+            include_str!("../../../tests/gsd/remote_io.gsd"),
+        ),
+        (
+            "encoder.gsd",
+            include_str!("../../../tests/gsd/encoder.gsd"),
+        ),
+    ] {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    let line = pty::Line::new();
+    let remote_io =
+        "gsd = \"remote_io.gsd\"\nmodules = [\"Head\", \"2 words in\", \"2 words out\"]";
+    let plain = "ident = 0x80E0";
+    let encoder = "gsd = \"encoder.gsd\"";
+    let stations = [
+        (3, remote_io),
+        (5, encoder),
+        (9, plain),
+        (20, remote_io),
+        (125, encoder),
+    ];
+    let mut text = format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"profibus-device\"\n\
+         device = \"{}\"\nbaud = 500000\nmax_tsdr = {}\nmax_age = \"5s\"\n",
+        line.end(0).display(),
+        SLOT - 1000
+    );
+    for (address, device) in stations {
+        let _ = writeln!(
+            text,
+            "[[station]]\nname = \"s{address}\"\naddress = {address}\n{device}\n"
+        );
+    }
+    for (address, _) in stations {
+        for (area, name) in [("I", "from"), ("Q", "to")] {
+            let _ = writeln!(
+                text,
+                "[[signal]]\nname = \"{name} {address}\"\nstation = \"s{address}\"\n\
+                 address = \"%{area}W2\"\ntype = \"INT\"\n"
+            );
+        }
+    }
+    let path = folder.path().join("driver.cfg");
+    std::fs::write(&path, &text).expect("a file");
+    let mut device = open(&path);
+    let slaves = stations.map(|(address, _)| {
+        let (ident, config, parameters): (_, &[u8], &[u8]) = match address {
+            3 | 20 => (0x0B1C, &[0x00, 0x51, 0x61], &[0xC0, 0, 0, 0, 0]),
+            9 => (0x80E0, &[0x71], &[]),
+            _ => (0xE4C0, &[0xF1], &[]),
+        };
+        Slave {
+            address,
+            ident,
+            parameters,
+            config,
+            inputs: 4,
+            outputs: 4,
+        }
+    });
+    let master = Master::run(
+        line.end(1),
+        Project {
+            slaves: slaves.to_vec(),
+            ..project()
+        },
+    );
+    for round in [1_u8, 2] {
+        for (number, (address, _)) in (1..).zip(stations) {
+            device.set(&format!("from {address}"), f64::from(10 * round + number));
+            master.all()[usize::from(number) - 1].outputs[3] = 20 * round + number;
+        }
+        until(&mut device, "each station has its own values", |device| {
+            let seen: Vec<Seen> = master.all().clone();
+            (1..).zip(stations).all(|(number, (address, _))| {
+                let came = &seen[usize::from(number) - 1].inputs;
+                came.get(3) == Some(&(10 * round + number))
+                    && device.get(&format!("to {address}")) == f64::from(20 * round + number)
+            })
+        });
+    }
+    let reason = device.link().reason;
+    assert!(
+        reason.starts_with("master 2 exchanges data with station"),
+        "{reason}"
+    );
+}
+
+fn open(path: &std::path::Path) -> End {
+    let logged = logged::Watch::new();
+    let config = tickbus_driver_cfg::Config::load(path).unwrap_or_else(|why| panic!("{why}"));
+    let driver = tickbus_driver::Driver::open(config, Monotonic::shared()).expect("opens");
+    let slots = driver.initial_slots();
+    End {
+        driver,
+        slots,
+        logged,
+    }
+}
+
+#[test]
+fn an_address_that_already_answers_is_refused_with_a_message() {
+    let _expected = logged::expect("answers at address 8");
+    let line = pty::Line::new();
+    let mut device = device(&line);
+    let mut other = std::fs::OpenOptions::new()
+        .write(true)
+        .open(line.end(1))
+        .expect("the other end");
+    until(&mut device, "it says so", |device| {
+        // Station 8 answers master 2: it is there.
+        other
+            .write_all(&[0x10, 0x02, 0x08, 0x00, 0x0A, 0x16])
+            .expect("a line");
+        device.link().reason.contains(
+            "answers at address 8; give the station another address, or take that device off the line",
+        )
+    });
+}
+
+#[test]
+fn it_closes_while_its_peer_is_silent() {
+    let line = pty::Line::new();
+    conformance::closes_while_its_peer_is_silent(&OnPort(line.end(0).display().to_string()));
+}
+
+#[test]
+fn it_refuses_bad_configuration() {
+    conformance::refuses_bad_configuration(&OnPort("unused".to_owned()));
+}

@@ -1,0 +1,57 @@
+//! Serial ports, for the buses that run on them.
+
+use std::fmt;
+#[cfg(unix)]
+use std::io::ErrorKind;
+#[cfg(unix)]
+use std::path::Path;
+
+#[cfg(unix)]
+use tickbus_base::os::{SerialPort, SerialSettings};
+use tickbus_base::toml_text::Value;
+
+use super::BusError;
+
+/// The longest name of a serial port, in characters.
+const DEVICE_LIMIT: usize = 1000;
+
+/// Reads the system's name of a port.
+pub fn read_device(value: &Value<'_>) -> Option<String> {
+    let right = "name the serial port, such as \"/dev/ttyUSB0\"";
+    value.label(DEVICE_LIMIT, right).map(str::to_owned)
+}
+
+/// Opens the port that the system calls `device`.
+///
+/// # Errors
+///
+/// It does not exist, is not a serial port, or does not support the settings.
+#[cfg(unix)]
+pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
+    SerialPort::open(Path::new(device), settings).map_err(|error| {
+        let right = match error.kind() {
+            ErrorKind::NotFound => {
+                "plug it in, or correct \"device\"; ls /dev/serial/by-id shows what is there"
+            }
+            ErrorKind::PermissionDenied => {
+                "get the right to use it; on Debian and Ubuntu that is the group dialout"
+            }
+            ErrorKind::ResourceBusy => "end the other program that has it",
+            _ if settings.rs485 => {
+                "if its driver cannot switch the direction of RS-485, remove rs485 = true and take an adapter that \
+                 does so by itself"
+            }
+            _ => "check that it is a serial port that can be set so",
+        };
+        BusError::Link(format!(
+            "cannot open {device} at {settings} ({error}); {right}"
+        ))
+    })
+}
+
+/// The serial port `device` is gone.
+pub fn gone(device: &str, why: impl fmt::Display) -> BusError {
+    BusError::Link(format!(
+        "the serial port {device} is gone ({why}); see whether it is still plugged in"
+    ))
+}

@@ -87,6 +87,8 @@ pub struct Station {
     state: State,
     /// The master that has set the parameters.
     owner: Option<u8>,
+    /// The master whose parameters were refused last.
+    refused: Option<u8>,
     watchdog: Option<Nanos>,
     /// When the owner was last heard.
     heard: Nanos,
@@ -151,6 +153,7 @@ impl Station {
             address,
             state: State::WaitPrm,
             owner: None,
+            refused: None,
             watchdog: None,
             heard: Nanos(0),
             min_tsdr: MIN_TSDR,
@@ -303,6 +306,8 @@ impl Station {
                 self.check(now, request.source, request.data, process);
                 Answer::Acknowledged
             }
+            // A master that has not read the diagnosis yet goes on, and would wait here forever.
+            sap::CHK_CFG if self.refused == Some(request.source) => Answer::Acknowledged,
             sap::RD_INP if exchanges => Answer::Data(Control::DATA_LOW, &self.inputs),
             sap::RD_OUTP if exchanges => Answer::Data(Control::DATA_LOW, &self.outputs),
             _ => Answer::Data(Control::NOT_ACTIVE, &[]),
@@ -342,6 +347,7 @@ impl Station {
         if self.owner.is_some_and(|owner| owner != master) {
             return;
         }
+        self.refused = None;
         let Some(parameters) = Parameters::read(data) else {
             let why = format!("{} octets, expected at least 7", data.len());
             return self.refuse(now, master, why, process);
@@ -374,7 +380,8 @@ impl Station {
             };
             if is_unsupported {
                 let why = "SYNC or FREEZE, which its GSD does not have".to_owned();
-                self.leave(now, Leaving::Parameters { master, why }, process);
+                self.refuse(now, master, why, process);
+                self.faults.parameters = false;
                 return;
             }
             self.has_sync = parameters.sync;
@@ -398,6 +405,7 @@ impl Station {
     fn refuse(&mut self, now: Nanos, master: u8, why: String, process: &mut impl Process) {
         self.leave(now, Leaving::Parameters { master, why }, process);
         self.faults.parameters = true;
+        self.refused = Some(master);
     }
 
     /// `Chk_Cfg`, acknowledged in any case, too.

@@ -246,6 +246,7 @@ fn wrong_parameters_are_acknowledged_and_told_in_the_diagnosis_and_in_words() {
     ] {
         let mut rig = Rig::new(identity());
         assert_eq!(rig.ask(61, parameters), Came::Short);
+        assert_eq!(rig.ask(62, &[0x50, 0x60]), Came::Short, "without effect");
         assert_eq!(rig.diagnosis()[..2], [0x42, 0x05], "{words}");
         let Some(Event::Left(why)) = rig.machine.events.last() else {
             panic!("nothing told of {words}");

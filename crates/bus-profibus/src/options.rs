@@ -355,12 +355,10 @@ fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
         stray.wrong("the station has no address", ADDRESS);
         return Keys::Wrong;
     }
-    for (first, second, why) in [
-        (&gsd, &ident, "the GSD file has the ident"),
-        (&gsd, &config, "the modules have the configuration"),
-    ] {
-        if let (Some(_), Some(second)) = (first, second) {
-            second.wrong(format!("it stands beside \"gsd\", and {why}"), "remove it");
+    for (key, value) in [("ident", &ident), ("config", &config)] {
+        if let (Some(_), Some(value)) = (&gsd, value) {
+            let what = format!("\"{key}\" stands beside \"gsd\", which says that");
+            value.wrong(what, "remove one of the two");
         }
     }
     if let (Some(modules), None) = (&modules, &gsd) {

@@ -1,0 +1,78 @@
+"""Drives a PROFIBUS station with pyprofibus, which also reads the station's GSD file.
+
+profibus_master.py DEVICE BAUD ADDRESS GSD MODULE
+
+The station has 4 bytes each way and brings the outputs back on the inputs. The last line has the number of exchanges.
+"""
+
+import os
+import sys
+import tempfile
+import time
+
+import pyprofibus
+
+CONF = """
+[PROFIBUS]
+debug=0
+[PHY]
+type=serial
+dev={device}
+baud={baud}
+[DP]
+master_class=1
+master_addr=2
+[SLAVE_0]
+name=station
+addr={address}
+gsd={gsd}
+sync_mode=0
+freeze_mode=0
+group_mask=1
+watchdog_ms=5000
+module_0={module}
+output_size=4
+input_size=4
+diag_period=0
+"""
+
+
+def open_master(arguments):
+    device, baud, address, gsd, module = arguments
+    with tempfile.NamedTemporaryFile("w", suffix=".conf", delete=False) as file:
+        file.write(CONF.format(device=device, baud=baud, address=address, gsd=gsd, module=module))
+    try:
+        conf = pyprofibus.PbConf.fromFile(file.name)
+    finally:
+        os.unlink(file.name)
+    master = conf.makeDPM()
+    slaves = []
+    for slave in conf.slaveConfs:
+        description = slave.makeDpSlaveDesc()
+        description.setUserPrmData(slave.gsd.getUserPrmData())
+        master.addSlave(description)
+        slaves.append(description)
+    master.initialize()
+    return master, slaves[0]
+
+
+def main():
+    master, slave = open_master(sys.argv[1:])
+    exchanges = 0
+    for number in range(1, 201):
+        sent = bytearray([number, 255 - number, 0x10, number ^ 0x55])
+        limit = time.monotonic() + 20
+        slave.setMasterOutData(sent)
+        while True:
+            master.run()
+            came = slave.getMasterInData()
+            exchanges += came is not None
+            if came == sent:
+                break
+            if time.monotonic() > limit:
+                sys.exit(f"{came} came back of {sent}")
+    master.destroy()
+    print(f"profibus_master: ok exchanges={exchanges}")
+
+
+main()

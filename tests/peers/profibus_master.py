@@ -62,8 +62,9 @@ def main():
     for number in range(1, 201):
         sent = bytearray([number, 255 - number, 0x10, number ^ 0x55])
         limit = time.monotonic() + 20
-        slave.setMasterOutData(sent)
         while True:
+            # It sends them once.
+            slave.setMasterOutData(sent)
             master.run()
             came = slave.getMasterInData()
             exchanges += came is not None

@@ -16,7 +16,7 @@ use profirust::phy::ProfibusPhy;
 use profirust::time::{Duration, Instant};
 
 /// The time for an answer in the master's project, in bits: a pseudo-terminal has no wire, and a busy machine needs time.
-pub const SLOT: u16 = 12_000;
+pub const SLOT: u16 = 6_000;
 
 /// What the master's project says of one station.
 #[derive(Clone, Debug)]

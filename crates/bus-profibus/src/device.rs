@@ -75,12 +75,7 @@ impl Stations {
     fn exchanging(&self) -> Option<String> {
         let exchanging = self.all.iter().filter(|side| side.exchanges);
         let all: Vec<String> = exchanging.map(|side| side.address.to_string()).collect();
-        let word = if all.len() == 1 {
-            "station"
-        } else {
-            "stations"
-        };
-        (!all.is_empty()).then(|| format!("{word} {}", all.join(", ")))
+        (!all.is_empty()).then(|| all.join(" "))
     }
 }
 
@@ -98,13 +93,19 @@ impl Machine<'_> {
         found.expect("only own stations are served")
     }
 
+    fn tell_exchanging(&self) {
+        let all = self.stations.exchanging();
+        self.port
+            .tell("exchanging", all.as_deref().unwrap_or("none"));
+    }
+
     fn left(&mut self, address: u8, why: &Leaving) {
         let text = format!("station {address}: {why}");
         if let Some(others) = self.stations.exchanging() {
             self.port.log(
                 log::Level::Warn,
                 "station left",
-                format_args!("{text}; {others} go on"),
+                format_args!("{text}; data are exchanged with {others}"),
             );
             return;
         }
@@ -159,10 +160,9 @@ impl Process for Machine<'_> {
             Event::Exchanges { master } => {
                 self.stations.all[index].exchanges = true;
                 self.port.plc_state(index, now, PlcState::Run);
-                if let Some(all) = self.stations.exchanging() {
-                    let reason = format!("master {master} exchanges data with {all}");
-                    self.port.running(&reason);
-                }
+                self.tell_exchanging();
+                self.port
+                    .running(&format!("master {master} exchanges data"));
             }
             Event::Cleared => self.port.plc_state(index, now, PlcState::Stop),
             Event::Operates => self.port.plc_state(index, now, PlcState::Run),
@@ -171,6 +171,7 @@ impl Process for Machine<'_> {
                 if std::mem::take(&mut self.stations.all[index].exchanges) {
                     // The outputs are cleared at once, however recent they are.
                     self.port.plc_state(index, now, PlcState::Stop);
+                    self.tell_exchanging();
                 }
                 self.left(station, &why);
             }

@@ -58,13 +58,6 @@ pub enum Leaving {
     },
 }
 
-impl Leaving {
-    /// Whether the master is at fault, or its project, and not merely gone.
-    pub fn is_mistake(&self) -> bool {
-        !matches!(self, Self::Watchdog(_) | Self::Released { .. })
-    }
-}
-
 impl fmt::Display for Leaving {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

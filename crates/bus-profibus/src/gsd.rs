@@ -3,8 +3,9 @@
 //! The file is read line by line, and keywords that say nothing of identity or modules are skipped: a device may
 //! describe parameters and diagnosis in ways that no slave has to know.
 
-use std::fmt::{self, Write as _};
+use std::fmt;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{did_you_mean, shown};
 
 use crate::Identity;
@@ -272,7 +273,7 @@ impl Gsd {
     /// # Errors
     ///
     /// It does not have one of them, or not in that slot, or not so many.
-    pub fn identity(&self, chosen: &[String]) -> Result<Identity, String> {
+    pub fn identity(&self, chosen: &[String]) -> Result<Identity, Mistake> {
         let modules = if chosen.is_empty() && !self.modular {
             self.modules.iter().collect()
         } else {
@@ -282,29 +283,32 @@ impl Gsd {
                 .collect::<Result<Vec<_>, _>>()?
         };
         if modules.is_empty() {
-            let mut why = format!("\"{}\" needs its modules", shown(&self.model));
-            if let Some(first) = self.modules.first() {
-                let _ = write!(why, "; write modules = [\"{}\", …]", shown(&first.name));
-            }
-            return Err(why);
+            let what = format!("\"{}\" needs its modules", shown(&self.model));
+            let first = self.modules.first().map_or("…", |module| &module.name);
+            let right = format!(
+                "write their names, such as modules = [\"{}\"]",
+                shown(first)
+            );
+            return Err(Mistake::new(what, right));
         }
         if let Some(most) = self.max_module
             && modules.len() > most
         {
-            return Err(format!(
-                "there are {} modules; \"{}\" has at most {most}",
-                modules.len(),
-                shown(&self.model)
+            return Err(Mistake::new(
+                format!("there are {} modules", modules.len()),
+                format!("\"{}\" has at most {most}", shown(&self.model)),
             ));
         }
         let slots = modules
             .iter()
             .map(|module| (&*module.name, &*module.identifiers));
-        let configuration = Configuration::of_modules(slots)?;
+        let configuration = Configuration::of_modules(slots)
+            .map_err(|why| Mistake::new(why, "correct the GSD file"))?;
         let most = configuration.inputs().max(configuration.outputs());
         if most > DATA_LIMIT {
-            return Err(format!(
-                "the modules have {most} bytes in one direction; a station has at most {DATA_LIMIT}"
+            return Err(Mistake::new(
+                format!("the modules have {most} bytes in one direction"),
+                format!("a station has at most {DATA_LIMIT}"),
             ));
         }
         Ok(Identity {
@@ -317,23 +321,28 @@ impl Gsd {
         })
     }
 
-    fn module(&self, slot: u32, name: &str) -> Result<&Module, String> {
+    fn module(&self, slot: u32, name: &str) -> Result<&Module, Mistake> {
         let found = self.modules.iter().find(|module| module.name == name);
         let Some(module) = found else {
             let names: Vec<&str> = self.modules.iter().map(|m| m.name.as_str()).collect();
-            return Err(format!(
-                "\"{}\" has no module \"{}\"; {}",
-                shown(&self.model),
-                shown(name),
-                did_you_mean(name, "modules", &names)
+            return Err(Mistake::new(
+                format!(
+                    "\"{}\" has no module \"{}\"",
+                    shown(&self.model),
+                    shown(name)
+                ),
+                did_you_mean(name, "modules", &names),
             ));
         };
         let fits = |slot: &Slot| module.reference.is_some_and(|n| slot.modules.contains(&n));
         match self.slots.iter().find(|own| own.number == slot) {
-            Some(own) if !fits(own) => Err(format!(
-                "\"{}\" does not fit into slot {slot} of \"{}\"; its GSD file lists the modules that do",
-                shown(name),
-                shown(&self.model)
+            Some(own) if !fits(own) => Err(Mistake::new(
+                format!(
+                    "\"{}\" does not fit into slot {slot} of \"{}\"",
+                    shown(name),
+                    shown(&self.model)
+                ),
+                "take one of those that its GSD file lists for the slot",
             )),
             _ => Ok(module),
         }
@@ -395,13 +404,21 @@ mod tests {
     #[test]
     fn modules_that_do_not_fit_are_refused_with_what_does() {
         let gsd = Gsd::read(REMOTE_IO.as_bytes()).expect("a right file");
-        let refused = |modules: &[&str]| gsd.identity(&names(modules)).expect_err("refused");
-        assert!(refused(&[]).contains("needs its modules; write modules = [\"Head\", …]"));
+        let refused = |modules: &[&str]| {
+            let mistake = gsd.identity(&names(modules)).expect_err("refused");
+            format!("{}; {}", mistake.what, mistake.right)
+        };
+        assert!(
+            refused(&[])
+                .contains("needs its modules; write their names, such as modules = [\"Head\"]")
+        );
         assert!(refused(&["Head", "2 word in"]).contains("did you mean \"2 words in\"?"));
         let why = refused(&["Axis"]);
         assert!(why.contains("\"Axis\" does not fit into slot 1"), "{why}");
         let many = ["Head", "Axis", "Axis", "Axis", "Axis"];
-        assert!(refused(&many).contains("has at most 4"));
+        assert!(
+            refused(&many).contains("there are 5 modules; \"Remote I/O; 4 slots\" has at most 4")
+        );
     }
 
     #[test]

@@ -8,7 +8,6 @@ mod configuration;
 mod device;
 mod event;
 mod gsd;
-mod kind;
 mod options;
 mod parameters;
 mod segment;

@@ -1,15 +1,17 @@
 //! What a driver.cfg says to the bus.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
-use tickbus_fieldbus::{OpenError, Role, serial};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial};
 use tickbus_image::signal::{self, SignalTable};
 
 use crate::configuration::Configuration;
+use crate::device::ProfibusDevice;
 use crate::gsd::Gsd;
 use crate::station::Identity;
 use crate::telegram::DATA_LIMIT;
@@ -49,8 +51,6 @@ pub struct Options {
     pub settings: SerialSettings,
     /// After so many bits an answer is not sent any more: the master repeats its request, and they would collide.
     pub max_tsdr: u16,
-    /// Whether every change by the master is an event, too.
-    pub events: bool,
     /// The keys of a station in `[fieldbus]`.
     common: Keys,
     /// Those of the `[[station]]` tables.
@@ -108,9 +108,10 @@ pub enum Device {
     },
 }
 
-impl Options {
-    /// Reads the keys of the bus.
-    pub(crate) fn read(role: Role, mut table: Table<'_>) -> Option<Self> {
+impl BusKind for Options {
+    const NAME: &'static str = "profibus-device";
+
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let device = table.require(
             "device",
             "name the serial port, such as device = \"/dev/ttyUSB0\"",
@@ -118,20 +119,16 @@ impl Options {
         let baud = table.take("baud");
         let rs485 = table.take("rs485");
         let max_tsdr = table.take("max_tsdr");
-        let events = table.take("events");
-        let common = read_station(&mut table, false);
+        let common = read_station(table, false);
         if role == Role::Controller {
             table.wrong(
                 "a \"profibus-device\" is the machine's end of the bus, a slave",
                 "remove role = \"controller\"; tickbus is no PROFIBUS master",
             );
         }
-        let at = table.at();
-        table.finish();
         let device = device.and_then(|value| serial::read_device(&value));
         let rate = baud.map_or(Some(RATES[1]), |value| read_rate(&value));
-        let flag = |value: Option<Value<'_>>| value.map_or(Some(false), |value| value.boolean());
-        let (rs485, events) = (flag(rs485), flag(events));
+        let rs485 = rs485.map_or(Some(false), |value| value.boolean());
         let max_tsdr = max_tsdr.map(|value| value.whole(11..=65_535));
         let (baud, standard) = rate?;
         let max_tsdr = match max_tsdr {
@@ -147,15 +144,47 @@ impl Options {
                 rs485: rs485?,
             },
             max_tsdr,
-            events: events?,
             common,
             own: Vec::new(),
-            at,
+            at: table.at(),
         })
     }
+}
 
-    /// Reads the keys of a `[[station]]` table.
-    pub(crate) fn read_station(&mut self, table: &mut Table<'_>) {
+impl BusOptions for Options {
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        let line = [
+            format!("PROFIBUS DP on {} at {}", self.device, self.settings),
+            format!("answers within {} bits", self.max_tsdr),
+        ];
+        let stations = self.stations().map(|station| {
+            let address = station.address;
+            match &station.device {
+                Device::Gsd { file, modules } if modules.is_empty() => {
+                    format!("station {address} by {}", file.display())
+                }
+                Device::Gsd { file, modules } => {
+                    let modules = modules.join("; ");
+                    format!("station {address} by {} with {modules}", file.display())
+                }
+                Device::Plain { ident, .. } => format!("station {address} with ident {ident:04X}"),
+            }
+        });
+        line.into_iter().chain(stations).collect()
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let stations = self.stations().zip(&setup.table.stations);
+        let identities: Result<Vec<_>, _> = stations
+            .map(|(station, signals)| {
+                let identity = station.identity(setup.folder, signals);
+                Ok((station.address, identity.map_err(OpenError::Config)?))
+            })
+            .collect();
+        Ok(Bus::Free(Box::new(ProfibusDevice::new(self, identities?))))
+    }
+
+    fn read_station(&mut self, _count: usize, table: &mut Table<'_>) {
         let read = read_station(table, true);
         if let Some(station) = read.right() {
             let same = |other: &&StationOptions| other.address == station.address;
@@ -170,15 +199,7 @@ impl Options {
         self.own.push(read);
     }
 
-    /// The stations, in the order of the signal table; none of those with mistakes.
-    pub fn stations(&self) -> impl Iterator<Item = &StationOptions> {
-        std::iter::once(&self.common)
-            .chain(&self.own)
-            .filter_map(Keys::right)
-    }
-
-    /// Reports what does not fit the stations and their signals.
-    pub(crate) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
         if self.own.is_empty() && self.common == Keys::Absent {
             collector.report(
                 self.at,
@@ -199,81 +220,47 @@ impl Options {
         }
         for (station, signals) in self.stations().zip(&table.stations) {
             if let Device::Plain { configuration, .. } = &station.device
-                && let Err(why) = check_sizes(configuration.as_ref(), signals)
+                && let Err(mistake) = check_sizes(configuration.as_ref(), signals)
             {
-                collector.report(station.at, why.what, why.right);
+                collector.collect(station.at, mistake);
             }
         }
     }
-
-    /// What each station is, given its signals.
-    pub(crate) fn identities(
-        &self,
-        folder: &Path,
-        table: &SignalTable,
-    ) -> Result<Vec<(u8, Identity)>, OpenError> {
-        let stations = self.stations().zip(&table.stations);
-        stations
-            .map(|(station, signals)| Ok((station.address, station.identity(folder, signals)?)))
-            .collect()
-    }
-
-    /// What the line is and does.
-    pub(crate) fn shown(&self) -> Vec<String> {
-        let mut parts = vec![
-            format!("PROFIBUS DP on {} at {}", self.device, self.settings),
-            format!("answers within {} bits", self.max_tsdr),
-        ];
-        for StationOptions {
-            address, device, ..
-        } in self.stations()
-        {
-            let mut part = format!("station {address} ");
-            let _ = match device {
-                Device::Gsd { file, modules } if modules.is_empty() => {
-                    write!(part, "by {}", file.display())
-                }
-                Device::Gsd { file, modules } => {
-                    write!(part, "by {} with {}", file.display(), modules.join("; "))
-                }
-                Device::Plain { ident, .. } => write!(part, "with ident {ident:04X}"),
-            };
-            parts.push(part);
-        }
-        parts
-    }
 }
 
-/// What does not fit, and what to do.
-struct Misfit {
-    what: String,
-    right: &'static str,
+impl Options {
+    /// The stations, in the order of the signal table; none of those with mistakes.
+    pub fn stations(&self) -> impl Iterator<Item = &StationOptions> {
+        std::iter::once(&self.common)
+            .chain(&self.own)
+            .filter_map(Keys::right)
+    }
 }
 
 /// Whether signals of these sizes fit into the modules, or into any station.
 fn check_sizes(
     configuration: Option<&Configuration>,
     signals: &signal::Station,
-) -> Result<(), Misfit> {
+) -> Result<(), Mistake> {
     let limits = configuration.map_or([DATA_LIMIT; 2], |own| [own.inputs(), own.outputs()]);
     let sizes = [("%I", signals.input_bytes), ("%Q", signals.output_bytes)];
     for ((area, size), limit) in sizes.into_iter().zip(limits) {
         if size > limit {
-            return Err(Misfit {
-                what: format!("the signals have {size} bytes of {area}, and the station {limit}"),
-                right: if configuration.is_some() {
-                    "give it more modules, or the signals lower addresses"
-                } else {
-                    "spread the signals over several stations"
-                },
-            });
+            let right = if configuration.is_some() {
+                "give it more modules, or the signals lower addresses"
+            } else {
+                "spread the signals over several stations"
+            };
+            let what = format!("the signals have {size} bytes of {area}, and the station {limit}");
+            return Err(Mistake::new(what, right));
         }
     }
     Ok(())
 }
 
 impl StationOptions {
-    fn identity(&self, folder: &Path, signals: &signal::Station) -> Result<Identity, OpenError> {
+    /// The device that it is, whose signals have these sizes.
+    fn identity(&self, folder: &Path, signals: &signal::Station) -> Result<Identity, Mistake> {
         let (file, modules) = match &self.device {
             Device::Gsd { file, modules } => (folder.join(file), modules),
             Device::Plain {
@@ -293,31 +280,31 @@ impl StationOptions {
             }
         };
         let name = file.display();
-        let wrong = |why: String| OpenError::Config(why);
         let size = fs::metadata(&file).map(|file| file.len());
         if size.is_ok_and(|size| size > GSD_LIMIT) {
-            return Err(wrong(format!(
-                "{name} is no GSD file: it is larger than 16 MiB; name another one in \"gsd\""
-            )));
+            return Err(Mistake::new(
+                format!("{name} is larger than 16 MiB, and no GSD file"),
+                "name another one in \"gsd\"",
+            ));
         }
         let bytes = fs::read(&file).map_err(|error| {
-            wrong(format!(
-                "cannot read the GSD file {name} ({error}); correct \"gsd\", or put the file there"
-            ))
+            Mistake::new(
+                format!("cannot read the GSD file {name} ({error})"),
+                "correct \"gsd\", or put the file there",
+            )
         })?;
         let gsd = Gsd::read(&bytes).map_err(|why| {
-            wrong(format!(
-                "{name}: {why}; name the GSD file that the PLC's project has, too"
-            ))
+            Mistake::new(
+                format!("{name}: {why}"),
+                "name the GSD file that the PLC's project has, too",
+            )
         })?;
-        let identity = gsd.identity(modules);
-        let identity = identity.map_err(|why| wrong(format!("station {}: {why}", self.address)))?;
-        check_sizes(Some(&identity.configuration), signals).map_err(|why| {
-            wrong(format!(
-                "station {}: {}; {}",
-                self.address, why.what, why.right
-            ))
-        })?;
+        let of_station = |mistake: Mistake| {
+            let what = format!("station {}: {}", self.address, mistake.what);
+            Mistake::new(what, mistake.right)
+        };
+        let identity = gsd.identity(modules).map_err(of_station)?;
+        check_sizes(Some(&identity.configuration), signals).map_err(of_station)?;
         Ok(identity)
     }
 }

@@ -1,6 +1,7 @@
 //! A DP-V0 slave: a function of its state, the time and a request, to an answer.
 
 mod diagnosis;
+mod exchange;
 
 use tickbus_base::time::Nanos;
 
@@ -8,6 +9,7 @@ use crate::configuration::Configuration;
 use crate::event::{Event, Leaving};
 use crate::parameters::Parameters;
 use crate::telegram::{BROADCAST, Control, Frame, append_short_ack};
+use exchange::Clear;
 
 /// The service access points of a slave, and that of a master.
 mod sap {
@@ -119,23 +121,16 @@ pub struct Station {
 /// The last request and its answer, for a master that repeats it.
 #[derive(Debug, Default)]
 struct Last {
-    request: Vec<u8>,
+    /// All of its head but the address of the station; `None` if there is nothing to repeat.
+    head: Option<Head>,
+    data: Vec<u8>,
     answer: Vec<u8>,
 }
 
-/// How a master shows that it is in CLEAR.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Clear {
-    /// By `Global_Control`.
-    by_control: bool,
-    /// By telegrams without outputs.
-    by_length: bool,
-}
+type Head = (u8, Control, Option<u8>, Option<u8>);
 
-impl Clear {
-    fn is_on(self) -> bool {
-        self.by_control || self.by_length
-    }
+fn head_of(request: &Frame<'_>) -> Head {
+    (request.source, request.control, request.dsap, request.ssap)
 }
 
 /// An answer without its addresses.
@@ -258,11 +253,10 @@ impl Station {
         }
         let before = reply.len();
         self.serve(now, request, process, reply);
-        self.last.request.clear();
         // The repetition of a request whose answer was lost here is served anew.
-        if reply.len() > before {
-            request.append(&mut self.last.request);
-        }
+        self.last.head = (reply.len() > before).then(|| head_of(request));
+        self.last.data.clear();
+        self.last.data.extend_from_slice(request.data);
         self.last.answer.clear();
         self.last.answer.extend_from_slice(&reply[before..]);
     }
@@ -270,9 +264,9 @@ impl Station {
     /// Whether the master repeats its last request because it did not get the answer. The frame count bit alone would
     /// do, but some masters never toggle it: a telegram with new outputs is never taken for a repetition.
     fn is_repeated(&self, request: &Frame<'_>) -> bool {
-        let mut bytes = Vec::new();
-        request.append(&mut bytes);
-        request.control.counts() && bytes == self.last.request
+        request.control.counts()
+            && self.last.head == Some(head_of(request))
+            && self.last.data == request.data
     }
 
     fn serve(
@@ -419,110 +413,6 @@ impl Station {
         if self.state == State::WaitCfg {
             self.state = State::DataExch;
             process.tell(self.address, now, Event::Exchanges { master });
-        }
-    }
-
-    /// `Data_Exchange`.
-    fn exchange(
-        &mut self,
-        now: Nanos,
-        request: &Frame<'_>,
-        process: &mut impl Process,
-        reply: &mut Vec<u8>,
-    ) {
-        let is_owner = self.owner == Some(request.source);
-        if self.state != State::DataExch || !is_owner {
-            return self.append(request, Control::NOT_ACTIVE, &[], reply);
-        }
-        let (expected, received) = (self.outputs.len(), request.data.len());
-        let is_fail_safe = self.fail_safe && received == 0 && expected > 0;
-        if received != expected && !is_fail_safe {
-            self.leave(now, Leaving::Length { expected, received }, process);
-            return self.append(request, Control::NOT_ACTIVE, &[], reply);
-        }
-        // A master that goes on to the next exchange has the answer to the last one.
-        if std::mem::take(&mut self.is_pending) && request.control.counts() {
-            process.delivered(self.address);
-        }
-        let clear = Clear {
-            by_length: is_fail_safe,
-            ..self.clear
-        };
-        self.set_clear(now, clear, process);
-        if clear.is_on() {
-            process.alive(self.address, now);
-        } else if self.is_synced {
-            self.held = Some(request.data.to_vec());
-            process.alive(self.address, now);
-        } else {
-            self.outputs.copy_from_slice(request.data);
-            process.outputs(self.address, now, &self.outputs);
-        }
-        if self.is_frozen {
-            self.is_pending = std::mem::take(&mut self.is_fresh);
-        } else if !self.inputs.is_empty() {
-            if !process.inputs(self.address, now, &mut self.inputs) {
-                return;
-            }
-            self.is_pending = true;
-        }
-        let control = if self.is_news {
-            Control::DATA_HIGH
-        } else {
-            Control::DATA_LOW
-        };
-        if self.inputs.is_empty() && !self.is_news {
-            append_short_ack(reply);
-        } else {
-            self.append(request, control, &self.inputs, reply);
-        }
-    }
-
-    /// `Global_Control`, from the owner.
-    fn control(&mut self, now: Nanos, data: &[u8], process: &mut impl Process) {
-        let &[command, groups] = data else { return };
-        if self.state != State::DataExch || groups != 0 && groups & self.group == 0 {
-            return;
-        }
-        let has = |bit: u8| command & (1 << bit) != 0;
-        let clear = Clear {
-            by_control: has(1),
-            ..self.clear
-        };
-        self.set_clear(now, clear, process);
-        if self.has_sync {
-            // Every SYNC lets the outputs through that have waited for it; UNSYNC does so for good.
-            if (has(4) || has(5))
-                && let Some(held) = self.held.take()
-                && !clear.is_on()
-            {
-                self.outputs.copy_from_slice(&held);
-                process.outputs(self.address, now, &self.outputs);
-            }
-            self.is_synced = !has(4) && (has(5) || self.is_synced);
-        }
-        if self.has_freeze {
-            if has(3) && !has(2) {
-                self.is_fresh = process.inputs(self.address, now, &mut self.inputs);
-                self.is_pending = false;
-                self.is_frozen = true;
-            }
-            self.is_frozen &= !has(2);
-        }
-    }
-
-    /// The master goes to CLEAR or leaves it.
-    fn set_clear(&mut self, now: Nanos, clear: Clear, process: &mut impl Process) {
-        let before = std::mem::replace(&mut self.clear, clear);
-        if before.is_on() == clear.is_on() {
-            return;
-        }
-        if clear.is_on() {
-            self.outputs.fill(0);
-            self.held = None;
-            process.tell(self.address, now, Event::Cleared);
-        } else {
-            process.tell(self.address, now, Event::Operates);
         }
     }
 

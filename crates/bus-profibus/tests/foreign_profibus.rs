@@ -12,13 +12,14 @@ mod peer;
 mod pty;
 
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::time::Duration;
 
 use peer::{Master, Project, SLOT, Seen, Slave};
 use profirust::Baudrate;
 use profirust::dp::PeripheralEvent;
-use tickbus_base::time::{Monotonic, Nanos};
+use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance as conformance;
 use tickbus_conformance::rig::{Bus, End, Liar, await_that, config, logged};
 use tickbus_driver::Code;
@@ -40,7 +41,7 @@ impl Bus for OnPort {
         )
     }
 
-    fn liar(&self, _clock: &std::sync::Arc<tickbus_base::time::Manual>) -> Liar {
+    fn liar(&self, _clock: &std::sync::Arc<Manual>) -> Liar {
         unreachable!("a master that lies is met below")
     }
 
@@ -143,7 +144,7 @@ fn it_is_started_up_and_exchanges_both_ways_at_every_rate_of_user_space() {
         let master = Master::run(line.end(1), project);
         until_exchanging(&mut device, &master);
         let reason = device.link().reason;
-        assert_eq!(reason, "master 2 exchanges data with station 8");
+        assert_eq!(reason, "master 2 exchanges data");
         for number in 1..=3 {
             exchange(&mut device, &master, number);
         }
@@ -238,6 +239,23 @@ fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_
         assert_ne!(link.state, LinkState::Running);
         let words = "station 8: the master has been silent for longer than 500";
         assert!(link.reason.contains(words), "{}", link.reason);
+    }
+}
+
+#[test]
+fn the_master_gets_fail_safe_values_while_the_simulation_stands_still() {
+    let line = pty::Line::new();
+    let bus = OnPort(line.end(0).display().to_string());
+    let text = config(&bus, "device", "watchdog = \"50ms\"");
+    let mut device = End::open(&text, &Monotonic::shared());
+    let master = Master::run(line.end(1), project());
+    until_exchanging(&mut device, &master);
+    for number in [5, 6] {
+        exchange(&mut device, &master, number);
+        await_that("the fail-safe value arrives", || {
+            std::thread::sleep(Duration::from_millis(1));
+            master.first(|seen| seen.inputs[2..4] == [0, 77])
+        });
     }
 }
 
@@ -398,11 +416,72 @@ fn many_stations_of_different_devices_share_a_line() {
             })
         });
     }
-    let reason = device.link().reason;
-    assert!(
-        reason.starts_with("master 2 exchanges data with station"),
-        "{reason}"
+    assert_eq!(device.statistic("exchanging"), "3 5 9 20 125");
+}
+
+/// One of two stations has another configuration in the master's project.
+#[test]
+fn a_station_with_a_mistake_does_not_hinder_the_others() {
+    logged::expect("station 9: master 2 sent another configuration");
+    let line = pty::Line::new();
+    let text = format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"profibus-device\"\n\
+         device = \"{}\"\nbaud = 500000\nmax_tsdr = {}\n\
+         [[station]]\nname = \"a\"\naddress = 8\nident = {IDENT:#06x}\nconfig = [0x52, 0x62]\n\
+         [[station]]\nname = \"b\"\naddress = 9\nident = {IDENT:#06x}\nconfig = [0x52, 0x62]\n\
+         [[signal]]\nname = \"speed\"\nstation = \"a\"\naddress = \"%QW2\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"position\"\nstation = \"a\"\naddress = \"%IW2\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"x\"\nstation = \"b\"\naddress = \"%QX0.0\"\n",
+        line.end(0).display(),
+        SLOT - 1000
     );
+    let mut device = End::open(&text, &Monotonic::shared());
+    let mistaken = Slave {
+        address: 9,
+        config: &[0x52],
+        outputs: 0,
+        ..slave()
+    };
+    let both = Project {
+        slaves: vec![slave(), mistaken],
+        ..project()
+    };
+    let master = Master::run(line.end(1), both);
+    for number in 1..=3 {
+        exchange(&mut device, &master, number);
+        master.all()[1].events.clear();
+        until(&mut device, "the master is told of the other one", |_| {
+            master.all()[1].has(PeripheralEvent::ConfigError)
+        });
+    }
+    assert_eq!(device.statistic("exchanging"), "8");
+}
+
+#[test]
+fn an_answer_that_would_be_late_is_not_sent() {
+    let line = pty::Line::new();
+    let bus = OnPort(line.end(0).display().to_string());
+    let text = config(&bus, "device", "");
+    // Between 1.1 ms and 6.3 ms after the request.
+    let text = text.replace("baud = 500000", "baud = 9600");
+    let text = text.replace(&format!("max_tsdr = {}", SLOT - 1000), "max_tsdr = 60");
+    let clock = Manual::new();
+    let device = End::open(&text, &clock);
+    let mut master = std::fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .custom_flags(i32::try_from(rustix::fs::OFlags::NONBLOCK.bits()).expect("a flag"))
+        .open(line.end(1))
+        .expect("the other end");
+    await_that("an answer is late", || {
+        let asked = [0x10, ADDRESS, 0x02, 0x49, 0x53, 0x16];
+        master.write_all(&asked).expect("a line");
+        // Whenever the request is heard, the clock is never between.
+        clock.advance(Nanos::from_millis(10));
+        let statistics = device.driver.statistics();
+        statistics.contains("\nprofibus-device.late=")
+    });
+    assert!(master.read(&mut [0; 16]).is_err(), "nothing was sent");
 }
 
 fn open(path: &std::path::Path) -> End {

@@ -3,26 +3,37 @@
 #[cfg(unix)]
 mod line;
 
+use tickbus_base::os::SerialSettings;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::{BusError, Free, PlcState, Port, Receipt};
 
 use crate::event::{Event, Leaving};
-use crate::options::Options;
 use crate::station::{Identity, Process};
 
 /// What the line says while it has no master.
 const WAITS: &str = "waiting for a master";
 
+/// The line of a driver.cfg.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LineOptions {
+    /// The system's name of the serial port.
+    pub device: String,
+    /// Its settings.
+    pub settings: SerialSettings,
+    /// After so many bits an answer is not sent any more: the master repeats its request, and they would collide.
+    pub max_tsdr: u16,
+}
+
 /// The bus of kind `profibus-device`.
 #[derive(Debug)]
 pub struct ProfibusDevice {
-    options: Options,
+    options: LineOptions,
     identities: Vec<(u8, Identity)>,
 }
 
 impl ProfibusDevice {
     /// The bus that `options` describe, with the device that each station is, by its address.
-    pub(crate) fn new(options: &Options, identities: Vec<(u8, Identity)>) -> Self {
+    pub(crate) fn new(options: &LineOptions, identities: Vec<(u8, Identity)>) -> Self {
         Self {
             options: options.clone(),
             identities,

@@ -15,7 +15,7 @@ mod station;
 pub mod telegram;
 
 pub use configuration::Configuration;
-pub use device::ProfibusDevice;
+pub use device::{LineOptions, ProfibusDevice};
 pub use event::{Event, Leaving};
 pub use gsd::{Gsd, GsdError, Module, Slot};
 pub use options::{Device, Options, StationOptions};

@@ -11,7 +11,7 @@ use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role, seri
 use tickbus_image::signal::{self, SignalTable};
 
 use crate::configuration::Configuration;
-use crate::device::ProfibusDevice;
+use crate::device::{LineOptions, ProfibusDevice};
 use crate::gsd::Gsd;
 use crate::station::Identity;
 use crate::telegram::DATA_LIMIT;
@@ -45,12 +45,8 @@ const GSD_LIMIT: u64 = 16 << 20;
 /// The options of the bus `profibus-device`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The system's name of the serial port.
-    pub device: String,
-    /// Its settings.
-    pub settings: SerialSettings,
-    /// After so many bits an answer is not sent any more: the master repeats its request, and they would collide.
-    pub max_tsdr: u16,
+    /// The serial line.
+    pub line: LineOptions,
     /// The keys of a station in `[fieldbus]`.
     common: Keys,
     /// Those of the `[[station]]` tables.
@@ -136,14 +132,16 @@ impl BusKind for Options {
             Some(stated) => u16::try_from(stated?).ok()?,
         };
         Some(Self {
-            device: device?,
-            settings: SerialSettings {
-                baud,
-                parity: Parity::Even,
-                two_stop_bits: false,
-                rs485: rs485?,
+            line: LineOptions {
+                device: device?,
+                settings: SerialSettings {
+                    baud,
+                    parity: Parity::Even,
+                    two_stop_bits: false,
+                    rs485: rs485?,
+                },
+                max_tsdr,
             },
-            max_tsdr,
             common,
             own: Vec::new(),
             at: table.at(),
@@ -154,8 +152,11 @@ impl BusKind for Options {
 impl BusOptions for Options {
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let line = [
-            format!("PROFIBUS DP on {} at {}", self.device, self.settings),
-            format!("answers within {} bits", self.max_tsdr),
+            format!(
+                "PROFIBUS DP on {} at {}",
+                self.line.device, self.line.settings
+            ),
+            format!("answers within {} bits", self.line.max_tsdr),
         ];
         let stations = self.stations().map(|station| {
             let address = station.address;
@@ -181,7 +182,10 @@ impl BusOptions for Options {
                 Ok((station.address, identity.map_err(OpenError::Config)?))
             })
             .collect();
-        Ok(Bus::Free(Box::new(ProfibusDevice::new(self, identities?))))
+        Ok(Bus::Free(Box::new(ProfibusDevice::new(
+            &self.line,
+            identities?,
+        ))))
     }
 
     fn read_station(&mut self, _count: usize, table: &mut Table<'_>) {

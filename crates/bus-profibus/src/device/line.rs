@@ -7,8 +7,7 @@ use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::{Machine, Stations};
-use crate::options::Options;
+use super::{LineOptions, Machine, Stations};
 use crate::segment::{Segment, Taken};
 use crate::station::{Identity, Station};
 
@@ -18,7 +17,7 @@ use crate::station::{Identity, Station};
 ///
 /// The serial port does not exist, or is gone, or an address is taken.
 pub(super) fn serve(
-    options: &Options,
+    options: &LineOptions,
     identities: &[(u8, Identity)],
     port: &mut Port,
     stop: &Stop,
@@ -42,7 +41,7 @@ pub(super) fn serve(
 }
 
 struct Line<'a> {
-    options: &'a Options,
+    options: &'a LineOptions,
     segment: Segment,
     stations: Stations,
     /// The answer being sent, and how much of it the system has accepted.

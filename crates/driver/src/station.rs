@@ -2,6 +2,7 @@
 
 use super::{Code, SlotMap, TickCounters};
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::is_stale;
 use tickbus_image::signal::{Area, Conversions, Plan, SignalTable, Slot};
 use tickbus_image::{Arrival, TickStation};
 
@@ -93,7 +94,7 @@ impl Station {
             self.tick.shown_instead();
             arrival = self.tick.read(now, &mut receiver);
         }
-        let stale = !still_valid || arrival.age > max_age;
+        let stale = is_stale(arrival.age, max_age, still_valid);
         if stale && (arrival.changed || !self.stale) {
             self.show_fail_safe(slots);
         }

@@ -9,8 +9,8 @@ use tickbus_base::os::dropped_log_lines;
 use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, TimeHistogram};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::LinkStatus;
 use tickbus_fieldbus::faults::FaultBoard;
+use tickbus_fieldbus::{LinkStatus, is_stale};
 use tickbus_record::RecorderCounters;
 
 /// Counters of the tick.
@@ -145,8 +145,8 @@ impl Snapshot {
         let sections = &self.config.table.stations;
         for ((age, is_valid, cycles), section) in self.stations.iter().zip(sections) {
             let key = |tail| Key::of("station", &section.name, tail);
-            let is_stale = *age > self.config.timing.max_age || !is_valid;
-            statistics.text(key("stale"), if is_stale { "true" } else { "false" });
+            let stale = is_stale(*age, self.config.timing.max_age, *is_valid);
+            statistics.text(key("stale"), if stale { "true" } else { "false" });
             if *age != Nanos::MAX {
                 statistics.number(key("age_ms"), age.as_micros() / 1e3, 3);
             }

@@ -12,6 +12,7 @@ mod link;
 mod port;
 mod rarely;
 mod role;
+mod staleness;
 mod validity;
 mod write_guard;
 
@@ -32,5 +33,6 @@ pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use port::{CallWatch, Frames, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use role::Role;
+pub use staleness::is_stale;
 pub use validity::PlcState;
 pub use write_guard::WriteGuard;

@@ -11,6 +11,7 @@ use tickbus_base::time::{Nanos, TimeHistogram};
 
 use super::BusError;
 use super::rarely::Rarely;
+use super::staleness::is_stale;
 
 /// The state of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -321,7 +322,10 @@ impl LinkStatus {
             return;
         }
         let limit = self.0.max_age;
-        let stale = ages.clone().filter(|age| *age > limit).count();
+        let stale = ages
+            .clone()
+            .filter(|age| is_stale(*age, limit, true))
+            .count();
         let (state, cause, reason) = match (record.doubt.clone(), before) {
             (Some((Cause::Frozen, _)), _) if record.link.cause == Cause::Silent => return,
             (Some((cause, reason)), _) => (LinkState::Stale, cause, reason),
@@ -343,7 +347,10 @@ impl LinkStatus {
     /// unless something changes.
     pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
         let limit = self.0.max_age;
-        let stale = ages.clone().filter(|age| *age > limit).count();
+        let stale = ages
+            .clone()
+            .filter(|age| is_stale(*age, limit, true))
+            .count();
         match self.state() {
             LinkState::Running if stale > 0 => {}
             LinkState::Stale if stale == 0 || stale != self.0.stale.load(Ordering::Relaxed) => {}

@@ -9,7 +9,7 @@ use opcua::types::{DataValue, NodeId, StatusCode, Variant};
 use crate::pki::date;
 use crate::values::{self, Values};
 use tickbus_base::time::{Nanos, WallClock};
-use tickbus_fieldbus::{Frames, Port, Receipt, Role};
+use tickbus_fieldbus::{Frames, Port, Receipt, Role, is_stale};
 use tickbus_image::Event;
 use tickbus_image::signal::{Plan, Scale, Signal, SignalTable, Slot};
 
@@ -197,7 +197,8 @@ impl Image {
         for index in 0..self.places.len() {
             let signal = &self.table.signals[index];
             if signal.area == self.role.areas().1 {
-                let stale = port.peer_age(signal.station, now) > port.max_age();
+                let age = port.peer_age(signal.station, now);
+                let stale = is_stale(age, port.max_age(), true);
                 let status = match (self.places[index].written, stale) {
                     (false, _) => StatusCode::BadWaitingForInitialData,
                     (true, true) => StatusCode::UncertainLastUsableValue,

@@ -1,4 +1,5 @@
-//! Byte orders of multi-byte values.
+//! Byte orders of multi-byte values: where a byte or a bit lies. The tick swaps the bytes of whole values, by the `Order`
+//! in `plan/word.rs`.
 
 use std::fmt;
 

@@ -14,7 +14,7 @@ use tickbus_import::{Client, ImportOptions, Imported, import};
 ///
 /// Takes workbooks (XLSX) and CSV with semicolons, commas or tabs, with or without headings, as spreadsheets and TIA Portal
 /// (XLSX, SDF) write them; PLCopen XML and L5X; and the lists of PLC4X and KEPServer, whose addresses of registers and
-/// data blocks become [fieldbus.at] of a client bus. What cannot be used is told with its place.
+/// data blocks become [fieldbus.at] of a client bus. What cannot be used is reported with its place.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The list.

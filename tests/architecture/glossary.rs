@@ -1,4 +1,4 @@
-//! The glossary of docs/ARCHITECTURE.md names what there is, by its path in the crate `tickbus`.
+//! The glossary of docs/ARCHITECTURE.md names items that exist, by their paths in the crate `tickbus`.
 
 use std::collections::{BTreeMap, HashSet};
 

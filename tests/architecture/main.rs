@@ -1,5 +1,5 @@
 //! Enforces the project's structure: unsafe code and reading the system's
-//! clocks are confined to certain files, no file grows without limit, and docs/ARCHITECTURE.md shows what there is.
+//! clocks are confined to certain files, no file grows without limit, and docs/ARCHITECTURE.md shows the rooms as they are.
 
 mod circles;
 mod glossary;

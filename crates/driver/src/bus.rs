@@ -26,8 +26,11 @@ pub(super) fn open(
         match &options.peer {
             Peer::Link(_) => {}
             Peer::Replay(file) => {
-                let (replay, tally) = Replay::open(config, &config.folder().join(file))?;
-                return Ok((Bus::Stepped(Box::new(replay)), Some(Program::Replay(tally))));
+                let (replay, scan_counters) = Replay::open(config, &config.folder().join(file))?;
+                return Ok((
+                    Bus::Stepped(Box::new(replay)),
+                    Some(Program::Replay(scan_counters)),
+                ));
             }
             Peer::Program {
                 name,
@@ -71,8 +74,11 @@ fn open_hosted(
     check_fit(config, &mut *program, Role::Controller)?;
     let scan = plc::interval(&*program, scan);
     if mode == Mode::Stepped {
-        let (host, tally) = SteppedHost::new(program, config, scan);
-        return Ok((Bus::Stepped(Box::new(host)), Some(Program::Stepped(tally))));
+        let (host, scan_counters) = SteppedHost::new(program, config, scan);
+        return Ok((
+            Bus::Stepped(Box::new(host)),
+            Some(Program::Stepped(scan_counters)),
+        ));
     }
     let sizes =
         |station| [Area::Input, Area::Output].map(|area| area_bytes(&config.table, station, area));

@@ -65,19 +65,19 @@ impl Host {
 
     /// The state of the line.
     pub fn link(&self) -> Link {
-        self.0.status.observe_call(self.0.told.clock.now());
+        self.0.status.observe_call(self.0.counters.clock.now());
         self.0.status.link()
     }
 
     /// The counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
-        let now = self.0.told.clock.now();
+        let now = self.0.counters.clock.now();
         let mut statistics = Statistics::default();
         self.0.status.observe_call(now);
         self.0.status.write(now, &mut statistics);
         self.0.board.tell(self.0.status.driver());
         self.0.board.write(&mut statistics);
-        self.0.told.write(&mut statistics);
+        self.0.counters.write(&mut statistics);
         statistics.count("log.dropped", dropped_log_lines());
         statistics.to_string()
     }
@@ -89,12 +89,12 @@ impl Host {
 
     /// The number of scans so far, and of those with stale data.
     pub fn scans(&self) -> (u64, u64) {
-        self.0.told.tally.scans()
+        self.0.counters.scan_counters.scans()
     }
 
     /// Why the program is no longer scanned, if so: it panicked, or a scan does not end.
     pub fn fault(&self) -> Option<String> {
-        self.0.told.fault()
+        self.0.counters.fault()
     }
 
     /// Stops scanning and closes the bus. Returns why the program did not end, if so.

@@ -93,7 +93,7 @@ impl Driver {
             samples: self.samples.clone(),
             status: self.status.clone(),
             board: Arc::clone(&self.board),
-            program: self.program.as_ref().map(Program::tally),
+            program: self.program.as_ref().map(Program::counters),
             record: self
                 .recorder
                 .as_ref()

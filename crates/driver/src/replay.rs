@@ -82,7 +82,7 @@ pub(super) struct Replay {
     offset: Option<Nanos>,
     max_age: Nanos,
     differences: Differences,
-    tally: Arc<ReplayCounters>,
+    scan_counters: Arc<ReplayCounters>,
     /// Keeps recorders of this process from writing to the file.
     _place: FileClaim,
 }
@@ -122,7 +122,7 @@ impl Replay {
         }
         let mut next = Tick::new(recording.columns());
         let more = recording.next(&mut next)?;
-        let tally = Arc::new(ReplayCounters {
+        let scan_counters = Arc::new(ReplayCounters {
             file: path.display().to_string(),
             unknown: unknown.len() as u64,
             ..ReplayCounters::default()
@@ -144,12 +144,12 @@ impl Replay {
             offset: None,
             max_age: config.timing.max_age,
             differences: Differences::new(path),
-            tally: Arc::clone(&tally),
+            scan_counters: Arc::clone(&scan_counters),
             recording,
             map,
             _place: place,
         };
-        Ok((replay, tally))
+        Ok((replay, scan_counters))
     }
 
     /// When the next recorded tick is due, if there is one.
@@ -171,7 +171,7 @@ impl Replay {
                 *slot = self.present.values[*column];
             }
         }
-        self.tally.ticks.fetch_add(1, Ordering::Relaxed);
+        self.scan_counters.ticks.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Hands in the frames of the current tick, as the driver received them when it was recorded.
@@ -210,7 +210,7 @@ impl Replay {
             return;
         }
         self.uncompared = false;
-        self.tally.compared.fetch_add(1, Ordering::Relaxed);
+        self.scan_counters.compared.fetch_add(1, Ordering::Relaxed);
         let (map, tick, list) = (&self.map.signals, &self.present, &mut self.differences);
         let mut found = 0;
         for station in &mut self.stations {
@@ -222,7 +222,9 @@ impl Replay {
             });
         }
         if found > 0 {
-            self.tally.differences.fetch_add(found, Ordering::Relaxed);
+            self.scan_counters
+                .differences
+                .fetch_add(found, Ordering::Relaxed);
             list.flush();
         }
     }
@@ -277,7 +279,7 @@ impl Stepped for Replay {
             Some(broken) => return Err(BusError::Protocol(broken.to_string())),
             None => {}
         }
-        if !self.tally.ended.swap(true, Ordering::Relaxed) {
+        if !self.scan_counters.ended.swap(true, Ordering::Relaxed) {
             let last = self.present.number;
             let why = format!("tick {last} was its last, {}", self.recording.ending());
             port.lost(&BusError::Left(why), "nothing follows");
@@ -289,8 +291,8 @@ impl Stepped for Replay {
 impl Drop for Replay {
     fn drop(&mut self) {
         self.differences.end(
-            self.tally.compared.load(Ordering::Relaxed),
-            self.tally.differences.load(Ordering::Relaxed),
+            self.scan_counters.compared.load(Ordering::Relaxed),
+            self.scan_counters.differences.load(Ordering::Relaxed),
         );
     }
 }

@@ -128,7 +128,7 @@ pub struct Recorder {
     head: Vec<u64>,
     slots: usize,
     lossless: bool,
-    tally: Arc<RecorderCounters>,
+    scans: Arc<RecorderCounters>,
     bell: Arc<Bell>,
     pub(super) close_timeout: Duration,
     /// Disconnected when the thread ends.
@@ -242,7 +242,7 @@ impl Recorder {
         let slots = columns.columns.len();
         let (ring, reader) = row_ring(ticks, head + slots);
         let bell = Arc::new(Bell::default());
-        let tally = Arc::new(RecorderCounters {
+        let scans = Arc::new(RecorderCounters {
             file: path,
             ..RecorderCounters::default()
         });
@@ -255,7 +255,7 @@ impl Recorder {
             sink: format.sink(columns),
             out: Out::new(target),
             before: None,
-            tally: Arc::clone(&tally),
+            scans: Arc::clone(&scans),
             bell: Arc::clone(&bell),
             _place: place,
         };
@@ -272,7 +272,7 @@ impl Recorder {
             head: Vec::with_capacity(head),
             slots,
             lossless,
-            tally,
+            scans,
             bell,
             close_timeout: CLOSE_TIMEOUT,
             ended,
@@ -295,7 +295,7 @@ impl Recorder {
         stations: impl Iterator<Item = i32>,
         slots: &[Slot],
     ) {
-        if self.tally.ended.load(Ordering::Relaxed) {
+        if self.scans.ended.load(Ordering::Relaxed) {
             return;
         }
         let word = |status: i32| i64::from(status).cast_unsigned();
@@ -310,7 +310,7 @@ impl Recorder {
             self.wait_for_room();
         }
         if !self.ring.push(&self.head, slots) {
-            self.tally.dropped.fetch_add(1, Ordering::Relaxed);
+            self.scans.dropped.fetch_add(1, Ordering::Relaxed);
         } else if self.lossless && self.ring.is_half_full() {
             self.bell.ring();
         }
@@ -320,7 +320,7 @@ impl Recorder {
     fn wait_for_room(&mut self) {
         self.bell.ring();
         let mut state = self.bell.lock();
-        while self.ring.is_full() && !self.tally.ended.load(Ordering::Acquire) {
+        while self.ring.is_full() && !self.scans.ended.load(Ordering::Acquire) {
             let waited = self.bell.room.wait_timeout(state, LOOK);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
@@ -328,7 +328,7 @@ impl Recorder {
 
     /// Its counters.
     pub fn counters(&self) -> &Arc<RecorderCounters> {
-        &self.tally
+        &self.scans
     }
 }
 
@@ -336,7 +336,7 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         self.bell.lock().stop = true;
         self.bell.work.notify_one();
-        let written = || self.tally.ticks.load(Ordering::Relaxed);
+        let written = || self.scans.ticks.load(Ordering::Relaxed);
         let mut before = written();
         while self.ended.recv_timeout(self.close_timeout) == Err(Timeout) {
             let ticks = written();
@@ -344,7 +344,7 @@ impl Drop for Recorder {
                 log::error!(
                     "{}: the file has taken nothing for {:?}, and the thread that records is left behind; the \
                      recording may lack its end, see whether its disc answers",
-                    self.tally.file.display(),
+                    self.scans.file.display(),
                     self.close_timeout
                 );
                 return;
@@ -354,7 +354,7 @@ impl Drop for Recorder {
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
-            log::error!("{}: the recording panicked", self.tally.file.display());
+            log::error!("{}: the recording panicked", self.scans.file.display());
         }
     }
 }
@@ -369,7 +369,7 @@ struct Writing {
     out: Out,
     /// Number and time of the previous tick.
     before: Option<(u64, Nanos)>,
-    tally: Arc<RecorderCounters>,
+    scans: Arc<RecorderCounters>,
     bell: Arc<Bell>,
     _place: Option<FileClaim>,
 }
@@ -377,12 +377,12 @@ struct Writing {
 impl Writing {
     fn run(&mut self) {
         // After this thread has ended, for whatever reason, no tick may wait for it.
-        let (tally, bell) = (Arc::clone(&self.tally), Arc::clone(&self.bell));
-        let _end = Ended { tally, bell };
+        let (scans, bell) = (Arc::clone(&self.scans), Arc::clone(&self.bell));
+        let _end = Ended { scans, bell };
         if let Err(error) = self.write() {
             let ticks = self.out.ticks();
             let why = format!("the recording ended with tick {ticks} of the file: {error}");
-            self.tally.ticks.store(ticks, Ordering::Relaxed);
+            self.scans.ticks.store(ticks, Ordering::Relaxed);
             // There may be room for a short comment even if there was none for a tick.
             if self.out.has_begun() {
                 self.sink.end(&why, self.out.buffer());
@@ -391,9 +391,9 @@ impl Writing {
             }
             log::error!(
                 "{}: {why}; the run goes on without it; free some space and open the driver again",
-                self.tally.file.display()
+                self.scans.file.display()
             );
-            *self.tally.lock_error() = Some(why);
+            *self.scans.lock_error() = Some(why);
         }
     }
 
@@ -419,9 +419,9 @@ impl Writing {
             }
             state.rung = false;
         }
-        let tally = &self.tally;
-        let ticks = tally.ticks.load(Ordering::Relaxed);
-        let dropped = tally.dropped.load(Ordering::Relaxed);
+        let scans = &self.scans;
+        let ticks = scans.ticks.load(Ordering::Relaxed);
+        let dropped = scans.dropped.load(Ordering::Relaxed);
         let note = format!("ticks={ticks} dropped={dropped}");
         self.sink.end(&note, self.out.buffer());
         self.out.whole(ticks);
@@ -433,7 +433,7 @@ impl Writing {
         while self.ring.take(&mut self.words) {
             self.unpack();
             self.sink.tick(&self.tick, self.out.buffer());
-            let ticks = self.tally.ticks.fetch_add(1, Ordering::Relaxed) + 1;
+            let ticks = self.scans.ticks.fetch_add(1, Ordering::Relaxed) + 1;
             self.out.whole(ticks);
             if self.out.pending() >= CHUNK {
                 self.bell.room.notify_one();
@@ -466,17 +466,17 @@ impl Writing {
             log::warn!(
                 "{}: ticks are dropped, since they come faster than they can be written; the recording has \
                  gaps, record.dropped counts them; write a larger ring in [record]",
-                self.tally.file.display()
+                self.scans.file.display()
             );
         }
         tick.dropped += gap;
         // Time in VCD cannot run backwards.
         if tick.time < time {
-            if self.tally.backwards.fetch_add(1, Ordering::Relaxed) == 0 {
+            if self.scans.backwards.fetch_add(1, Ordering::Relaxed) == 0 {
                 log::warn!(
                     "{}: simulation time went back from {time} to {} in tick {}; the recording has it at \
                      {time}",
-                    self.tally.file.display(),
+                    self.scans.file.display(),
                     tick.time,
                     tick.number
                 );
@@ -489,13 +489,13 @@ impl Writing {
 
 /// Reports on drop that the recording has ended.
 struct Ended {
-    tally: Arc<RecorderCounters>,
+    scans: Arc<RecorderCounters>,
     bell: Arc<Bell>,
 }
 
 impl Drop for Ended {
     fn drop(&mut self) {
-        self.tally.ended.store(true, Ordering::Release);
+        self.scans.ended.store(true, Ordering::Release);
         self.bell.room.notify_one();
     }
 }

@@ -333,12 +333,12 @@ fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String,
         let time = Nanos::from_millis(i64::try_from(number).expect("small"));
         recorder.record(number, time, 0, std::iter::empty(), &slots);
     }
-    let tally = recorder.counters().clone();
+    let scans = recorder.counters().clone();
     let mut statistics = tickbus_base::statistics::Statistics::default();
-    tally.write(&mut statistics);
+    scans.write(&mut statistics);
     let mut text = statistics.to_string();
     drop(recorder);
-    if let Some(error) = tally.error() {
+    if let Some(error) = scans.error() {
         text = format!("record.error={error}");
     }
     let bytes = disc.bytes.lock().expect("no panic").clone();

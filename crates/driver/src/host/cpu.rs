@@ -24,7 +24,7 @@ pub(super) struct Cpu {
     max_age: Nanos,
     /// The areas that it writes and reads.
     pub(super) areas: (Area, Area),
-    pub(super) tally: Arc<ScanCounters>,
+    pub(super) scan_counters: Arc<ScanCounters>,
     /// The faults injected at this end, into the first station.
     pub(super) faults: Option<FrameFaults>,
     /// The recording of the first station.
@@ -60,7 +60,7 @@ impl Unit {
         &mut self,
         (now, in_time, max_age): (Nanos, bool, Nanos),
         image: &mut TickStation,
-        tally: &ScanCounters,
+        scan_counters: &ScanCounters,
         (writes, reads): (Area, Area),
         mut faults: Option<&mut FrameFaults>,
         mut tape: Option<&mut ScanRecorder>,
@@ -73,7 +73,7 @@ impl Unit {
             outputs_before,
             beats,
         } = self;
-        tally.keep((*station, reads), &mut inputs.before, &inputs.bytes);
+        scan_counters.keep((*station, reads), &mut inputs.before, &inputs.bytes);
         if let Some(faults) = &mut faults {
             faults.begin_scan(now, &mut inputs.bytes, outputs);
         }
@@ -86,11 +86,11 @@ impl Unit {
         if let Some(faults) = &mut faults {
             faults.received(&mut inputs.bytes);
         }
-        tally.count((*station, reads), &inputs.before, &inputs.bytes);
+        scan_counters.count((*station, reads), &inputs.before, &inputs.bytes);
         // The PLC may have stopped between the check and the read, and the frame may be from after that:
         // checked again.
         let alive = in_time && valid && image.is_valid() && arrival.age <= max_age;
-        tally.keep((*station, writes), outputs_before, outputs);
+        scan_counters.keep((*station, writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
             alive,
@@ -99,7 +99,7 @@ impl Unit {
             outputs,
         });
         beats.beat(now, outputs);
-        tally.count((*station, writes), outputs_before, outputs);
+        scan_counters.count((*station, writes), outputs_before, outputs);
         image.write(now, |frame| {
             frame.copy_from_slice(outputs);
             if let Some(faults) = faults {
@@ -166,19 +166,19 @@ impl Cpu {
             let faults = self.faults.as_mut().filter(|_| is_first);
             let tape = self.tape.as_mut().filter(|_| is_first);
             let time = (now, in_time, self.max_age);
-            let found = unit.scan(time, image, &self.tally, self.areas, faults, tape);
+            let found = unit.scan(time, image, &self.scan_counters, self.areas, faults, tape);
             age = age.max(found.0);
             alive &= found.1;
         }
-        self.tally.scanned(age, alive);
+        self.scan_counters.scanned(age, alive);
     }
 }
 
-/// Creates the program's half of a line: the CPU, the bus's end of its image, its tally. A program that can
+/// Creates the program's half of a line: the CPU, the bus's end of its image, its counters. A program that can
 /// serve several stations serves all of them.
 pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
     let table = &config.table;
-    let tally = Arc::new(ScanCounters::new(table));
+    let scan_counters = Arc::new(ScanCounters::new(table));
     let (tick, bus) = image(directions(table, role));
     let others = (1..table.stations.len())
         .filter_map(|station| Some((program.for_another_station()?, station)))
@@ -191,7 +191,7 @@ pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (C
         tick,
         max_age: config.timing.max_age,
         areas: role.areas(),
-        tally,
+        scan_counters,
         faults: None,
         tape: None,
     };

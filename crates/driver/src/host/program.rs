@@ -25,11 +25,11 @@ pub(crate) enum ProgramCounters {
 }
 
 impl Program {
-    pub(crate) fn tally(&self) -> ProgramCounters {
+    pub(crate) fn counters(&self) -> ProgramCounters {
         match self {
-            Self::Thread(host) => ProgramCounters::Thread(host.told.clone()),
-            Self::Stepped(tally) => ProgramCounters::Stepped(Arc::clone(tally)),
-            Self::Replay(tally) => ProgramCounters::Replay(Arc::clone(tally)),
+            Self::Thread(host) => ProgramCounters::Thread(host.counters.clone()),
+            Self::Stepped(scan_counters) => ProgramCounters::Stepped(Arc::clone(scan_counters)),
+            Self::Replay(scan_counters) => ProgramCounters::Replay(Arc::clone(scan_counters)),
         }
     }
 }
@@ -39,8 +39,8 @@ impl ProgramCounters {
     pub(crate) fn write(&self, statistics: &mut Statistics) {
         match self {
             Self::Thread(host) => host.write(statistics),
-            Self::Stepped(tally) => tally.write(statistics),
-            Self::Replay(tally) => tally.write(statistics),
+            Self::Stepped(scan_counters) => scan_counters.write(statistics),
+            Self::Replay(scan_counters) => scan_counters.write(statistics),
         }
     }
 }

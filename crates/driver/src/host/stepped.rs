@@ -33,7 +33,7 @@ impl SteppedHost {
     ) -> (Self, Arc<ScanCounters>) {
         let max_age = config.timing.max_age;
         let (cpu, bus) = half(program, config, Role::Controller);
-        let tally = Arc::clone(&cpu.tally);
+        let scan_counters = Arc::clone(&cpu.scan_counters);
         let status = LinkStatus::new(cpu.units[0].program.name(), max_age);
         let watches = config
             .life_signs
@@ -48,7 +48,7 @@ impl SteppedHost {
                 due: None,
                 is_delivered: false,
             },
-            tally,
+            scan_counters,
         )
     }
 }

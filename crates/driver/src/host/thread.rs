@@ -57,7 +57,7 @@ pub(crate) struct ScanSetup {
 /// What a program's thread publishes about itself.
 #[derive(Clone, Debug)]
 pub(crate) struct HostCounters {
-    pub(crate) tally: Arc<ScanCounters>,
+    pub(crate) scan_counters: Arc<ScanCounters>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
     report: Option<Arc<dyn Report>>,
@@ -68,7 +68,7 @@ pub(crate) struct HostCounters {
 /// A program on its own thread, and the bus thread of its end of the line; dropping it stops both.
 #[derive(Debug)]
 pub(crate) struct HostThread {
-    pub(crate) told: HostCounters,
+    pub(crate) counters: HostCounters,
     /// Disconnected when the thread ends.
     ended: Receiver<()>,
     pub(crate) status: LinkStatus,
@@ -114,7 +114,7 @@ impl HostThread {
         let reconnect = config.timing.reconnect.clone();
         let bus = BusThread::start(bus, port, reconnect, status.clone(), &name);
         let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
-        let (tally, stop) = (Arc::clone(&cpu.tally), Stop::new());
+        let (scan_counters, stop) = (Arc::clone(&cpu.scan_counters), Stop::new());
         let fault = Arc::new(Mutex::new(None));
         let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
         let (end, ended) = mpsc::channel();
@@ -137,8 +137,8 @@ impl HostThread {
         });
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
-            told: HostCounters {
-                tally,
+            counters: HostCounters {
+                scan_counters,
                 fault,
                 scanning,
                 report,
@@ -158,7 +158,7 @@ impl HostThread {
 impl HostCounters {
     /// Adds the program's counters, and its fault.
     pub(crate) fn write(&self, statistics: &mut Statistics) {
-        self.tally.write(statistics);
+        self.scan_counters.write(statistics);
         if let Some(report) = &self.report {
             report.write(statistics);
         }

@@ -281,7 +281,7 @@ impl Chains {
         lasts
     }
 
-    fn hand_over(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Nanos {
+    fn hand_over(&mut self, io: &mut Io, now: Nanos, counters: &PeelerCounters) -> Nanos {
         let clamped = io.is_on(self.places.blocks[6]);
         let (ready, holds) = (
             io.is_on(self.places.lathe_ready),
@@ -345,7 +345,7 @@ impl Chains {
                 Some(Transfer::Open)
             }
             Transfer::Open => (stand && opened).then(|| {
-                tally.blocks.fetch_add(1, Relaxed);
+                counters.blocks.fetch_add(1, Relaxed);
                 Transfer::Home
             }),
         };
@@ -385,11 +385,11 @@ impl Sequence for Chains {
         Ok(())
     }
 
-    fn begins_anew(&mut self, io: &Io, now: Nanos, alive: bool, tally: &PeelerCounters) -> bool {
+    fn begins_anew(&mut self, io: &Io, now: Nanos, alive: bool, counters: &PeelerCounters) -> bool {
         let time = alive.then(|| io.value(self.places.time));
         let simulation = self.time.call(now, time, FROZEN);
         if self.time.restarted {
-            tally.restarts.fetch_add(1, Relaxed);
+            counters.restarts.fetch_add(1, Relaxed);
             log::info!("charger: the simulation was started again; beginning anew");
         }
         self.time.restarted || simulation == Simulation::Unknown
@@ -419,7 +419,7 @@ impl Sequence for Chains {
         });
     }
 
-    fn step(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Result<(), String> {
+    fn step(&mut self, io: &mut Io, now: Nanos, counters: &PeelerCounters) -> Result<(), String> {
         if self.time.state == Simulation::Stopped {
             // No chain progresses, but that is not a time-out.
             self.feeding.since = None;
@@ -430,7 +430,7 @@ impl Sequence for Chains {
         let spans = [
             self.feed(io, now),
             self.centre(io, now),
-            self.hand_over(io, now, tally),
+            self.hand_over(io, now, counters),
         ];
         if spans.into_iter().any(|span| span > LIMIT) {
             return Err(format!(

@@ -122,12 +122,12 @@ impl Io {
     }
 
     /// Calls the blocks of all axes and writes the outputs to the image.
-    pub(super) fn end(&mut self, scan: &mut Scan<'_>, enable: bool, tally: &PeelerCounters) {
-        for (axis, tally) in self.axes.iter_mut().zip(tally.axes()) {
+    pub(super) fn end(&mut self, scan: &mut Scan<'_>, enable: bool, counters: &PeelerCounters) {
+        for (axis, counters) in self.axes.iter_mut().zip(counters.axes()) {
             let commands = axis.control.commands();
             axis.control.call(scan.now, &axis.inputs, enable);
             if axis.control.commands() > commands {
-                tally.count(scan.now);
+                counters.count(scan.now);
             }
             let demand = &axis.control.demand;
             let Motion {

@@ -226,7 +226,7 @@ impl Steps {
     }
 
     /// One scan of the sequence; returns how long the step has lasted, if that is limited, and its limit.
-    fn sequence(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> (Nanos, Nanos) {
+    fn sequence(&mut self, io: &mut Io, now: Nanos, counters: &PeelerCounters) -> (Nanos, Nanos) {
         let lasts = now - *self.since.get_or_insert(now);
         let (presented, clear) = (io.is_on(self.places.presented), io.is_on(self.places.clear));
         let axes = &mut io.axes;
@@ -287,7 +287,9 @@ impl Steps {
                 self.keep_speed(axes, wanted);
                 // During the first turns the drive is still accelerating.
                 if lasts > WELL && wanted < MOST_TURNS {
-                    tally.kept.sample(axes[ROTATION].inputs.speed.abs(), wanted);
+                    counters
+                        .kept
+                        .sample(axes[ROTATION].inputs.speed.abs(), wanted);
                 }
                 (axes[KNIFE].inputs.position <= CORE).then_some(Step::Retract)
             }
@@ -301,7 +303,7 @@ impl Steps {
                 }
                 (open && stand).then(|| {
                     self.holds = false;
-                    tally.blocks.fetch_add(1, Relaxed);
+                    counters.blocks.fetch_add(1, Relaxed);
                     Step::Home
                 })
             }
@@ -358,9 +360,9 @@ impl Sequence for Steps {
         });
     }
 
-    fn step(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Result<(), String> {
+    fn step(&mut self, io: &mut Io, now: Nanos, counters: &PeelerCounters) -> Result<(), String> {
         let step = self.step;
-        let (lasts, most) = self.sequence(io, now, tally);
+        let (lasts, most) = self.sequence(io, now, counters);
         if lasts > most {
             return Err(format!("the step {step:?} takes too long"));
         }

@@ -88,7 +88,7 @@ pub(crate) trait Sequence: Debug + Send {
     fn restart(&mut self, io: &mut Io);
 
     /// One scan with healthy axes. An error is a fault: all axes stop.
-    fn step(&mut self, io: &mut Io, now: Nanos, tally: &PeelerCounters) -> Result<(), String>;
+    fn step(&mut self, io: &mut Io, now: Nanos, counters: &PeelerCounters) -> Result<(), String>;
 
     /// Sets the signals other than the axes; `enable` is false while all axes are stopped.
     fn show(&self, io: &mut Io, enable: bool);
@@ -100,7 +100,7 @@ pub(crate) struct Sequenced<S> {
     sequence: S,
     hold: Option<Nanos>,
     io: Option<Io>,
-    tally: Arc<PeelerCounters>,
+    counters: Arc<PeelerCounters>,
     /// A fault has occurred, and no axis is enabled. Until the machine has been heard from, its health is unknown.
     failed: bool,
     well: Ton,
@@ -117,13 +117,13 @@ impl<S: Sequence> Sequenced<S> {
     /// The option does not exist, or does not accept the value.
     pub(crate) fn from_options(options: &[(String, String)]) -> Result<Self, ProgramError> {
         let options = Options::read(S::NAME, S::OPTIONS, options)?;
-        let tally = Arc::new(PeelerCounters::new(S::AXES.iter().map(|(name, _)| *name)));
-        tally.asked.store(options.blocks.unwrap_or(0), Relaxed);
+        let counters = Arc::new(PeelerCounters::new(S::AXES.iter().map(|(name, _)| *name)));
+        counters.asked.store(options.blocks.unwrap_or(0), Relaxed);
         Ok(Self {
             sequence: S::new(options),
             hold: options.hold,
             io: None,
-            tally,
+            counters,
             failed: true,
             well: Ton::default(),
         })
@@ -131,7 +131,7 @@ impl<S: Sequence> Sequenced<S> {
 
     /// One scan of the sequence; whether the axes are enabled.
     fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
-        let anew = self.sequence.begins_anew(io, now, alive, &self.tally);
+        let anew = self.sequence.begins_anew(io, now, alive, &self.counters);
         let well = self.well.call(now, alive && io.all_healthy(), WELL);
         if !alive || self.failed || anew {
             self.failed = !well || anew;
@@ -141,7 +141,7 @@ impl<S: Sequence> Sequenced<S> {
             return false;
         }
         let done = if io.all_healthy() {
-            self.sequence.step(io, now, &self.tally)
+            self.sequence.step(io, now, &self.counters)
         } else {
             Err("an axis is not healthy".to_owned())
         };
@@ -152,7 +152,7 @@ impl<S: Sequence> Sequenced<S> {
             );
             self.failed = true;
             self.well = Ton::default();
-            self.tally.faults.fetch_add(1, Relaxed);
+            self.counters.faults.fetch_add(1, Relaxed);
         }
         done.is_ok()
     }
@@ -185,12 +185,12 @@ impl<S: Sequence> Program for Sequenced<S> {
         if io.begin(scan) {
             let enable = self.solve(&mut io, scan.now, scan.alive);
             self.sequence.show(&mut io, enable);
-            io.end(scan, enable, &self.tally);
+            io.end(scan, enable, &self.counters);
         }
         self.io = Some(io);
     }
 
     fn report(&self) -> Option<Arc<dyn Report>> {
-        Some(Arc::clone(&self.tally) as _)
+        Some(Arc::clone(&self.counters) as _)
     }
 }

@@ -41,7 +41,7 @@ public final class Demo {
 
     private static final long PICTURE_NANOS = 400_000_000L;
 
-    /** How long it may take until this process is told of a Ctrl-C. */
+    /** How long it may take until this process learns of a Ctrl-C. */
     private static final long INTERRUPTION_MILLIS = 500;
 
     private final DemoOptions options;

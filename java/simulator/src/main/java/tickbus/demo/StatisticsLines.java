@@ -13,7 +13,7 @@ final class StatisticsLines {
     private StatisticsLines() {
     }
 
-    /** The key and value of a line; empty if it is none. */
+    /** The key and value of a line; empty if the line has no "=". */
     static Optional<Map.Entry<String, String>> read(String line) {
         Matcher entry = LINE.matcher(line);
         return entry.matches()

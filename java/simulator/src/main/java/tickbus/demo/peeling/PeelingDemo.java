@@ -48,7 +48,7 @@ public final class PeelingDemo {
     /** The position of the knife at which the picture of a block that is not round shows most. */
     private static final double PICTURE_MM = 138;
 
-    /** How long it may take until this process is told of a Ctrl-C. */
+    /** How long it may take until this process learns of a Ctrl-C. */
     private static final long INTERRUPTION_MILLIS = 500;
 
     /** Need not be written: the driver acknowledges by itself, and without a jerk there are no S-curves. */

@@ -26,12 +26,7 @@ import tickbus.simulator.text.Durations;
  * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
  */
 public final class Demo {
-    private static final int OK = 0;
-    private static final int FAILED = 1;
-    private static final int USAGE = 2;
-    private static final int INTERRUPTED = 130;
-
-    private static final String OK_BEGINS = "demo: ok ";
+    private static final Verdict VERDICT = new Verdict("demo");
 
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
     private static final int ATTEMPTS = 3;
@@ -40,9 +35,6 @@ public final class Demo {
     private static final int PICTURE_STEP = 5;
 
     private static final long PICTURE_NANOS = 400_000_000L;
-
-    /** How long it may take until this process learns of a Ctrl-C. */
-    private static final long INTERRUPTION_MILLIS = 500;
 
     private final DemoOptions options;
     private final Display display;
@@ -82,7 +74,7 @@ public final class Demo {
     public static int run(String[] args, PrintStream out, PrintStream err) {
         if (List.of(args).contains("--help")) {
             out.print(DemoOptions.USAGE);
-            return OK;
+            return Verdict.OK;
         }
         DemoOptions options;
         try {
@@ -90,8 +82,8 @@ public final class Demo {
         } catch (Arguments.UsageException e) {
             err.println(e.getMessage() + "\n");
             err.print(DemoOptions.USAGE);
-            out.println(failed(e.getMessage()));
-            return USAGE;
+            out.println(VERDICT.failed(e.getMessage()));
+            return Verdict.USAGE;
         }
         Path folder = options.drivers();
         return run(options, () -> DeviceDriverFolder.scan(folder).open(),
@@ -127,27 +119,25 @@ public final class Demo {
                 Demo demo = new Demo(options, display, List.copyOf(notes));
                 verdict = demo.play(opener, plc, guard, err);
                 long stall = demo.stalls.longestNanos();
-                if (verdict.startsWith(OK_BEGINS) || guard.triggered() || stall == 0) {
+                if (VERDICT.isOk(verdict) || guard.triggered() || stall == 0) {
                     break;
                 }
                 notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
                         + stall / 1_000_000 + " ms: " + verdict);
                 if (notes.size() == ATTEMPTS) {
-                    verdict = failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, the last"
+                    verdict = VERDICT.failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, the last"
                             + " time for " + stall / 1_000_000 + " ms, so nothing can be said; the last attempt ended: "
-                            + verdict.replaceFirst("^demo: failed reason=", ""));
+                            + VERDICT.reason(verdict));
                     break;
                 }
             }
             if (options.recording() != null && options.plc() != null) {
                 String trouble = HtmlPage.make(options, out);
-                if (trouble != null && verdict.startsWith(OK_BEGINS)) {
-                    verdict = failed(trouble);
+                if (trouble != null && VERDICT.isOk(verdict)) {
+                    verdict = VERDICT.failed(trouble);
                 }
             }
-            out.println(verdict);
-            out.flush();
-            return guard.triggered() ? INTERRUPTED : verdict.startsWith(OK_BEGINS) ? OK : FAILED;
+            return VERDICT.end(verdict, guard, out);
         }
     }
 
@@ -162,7 +152,7 @@ public final class Demo {
             verdict = report(verdict);
         } catch (RuntimeException | Error e) {
             // The drivers or the control table did not open, or the drivers did not close.
-            verdict = report(failure(e, err));
+            verdict = report(VERDICT.failed(e, err));
         }
         return verdict;
     }
@@ -190,7 +180,7 @@ public final class Demo {
             operate(simulator, driver, ending.plc, guard);
             return check(simulator);
         } catch (RuntimeException | Error e) {
-            return failure(e, err);
+            return VERDICT.failed(e, err);
         }
     }
 
@@ -210,7 +200,7 @@ public final class Demo {
             }
             if (simulator.ticks() > 0) {
                 lookForStalls(plc);
-                checkPlc(plc, guard);
+                Verdict.unlessInterrupted(guard, plc::check);
                 audit.look();
                 watcher.look();
                 operator.act();
@@ -233,18 +223,6 @@ public final class Demo {
         if (options.mode() == TickMode.REAL_TIME) {
             stalls.look();
             stalls.silent(plc.longestSilenceNanos());
-        }
-    }
-
-    private static void checkPlc(Plc plc, ShutdownGuard guard) {
-        try {
-            plc.check();
-        } catch (DemoFailure e) {
-            // Ctrl-C in a terminal reaches all of its processes, and the PLC may have been faster.
-            if (guard.triggers(INTERRUPTION_MILLIS)) {
-                throw new DemoFailure("interrupted");
-            }
-            throw e;
         }
     }
 
@@ -271,28 +249,15 @@ public final class Demo {
             must(operator.outage().over(), "the outage never ended");
             must(watcher.staleTicksInOutage() > 0, "no tick was stale while the PLC was dead");
         }
-        return OK_BEGINS + "cycles=" + watcher.cycles() + " jams=" + counters.jams() + " restarts="
+        return VERDICT.ok("cycles=" + watcher.cycles() + " jams=" + counters.jams() + " restarts="
                 + operator.restarts() + " ticks=" + simulator.ticks() + " missed_edges=" + missed + " stale_ticks="
-                + watcher.staleTicksInOutage() + " report=" + options.report();
+                + watcher.staleTicksInOutage() + " report=" + options.report());
     }
 
     private static void must(boolean fulfilled, String reason) {
         if (!fulfilled) {
             throw new DemoFailure(reason);
         }
-    }
-
-    private static String failure(Throwable e, PrintStream err) {
-        boolean told = e instanceof DemoFailure || e.getMessage() != null;
-        if (!(e instanceof DemoFailure)) {
-            err.println(told ? e.getMessage() : e.toString());
-        }
-        return failed(told ? e.getMessage() : e.toString());
-    }
-
-    private static String failed(String reason) {
-        String line = reason.strip().replaceAll("\\s*\\R\\s*", "; ").replace('"', '\'');
-        return "demo: failed reason=" + (line.matches("[\\w.-]+") ? line : "\"" + line + "\"");
     }
 
     private String report(String verdict) {
@@ -304,7 +269,7 @@ public final class Demo {
             Files.writeString(options.report(), Report.write(options, verdict, timeline, watcher, audit, operator));
             return verdict;
         } catch (IOException e) {
-            return verdict.startsWith(OK_BEGINS) ? failed("the report cannot be written: " + e) : verdict;
+            return VERDICT.isOk(verdict) ? VERDICT.failed("the report cannot be written: " + e) : verdict;
         }
     }
 

@@ -15,6 +15,7 @@ import tickbus.demo.HtmlPage;
 import tickbus.demo.Screen;
 import tickbus.demo.Stalls;
 import tickbus.demo.Timeline;
+import tickbus.demo.Verdict;
 import tickbus.demo.peeler.AxisName;
 import tickbus.demo.peeler.LathePicture;
 import tickbus.demo.peeler.Peeler;
@@ -34,22 +35,13 @@ import tickbus.simulator.text.Durations;
  * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
  */
 public final class PeelingDemo {
-    private static final int OK = 0;
-    private static final int FAILED = 1;
-    private static final int USAGE = 2;
-    private static final int INTERRUPTED = 130;
-
-    private static final String OK_BEGINS = "demo-peeler: ok ";
-    private static final String FAILED_BEGINS = "demo-peeler: failed reason=";
+    private static final Verdict VERDICT = new Verdict("demo-peeler");
 
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
     private static final int ATTEMPTS = 3;
 
     /** The position of the knife at which the picture of a block that is not round shows most. */
     private static final double PICTURE_MM = 138;
-
-    /** How long it may take until this process learns of a Ctrl-C. */
-    private static final long INTERRUPTION_MILLIS = 500;
 
     /** Need not be written: the driver acknowledges by itself, and without a jerk there are no S-curves. */
     private static final List<String> LEFT_OUT = List.of(".Acknowledge", ".Jerk");
@@ -97,7 +89,7 @@ public final class PeelingDemo {
     public static int run(String[] args, PrintStream out, PrintStream err) {
         if (List.of(args).contains("--help")) {
             out.print(PeelingOptions.USAGE);
-            return OK;
+            return Verdict.OK;
         }
         PeelingOptions options;
         try {
@@ -105,20 +97,20 @@ public final class PeelingDemo {
         } catch (Arguments.UsageException e) {
             err.println(e.getMessage() + "\n");
             err.print(PeelingOptions.USAGE);
-            out.println(failed(e.getMessage()));
-            return USAGE;
+            out.println(VERDICT.failed(e.getMessage()));
+            return Verdict.USAGE;
         }
         // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
             PeelingDemo demo = new PeelingDemo(options, out, List.of());
             String verdict = demo.play(guard, err);
             List<String> notes = new ArrayList<>();
-            while (!verdict.startsWith(OK_BEGINS) && !guard.triggered() && demo.stalls.longestNanos() > 0) {
+            while (!VERDICT.isOk(verdict) && !guard.triggered() && demo.stalls.longestNanos() > 0) {
                 notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
                         + demo.stalls.longestNanos() / 1_000_000 + " ms: " + verdict);
                 if (notes.size() == ATTEMPTS) {
-                    verdict = failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, so nothing"
-                            + " can be said; the last attempt ended: " + reason(verdict));
+                    verdict = VERDICT.failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, so nothing"
+                            + " can be said; the last attempt ended: " + VERDICT.reason(verdict));
                     break;
                 }
                 demo = new PeelingDemo(options, out, List.copyOf(notes));
@@ -126,12 +118,10 @@ public final class PeelingDemo {
             }
             out.print(demo.tables);
             String trouble = demo.pages();
-            if (trouble != null && verdict.startsWith(OK_BEGINS)) {
-                verdict = failed(trouble);
+            if (trouble != null && VERDICT.isOk(verdict)) {
+                verdict = VERDICT.failed(trouble);
             }
-            out.println(verdict);
-            out.flush();
-            return guard.triggered() ? INTERRUPTED : verdict.startsWith(OK_BEGINS) ? OK : FAILED;
+            return VERDICT.end(verdict, guard, out);
         }
     }
 
@@ -145,7 +135,7 @@ public final class PeelingDemo {
             verdict = report(verdict);
         } catch (RuntimeException | Error e) {
             // The drivers or the control table did not open, or the drivers did not close.
-            verdict = report(failure(e, err));
+            verdict = report(VERDICT.failed(e, err));
         }
         return verdict;
     }
@@ -158,12 +148,12 @@ public final class PeelingDemo {
             tables = PeelingReport.tables(intervals, rate);
             LineCheck.check(watcher, options.logs());
             double mean = intervals.values().stream().mapToDouble(Intervals::mean).max().orElse(0);
-            return String.format(Locale.ROOT,
-                    "%slogs=%d veneer_m=%.1f commands_per_s=%.2f busiest_per_s=%.2f busiest_in_1s=%d mean_ms=%.2f report=%s",
-                    OK_BEGINS, line.wood().coreCount(), line.wood().ribbon(), rate.mean(), rate.mean(rate.busiest()),
-                    rate.most(rate.busiest()), mean, options.report());
+            return VERDICT.ok(String.format(Locale.ROOT,
+                    "logs=%d veneer_m=%.1f commands_per_s=%.2f busiest_per_s=%.2f busiest_in_1s=%d mean_ms=%.2f report=%s",
+                    line.wood().coreCount(), line.wood().ribbon(), rate.mean(), rate.mean(rate.busiest()),
+                    rate.most(rate.busiest()), mean, options.report()));
         } catch (RuntimeException | Error e) {
-            return failure(e, err);
+            return VERDICT.failed(e, err);
         }
     }
 
@@ -185,7 +175,7 @@ public final class PeelingDemo {
                 lookAtLinks(plcs, guard);
                 if (simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
                     plcs.listen(simulator.simulationNanos(), timeline);
-                    check(plcs, guard);
+                    Verdict.unlessInterrupted(guard, plcs::check);
                 }
                 display.tick(watcher, rate);
                 picture();
@@ -210,12 +200,11 @@ public final class PeelingDemo {
         if (watcher.broken() == null) {
             return;
         }
-        if (guard.triggers(INTERRUPTION_MILLIS)) {
-            throw new DemoFailure("interrupted");
-        }
-        plcs.check();
-        stalls.silent(watcher.silentNanos());
-        throw new DemoFailure(watcher.broken());
+        Verdict.unlessInterrupted(guard, () -> {
+            plcs.check();
+            stalls.silent(watcher.silentNanos());
+            throw new DemoFailure(watcher.broken());
+        });
     }
 
     /** A picture of a block that is being rounded, once. */
@@ -234,18 +223,6 @@ public final class PeelingDemo {
         }
     }
 
-    private static void check(Plcs plcs, ShutdownGuard guard) {
-        try {
-            plcs.check();
-        } catch (DemoFailure e) {
-            // Ctrl-C in a terminal reaches all of its processes, and a PLC may have been faster.
-            if (guard.triggers(INTERRUPTION_MILLIS)) {
-                throw new DemoFailure("interrupted");
-            }
-            throw e;
-        }
-    }
-
     private static Map<Intervals.Direction, Intervals> intervals(List<ControlInterfaceDeviceDriver> drivers, Plcs plcs) {
         Map<Intervals.Direction, Intervals> intervals = new EnumMap<>(Intervals.Direction.class);
         for (Intervals.Direction direction : Intervals.Direction.values()) {
@@ -256,23 +233,6 @@ public final class PeelingDemo {
             intervals.put(direction, Intervals.of(statistics, direction));
         }
         return intervals;
-    }
-
-    private static String failure(Throwable e, PrintStream err) {
-        boolean told = e instanceof DemoFailure || e.getMessage() != null;
-        if (!(e instanceof DemoFailure)) {
-            err.println(told ? e.getMessage() : e.toString());
-        }
-        return failed(told ? e.getMessage() : e.toString());
-    }
-
-    private static String failed(String reason) {
-        String line = reason.strip().replaceAll("\\s*\\R\\s*", "; ").replace('"', '\'');
-        return FAILED_BEGINS + (line.matches("[\\w.-]+") ? line : "\"" + line + "\"");
-    }
-
-    private static String reason(String verdict) {
-        return verdict.substring(FAILED_BEGINS.length()).replace("\"", "");
     }
 
     private String report(String verdict) {
@@ -288,7 +248,7 @@ public final class PeelingDemo {
                     PeelingReport.write(options, verdict, timeline, watcher, tables, rate));
             return verdict;
         } catch (IOException e) {
-            return verdict.startsWith(OK_BEGINS) ? failed("the report cannot be written: " + e) : verdict;
+            return VERDICT.isOk(verdict) ? VERDICT.failed("the report cannot be written: " + e) : verdict;
         }
     }
 

@@ -95,6 +95,9 @@ fn report(config: &Config) -> String {
             &format!("{name}{sizes}"),
         );
     }
+    for (head, text) in config.bus.details(config.folder(), &config.table) {
+        line(&head, &text);
+    }
     for fault in &config.faults {
         let when = format!("{} {}", fault.begin, fault.lasts);
         line(

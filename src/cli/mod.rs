@@ -5,6 +5,7 @@
 mod axes;
 mod check;
 mod export;
+mod gsd;
 mod host;
 mod import;
 mod mirror;
@@ -33,6 +34,7 @@ enum Command {
     Axes(axes::Arguments),
     Check(check::Arguments),
     Export(export::Arguments),
+    Gsd(gsd::Arguments),
     Import(import::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
@@ -80,6 +82,7 @@ pub fn main() -> ExitCode {
         Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        Command::Gsd(arguments) => gsd::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),

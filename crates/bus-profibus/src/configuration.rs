@@ -1,6 +1,12 @@
 //! What a station is made of: the identifiers of its modules, as `Chk_Cfg` and `Get_Cfg` carry them.
 
 use std::fmt::Write as _;
+use std::ops::Range;
+
+use tickbus_base::toml_text::shown;
+
+/// How many octets a message shows at most.
+const SHOWN_OCTETS: usize = 16;
 
 /// The longest block of one identifier, in bytes.
 const BLOCK: usize = 16;
@@ -8,7 +14,7 @@ const BLOCK: usize = 16;
 /// The modules of a station, in the order of their slots.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Configuration {
-    modules: Vec<Module>,
+    modules: Vec<SlotModule>,
     bytes: Vec<u8>,
     inputs: usize,
     outputs: usize,
@@ -16,12 +22,17 @@ pub struct Configuration {
     sizes_only: bool,
 }
 
-/// One slot.
+/// A module in its slot.
 #[derive(Clone, Debug, PartialEq, Eq)]
-struct Module {
+pub struct SlotModule {
     /// Its name in the GSD file; empty if there is none.
-    name: String,
-    identifiers: Vec<u8>,
+    pub name: String,
+    /// Its identifiers.
+    pub identifiers: Vec<u8>,
+    /// Its bytes among those that the station sends.
+    pub inputs: Range<usize>,
+    /// Its bytes among those that the station receives.
+    pub outputs: Range<usize>,
 }
 
 /// One identifier: how many bytes of it there are, and what they say of the I/O.
@@ -86,11 +97,12 @@ impl Configuration {
         let mut all = Self::default();
         for (name, identifiers) in modules {
             let mut rest = identifiers;
+            let (inputs, outputs) = (all.inputs, all.outputs);
             while !rest.is_empty() {
                 let Some(one) = Identifier::read(rest) else {
                     return Err(format!(
                         "the identifier {} of slot {} ends in its midst",
-                        hex(rest),
+                        brief(rest),
                         all.modules.len() + 1
                     ));
                 };
@@ -99,9 +111,11 @@ impl Configuration {
                 rest = &rest[one.length..];
             }
             all.bytes.extend_from_slice(identifiers);
-            all.modules.push(Module {
+            all.modules.push(SlotModule {
                 name: name.to_owned(),
                 identifiers: identifiers.to_vec(),
+                inputs: inputs..all.inputs,
+                outputs: outputs..all.outputs,
             });
         }
         Ok(all)
@@ -144,6 +158,16 @@ impl Configuration {
         &self.bytes
     }
 
+    /// Its modules: that of slot 1, and so on.
+    pub fn modules(&self) -> &[SlotModule] {
+        &self.modules
+    }
+
+    /// Whether any other modules of the same sizes will do.
+    pub fn has_sizes_only(&self) -> bool {
+        self.sizes_only
+    }
+
     /// The bytes that the station sends.
     pub fn inputs(&self) -> usize {
         self.inputs
@@ -166,7 +190,7 @@ impl Configuration {
                     "expected {} and {} in all, received {} ({} and {})",
                     inputs(self.inputs),
                     outputs(self.outputs),
-                    hex(received),
+                    brief(received),
                     inputs(other.inputs),
                     outputs(other.outputs),
                 )),
@@ -181,13 +205,13 @@ impl Configuration {
             }
             let mut text = format!("slot {number}: expected ");
             if !module.name.is_empty() {
-                let _ = write!(text, "\"{}\", ", module.name);
+                let _ = write!(text, "\"{}\", ", shown(&module.name));
             }
-            let _ = write!(text, "{}, received ", shown(&module.identifiers));
+            let _ = write!(text, "{}, received ", in_words(&module.identifiers));
             match Identifier::read(rest) {
                 _ if rest.is_empty() => text.push_str("no module"),
-                Some(one) => text.push_str(&shown(&rest[..one.length])),
-                None => text.push_str(&hex(rest)),
+                Some(one) => text.push_str(&in_words(&rest[..one.length])),
+                None => text.push_str(&brief(rest)),
             }
             return Some(text);
         }
@@ -195,13 +219,13 @@ impl Configuration {
         Some(format!(
             "slot {}: expected no module, received {}",
             self.modules.len() + 1,
-            shown(next)
+            in_words(next)
         ))
     }
 }
 
 /// Identifiers as text: their bytes and what they mean.
-fn shown(identifiers: &[u8]) -> String {
+fn in_words(identifiers: &[u8]) -> String {
     let (mut ins, mut outs) = (0, 0);
     let mut rest = identifiers;
     while let Some(one) = Identifier::read(rest) {
@@ -215,7 +239,7 @@ fn shown(identifiers: &[u8]) -> String {
         (0, outs) => outputs(outs),
         (ins, outs) => format!("{}, {}", inputs(ins), outputs(outs)),
     };
-    format!("{} ({what})", hex(identifiers))
+    format!("{} ({what})", brief(identifiers))
 }
 
 fn inputs(bytes: usize) -> String {
@@ -234,6 +258,14 @@ fn count(bytes: usize) -> String {
 pub(crate) fn hex(bytes: &[u8]) -> String {
     let octets: Vec<String> = bytes.iter().map(|octet| format!("{octet:02X}")).collect();
     octets.join(" ")
+}
+
+/// As [`hex`], shortened for a message.
+fn brief(bytes: &[u8]) -> String {
+    if bytes.len() <= SHOWN_OCTETS {
+        return hex(bytes);
+    }
+    format!("{} … ({} octets)", hex(&bytes[..SHOWN_OCTETS]), bytes.len())
 }
 
 #[cfg(test)]
@@ -291,6 +323,38 @@ mod tests {
         ] {
             assert_eq!(expected.difference(received).as_deref(), Some(words));
         }
+    }
+
+    #[test]
+    fn a_difference_is_short_however_long_the_modules_are() {
+        let name = "n".repeat(1000);
+        let expected = Configuration::of_modules([(&*name, &[0x50; 200][..])]).expect("whole");
+        let why = expected.difference(&[0x40; 244]).expect("other modules");
+        assert!(why.len() < 300, "{why}");
+        assert!(
+            why.contains("50 50 … (200 octets) (400 bytes of inputs)"),
+            "{why}"
+        );
+    }
+
+    #[test]
+    fn each_module_has_its_bytes_in_the_order_of_the_slots() {
+        let modules = [
+            ("", &[0x50][..]),
+            ("", &[0x00]),
+            ("", &[0x70]),
+            ("", &[0x10, 0x22]),
+        ];
+        let all = Configuration::of_modules(modules).expect("whole");
+        let bytes: Vec<_> = all
+            .modules()
+            .iter()
+            .map(|m| (m.inputs.clone(), m.outputs.clone()))
+            .collect();
+        assert_eq!(
+            bytes,
+            [(0..2, 0..0), (2..2, 0..0), (2..4, 0..2), (4..5, 2..5)]
+        );
     }
 
     #[test]

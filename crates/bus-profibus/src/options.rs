@@ -1,46 +1,21 @@
 //! What a driver.cfg says to the bus.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+mod details;
+mod machine;
+mod station;
+
+use std::path::Path;
 
 use tickbus_axis::Axis;
-use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial};
-use tickbus_image::signal::{self, SignalTable};
+use tickbus_image::signal::SignalTable;
 
-use crate::configuration::Configuration;
 use crate::device::{LineOptions, ProfibusDevice};
-use crate::gsd::Gsd;
-use crate::station::Identity;
-use crate::telegram::DATA_LIMIT;
-
-/// The rates of the standard, in bits per second, each with the longest wait before an answer, in bits.
-const RATES: [(u32, u16); 10] = [
-    (9_600, 60),
-    (19_200, 60),
-    (45_450, 60),
-    (93_750, 60),
-    (187_500, 60),
-    (500_000, 100),
-    (1_500_000, 150),
-    (3_000_000, 250),
-    (6_000_000, 450),
-    (12_000_000, 800),
-];
-
-/// The longest path of a GSD file, in characters.
-const PATH_LIMIT: usize = 1000;
-
-/// The longest name of a module, in characters.
-const NAME_LIMIT: usize = 200;
-
-/// The most modules of a station.
-const MODULE_LIMIT: usize = 244;
-
-/// A GSD file is at most this long, in bytes.
-const GSD_LIMIT: u64 = 16 << 20;
+use crate::rates::{RATES, Rate};
+pub use station::{Device, StationOptions};
+use station::{check_sizes, read_station};
 
 /// The options of the bus `profibus-device`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,37 +48,6 @@ impl Keys {
     }
 }
 
-/// The keys of one station.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StationOptions {
-    /// Its address on the line.
-    pub address: u8,
-    /// Which device it is.
-    pub device: Device,
-    /// The offset of its address, and the line.
-    at: usize,
-    line: usize,
-}
-
-/// Which device a station is.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Device {
-    /// That of a GSD file, with these modules.
-    Gsd {
-        /// The file as written: relative to the folder of the driver.cfg.
-        file: PathBuf,
-        /// Their names.
-        modules: Vec<String>,
-    },
-    /// One without a file.
-    Plain {
-        /// The number of its kind.
-        ident: u16,
-        /// Its modules; `None` for any that have the sizes of its signals.
-        configuration: Option<Configuration>,
-    },
-}
-
 impl BusKind for Options {
     const NAME: &'static str = "profibus-device";
 
@@ -126,16 +70,16 @@ impl BusKind for Options {
         let rate = baud.map_or(Some(RATES[1]), |value| read_rate(&value));
         let rs485 = rs485.map_or(Some(false), |value| value.boolean());
         let max_tsdr = max_tsdr.map(|value| value.whole(11..=65_535));
-        let (baud, standard) = rate?;
+        let rate = rate?;
         let max_tsdr = match max_tsdr {
-            None => standard,
+            None => rate.max_tsdr,
             Some(stated) => u16::try_from(stated?).ok()?,
         };
         Some(Self {
             line: LineOptions {
                 device: device?,
                 settings: SerialSettings {
-                    baud,
+                    baud: rate.baud,
                     parity: Parity::Even,
                     two_stop_bits: false,
                     rs485: rs485?,
@@ -179,7 +123,8 @@ impl BusOptions for Options {
         let identities: Result<Vec<_>, _> = stations
             .map(|(station, signals)| {
                 let identity = station.identity(setup.folder, signals);
-                Ok((station.address, identity.map_err(OpenError::Config)?))
+                let identity = identity.map_err(|(_, mistake)| OpenError::Config(mistake))?;
+                Ok((station.address, identity))
             })
             .collect();
         Ok(Bus::Free(Box::new(ProfibusDevice::new(
@@ -201,6 +146,21 @@ impl BusOptions for Options {
             }
         }
         self.own.push(read);
+    }
+
+    fn check_files(&self, folder: &Path, table: &SignalTable, collector: &Collector<'_>) {
+        for (station, signals) in self.stations().zip(&table.stations) {
+            if let Err((at, mistake)) = station.identity(folder, signals) {
+                collector.collect(at, mistake);
+            }
+        }
+    }
+
+    fn details(&self, folder: &Path, table: &SignalTable) -> Vec<(String, String)> {
+        let stations = self.stations().zip(&table.stations);
+        let details =
+            stations.map(|(station, signals)| station.details(&self.line, folder, signals));
+        details.flatten().flatten().collect()
     }
 
     fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
@@ -241,217 +201,15 @@ impl Options {
     }
 }
 
-/// Whether signals of these sizes fit into the modules, or into any station.
-fn check_sizes(
-    configuration: Option<&Configuration>,
-    signals: &signal::Station,
-) -> Result<(), Mistake> {
-    let limits = configuration.map_or([DATA_LIMIT; 2], |own| [own.inputs(), own.outputs()]);
-    let sizes = [("%I", signals.input_bytes), ("%Q", signals.output_bytes)];
-    for ((area, size), limit) in sizes.into_iter().zip(limits) {
-        if size > limit {
-            let right = if configuration.is_some() {
-                "give it more modules, or the signals lower addresses"
-            } else {
-                "spread the signals over several stations"
-            };
-            let what = format!("the signals have {size} bytes of {area}, and the station {limit}");
-            return Err(Mistake::new(what, right));
-        }
-    }
-    Ok(())
-}
-
-impl StationOptions {
-    /// The device that it is, whose signals have these sizes.
-    fn identity(&self, folder: &Path, signals: &signal::Station) -> Result<Identity, Mistake> {
-        let (file, modules) = match &self.device {
-            Device::Gsd { file, modules } => (folder.join(file), modules),
-            Device::Plain {
-                ident,
-                configuration,
-            } => {
-                let by_sizes =
-                    || Configuration::of_sizes(signals.input_bytes, signals.output_bytes);
-                return Ok(Identity {
-                    ident: *ident,
-                    configuration: configuration.clone().unwrap_or_else(by_sizes),
-                    sync: true,
-                    freeze: true,
-                    fail_safe: false,
-                    dpv1: false,
-                });
-            }
-        };
-        let name = file.display();
-        let size = fs::metadata(&file).map(|file| file.len());
-        if size.is_ok_and(|size| size > GSD_LIMIT) {
-            return Err(Mistake::new(
-                format!("{name} is larger than 16 MiB, and no GSD file"),
-                "name another one in \"gsd\"",
-            ));
-        }
-        let bytes = fs::read(&file).map_err(|error| {
-            Mistake::new(
-                format!("cannot read the GSD file {name} ({error})"),
-                "correct \"gsd\", or put the file there",
-            )
-        })?;
-        let gsd = Gsd::read(&bytes).map_err(|why| {
-            Mistake::new(
-                format!("{name}: {why}"),
-                "name the GSD file that the PLC's project has, too",
-            )
-        })?;
-        let of_station = |mistake: Mistake| {
-            let what = format!("station {}: {}", self.address, mistake.what);
-            Mistake::new(what, mistake.right)
-        };
-        let identity = gsd.identity(modules).map_err(of_station)?;
-        check_sizes(Some(&identity.configuration), signals).map_err(of_station)?;
-        Ok(identity)
-    }
-}
-
-fn read_rate(value: &Value<'_>) -> Option<(u32, u16)> {
+fn read_rate(value: &Value<'_>) -> Option<Rate> {
     let baud = value.whole(1..=i128::from(u32::MAX))?;
-    let found = RATES.iter().find(|(rate, _)| i128::from(*rate) == baud);
+    let found = RATES.iter().find(|rate| i128::from(rate.baud) == baud);
     if found.is_none() {
-        let rates: Vec<String> = RATES.iter().map(|(rate, _)| rate.to_string()).collect();
+        let rates: Vec<String> = RATES.iter().map(|rate| rate.baud.to_string()).collect();
         value.wrong(
             format!("{baud} is no rate of PROFIBUS"),
             format!("the rates are {}", rates.join(", ")),
         );
     }
     found.copied()
-}
-
-/// Reads the keys of a station, which has to be there or not.
-fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
-    const ADDRESS: &str = "write the station's address in the PLC's project, such as address = 3";
-    let address = if is_required {
-        table.require("address", ADDRESS)
-    } else {
-        table.take("address")
-    };
-    let gsd = table.take("gsd");
-    let modules = table.take("modules");
-    let ident = table.take("ident");
-    let config = table.take("config");
-    let others = [&gsd, &modules, &ident, &config];
-    if !is_required && address.is_none() {
-        let Some(stray) = others.into_iter().flatten().next() else {
-            return Keys::Absent;
-        };
-        stray.wrong("the station has no address", ADDRESS);
-        return Keys::Wrong;
-    }
-    for (key, value) in [("ident", &ident), ("config", &config)] {
-        if let (Some(_), Some(value)) = (&gsd, value) {
-            let what = format!("\"{key}\" stands beside \"gsd\", which says that");
-            value.wrong(what, "remove one of the two");
-        }
-    }
-    if let (Some(modules), None) = (&modules, &gsd) {
-        modules.wrong(
-            "\"modules\" stands without \"gsd\"",
-            "name the GSD file that has them, or write config = [0x50, 0x60]",
-        );
-    }
-    let line = address.as_ref().map_or(0, Value::line);
-    let at = address.as_ref().map_or(table.at(), Value::at);
-    let address = address.and_then(|value| value.whole(0..=125));
-    let address = address.and_then(|address| u8::try_from(address).ok());
-    let device = match (gsd, ident) {
-        (Some(gsd), ident) => {
-            let file = gsd.label(PATH_LIMIT, "name the device's GSD file");
-            let modules = modules.map_or(Some(Vec::new()), |value| read_modules(&value));
-            let is_right = ident.is_none() && config.is_none();
-            is_right
-                .then_some(())
-                .and_then(|()| Some((file?, modules?)))
-                .map(|(file, modules)| Device::Gsd {
-                    file: file.into(),
-                    modules,
-                })
-        }
-        (None, Some(ident)) => {
-            let ident = ident.whole(0..=0xFFFF);
-            let configuration = config.map(|value| read_config(&value));
-            let is_right = modules.is_none();
-            let configuration = match configuration {
-                Some(read) => read.map(Some),
-                None => Some(None),
-            };
-            is_right
-                .then_some(())
-                .and_then(|()| Some((u16::try_from(ident?).ok()?, configuration?)))
-                .map(|(ident, configuration)| Device::Plain {
-                    ident,
-                    configuration,
-                })
-        }
-        (None, None) => {
-            if table.is_whole() {
-                table.collector().report(
-                    at,
-                    "it is not said which device the station is",
-                    "write gsd = \"device.gsd\" with its modules, or an ident such as ident = 0x80E0",
-                );
-            }
-            None
-        }
-    };
-    match (address, device) {
-        (Some(address), Some(device)) => Keys::Right(StationOptions {
-            address,
-            device,
-            at,
-            line,
-        }),
-        _ => Keys::Wrong,
-    }
-}
-
-fn read_modules(value: &Value<'_>) -> Option<Vec<String>> {
-    let right = "write the names of the modules as the GSD file has them, such as [\"2 words in\"]";
-    let names = value.list(right)?;
-    if names.len() > MODULE_LIMIT {
-        value.wrong(
-            format!("there are {} modules", names.len()),
-            format!("a station has at most {MODULE_LIMIT}"),
-        );
-        return None;
-    }
-    let names = names
-        .iter()
-        .map(|name| name.label(NAME_LIMIT, right).map(str::to_owned));
-    names.collect()
-}
-
-fn read_config(value: &Value<'_>) -> Option<Configuration> {
-    let octets = value.list("write the octets of the configuration, such as [0x50, 0x60]")?;
-    let octets = octets.iter().map(|octet| {
-        let octet = octet.whole(0..=255)?;
-        u8::try_from(octet).ok()
-    });
-    let octets: Vec<u8> = octets.collect::<Option<_>>()?;
-    let right = "write the identifiers that the PLC's project has for the station";
-    if octets.is_empty() || octets.len() > DATA_LIMIT {
-        value.wrong(format!("there are {} octets", octets.len()), right);
-        return None;
-    }
-    match Configuration::of_bytes(&octets) {
-        Ok(own) if own.inputs().max(own.outputs()) <= DATA_LIMIT => Some(own),
-        Ok(own) => {
-            let most = own.inputs().max(own.outputs());
-            let what = format!("the modules have {most} bytes in one direction");
-            value.wrong(what, format!("a station has at most {DATA_LIMIT}"));
-            None
-        }
-        Err(why) => {
-            value.wrong(why, right);
-            None
-        }
-    }
 }

@@ -206,6 +206,7 @@ mod tests {
     use crate::event::Event;
     use crate::station::Identity;
     use crate::telegram::Control;
+    use crate::user_parameters::UserParameters;
 
     struct Nothing;
 
@@ -224,6 +225,7 @@ mod tests {
             let identity = Identity {
                 ident: 1,
                 configuration: Configuration::of_sizes(1, 1),
+                user: UserParameters::default(),
                 sync: true,
                 freeze: true,
                 fail_safe: false,

@@ -9,6 +9,7 @@ use crate::configuration::Configuration;
 use crate::event::{Event, Leaving};
 use crate::parameters::Parameters;
 use crate::telegram::{BROADCAST, Control, Frame, append_short_ack};
+use crate::user_parameters::UserParameters;
 use exchange::Clear;
 
 /// The service access points of a slave, and that of a master.
@@ -56,6 +57,8 @@ pub struct Identity {
     pub ident: u16,
     /// Its modules.
     pub configuration: Configuration,
+    /// Its user's parameters; by default it accepts any.
+    pub user: UserParameters,
     /// Whether it supports SYNC.
     pub sync: bool,
     /// Whether it supports FREEZE.
@@ -377,6 +380,11 @@ impl Station {
                 self.refuse(now, master, why, process);
                 self.faults.parameters = false;
                 return;
+            }
+            match self.identity.user.check(parameters.user) {
+                Ok(None) => {}
+                Ok(Some(unusual)) => log::debug!("station {}: {unusual}", self.address),
+                Err(why) => return self.refuse(now, master, why, process),
             }
             self.has_sync = parameters.sync;
             self.has_freeze = parameters.freeze;

@@ -28,6 +28,9 @@ use tickbus_fieldbus::LinkState;
 const ADDRESS: u8 = 8;
 const IDENT: u16 = 0x80E0;
 
+/// What a PLC's tool sends to remote_io.gsd with its first three modules.
+const REMOTE_IO_PARAMETERS: [u8; 10] = [0xC0, 0, 0, 0, 0, 0x11, 0xFF, 0xFF, 0xFF, 0xFE];
+
 /// The kind for the rig, on this port.
 struct OnPort(String);
 
@@ -382,7 +385,7 @@ fn many_stations_of_different_devices_share_a_line() {
     let mut device = open(&path);
     let slaves = stations.map(|(address, _)| {
         let (ident, config, parameters): (_, &[u8], &[u8]) = match address {
-            3 | 20 => (0x0B1C, &[0x00, 0x51, 0x61], &[0xC0, 0, 0, 0, 0]),
+            3 | 20 => (0x0B1C, &[0x00, 0x51, 0x61], &REMOTE_IO_PARAMETERS),
             9 => (0x80E0, &[0x71], &[]),
             _ => (0xE4C0, &[0xF1], &[]),
         };

@@ -85,7 +85,15 @@ impl Config {
     /// As [`load`](Self::load); or the file states the other role; or its bus cannot leave the process.
     pub fn load_as(path: &Path, asked: Option<CommandLineEnd>) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
-        let mut config = Self::parse_at(path, &path.display().to_string(), &text, asked)?;
+        let shown = path.display().to_string();
+        let mut config = Self::parse_at(path, &shown, &text, asked)?;
+        let collector = Collector::new(&shown, &text);
+        config
+            .bus
+            .check_files(config.folder(), &config.table, &collector);
+        if let Some(mistakes) = collector.finish() {
+            return Err(mistakes);
+        }
         if let Some(file) = config.fault_file.take() {
             config.add_faults(&file)?;
         }

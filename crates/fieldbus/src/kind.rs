@@ -95,6 +95,18 @@ pub trait BusOptions {
         let _ = (table, axes, collector);
     }
 
+    /// Reads the files that the options name, relative to `folder`, and reports what is wrong in them and what they lack;
+    /// for a driver.cfg that has no other mistakes.
+    fn check_files(&self, folder: &Path, table: &SignalTable, collector: &Collector<'_>) {
+        let _ = (folder, table, collector);
+    }
+
+    /// What those files say of the bus, for `tickbus check`: lines, each with its head.
+    fn details(&self, folder: &Path, table: &SignalTable) -> Vec<(String, String)> {
+        let _ = (folder, table);
+        Vec::new()
+    }
+
     /// The place of a signal of `station` in the bus's own notation; empty where it is its address.
     fn place(&self, signal: &Signal, station: &Station) -> String {
         let _ = (signal, station);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::Gsd;
 use crate::telegram::Telegram;
 
 const MASTER: u8 = 2;
@@ -59,6 +60,7 @@ fn identity() -> Identity {
     Identity {
         ident: 0x80E0,
         configuration: Configuration::of_bytes(&[0x50, 0x60]).expect("whole"),
+        user: UserParameters::default(),
         sync: true,
         freeze: true,
         fail_safe: false,
@@ -256,6 +258,40 @@ fn wrong_parameters_are_acknowledged_and_told_in_the_diagnosis_and_in_words() {
         rig.parameterise(LOCK, 0);
         assert_eq!(rig.diagnosis()[..2], [0x02, 0x04]);
     }
+}
+
+#[test]
+fn parameters_that_its_gsd_file_does_not_allow_are_refused_in_words() {
+    let drive = include_str!("../../../../tests/gsd/drive.gsd");
+    let gsd = Gsd::read(drive.as_bytes()).expect("a right file");
+    let names = ["Standard telegram 1", "Empty"].map(str::to_owned);
+    let mut rig = Rig::new(gsd.identity(&names).expect("its modules"));
+    let right = [
+        &[LOCK, 0, 0, 11, 0x0D, 0x51, 0][..],
+        &[0xC0, 0x60, 0, 1, 1, 0xF4, 1, 0xFF, 0x9C],
+    ];
+    let right = right.concat();
+    let mut wrong = right.clone();
+    wrong[10] = 3;
+    for (parameters, words) in [
+        (
+            &wrong[..],
+            "the device: parameter \"Stop mode\" is 3; the GSD allows 0 to 2",
+        ),
+        (
+            &right[..13],
+            "expected 9 octets of user parameters, received 6; those of slot 1 \"Standard telegram 1\" are missing",
+        ),
+    ] {
+        assert_eq!(rig.ask(61, parameters), Came::Short);
+        assert_eq!(rig.diagnosis()[..2], [0x42, 0x05], "{words}");
+        let Some(Event::Left(why)) = rig.machine.events.last() else {
+            panic!("nothing told of {words}");
+        };
+        assert!(why.to_string().contains(words), "{why}");
+    }
+    assert_eq!(rig.ask(61, &right), Came::Short);
+    assert_eq!(rig.station.state(), State::WaitCfg);
 }
 
 #[test]

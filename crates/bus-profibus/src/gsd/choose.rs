@@ -1,0 +1,162 @@
+//! A device with the modules that somebody has chosen for its slots.
+
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::{did_you_mean, shown};
+
+use super::{Gsd, Module};
+use crate::Identity;
+use crate::configuration::Configuration;
+use crate::telegram::DATA_LIMIT;
+use crate::user_parameters::{LIMIT, UserParameters};
+
+/// How many modules a message names.
+const SHOWN_MODULES: usize = 6;
+
+impl Gsd {
+    /// The device with these modules in its slots, by their names; a device whose modules are fixed needs none.
+    ///
+    /// # Errors
+    ///
+    /// It does not have one of them, or not in that slot, or not so many, or they have too many bytes.
+    pub fn identity(&self, chosen: &[String]) -> Result<Identity, Mistake> {
+        let modules = self.modules(chosen)?;
+        let slots = modules
+            .iter()
+            .map(|module| (&*module.name, &*module.identifiers));
+        let configuration = Configuration::of_modules(slots)
+            .map_err(|why| Mistake::new(why, "correct the GSD file"))?;
+        let (inputs, outputs) = (configuration.inputs(), configuration.outputs());
+        let mut user = UserParameters::default();
+        user.push(None, &self.parameters);
+        for (slot, module) in (1..).zip(&modules) {
+            user.push(Some((slot, &module.name)), &module.parameters);
+        }
+        let limit = |own: Option<usize>| own.filter(|_| self.modular).unwrap_or(usize::MAX);
+        let octets = "octets of the user's parameters";
+        for (count, what, most) in [
+            (
+                inputs,
+                "bytes of inputs",
+                DATA_LIMIT.min(limit(self.max_inputs)),
+            ),
+            (
+                outputs,
+                "bytes of outputs",
+                DATA_LIMIT.min(limit(self.max_outputs)),
+            ),
+            (inputs + outputs, "bytes in all", limit(self.max_data)),
+            (
+                user.defaults().len(),
+                octets,
+                LIMIT.min(limit(self.max_parameters)),
+            ),
+        ] {
+            if count > most {
+                return Err(Mistake::new(
+                    format!("the modules have {count} {what}"),
+                    format!("\"{}\" has at most {most}", shown(&self.model)),
+                ));
+            }
+        }
+        Ok(Identity {
+            ident: self.ident,
+            configuration,
+            user,
+            sync: self.sync,
+            freeze: self.freeze,
+            fail_safe: self.fail_safe,
+            dpv1: self.dpv1,
+        })
+    }
+
+    fn modules(&self, chosen: &[String]) -> Result<Vec<&Module>, Mistake> {
+        let modules: Vec<&Module> = if chosen.is_empty() && !self.modular {
+            self.modules.iter().collect()
+        } else {
+            let names = (1..).zip(chosen);
+            names
+                .map(|(slot, name)| self.module(slot, name))
+                .collect::<Result<_, _>>()?
+        };
+        if modules.is_empty() {
+            let what = format!("\"{}\" needs its modules", shown(&self.model));
+            let right = format!("write their names, such as modules = [{}]", self.proposal());
+            return Err(Mistake::new(what, right));
+        }
+        if let Some(most) = self.max_module
+            && modules.len() > most
+        {
+            return Err(Mistake::new(
+                format!("there are {} modules", modules.len()),
+                format!("\"{}\" has at most {most}", shown(&self.model)),
+            ));
+        }
+        Ok(modules)
+    }
+
+    /// The names of the modules that its slots have by default, or of its first module.
+    fn proposal(&self) -> String {
+        let of_slot = |slot: &super::Slot| {
+            let mut all = self.modules.iter();
+            all.find(|module| module.reference == Some(slot.default))
+        };
+        let mut proposed: Vec<&Module> = self.slots.iter().map_while(of_slot).collect();
+        if proposed.is_empty() {
+            proposed.extend(self.modules.first());
+        }
+        quoted(proposed.into_iter())
+    }
+
+    fn module(&self, slot: u32, name: &str) -> Result<&Module, Mistake> {
+        let found = self.modules.iter().find(|module| module.name == name);
+        let Some(module) = found else {
+            let names: Vec<&str> = self.modules.iter().map(|m| m.name.as_str()).collect();
+            return Err(Mistake::new(
+                format!(
+                    "\"{}\" has no module \"{}\"",
+                    shown(&self.model),
+                    shown(name)
+                ),
+                did_you_mean(name, "modules", &names),
+            ));
+        };
+        let Some(own) = self.slots.iter().find(|own| own.number == slot) else {
+            return Ok(module);
+        };
+        let fits = |module: &&Module| {
+            let reference = module.reference;
+            reference.is_some_and(|number| own.fitting.iter().any(|range| range.contains(&number)))
+        };
+        if fits(&module) {
+            return Ok(module);
+        }
+        Err(Mistake::new(
+            format!(
+                "\"{}\" does not fit into slot {slot} of \"{}\"",
+                shown(name),
+                shown(&self.model)
+            ),
+            format!(
+                "its GSD file allows {}",
+                quoted(self.modules.iter().filter(fits))
+            ),
+        ))
+    }
+}
+
+/// The names of some modules, and whether there are more.
+fn quoted<'m>(mut modules: impl Iterator<Item = &'m Module>) -> String {
+    let names = modules.by_ref().take(SHOWN_MODULES);
+    let names: Vec<String> = names
+        .map(|module| format!("\"{}\"", shown(&module.name)))
+        .collect();
+    let more = if modules.next().is_some() {
+        ", …"
+    } else {
+        ""
+    };
+    if names.is_empty() {
+        return "none that it describes".to_owned();
+    }
+    format!("{}{more}", names.join(", "))
+}

@@ -1,0 +1,94 @@
+//! What a station is, for `tickbus check`: its device, its modules, its parameters.
+
+use std::ops::Range;
+use std::path::Path;
+
+use tickbus_image::signal;
+
+use super::station::read_gsd;
+use super::{Device, StationOptions};
+use crate::configuration::{SlotModule, hex};
+use crate::device::LineOptions;
+
+impl StationOptions {
+    /// The lines, each with its head; `None` for a station that has mistakes.
+    pub(super) fn details(
+        &self,
+        line: &LineOptions,
+        folder: &Path,
+        signals: &signal::Station,
+    ) -> Option<Vec<(String, String)>> {
+        let identity = self.identity(folder, signals).ok()?;
+        let mut lines = Vec::new();
+        let mut put = |head: &str, text: String| lines.push((head.to_owned(), text));
+        let (address, ident) = (self.address, identity.ident);
+        let mut notes = Vec::new();
+        if let Device::Gsd { file, .. } = &self.device {
+            let gsd = read_gsd(&folder.join(file)).ok()?;
+            let (model, vendor) = (&gsd.model, &gsd.vendor);
+            let text = format!("station {address}: \"{model}\" of \"{vendor}\", ident {ident:04X}");
+            put("device", text);
+            let baud = line.settings.baud;
+            match gsd.rates.get(&baud) {
+                None => notes.push(format!("its GSD file does not support {baud} baud")),
+                Some(most) if line.max_tsdr > *most => notes.push(format!(
+                    "this end answers within {} bits, its GSD file says {most}: set a longer slot time in the PLC's \
+                     project",
+                    line.max_tsdr
+                )),
+                Some(_) => {}
+            }
+        } else {
+            put(
+                "device",
+                format!("station {address}: ident {ident:04X}, without a GSD file"),
+            );
+        }
+        if identity.configuration.has_sizes_only() {
+            put("slots", "any modules that have these sizes".to_owned());
+        } else {
+            for (slot, module) in (1..).zip(identity.configuration.modules()) {
+                put(&format!("slot {slot}"), in_words(module));
+            }
+        }
+        let defaults = identity.user.defaults();
+        if !defaults.is_empty() {
+            put("Set_Prm", format!("{} by default", hex(defaults)));
+        }
+        for text in identity.user.in_words() {
+            put("", text);
+        }
+        for text in notes {
+            put("note", format!("station {address}: {text}"));
+        }
+        Some(lines)
+    }
+}
+
+/// A module: its name, its identifiers, and where its bytes are.
+fn in_words(module: &SlotModule) -> String {
+    let name = if module.name.is_empty() {
+        String::new()
+    } else {
+        format!("\"{}\", ", module.name)
+    };
+    let areas = [("%I", &module.inputs), ("%Q", &module.outputs)];
+    let bytes: Vec<String> = areas
+        .into_iter()
+        .filter_map(|(area, range)| bytes(area, range))
+        .collect();
+    let bytes = if bytes.is_empty() {
+        "no I/O".to_owned()
+    } else {
+        bytes.join(", ")
+    };
+    format!("{name}{}: {bytes}", hex(&module.identifiers))
+}
+
+fn bytes(area: &str, range: &Range<usize>) -> Option<String> {
+    let last = range.end.checked_sub(1)?;
+    match last.checked_sub(range.start)? {
+        0 => Some(format!("{area}B{last}")),
+        _ => Some(format!("{area}B{} to {area}B{last}", range.start)),
+    }
+}

@@ -1,0 +1,283 @@
+//! The keys of a station: its address, and which device it is.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::{Table, Value};
+use tickbus_image::signal;
+
+use super::Keys;
+use crate::configuration::Configuration;
+use crate::gsd::Gsd;
+use crate::station::Identity;
+use crate::telegram::DATA_LIMIT;
+use crate::user_parameters::UserParameters;
+
+/// The longest path of a GSD file, in characters.
+const PATH_LIMIT: usize = 1000;
+
+/// The longest name of a module, in characters.
+const NAME_LIMIT: usize = 200;
+
+/// The most modules of a station.
+const MODULE_LIMIT: usize = 244;
+
+/// A GSD file is at most this long, in bytes.
+const GSD_LIMIT: u64 = 16 << 20;
+
+/// The keys of one station.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StationOptions {
+    /// Its address on the line.
+    pub address: u8,
+    /// Which device it is.
+    pub device: Device,
+    /// The offset of its address, and the line.
+    pub(super) at: usize,
+    pub(super) line: usize,
+    /// The offsets of `gsd` and `modules`.
+    gsd_at: usize,
+    modules_at: usize,
+}
+
+/// Which device a station is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Device {
+    /// That of a GSD file, with these modules.
+    Gsd {
+        /// The file as written: relative to the folder of the driver.cfg.
+        file: PathBuf,
+        /// Their names.
+        modules: Vec<String>,
+    },
+    /// One without a file.
+    Plain {
+        /// The number of its kind.
+        ident: u16,
+        /// Its modules; `None` for any that have the sizes of its signals.
+        configuration: Option<Configuration>,
+    },
+}
+
+/// Whether signals of these sizes fit into the modules, or into any station.
+pub(super) fn check_sizes(
+    configuration: Option<&Configuration>,
+    signals: &signal::Station,
+) -> Result<(), Mistake> {
+    let limits = configuration.map_or([DATA_LIMIT; 2], |own| [own.inputs(), own.outputs()]);
+    let sizes = [("%I", signals.input_bytes), ("%Q", signals.output_bytes)];
+    for ((area, size), limit) in sizes.into_iter().zip(limits) {
+        if size > limit {
+            let right = if configuration.is_some() {
+                "give it more modules, or the signals lower addresses"
+            } else {
+                "spread the signals over several stations"
+            };
+            let what = format!("the signals have {size} bytes of {area}, and the station {limit}");
+            return Err(Mistake::new(what, right));
+        }
+    }
+    Ok(())
+}
+
+impl StationOptions {
+    /// The device that it is, whose signals have these sizes; a mistake comes with its offset in the driver.cfg.
+    pub(super) fn identity(
+        &self,
+        folder: &Path,
+        signals: &signal::Station,
+    ) -> Result<Identity, (usize, Mistake)> {
+        match &self.device {
+            Device::Gsd { file, modules } => {
+                let gsd = read_gsd(&folder.join(file)).map_err(|mistake| (self.gsd_at, mistake))?;
+                let identity = gsd.identity(modules).and_then(|identity| {
+                    check_sizes(Some(&identity.configuration), signals)?;
+                    Ok(identity)
+                });
+                identity.map_err(|Mistake { what, right }| {
+                    let what = format!("station {}: {what}", self.address);
+                    (self.modules_at, Mistake::new(what, right))
+                })
+            }
+            Device::Plain {
+                ident,
+                configuration,
+            } => Ok(plain(*ident, configuration.as_ref(), signals)),
+        }
+    }
+}
+
+/// A device without a GSD file, whose signals have these sizes.
+pub(super) fn plain(
+    ident: u16,
+    configuration: Option<&Configuration>,
+    signals: &signal::Station,
+) -> Identity {
+    let by_sizes = || Configuration::of_sizes(signals.input_bytes, signals.output_bytes);
+    Identity {
+        ident,
+        configuration: configuration.cloned().unwrap_or_else(by_sizes),
+        user: UserParameters::default(),
+        sync: true,
+        freeze: true,
+        fail_safe: false,
+        dpv1: false,
+    }
+}
+
+/// Reads the GSD file at `path`; mistakes in it name it and the line.
+pub(super) fn read_gsd(path: &Path) -> Result<Gsd, Mistake> {
+    let name = path.display();
+    let size = fs::metadata(path).map(|file| file.len());
+    if size.is_ok_and(|size| size > GSD_LIMIT) {
+        return Err(Mistake::new(
+            format!("{name} is larger than 16 MiB, and no GSD file"),
+            "name another one in \"gsd\"",
+        ));
+    }
+    let bytes = fs::read(path).map_err(|error| {
+        Mistake::new(
+            format!("cannot read the GSD file {name} ({error})"),
+            "correct \"gsd\", or put the file there",
+        )
+    })?;
+    Gsd::read(&bytes).map_err(|error| {
+        let Mistake { what, right } = error.mistake;
+        Mistake::new(format!("{name}:{}: {what}", error.line), right)
+    })
+}
+
+/// Reads the keys of a station, which has to be there or not.
+pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
+    const ADDRESS: &str = "write the station's address in the PLC's project, such as address = 3";
+    let address = if is_required {
+        table.require("address", ADDRESS)
+    } else {
+        table.take("address")
+    };
+    let gsd = table.take("gsd");
+    let modules = table.take("modules");
+    let ident = table.take("ident");
+    let config = table.take("config");
+    let others = [&gsd, &modules, &ident, &config];
+    if !is_required && address.is_none() {
+        let Some(stray) = others.into_iter().flatten().next() else {
+            return Keys::Absent;
+        };
+        stray.wrong("the station has no address", ADDRESS);
+        return Keys::Wrong;
+    }
+    for (key, value) in [("ident", &ident), ("config", &config)] {
+        if let (Some(_), Some(value)) = (&gsd, value) {
+            let what = format!("\"{key}\" stands beside \"gsd\", which says that");
+            value.wrong(what, "remove one of the two");
+        }
+    }
+    if let (Some(modules), None) = (&modules, &gsd) {
+        modules.wrong(
+            "\"modules\" stands without \"gsd\"",
+            "name the GSD file that has them, or write config = [0x50, 0x60]",
+        );
+    }
+    let line = address.as_ref().map_or(0, Value::line);
+    let gsd_at = gsd.as_ref().map_or(0, Value::at);
+    let modules_at = modules.as_ref().map_or(gsd_at, Value::at);
+    let at = address.as_ref().map_or(table.at(), Value::at);
+    let address = address.and_then(|value| value.whole(0..=125));
+    let address = address.and_then(|address| u8::try_from(address).ok());
+    let device = match (gsd, ident) {
+        (Some(gsd), ident) => {
+            let file = gsd.label(PATH_LIMIT, "name the device's GSD file");
+            let modules = modules.map_or(Some(Vec::new()), |value| read_modules(&value));
+            let is_right = ident.is_none() && config.is_none();
+            is_right
+                .then_some(())
+                .and_then(|()| Some((file?, modules?)))
+                .map(|(file, modules)| Device::Gsd {
+                    file: file.into(),
+                    modules,
+                })
+        }
+        (None, Some(ident)) => {
+            let ident = ident.whole(0..=0xFFFF);
+            let configuration = config.map(|value| read_config(&value));
+            let is_right = modules.is_none();
+            let configuration = match configuration {
+                Some(read) => read.map(Some),
+                None => Some(None),
+            };
+            is_right
+                .then_some(())
+                .and_then(|()| Some((u16::try_from(ident?).ok()?, configuration?)))
+                .map(|(ident, configuration)| Device::Plain {
+                    ident,
+                    configuration,
+                })
+        }
+        (None, None) => {
+            if table.is_whole() {
+                table.collector().report(
+                    at,
+                    "it is not said which device the station is",
+                    "write gsd = \"device.gsd\" with its modules, or an ident such as ident = 0x80E0",
+                );
+            }
+            None
+        }
+    };
+    match (address, device) {
+        (Some(address), Some(device)) => Keys::Right(StationOptions {
+            address,
+            device,
+            at,
+            line,
+            gsd_at,
+            modules_at,
+        }),
+        _ => Keys::Wrong,
+    }
+}
+
+fn read_modules(value: &Value<'_>) -> Option<Vec<String>> {
+    let right = "write the names of the modules as the GSD file has them, such as [\"2 words in\"]";
+    let names = value.list(right)?;
+    if names.len() > MODULE_LIMIT {
+        value.wrong(
+            format!("there are {} modules", names.len()),
+            format!("a station has at most {MODULE_LIMIT}"),
+        );
+        return None;
+    }
+    let names = names
+        .iter()
+        .map(|name| name.label(NAME_LIMIT, right).map(str::to_owned));
+    names.collect()
+}
+
+fn read_config(value: &Value<'_>) -> Option<Configuration> {
+    let octets = value.list("write the octets of the configuration, such as [0x50, 0x60]")?;
+    let octets = octets.iter().map(|octet| {
+        let octet = octet.whole(0..=255)?;
+        u8::try_from(octet).ok()
+    });
+    let octets: Vec<u8> = octets.collect::<Option<_>>()?;
+    let right = "write the identifiers that the PLC's project has for the station";
+    if octets.is_empty() || octets.len() > DATA_LIMIT {
+        value.wrong(format!("there are {} octets", octets.len()), right);
+        return None;
+    }
+    match Configuration::of_bytes(&octets) {
+        Ok(own) if own.inputs().max(own.outputs()) <= DATA_LIMIT => Some(own),
+        Ok(own) => {
+            let most = own.inputs().max(own.outputs());
+            let what = format!("the modules have {most} bytes in one direction");
+            value.wrong(what, format!("a station has at most {DATA_LIMIT}"));
+            None
+        }
+        Err(why) => {
+            value.wrong(why, right);
+            None
+        }
+    }
+}

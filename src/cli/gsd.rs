@@ -1,0 +1,57 @@
+//! `tickbus gsd FILE`: the GSD file of a machine of one's own.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use super::Outcome;
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::Mistakes;
+use tickbus_driver_cfg::{Config, Options};
+
+/// Print the GSD file for the PLC's project, of the PROFIBUS stations that have none of a maker.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The driver.cfg of the simulated machine.
+    file: PathBuf,
+
+    /// The stations with this ident, such as 0x80E0, if there are several.
+    #[arg(long, value_name = "NUMBER", value_parser = ident)]
+    ident: Option<u16>,
+}
+
+fn ident(text: &str) -> Result<u16, String> {
+    let read = match text.strip_prefix("0x") {
+        Some(hex) => u16::from_str_radix(hex, 16),
+        None => text.parse(),
+    };
+    read.map_err(|_| "write a number from 0 to 0xFFFF, such as 0x80E0".to_owned())
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let of_file = |mistake| Mistakes::of(&arguments.file.display().to_string(), mistake);
+    let made = Config::load(&arguments.file).and_then(|config| {
+        let Options::ProfibusDevice(options) = &config.bus else {
+            return Err(of_file(Mistake::new(
+                format!("the bus \"{}\" has no GSD file", config.bus.kind()),
+                "name a driver.cfg with kind = \"profibus-device\"",
+            )));
+        };
+        let made = options.gsd(&config.name, &config.table, arguments.ident);
+        made.map_err(of_file)
+    });
+    // If the reader of stdout is gone (`| head`), that need not be reported.
+    match made {
+        Ok(text) => {
+            let _ = std::io::stdout().lock().write_all(text.as_bytes());
+            Outcome::Done
+        }
+        Err(mistakes) => {
+            let _ = writeln!(
+                std::io::stderr().lock(),
+                "{mistakes}\ngsd: failed mistakes={}",
+                mistakes.len()
+            );
+            Outcome::WrongInput
+        }
+    }
+}

@@ -229,3 +229,54 @@ fn the_faults_of_the_documentation_are_right() {
         assert!(!faults.is_empty(), "{block}");
     }
 }
+
+/// Runs `tickbus gsd` in tests/right.
+fn gsd(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .arg("gsd")
+        .args(arguments)
+        .current_dir(repository().join("tests/right"))
+        .output()
+        .expect("the tickbus program runs")
+}
+
+/// `BLESS` rewrites the golden file, too.
+#[test]
+fn the_gsd_file_of_a_machine_is_its_golden_file() {
+    let output = gsd(&["profibus-device.cfg", "--ident", "0x80E0"]);
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    let golden = repository().join("tests/right/profibus-device.gsd");
+    if std::env::var_os("BLESS").is_some() {
+        fs::write(&golden, &output.stdout).expect("the file is written");
+    }
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        fs::read_to_string(golden).unwrap()
+    );
+}
+
+#[test]
+fn a_gsd_file_that_cannot_be_made_is_refused_with_what_to_do() {
+    for (arguments, words) in [
+        (
+            &["profibus-device.cfg"][..],
+            "profibus-device.cfg: the stations have 2 idents, 0x80E0, 0x80E1; each has a GSD file of its own: add \
+             --ident 0x80E0",
+        ),
+        (
+            &["profibus-device.cfg", "--ident", "7"],
+            "profibus-device.cfg: no station has the ident 0x0007; the stations without a GSD file have 0x80E0, 0x80E1",
+        ),
+        (
+            &["modbus-server.cfg"],
+            "modbus-server.cfg: the bus \"modbus-server\" has no GSD file; name a driver.cfg with kind = \
+             \"profibus-device\"",
+        ),
+    ] {
+        let output = gsd(arguments);
+        let right = format!("{words}\ngsd: failed mistakes=1\n");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), right);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(output.stdout.is_empty());
+    }
+}

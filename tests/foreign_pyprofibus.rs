@@ -7,19 +7,22 @@ mod foreign;
 #[path = "peers/pty.rs"]
 mod pty;
 
+use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use foreign::Absent;
 #[cfg(unix)]
 use foreign::machine::Machine;
+use tickbus::fieldbus::profibus::Gsd;
 #[cfg(unix)]
 use tickbus_conformance::rig::statistic;
 
 fn main() -> ExitCode {
     foreign::main(&[
+        ("pyprofibus_reads_gsd_files_as_we_do", reads),
         #[cfg(unix)]
         (
-            "pyprofibus_reads_our_gsd_file_and_exchanges_at_every_rate_of_user_space",
+            "pyprofibus_takes_our_gsd_files_and_exchanges_at_every_rate_of_user_space",
             exchanges,
         ),
     ])
@@ -27,34 +30,137 @@ fn main() -> ExitCode {
 
 #[cfg(unix)]
 fn exchanges() -> Result<(), Absent> {
-    let gsd = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/gsd/encoder.gsd");
-    let script = concat!(
+    const SCRIPT: &str = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/tests/peers/profibus_master.py"
     );
-    for baud in ["9600", "19200", "187500", "500000"] {
+    let folder = tempfile::tempdir().expect("a folder");
+    let encoder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/gsd/encoder.gsd");
+    let by_gsd = format!("gsd = \"{encoder}\"");
+    let own = folder.path().join("own.gsd");
+    let own = own.to_str().expect("UTF-8");
+    for (baud, device, gsd, module) in [
+        ("9600", &*by_gsd, encoder, "4 bytes in and out"),
+        ("19200", &*by_gsd, encoder, "4 bytes in and out"),
+        ("187500", &*by_gsd, encoder, "4 bytes in and out"),
+        ("500000", &*by_gsd, encoder, "4 bytes in and out"),
+        // By the file that "tickbus gsd" writes.
+        (
+            "500000",
+            "ident = 0x80E1\nconfig = [0xF1]",
+            own,
+            "2 words in and out, consistent",
+        ),
+    ] {
         let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
         // A port of its own each time: one whose parity was asked for cannot be opened again with the same settings.
         let line = pty::Line::new();
-        let device = line.end(0).display();
-        let mut machine = Machine::open(&format!(
-            "[driver]\nid = 1\nname = \"encoder\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{device}\"\n\
-             baud = {baud}\nmax_tsdr = 60000\nmax_age = \"5s\"\naddress = 8\ngsd = \"{gsd}\"\n\
+        let port = line.end(0).display();
+        let text = format!(
+            "[driver]\nid = 1\nname = \"encoder\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
+             baud = {baud}\nmax_tsdr = 60000\nmax_age = \"5s\"\naddress = 8\n{device}\n\
              [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
              [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n"
-        ));
+        );
+        if gsd == own {
+            write_gsd(folder.path(), &text, own);
+        }
+        let mut machine = Machine::open(&text);
         machine.until("it listens", |machine| {
             statistic(&machine.driver, "device").is_some()
         });
-        master.arg(script).arg(line.end(1));
-        master.args([baud, "8", gsd, "4 bytes in and out"]);
+        master.arg(SCRIPT).arg(line.end(1));
+        master.args([baud, "8", gsd, module]);
         let told = machine.until_the_end_of(master, |machine| {
             machine.tick();
             let value = machine.get("out");
             machine.set("in", value);
         });
         assert!(told.contains("profibus_master: ok exchanges="), "{told}");
-        println!("{baud} baud: {}", told.trim());
+        println!("{baud} baud, {module}: {}", told.trim());
+    }
+    Ok(())
+}
+
+/// Runs `tickbus gsd` on this driver.cfg.
+#[cfg(unix)]
+fn write_gsd(folder: &std::path::Path, text: &str, to: &str) {
+    let file = folder.join("driver.cfg");
+    std::fs::write(&file, text).expect("a file");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tickbus"));
+    let output = command.arg("gsd").arg(&file).output().expect("it runs");
+    assert!(output.status.success(), "{output:?}");
+    std::fs::write(to, output.stdout).expect("a file");
+}
+
+/// What pyprofibus makes of a file and its modules is what we make of it.
+fn reads() -> Result<(), Absent> {
+    for (file, modules) in [
+        (
+            "own_machine.gsd",
+            &[
+                "1 word in",
+                "1 word out",
+                "1 word in",
+                "4 bytes in, consistent",
+                "module 4: 2 in, 8 out",
+            ][..],
+        ),
+        (
+            "own_machine.gsd",
+            &["16 bytes in", "4 bytes in", "1 byte out"],
+        ),
+        ("valves.gsd", &[]),
+        ("encoder.gsd", &[]),
+        ("drive.gsd", &["Empty", "Position, 4 bytes"]),
+    ] {
+        let path = format!("{}/tests/gsd/{file}", env!("CARGO_MANIFEST_DIR"));
+        let mut peer = foreign::python_with("main", &["pyprofibus"])?;
+        peer.arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/tests/peers/profibus_gsd.py"
+        ));
+        let output = peer.arg(&path).args(modules).output().expect("it runs");
+        let gsd = Gsd::read(&std::fs::read(&path).expect("the file")).expect("a right file");
+        let mut theirs = String::from_utf8(output.stdout).expect("UTF-8");
+        let modules: Vec<String> = modules.iter().map(|name| (*name).to_owned()).collect();
+        // It does not know slots.
+        let identity = Gsd {
+            slots: Vec::new(),
+            ..gsd.clone()
+        }
+        .identity(&modules);
+        let identity = identity.expect("its modules");
+        let hex = |octets: &[u8]| {
+            octets
+                .iter()
+                .map(|octet| format!("{octet:02x}"))
+                .collect::<String>()
+        };
+        let mut ours = format!(
+            "ident {:04x}\nconfig {}\n",
+            identity.ident,
+            hex(identity.configuration.bytes())
+        );
+        for (rate, wait) in gsd.rates.iter().filter(|(rate, _)| **rate <= 500_000) {
+            // Where the file does not say how long it takes, it does not guess.
+            if theirs.contains(&format!("tsdr {rate} ")) {
+                writeln!(ours, "tsdr {rate} {wait}").expect("a String takes all");
+            }
+        }
+        if file == "drive.gsd" {
+            // It fills in the constants alone.
+            theirs.truncate(theirs.find("parameters").expect("the last line"));
+        } else {
+            writeln!(ours, "parameters {}", hex(identity.user.defaults()))
+                .expect("a String takes all");
+        }
+        assert_eq!(
+            ours,
+            theirs,
+            "{file}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
     }
     Ok(())
 }

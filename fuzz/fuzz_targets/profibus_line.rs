@@ -7,7 +7,7 @@
 use libfuzzer_sys::fuzz_target;
 use tickbus_base::time::Nanos;
 use tickbus_bus_profibus::telegram::{DATA_LIMIT, Telegram};
-use tickbus_bus_profibus::{Configuration, Event, Gsd, Identity, Process, Segment, Station};
+use tickbus_bus_profibus::{Configuration, Event, Gsd, Identity, Process, Segment, Station, UserParameters};
 
 fuzz_target!(|data: &[u8]| {
     let Some((first, rest)) = data.split_first() else {
@@ -20,6 +20,7 @@ fuzz_target!(|data: &[u8]| {
         if let Ok(identity) = gsd.identity(&all) {
             assert!(identity.configuration.inputs() <= DATA_LIMIT);
             assert_eq!(identity.configuration.difference(identity.configuration.bytes()), None);
+            assert_eq!(identity.user.check(identity.user.defaults()), Ok(None));
         }
     }
 });
@@ -29,6 +30,7 @@ fn line(dpv1: bool, mut stream: &[u8]) {
         let identity = Identity {
             ident: 0x80E0,
             configuration,
+            user: UserParameters::default(),
             sync: true,
             freeze: true,
             fail_safe: address == 4,

@@ -8,6 +8,7 @@ use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::{BusError, Free, PlcState, Port, Receipt};
 
 use crate::event::{Event, Leaving};
+use crate::layout::Layout;
 use crate::station::{Identity, Process};
 
 /// What the line says while it has no master.
@@ -28,15 +29,25 @@ pub struct LineOptions {
 #[derive(Debug)]
 pub struct ProfibusDevice {
     options: LineOptions,
-    identities: Vec<(u8, Identity)>,
+    stations: Vec<StationSetup>,
+}
+
+/// A station of the line.
+#[derive(Clone, Debug)]
+pub(crate) struct StationSetup {
+    pub(crate) address: u8,
+    pub(crate) identity: Identity,
+    /// Where its signals lie among the bytes that it sends and receives.
+    pub(crate) inputs: Layout,
+    pub(crate) outputs: Layout,
 }
 
 impl ProfibusDevice {
-    /// The bus that `options` describe, with the device that each station is, by its address.
-    pub(crate) fn new(options: &LineOptions, identities: Vec<(u8, Identity)>) -> Self {
+    /// The bus that `options` describe, with its stations.
+    pub(crate) fn new(options: &LineOptions, stations: Vec<StationSetup>) -> Self {
         Self {
             options: options.clone(),
-            identities,
+            stations,
         }
     }
 }
@@ -44,7 +55,7 @@ impl ProfibusDevice {
 impl Free for ProfibusDevice {
     #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        line::serve(&self.options, &self.identities, port, stop)
+        line::serve(&self.options, &self.stations, port, stop)
     }
 
     #[cfg(not(unix))]
@@ -68,17 +79,24 @@ struct Side {
     /// For the inputs that the master may have by now.
     receipt: Option<Receipt>,
     exchanges: bool,
+    inputs: Layout,
+    outputs: Layout,
+    /// The outputs as they lie in the image.
+    frame: Vec<u8>,
 }
 
 impl Stations {
-    fn new(addresses: impl Iterator<Item = u8>) -> Self {
-        let side = |address| Side {
-            address,
+    fn new(setups: &[StationSetup], port: &Port) -> Self {
+        let side = |(index, setup): (usize, &StationSetup)| Side {
+            address: setup.address,
             receipt: None,
             exchanges: false,
+            inputs: setup.inputs.clone(),
+            outputs: setup.outputs.clone(),
+            frame: vec![0; port.sizes(index).1],
         };
         Self {
-            all: addresses.map(side).collect(),
+            all: setups.iter().enumerate().map(side).collect(),
         }
     }
 
@@ -135,10 +153,10 @@ impl Process for Machine<'_> {
         let Some(mut frames) = self.port.take(index..index + 1, now) else {
             return false;
         };
-        let frame = frames.frame(index);
+        let side = &mut self.stations.all[index];
         // Modules may have more bytes than there are signals.
-        inputs[..frame.len()].copy_from_slice(frame);
-        self.stations.all[index].receipt = Some(frames.receipt());
+        side.inputs.send(frames.frame(index), inputs);
+        side.receipt = Some(frames.receipt());
         true
     }
 
@@ -151,8 +169,13 @@ impl Process for Machine<'_> {
 
     fn outputs(&mut self, station: u8, now: Nanos, outputs: &[u8]) {
         let index = self.index(station);
-        let (_, size) = self.port.sizes(index);
-        self.port.received(index, now, &outputs[..size]);
+        let Side {
+            outputs: layout,
+            frame,
+            ..
+        } = &mut self.stations.all[index];
+        self.port
+            .received(index, now, layout.receive(outputs, frame));
     }
 
     fn alive(&mut self, station: u8, now: Nanos) {

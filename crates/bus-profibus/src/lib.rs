@@ -8,6 +8,7 @@ mod configuration;
 mod device;
 mod event;
 mod gsd;
+mod layout;
 mod options;
 mod parameters;
 mod rates;

@@ -4,15 +4,18 @@ mod details;
 mod machine;
 mod station;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use tickbus_axis::Axis;
+use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial};
-use tickbus_image::signal::SignalTable;
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial};
+use tickbus_image::signal::{self, Area, Signal, SignalTable};
 
-use crate::device::{LineOptions, ProfibusDevice};
+use crate::device::{LineOptions, ProfibusDevice, StationSetup};
+use crate::layout::{Layout, Place};
 use crate::rates::{RATES, Rate};
 pub use station::{Device, StationOptions};
 use station::{check_sizes, read_station};
@@ -26,6 +29,8 @@ pub struct Options {
     common: Keys,
     /// Those of the `[[station]]` tables.
     own: Vec<Keys>,
+    /// The places of single signals in modules, by the signals' names, each with its offset.
+    places: BTreeMap<String, (Place, usize)>,
     /// The offset of `[fieldbus]`.
     at: usize,
 }
@@ -88,6 +93,7 @@ impl BusKind for Options {
             },
             common,
             own: Vec::new(),
+            places: BTreeMap::new(),
             at: table.at(),
         })
     }
@@ -119,18 +125,38 @@ impl BusOptions for Options {
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let stations = self.stations().zip(&setup.table.stations);
-        let identities: Result<Vec<_>, _> = stations
-            .map(|(station, signals)| {
-                let identity = station.identity(setup.folder, signals);
-                let identity = identity.map_err(|(_, mistake)| OpenError::Config(mistake))?;
-                Ok((station.address, identity))
-            })
-            .collect();
+        let stations: Result<Vec<_>, _> = self.setups(setup.folder, setup.table).collect();
+        let stations = stations.map_err(|(_, mistake)| OpenError::Config(mistake))?;
         Ok(Bus::Free(Box::new(ProfibusDevice::new(
-            &self.line,
-            identities?,
+            &self.line, stations,
         ))))
+    }
+
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        for line in lines {
+            let signal = &table.signals[line.signal];
+            let place = line.text.parse().and_then(|place: Place| {
+                place.suits(signal)?;
+                Ok(place)
+            });
+            match place {
+                Ok(place) => {
+                    self.places.insert(signal.name.clone(), (place, line.at()));
+                }
+                Err(mistake) => line.refuse(mistake),
+            }
+        }
+    }
+
+    fn place(&self, signal: &Signal, _station: &signal::Station) -> String {
+        let place = self.places.get(&signal.name);
+        place.map_or_else(String::new, |(place, _)| {
+            format!("slot {} {}", place.slot, place.address)
+        })
     }
 
     fn read_station(&mut self, _count: usize, table: &mut Table<'_>) {
@@ -149,10 +175,8 @@ impl BusOptions for Options {
     }
 
     fn check_files(&self, folder: &Path, table: &SignalTable, collector: &Collector<'_>) {
-        for (station, signals) in self.stations().zip(&table.stations) {
-            if let Err((at, mistake)) = station.identity(folder, signals) {
-                collector.collect(at, mistake);
-            }
+        for (at, mistake) in self.setups(folder, table).filter_map(Result::err) {
+            collector.collect(at, mistake);
         }
     }
 
@@ -182,9 +206,11 @@ impl BusOptions for Options {
         if self.own.contains(&Keys::Wrong) {
             return;
         }
-        for (station, signals) in self.stations().zip(&table.stations) {
+        let stations = self.stations().zip(&table.stations).enumerate();
+        for (index, (station, signals)) in stations {
+            let has_places = self.have_places(table, index);
             if let Device::Plain { configuration, .. } = &station.device
-                && let Err(mistake) = check_sizes(configuration.as_ref(), signals)
+                && let Err(mistake) = check_sizes(configuration.as_ref(), signals, has_places)
             {
                 collector.collect(station.at, mistake);
             }
@@ -193,6 +219,40 @@ impl BusOptions for Options {
 }
 
 impl Options {
+    /// What its stations are; a mistake comes with its offset in the driver.cfg.
+    fn setups(
+        &self,
+        folder: &Path,
+        table: &SignalTable,
+    ) -> impl Iterator<Item = Result<StationSetup, (usize, Mistake)>> {
+        let stations = self.stations().zip(&table.stations).enumerate();
+        stations.map(move |(index, (station, signals))| {
+            let identity = station.identity(folder, signals)?;
+            let layout = |area| {
+                let own = table.signals.iter();
+                let own = own.filter(|signal| (signal.station, signal.area) == (index, area));
+                Layout::new(own, &self.places, &identity.configuration, area)
+            };
+            let (inputs, outputs) = (layout(Area::Input)?, layout(Area::Output)?);
+            station.check_modules(&identity, signals, self.have_places(table, index))?;
+            Ok(StationSetup {
+                address: station.address,
+                identity,
+                inputs,
+                outputs,
+            })
+        })
+    }
+
+    /// Whether any inputs, and any outputs, of a station have places of their own.
+    fn have_places(&self, table: &SignalTable, station: usize) -> [bool; 2] {
+        [Area::Input, Area::Output].map(|area| {
+            let own = table.signals.iter();
+            let mut own = own.filter(|signal| (signal.station, signal.area) == (station, area));
+            own.any(|signal| self.places.contains_key(&signal.name))
+        })
+    }
+
     /// The stations, in the order of the signal table; none of those with mistakes.
     pub fn stations(&self) -> impl Iterator<Item = &StationOptions> {
         std::iter::once(&self.common)

@@ -115,14 +115,13 @@ pub enum Allowed {
 }
 
 impl Parameter {
-    /// Whether a device accepts `value`. Its own default it always does.
+    /// Whether the file allows `value`. A device accepts the default, too, whether it does or not.
     pub fn allows(&self, value: i64) -> bool {
-        value == self.default
-            || match &self.allowed {
-                Allowed::Any => true,
-                Allowed::Range(least, most) => (*least..=*most).contains(&value),
-                Allowed::List(values) => values.contains(&value),
-            }
+        match &self.allowed {
+            Allowed::Any => true,
+            Allowed::Range(least, most) => (*least..=*most).contains(&value),
+            Allowed::List(values) => values.contains(&value),
+        }
     }
 
     /// A value, with what it means.
@@ -272,8 +271,11 @@ impl UserParameters {
         }
         for part in &self.parts {
             for (at, parameter) in &part.block.parameters {
-                let value = parameter.kind.read(&received[part.at + at..]);
-                if !parameter.allows(value) {
+                let at = part.at + at;
+                let value = parameter.kind.read(&received[at..]);
+                // Where a file puts two parameters into the same bits, the tool sends the later one.
+                let is_default = value == parameter.kind.read(&self.defaults[at..]);
+                if !is_default && !parameter.allows(value) {
                     return Err(format!(
                         "{}: parameter \"{}\" is {value}; the GSD allows {}",
                         part.label,
@@ -415,6 +417,23 @@ mod tests {
         let more = noted(&[0xC0, 0x08, 0x83, 0, 0, 1, 0]).expect("more");
         assert_eq!(more, "1 octets of user parameters more than the GSD has");
         assert_eq!(UserParameters::default().check(&[1, 2, 3]), Ok(None));
+    }
+
+    #[test]
+    fn the_defaults_are_accepted_whatever_the_file_allows() {
+        let range = parameter("range", bits(0, 1), 3, Allowed::Range(0, 1));
+        let beside = parameter("beside", bits(1, 2), 2, Allowed::Any);
+        for parameters in [vec![(0, Arc::clone(&range))], vec![(0, range), (0, beside)]] {
+            let block = ParameterBlock {
+                length: 1,
+                constants: vec![],
+                parameters,
+            };
+            let mut own = UserParameters::default();
+            own.push(None, &Arc::new(block));
+            assert_eq!(own.check(own.defaults()), Ok(None));
+            assert!(own.check(&[2]).is_err());
+        }
     }
 
     #[test]

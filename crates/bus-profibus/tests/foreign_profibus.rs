@@ -28,7 +28,7 @@ use tickbus_fieldbus::LinkState;
 const ADDRESS: u8 = 8;
 const IDENT: u16 = 0x80E0;
 
-/// What a PLC's tool sends to remote_io.gsd with its first three modules.
+/// What a PLC's tool sends to `remote_io.gsd` with its first three modules.
 const REMOTE_IO_PARAMETERS: [u8; 10] = [0xC0, 0, 0, 0, 0, 0x11, 0xFF, 0xFF, 0xFF, 0xFE];
 
 /// The kind for the rig, on this port.
@@ -380,6 +380,10 @@ fn many_stations_of_different_devices_share_a_line() {
             );
         }
     }
+    // All others have the address in the image.
+    let at = "[fieldbus.at]\n\"from 20\" = \"slot 2 %IW0\"\n\"to 20\" = \"slot 3 %QW0\"\n";
+    text.push_str(at);
+    let low = |address| if address == 20 { 1 } else { 3 };
     let path = folder.path().join("driver.cfg");
     std::fs::write(&path, &text).expect("a file");
     let mut device = open(&path);
@@ -408,13 +412,13 @@ fn many_stations_of_different_devices_share_a_line() {
     for round in [1_u8, 2] {
         for (number, (address, _)) in (1..).zip(stations) {
             device.set(&format!("from {address}"), f64::from(10 * round + number));
-            master.all()[usize::from(number) - 1].outputs[3] = 20 * round + number;
+            master.all()[usize::from(number) - 1].outputs[low(address)] = 20 * round + number;
         }
         until(&mut device, "each station has its own values", |device| {
             let seen: Vec<Seen> = master.all().clone();
             (1..).zip(stations).all(|(number, (address, _))| {
                 let came = &seen[usize::from(number) - 1].inputs;
-                came.get(3) == Some(&(10 * round + number))
+                came.get(low(address)) == Some(&(10 * round + number))
                     && device.get(&format!("to {address}")) == f64::from(20 * round + number)
             })
         });

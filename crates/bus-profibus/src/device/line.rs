@@ -7,9 +7,9 @@ use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::{LineOptions, Machine, Stations};
+use super::{LineOptions, Machine, StationSetup, Stations};
 use crate::segment::{Segment, Taken};
-use crate::station::{Identity, Station};
+use crate::station::Station;
 
 /// Serves the stations until `stop`.
 ///
@@ -18,20 +18,20 @@ use crate::station::{Identity, Station};
 /// The serial port does not exist, or is gone, or an address is taken.
 pub(super) fn serve(
     options: &LineOptions,
-    identities: &[(u8, Identity)],
+    setups: &[StationSetup],
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
     let mut call = Call::new(open(&options.device, options.settings)?);
     port.tell("device", &options.device);
     port.opening(&format!("listening on {}", options.device));
-    let stations = identities
+    let stations = setups
         .iter()
-        .map(|(address, identity)| Station::new(*address, identity.clone()));
+        .map(|setup| Station::new(setup.address, setup.identity.clone()));
     let mut line = Line {
         options,
         segment: Segment::new(options.settings.baud, stations.collect()),
-        stations: Stations::new(identities.iter().map(|(address, _)| *address)),
+        stations: Stations::new(setups, port),
         reply: Vec::new(),
         written: 0,
         not_before: Nanos(0),

@@ -60,15 +60,17 @@ pub enum Device {
     },
 }
 
-/// Whether signals of these sizes fit into the modules, or into any station.
+/// Whether signals of these sizes fit into the modules, or into any station. An area in which signals have places of
+/// their own is checked with those.
 pub(super) fn check_sizes(
     configuration: Option<&Configuration>,
     signals: &signal::Station,
+    has_places: [bool; 2],
 ) -> Result<(), Mistake> {
     let limits = configuration.map_or([DATA_LIMIT; 2], |own| [own.inputs(), own.outputs()]);
     let sizes = [("%I", signals.input_bytes), ("%Q", signals.output_bytes)];
-    for ((area, size), limit) in sizes.into_iter().zip(limits) {
-        if size > limit {
+    for (((area, size), limit), has_places) in sizes.into_iter().zip(limits).zip(has_places) {
+        if size > limit && !has_places {
             let right = if configuration.is_some() {
                 "give it more modules, or the signals lower addresses"
             } else {
@@ -91,19 +93,35 @@ impl StationOptions {
         match &self.device {
             Device::Gsd { file, modules } => {
                 let gsd = read_gsd(&folder.join(file)).map_err(|mistake| (self.gsd_at, mistake))?;
-                let identity = gsd.identity(modules).and_then(|identity| {
-                    check_sizes(Some(&identity.configuration), signals)?;
-                    Ok(identity)
-                });
-                identity.map_err(|Mistake { what, right }| {
-                    let what = format!("station {}: {what}", self.address);
-                    (self.modules_at, Mistake::new(what, right))
-                })
+                gsd.identity(modules)
+                    .map_err(|mistake| self.of_modules(mistake))
             }
             Device::Plain {
                 ident,
                 configuration,
             } => Ok(plain(*ident, configuration.as_ref(), signals)),
+        }
+    }
+}
+
+impl StationOptions {
+    /// A mistake in what the modules of its GSD file are.
+    fn of_modules(&self, Mistake { what, right }: Mistake) -> (usize, Mistake) {
+        let what = format!("station {}: {what}", self.address);
+        (self.modules_at, Mistake::new(what, right))
+    }
+
+    /// Whether its signals fit into the modules of its GSD file; the sizes of others are checked without any file.
+    pub(super) fn check_modules(
+        &self,
+        identity: &Identity,
+        signals: &signal::Station,
+        has_places: [bool; 2],
+    ) -> Result<(), (usize, Mistake)> {
+        match self.device {
+            Device::Gsd { .. } => check_sizes(Some(&identity.configuration), signals, has_places)
+                .map_err(|mistake| self.of_modules(mistake)),
+            Device::Plain { .. } => Ok(()),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! GSD files: which device a station is, by its maker.
 //!
 //! The reader is our own: crate `gsd-parser` 0.6 panics on a file that refers to a parameter which it does not define,
-//! refuses blocks such as `X_Unit_Diag_Area`, and does not tell lengths of parameters, DPV1 and the slave interval.
+//! refuses 34 of 583 files of a maker's catalogue, which this one reads, and puts wrong bits beside a `BitArea`.
 //!
 //! Keywords that say nothing to a slave are skipped, and so are the keywords of safety modules (`F_…`).
 

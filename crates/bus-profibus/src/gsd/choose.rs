@@ -70,7 +70,10 @@ impl Gsd {
     }
 
     fn modules(&self, chosen: &[String]) -> Result<Vec<&Module>, Mistake> {
-        let modules: Vec<&Module> = if chosen.is_empty() && !self.modular {
+        let most = self.max_module.unwrap_or(usize::MAX);
+        // Of the modules of a device that has room for some of them alone, they are chosen in any case.
+        let are_fixed = !self.modular && self.modules.len() <= most;
+        let modules: Vec<&Module> = if chosen.is_empty() && are_fixed {
             self.modules.iter().collect()
         } else {
             let names = (1..).zip(chosen);
@@ -83,9 +86,7 @@ impl Gsd {
             let right = format!("write their names, such as modules = [{}]", self.proposal());
             return Err(Mistake::new(what, right));
         }
-        if let Some(most) = self.max_module
-            && modules.len() > most
-        {
+        if modules.len() > most {
             return Err(Mistake::new(
                 format!("there are {} modules", modules.len()),
                 format!("\"{}\" has at most {most}", shown(&self.model)),

@@ -132,10 +132,10 @@ fn reads() -> Result<(), Absent> {
         .identity(&modules);
         let identity = identity.expect("its modules");
         let hex = |octets: &[u8]| {
-            octets
-                .iter()
-                .map(|octet| format!("{octet:02x}"))
-                .collect::<String>()
+            octets.iter().fold(String::new(), |mut text, octet| {
+                write!(text, "{octet:02x}").expect("a String takes all");
+                text
+            })
         };
         let mut ours = format!(
             "ident {:04x}\nconfig {}\n",

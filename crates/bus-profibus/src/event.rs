@@ -63,7 +63,7 @@ impl fmt::Display for Leaving {
         match self {
             Self::Parameters { master, why } => write!(
                 f,
-                "master {master} sent parameters of another device: {why}; take the same GSD in both projects"
+                "master {master} sent wrong parameters: {why}; take the same GSD in both projects"
             ),
             Self::Configuration { master, why } => write!(
                 f,

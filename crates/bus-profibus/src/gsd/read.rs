@@ -14,8 +14,12 @@ use crate::user_parameters::{Allowed, LIMIT, Parameter, ParameterBlock, Paramete
 /// The most values, modules of a slot, and the like in one list.
 const LIST_LIMIT: usize = 4096;
 
-/// Blocks that say nothing to a slave; each ends at its keyword with "End" or "End_" before it.
-const SKIPPED: [&str; 3] = ["unitdiagtype", "physical_interface", "jokerblock_type"];
+/// Blocks that say nothing to a slave, each with its end.
+const SKIPPED: [(&str, &str); 3] = [
+    ("unitdiagtype", "EndUnitDiagType"),
+    ("physical_interface", "End_Physical_Interface"),
+    ("jokerblock_type", "End_Jokerblock_Type"),
+];
 
 /// The parameters of a device or a module, as far as they are read.
 #[derive(Default)]
@@ -106,11 +110,12 @@ impl Reader<'_> {
             "extuserprmdata" => self.parameter(line, values)?,
             "module" => self.module(line, values)?,
             "slot" => self.slot(index, values)?,
-            key if SKIPPED.contains(&key) => {
-                let end = [format!("end{key}"), format!("end_{key}")];
-                while !end.contains(&self.inner(line, &format!("End_{key}"))?.setting().0) {}
-            }
-            key => self.rate(key, values)?,
+            key => match SKIPPED.iter().find(|(block, _)| *block == key) {
+                Some((_, end)) => {
+                    while !self.inner(line, end)?.setting().0.eq_ignore_ascii_case(end) {}
+                }
+                None => self.rate(key, values)?,
+            },
         }
         Ok(())
     }

@@ -296,7 +296,7 @@ fn mistakes_name_the_line() {
         ),
         (
             "UnitDiagType=3\n\n",
-            "line 4: the block that begins here has no \"End_unitdiagtype\"",
+            "line 4: the block that begins here has no \"EndUnitDiagType\"",
         ),
         ("Module=a 0x50", "line 4: there is no text in quotes"),
         ("Slot(1)=\"x\" 1 0-", "line 4: the line ends too early"),

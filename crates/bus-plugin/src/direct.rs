@@ -3,12 +3,10 @@
 use std::sync::Arc;
 
 use super::Limits;
-use super::cycle::{self, Exchange};
 use super::library::{Bus, Library};
-use super::outcome::Outcome;
 use super::setup::Setup;
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::{BusError, Free, Port};
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::{BusError, Exchange, Exchanged, Free, Port};
 
 /// Calls the library on the bus thread.
 #[derive(Debug)]
@@ -49,44 +47,15 @@ impl Direct {
     }
 }
 
-/// How often a call in progress is checked.
-const LOOK: Nanos = Nanos::from_millis(250);
-
 impl Free for Direct {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        let cannot =
-            |error: std::io::Error| BusError::Link(format!("the system refused a thread: {error}"));
-        // A call that does not return cannot report itself. Its watchdog uses the system's time, whatever
-        // clock the driver has, and is left behind with the bus thread if need be.
-        let real = Monotonic::shared();
-        let (watch, over) = (port.call_watch(), Stop::new());
-        std::thread::scope(|scope| {
-            std::thread::Builder::new()
-                .name(format!("watch {}", self.setup.name))
-                .spawn_scoped(scope, || {
-                    while !over.is_stopped() {
-                        real.wait_until(real.now() + LOOK, &over);
-                        watch.look();
-                    }
-                })
-                .map_err(cannot)?;
-            let _end = StopOnDrop(&over);
-            self.run_watched(port, stop)
-        })
+        let name = self.setup.name.clone();
+        port.watching_calls(&name, |port| self.run_watched(port, stop))
     }
 
     fn close_timeout(&self) -> Nanos {
         // A call in progress may use its time first.
         self.setup.timeout() + self.limits.close
-    }
-}
-
-/// Ends the watchdog even if the bus panics.
-struct StopOnDrop<'a>(&'a Stop);
-
-impl Drop for StopOnDrop<'_> {
-    fn drop(&mut self) {
-        self.0.stop();
     }
 }
 
@@ -109,7 +78,7 @@ impl Direct {
             call: &calls.exchange,
             limit: setup.timeout() + limits.call,
         };
-        let ended = cycle::serve(&mut line, setup, port, stop);
+        let ended = setup.cycles().serve(&mut line, port, stop);
         port.calling(&calls.close, limits.close, || drop(line));
         if stop.is_stopped() {
             // Here, while the watchdog is running: unloading also runs code of the library.
@@ -133,9 +102,9 @@ impl Exchange for OpenBus<'_> {
         self.bus.input()
     }
 
-    fn exchange(&mut self, port: &Port, _stop: &Stop) -> Result<Option<Outcome>, BusError> {
+    fn exchange(&mut self, port: &Port, _stop: &Stop) -> Result<Exchanged, BusError> {
         let call = || self.bus.exchange(self.timeout_ms);
-        port.calling(self.call, self.limit, call).map(Some)
+        Ok(port.calling(self.call, self.limit, call)?.exchanged())
     }
 
     fn output(&self) -> &[u8] {

@@ -14,16 +14,14 @@ use std::sync::Arc;
 use rustix::process::Signal;
 
 use super::answer::Answer;
-use super::cycle::{self, Exchange};
 use super::helper::{memory_bytes, out_word};
-use super::outcome::Outcome;
 use super::request::Request;
 use super::setup::Setup;
 use super::wire::{Inbox, Message as _};
 use super::{Limits, VERSION};
 use tickbus_base::os::{Interest, PollSet, SharedMemory};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::{BusError, Free, Port};
+use tickbus_fieldbus::{BusError, Exchange, Exchanged, Free, Port};
 
 /// How long a helper may take to end after it was killed.
 const END: Nanos = Nanos::from_secs(1);
@@ -75,7 +73,7 @@ impl Free for Isolated {
             call: &self.exchange,
             limit: setup.timeout() + self.limits.call,
         };
-        let ended = cycle::serve(&mut line, setup, port, stop);
+        let ended = setup.cycles().serve(&mut line, port, stop);
         port.calling(&self.close, self.close_timeout(), || drop(line));
         ended
     }
@@ -101,7 +99,7 @@ impl Exchange for OpenBus<'_> {
         &mut self.input
     }
 
-    fn exchange(&mut self, port: &Port, stop: &Stop) -> Result<Option<Outcome>, BusError> {
+    fn exchange(&mut self, port: &Port, stop: &Stop) -> Result<Exchanged, BusError> {
         let helper = &mut self.helper;
         helper.memory.write(0, &self.input);
         let asked = port.calling(self.call, self.limit, || {
@@ -109,14 +107,14 @@ impl Exchange for OpenBus<'_> {
             helper.ask(Some(&Request::Exchange), what, self.limit, stop)
         });
         let outcome = match asked? {
-            None => return Ok(None),
+            None => return Ok(Exchanged::Stopped),
             Some(Answer::Done(outcome)) => outcome,
             Some(other) => return Err(helper.out_of_turn(&other)),
         };
         if outcome.is_fresh() {
             helper.memory.read(out_word(self.setup), &mut self.output);
         }
-        Ok(Some(outcome))
+        Ok(outcome.exchanged())
     }
 
     fn output(&self) -> &[u8] {

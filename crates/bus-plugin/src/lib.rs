@@ -7,7 +7,6 @@
 mod abi;
 #[cfg(unix)]
 mod answer;
-mod cycle;
 mod direct;
 #[cfg(unix)]
 mod helper;

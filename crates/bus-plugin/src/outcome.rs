@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::abi::{error, flag};
-use tickbus_fieldbus::BusError;
+use tickbus_fieldbus::{BusError, Exchanged};
 
 /// The result of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,6 +35,15 @@ impl Outcome {
     /// The peer gave any sign of life.
     pub fn is_alive(self) -> bool {
         self != Self::NOTHING
+    }
+
+    /// What came of its exchange.
+    pub(super) fn exchanged(self) -> Exchanged {
+        Exchanged::Data {
+            is_taken: self.is_taken(),
+            is_fresh: self.is_fresh(),
+            is_alive: self.is_alive(),
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Options;
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::{BusSetup, CYCLE, Role};
+use tickbus_fieldbus::{BusSetup, CYCLE, Cycles, Role};
 use tickbus_image::signal::Area;
 
 /// The smallest default time-out of an exchange.
@@ -98,8 +98,13 @@ impl Setup {
         bytes.sum()
     }
 
-    pub(super) fn cycle(&self) -> Nanos {
-        Nanos(i64::try_from(self.cycle_ns).unwrap_or(i64::MAX))
+    /// How exchanges are paced.
+    pub(super) fn cycles(&self) -> Cycles {
+        Cycles {
+            cycle: Nanos(i64::try_from(self.cycle_ns).unwrap_or(i64::MAX)),
+            timeout: self.timeout(),
+            slow: "plugin.slow_calls",
+        }
     }
 
     pub(super) fn timeout(&self) -> Nanos {

@@ -9,6 +9,7 @@
 
 pub mod resources;
 pub mod rig;
+pub mod standin;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_bus_hilscher as hilscher;
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
 use tickbus_bus_plugin as plugin;
@@ -117,6 +118,8 @@ kinds! {
     by_hand:
     /// `kind = "profibus-device"`: DP slaves in software on a serial line.
     ProfibusDevice(profibus::Options),
+    /// `kind = "hilscher-cifx"`: a cifX or netX card.
+    HilscherCifx(hilscher::cifx::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
     /// `kind = "mailbox"`: the example of `examples/bus-mailbox`.
@@ -125,13 +128,7 @@ kinds! {
 }
 
 /// Bus kinds that a later version will have.
-const PLANNED: [&str; 5] = [
-    "hilscher-cif",
-    "hilscher-cifx",
-    "interbus-ddi",
-    "sdsp",
-    "dispatcher",
-];
+const PLANNED: [&str; 4] = ["hilscher-cif", "interbus-ddi", "sdsp", "dispatcher"];
 
 impl Options {
     /// The recording that replaces the peer, as named in the driver.cfg.

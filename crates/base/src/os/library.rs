@@ -6,12 +6,14 @@ use std::path::Path;
 
 use libloading::Library as Loaded;
 
+use crate::Mistake;
+
 /// A shared library, loaded into this process; dropping it unloads it.
 #[derive(Debug)]
 pub struct Library(Loaded);
 
 impl Library {
-    /// Loads the library at `path`. Its initialisers run: the caller vouches for the file, as for any program
+    /// Loads the library at `path`; a name without a folder is searched for as the system does it. Its initialisers run: the caller vouches for the file, as for any program
     /// that they start. All symbols that it imports are resolved at once, so that a missing one is an error
     /// here and not a crash later; its exports are not visible to other libraries.
     ///
@@ -38,11 +40,66 @@ impl Library {
         found.map(|found| *found).map_err(|error| words(&error))
     }
 
+    /// The function of a vendor's library under one of these names, for [`vendor_functions!`](crate::vendor_functions).
+    ///
+    /// # Errors
+    ///
+    /// There is none of them: the first name, and what to do.
+    ///
+    /// # Safety
+    ///
+    /// As [`symbol`](Self::symbol), for each name.
+    pub unsafe fn function<T: Copy>(&self, names: &[&str]) -> Result<T, Mistake> {
+        // SAFETY: the caller answers for the type.
+        let mut found = names.iter().map(|name| unsafe { self.symbol::<T>(name) });
+        found.find_map(Result::ok).ok_or_else(|| {
+            Mistake::new(
+                format!("it does not export {}", names[0]),
+                "name the vendor's own library in `library`, in a version for this program's system and word size",
+            )
+        })
+    }
+
     /// Whether it exports this symbol.
     pub fn has(&self, name: &str) -> bool {
         // SAFETY: any symbol is an address, and nothing is done with it.
         unsafe { self.symbol::<*const ()>(name) }.is_ok()
     }
+}
+
+/// Declares a struct of the functions of a vendor's library, with `load`, which finds all of them; further names of a
+/// function are tried in their order. The struct keeps the library loaded.
+///
+/// The file that uses it answers for the types, so it is one that may have unsafe code.
+#[macro_export]
+macro_rules! vendor_functions {
+    ($(#[$doc:meta])* struct $name:ident { $($field:ident: $type:ty = $($symbol:literal)or+,)+ }) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        struct $name {
+            $($field: $type,)+
+            #[expect(dead_code, reason = "kept loaded for its functions")]
+            loaded: $crate::os::Library,
+        }
+
+        impl $name {
+            /// Loads the library at `path`.
+            fn load(path: &std::path::Path) -> Result<Self, $crate::Mistake> {
+                let loaded = $crate::os::Library::load(path).map_err(|error| {
+                    $crate::Mistake::new(
+                        format!("it cannot be loaded: {error}"),
+                        "install the vendor's driver, or name its library in `library`; check that it is made for \
+                         this system, and that the libraries it needs are there",
+                    )
+                })?;
+                Ok(Self {
+                    // SAFETY: the types are those of the vendor's header, and the struct keeps the library loaded.
+                    $($field: unsafe { loaded.function(&[$($symbol),+]) }?,)+
+                    loaded,
+                })
+            }
+        }
+    };
 }
 
 #[cfg(unix)]
@@ -56,8 +113,14 @@ fn open(path: &Path) -> Result<Loaded, libloading::Error> {
 #[cfg(windows)]
 fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // SAFETY: as on other systems. Libraries that it imports are also looked for in its own folder.
-    unsafe { Library::load_with_flags(path, LOAD_WITH_ALTERED_SEARCH_PATH) }.map(Into::into)
+    // Libraries that it imports are also looked for in its own folder; one without a folder is looked for itself.
+    let flags = if path.is_absolute() {
+        LOAD_WITH_ALTERED_SEARCH_PATH
+    } else {
+        0
+    };
+    // SAFETY: as on other systems.
+    unsafe { Library::load_with_flags(path, flags) }.map(Into::into)
 }
 
 fn words(error: &libloading::Error) -> String {

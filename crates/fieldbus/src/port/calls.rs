@@ -2,12 +2,56 @@
 
 use std::sync::Arc;
 
-use tickbus_base::time::{Clock, Nanos};
+use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 
 use super::Port;
-use crate::LinkStatus;
+use crate::{BusError, LinkStatus};
+
+/// How often a call in progress is checked.
+const LOOK: Nanos = Nanos::from_millis(250);
 
 impl Port {
+    /// Runs `bus` while another thread watches its [calls](Self::calling): one that does not return cannot report
+    /// itself. `name` is that of the driver.
+    ///
+    /// # Errors
+    ///
+    /// Those of `bus`, or the system refuses the thread.
+    pub fn watching_calls(
+        &mut self,
+        name: &str,
+        bus: impl FnOnce(&mut Self) -> Result<(), BusError>,
+    ) -> Result<(), BusError> {
+        /// Ends the watch even if the bus panics.
+        struct StopOnDrop<'a>(&'a Stop);
+
+        impl Drop for StopOnDrop<'_> {
+            fn drop(&mut self) {
+                self.0.stop();
+            }
+        }
+
+        let cannot =
+            |error: std::io::Error| BusError::Link(format!("the system refused a thread: {error}"));
+        // The watch uses the system's time, whatever clock the driver has, and is left behind with the bus thread
+        // if need be.
+        let real = Monotonic::shared();
+        let (watch, over) = (self.call_watch(), Stop::new());
+        std::thread::scope(|scope| {
+            std::thread::Builder::new()
+                .name(format!("watch {name}"))
+                .spawn_scoped(scope, || {
+                    while !over.is_stopped() {
+                        real.wait_until(real.now() + LOOK, &over);
+                        watch.look();
+                    }
+                })
+                .map_err(cannot)?;
+            let _end = StopOnDrop(&over);
+            bus(self)
+        })
+    }
+
     /// Lets another thread supervise the [calls](Self::calling) of this one.
     pub fn call_watch(&self) -> CallWatch {
         CallWatch {

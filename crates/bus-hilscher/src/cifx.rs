@@ -1,0 +1,250 @@
+//! The bus `hilscher-cifx`: cifX and netX cards.
+
+mod errors;
+mod information;
+mod library;
+
+pub use errors::ERRORS;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::Table;
+use tickbus_fieldbus::{
+    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Meaning,
+    Moved, OpenError, Port, Role, Vendor, Verdict,
+};
+use tickbus_image::signal::SignalTable;
+
+use crate::timeout::{millis, read};
+use errors::failing;
+use library::{Channel, Driver, Library, NAME, OFF, ON};
+
+/// How long the card may take to note that this program is ready or not, and to switch its bus off.
+const STATE: Nanos = Nanos::from_secs(1);
+
+/// The longest name of a board, as the driver has them.
+const BOARD_LIMIT: usize = 15;
+
+/// The options of the bus `hilscher-cifx`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Library, places and watchdog.
+    pub card: CardOptions,
+    /// The board's name or alias.
+    pub board: String,
+    /// Its channel.
+    pub channel: u32,
+    /// How long the card may take to hand over the process data.
+    pub io_timeout: Nanos,
+    /// How long opening waits for the bus to communicate.
+    pub bus_on_timeout: Nanos,
+}
+
+impl BusKind for Options {
+    const NAME: &'static str = "hilscher-cifx";
+
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        let board = table.take("board");
+        let channel = table.take("channel");
+        let io_timeout = table.take("io_timeout");
+        let bus_on_timeout = table.take("bus_on_timeout");
+        let card = CardOptions::read(table, Some(NAME));
+        let board = board.map_or(Some("cifX0"), |value| {
+            value.label(
+                BOARD_LIMIT,
+                "name the board as the vendor's tools do, such as \"cifX0\"",
+            )
+        });
+        let channel = channel.map_or(Some(0), |value| value.whole(0..=5));
+        let io_timeout = read(io_timeout, Nanos::from_millis(10));
+        let bus_on_timeout = read(bus_on_timeout, Nanos::from_secs(10));
+        Some(Self {
+            card: card?,
+            board: board?.to_owned(),
+            channel: u32::try_from(channel?).ok()?,
+            io_timeout: io_timeout?,
+            bus_on_timeout: bus_on_timeout?,
+        })
+    }
+}
+
+impl BusOptions for Options {
+    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
+        let mut parts = vec![format!("board {} channel {}", self.board, self.channel)];
+        parts.extend(self.card.summary(Some(NAME), role, table));
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let path = self.card.library(NAME, setup.folder)?;
+        let driver = Cifx(self.clone());
+        Ok(Bus::Free(Box::new(CardBus::new(driver, path, setup))))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+}
+
+/// The way to the card that the options name.
+struct Cifx(Options);
+
+impl Vendor for Cifx {
+    const COUNTERS: [&'static str; 3] = [
+        "hilscher-cifx.slow_calls",
+        "hilscher-cifx.no_com",
+        "hilscher-cifx.again",
+    ];
+
+    type Library = Arc<Library>;
+
+    fn load(&self, path: &Path) -> Result<Self::Library, Mistake> {
+        Library::load(path)
+    }
+
+    fn open<'l>(
+        &self,
+        library: &'l Self::Library,
+        port: &Port,
+        _sizes: [usize; 2],
+    ) -> Result<Box<dyn Card + 'l>, BusError> {
+        let driver = Driver::open(library)?;
+        let mut card = OpenCard {
+            channel: Channel::open(driver, &self.0.board, self.0.channel)?,
+            is_ready: false,
+            is_on: false,
+            is_watched: false,
+            options: self.0.clone(),
+        };
+        // Only for people: a driver that cannot tell is no reason to stop.
+        if let Ok(information) = card.channel.information() {
+            port.tell("card", &information.to_string());
+            port.tell("card.state", &information.state());
+        }
+        card.start()?;
+        Ok(Box::new(card))
+    }
+
+    fn limits(&self) -> [Nanos; 2] {
+        // The driver for Linux looks for its cards at its start.
+        let start = Nanos::from_secs(10);
+        [
+            start + STATE + self.0.bus_on_timeout,
+            STATE.times(2) + Nanos::from_secs(2),
+        ]
+    }
+
+    fn timeout(&self) -> Nanos {
+        self.0.io_timeout.times(2)
+    }
+}
+
+/// An open channel, and how far it was started; dropping it goes back the same way.
+struct OpenCard<'l> {
+    channel: Channel<'l>,
+    is_ready: bool,
+    is_on: bool,
+    is_watched: bool,
+    options: Options,
+}
+
+impl OpenCard<'_> {
+    fn start(&mut self) -> Result<(), BusError> {
+        self.is_ready = true;
+        self.channel.host_state(ON, millis(STATE))?;
+        self.is_on = true;
+        let timeout = millis(self.options.bus_on_timeout);
+        match self.channel.bus_state(ON, timeout) {
+            // Its bus may come up later.
+            Err(failing) if failing.verdict == Verdict::NoPeer => {}
+            other => other?,
+        }
+        self.is_watched = self.options.card.watchdog;
+        self.trigger()
+    }
+
+    /// Triggers the card's watchdog, if there is one.
+    fn trigger(&self) -> Result<(), BusError> {
+        if !self.is_watched {
+            return Ok(());
+        }
+        match self.channel.watchdog(ON) {
+            0 => Ok(()),
+            code => Err(failing("xChannelWatchdog", code).into()),
+        }
+    }
+}
+
+/// What a code says of data that were to be moved.
+enum Answer {
+    Moved,
+    Again(&'static Meaning),
+    NoPeer(&'static str),
+}
+
+impl Answer {
+    fn of(function: &str, code: u32) -> Result<Self, BusError> {
+        match Meaning::of(ERRORS, code) {
+            _ if code == 0 => Ok(Self::Moved),
+            Some(Meaning {
+                verdict: Verdict::NoPeer,
+                words,
+                ..
+            }) => Ok(Self::NoPeer(words)),
+            Some(meaning) if meaning.verdict == Verdict::Again => Ok(Self::Again(meaning)),
+            _ => Err(failing(function, code).into()),
+        }
+    }
+}
+
+impl Card for OpenCard<'_> {
+    fn exchange(
+        &mut self,
+        _now: Nanos,
+        output: &[u8],
+        input: &mut [u8],
+    ) -> Result<Moved, BusError> {
+        let Options {
+            card, io_timeout, ..
+        } = &self.options;
+        let timeout = millis(*io_timeout);
+        self.trigger()?;
+        let (mut out, mut back, mut again) = (false, false, None);
+        let mut no_peer = None;
+        let mut note = |answer: Answer, moved: &mut bool| match answer {
+            Answer::Moved => *moved = true,
+            Answer::Again(meaning) => again = Some(meaning),
+            Answer::NoPeer(words) => no_peer = Some(words),
+        };
+        if !output.is_empty() {
+            let code = self.channel.write(card.write_offset, output, timeout);
+            note(Answer::of("xChannelIOWrite", code)?, &mut out);
+        }
+        if !input.is_empty() {
+            let code = self.channel.read(card.read_offset, input, timeout);
+            note(Answer::of("xChannelIORead", code)?, &mut back);
+        }
+        Ok(match no_peer {
+            Some(words) => Moved::NoPeer(words),
+            None => Moved::Data { out, back, again },
+        })
+    }
+}
+
+impl Drop for OpenCard<'_> {
+    fn drop(&mut self) {
+        // What fails now has failed before, or the card is gone: the rest is closed all the same.
+        if self.is_watched {
+            self.channel.watchdog(OFF);
+        }
+        if self.is_on {
+            let _ = self.channel.bus_state(OFF, millis(STATE));
+        }
+        if self.is_ready {
+            let _ = self.channel.host_state(OFF, millis(STATE));
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Stand-ins for vendors' libraries: shared libraries that are built from C, record their calls, and do what a script
+//! says. `tests/plugins/standin.h` is their other half.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tempfile::TempDir;
+use tickbus_base::time::Manual;
+
+use crate::rig::{CYCLE, End, await_that};
+
+/// The libraries built so far, by source and switches.
+static BUILT: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
+
+/// A stand-in of one's own, in a folder of its own.
+pub struct StandIn {
+    folder: TempDir,
+    library: PathBuf,
+}
+
+impl StandIn {
+    /// Builds `tests/plugins/<source>` with these switches, under the file name `name`.
+    pub fn build(source: &str, switches: &[&str], name: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let library = folder.path().join(name);
+        let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes = built
+            .entry(format!("{source} {switches:?}"))
+            .or_insert_with(|| {
+                let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+                let cc = Command::new("cc")
+                    .args(["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror"])
+                    .args(["-fPIC", "-shared"])
+                    .args(switches)
+                    .arg("-I")
+                    .arg(root.join("include"))
+                    .arg("-o")
+                    .arg(&library)
+                    .arg(root.join("tests/plugins").join(source))
+                    .args(["-ldl", "-lpthread"])
+                    .output()
+                    .expect("a C compiler");
+                let told = String::from_utf8_lossy(&cc.stderr);
+                assert!(cc.status.success(), "{source}: {told}");
+                fs::read(&library).expect("it is built")
+            });
+        fs::write(&library, bytes).expect("it is written");
+        Self { folder, library }
+    }
+
+    /// The library's file.
+    pub fn library(&self) -> std::path::Display<'_> {
+        self.library.display()
+    }
+
+    /// A file beside it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Lets it do what these lines say from now on.
+    pub fn script(&self, lines: &str) {
+        // The library never reads half a script.
+        let (new, script) = (self.file("new"), self.file("script"));
+        fs::write(&new, lines).expect("the script is written");
+        fs::rename(new, script).expect("the script is there");
+    }
+
+    /// The calls so far; the same one again counts once.
+    pub fn calls(&self) -> Vec<String> {
+        let calls = fs::read_to_string(self.file("calls")).unwrap_or_default();
+        calls.lines().map(str::to_owned).collect()
+    }
+}
+
+/// Lets time pass until the line is in `state` for `cause`; returns the reason.
+#[track_caller]
+pub fn until(end: &mut End, clock: &Arc<Manual>, state: &str, cause: &str) -> String {
+    let mut reason = String::new();
+    await_that(&format!("{state}, {cause}"), || {
+        clock.advance(CYCLE);
+        end.tick();
+        let link = end.link();
+        reason = link.reason;
+        (link.state.name(), link.cause.name()) == (state, cause)
+    });
+    reason
+}

@@ -1,0 +1,382 @@
+//! Bus cards behind the libraries of their vendors: what they have in common.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_base::toml_text::Table;
+use tickbus_image::signal::SignalTable;
+
+use super::{BusError, BusSetup, CYCLE, Cycles, Exchange, Exchanged, Free, OpenError, Port, Role};
+
+/// The longest path of a library, in bytes.
+const PATH_LIMIT: usize = 4000;
+
+/// How long loading a library may take.
+const LOAD: Nanos = Nanos::from_secs(10);
+
+/// How much longer than its own time-out a call may take.
+const CALL: Nanos = Nanos::from_secs(1);
+
+/// What a driver.cfg says of any card.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CardOptions {
+    /// The library's file as written; `None` for the vendor's.
+    pub library: Option<PathBuf>,
+    /// The first byte that this end writes in what the card sends.
+    pub write_offset: u16,
+    /// The first byte that it reads in what the card receives.
+    pub read_offset: u16,
+    /// Whether the card watches that this end lives.
+    pub watchdog: bool,
+}
+
+impl CardOptions {
+    /// Reads `library`, `write_offset`, `read_offset` and `card_watchdog`. A `vendor` without a library for this system
+    /// needs the first.
+    pub fn read(table: &mut Table<'_>, vendor: Option<&str>) -> Option<Self> {
+        const RIGHT: &str = "name the file of the vendor's library";
+        let library = match vendor {
+            Some(_) => table.take("library"),
+            None => table.require("library", RIGHT),
+        };
+        let [write_offset, read_offset] =
+            ["write_offset", "read_offset"].map(|key| table.take(key));
+        let watchdog = table.take("card_watchdog");
+        let is_missing = library.is_none() && vendor.is_none();
+        let library = match library {
+            None => Some(None),
+            Some(value) => (value.label(PATH_LIMIT, RIGHT)).map(|path| Some(PathBuf::from(path))),
+        };
+        let [write_offset, read_offset] = [write_offset, read_offset].map(|value| {
+            let offset = value.map_or(Some(0), |value| value.whole(0..=65_535))?;
+            u16::try_from(offset).ok()
+        });
+        let watchdog = watchdog.map_or(Some(false), |value| value.boolean());
+        Some(Self {
+            library: library.filter(|_| !is_missing)?,
+            write_offset: write_offset?,
+            read_offset: read_offset?,
+            watchdog: watchdog?,
+        })
+    }
+
+    /// Parts of the line's summary: the library `vendor` unless another one is named, and the bytes used.
+    pub fn summary(&self, vendor: Option<&str>, role: Role, table: &SignalTable) -> Vec<String> {
+        let [writes, reads] = sizes(role, table);
+        let library = (self.library.as_deref()).unwrap_or(Path::new(vendor.unwrap_or_default()));
+        let mut parts = vec![
+            format!("library {}", library.display()),
+            format!("writes {writes} bytes from {}", self.write_offset),
+            format!("reads {reads} bytes from {}", self.read_offset),
+        ];
+        parts.extend(self.watchdog.then(|| "card watchdog".to_owned()));
+        parts
+    }
+
+    /// The library to load: `vendor`, which the system searches for, unless the driver.cfg names another one.
+    ///
+    /// # Errors
+    ///
+    /// The file that it names with its folder does not exist.
+    pub fn library(&self, vendor: &str, folder: &Path) -> Result<PathBuf, OpenError> {
+        let Some(named) = &self.library else {
+            return Ok(PathBuf::from(vendor));
+        };
+        if named.components().count() == 1 && !folder.join(named).is_file() {
+            return Ok(named.clone());
+        }
+        let joined = folder.join(named);
+        // Fails if the current folder was deleted; then the path stays relative.
+        let path = std::path::absolute(&joined).unwrap_or(joined);
+        if path.is_file() {
+            return Ok(path);
+        }
+        Err(OpenError::Config(Mistake::new(
+            format!("there is no library {}", path.display()),
+            "check `library`, which begins at the folder of the driver.cfg; a name alone is searched for by the system",
+        )))
+    }
+}
+
+/// Bytes that the end with `role` writes and reads.
+fn sizes(role: Role, table: &SignalTable) -> [usize; 2] {
+    let (writes, reads) = role.areas();
+    [writes, reads].map(|area| {
+        table
+            .stations
+            .iter()
+            .map(|station| station.bytes(area))
+            .sum()
+    })
+}
+
+/// What is to be made of an error code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The card works, but not its bus; data were moved all the same.
+    NoPeer,
+    /// Not this time; the next cycle tries again.
+    Again,
+    /// Something may be repaired: the line fails, and is opened again.
+    Broken,
+    /// The driver.cfg, or the card's configuration, has to be changed.
+    Refused,
+}
+
+/// An error code in the words of its vendor's table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Meaning {
+    /// The code.
+    pub code: u32,
+    /// Its name in the vendor's header.
+    pub name: &'static str,
+    /// What is to be made of it.
+    pub verdict: Verdict,
+    /// What happened; what to do.
+    pub words: &'static str,
+}
+
+impl Meaning {
+    /// The entry of `table` for `code`.
+    pub fn of(table: &'static [Self], code: u32) -> Option<&'static Self> {
+        table.iter().find(|meaning| meaning.code == code)
+    }
+}
+
+/// A function of the library that returned an error.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failing {
+    /// What is to be made of it.
+    pub verdict: Verdict,
+    /// The function, the code, its name and its words.
+    pub text: String,
+}
+
+impl Failing {
+    /// `function` returned a code, which is `shown` so, and has this meaning, if any is known.
+    pub fn new(function: &str, shown: &str, meaning: Option<&Meaning>) -> Self {
+        match meaning {
+            Some(Meaning {
+                name,
+                verdict,
+                words,
+                ..
+            }) => Self {
+                verdict: *verdict,
+                text: format!("{function} returned {name} ({shown}): {words}"),
+            },
+            None => Self {
+                verdict: Verdict::Broken,
+                text: format!(
+                    "{function} returned {shown}, a code that tickbus does not know; see the vendor's manual"
+                ),
+            },
+        }
+    }
+}
+
+impl From<Failing> for BusError {
+    fn from(failing: Failing) -> Self {
+        match failing.verdict {
+            Verdict::Refused => Self::Refused(failing.text),
+            _ => Self::Link(failing.text),
+        }
+    }
+}
+
+/// What a card made of an exchange.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// Data were moved in these directions, if the bus communicates.
+    Data {
+        /// To the card.
+        out: bool,
+        /// From the card.
+        back: bool,
+        /// What is tried again in the next cycle.
+        again: Option<&'static Meaning>,
+    },
+    /// The bus does not communicate: why, and what to do.
+    NoPeer(&'static str),
+}
+
+/// An open card; dropping it closes it.
+pub trait Card {
+    /// Writes `output` to the card at `now`, and reads `input` from it.
+    ///
+    /// # Errors
+    ///
+    /// The card has to be opened again.
+    fn exchange(&mut self, now: Nanos, output: &[u8], input: &mut [u8]) -> Result<Moved, BusError>;
+}
+
+/// A library's way to its cards.
+pub trait Vendor: Send {
+    /// The counters: of calls that came back too late, of exchanges without a bus, and of such as are tried again.
+    const COUNTERS: [&'static str; 3];
+
+    /// A loaded library.
+    type Library: Send;
+
+    /// Loads the library at `path`.
+    ///
+    /// # Errors
+    ///
+    /// It is not there, or lacks a function.
+    fn load(&self, path: &Path) -> Result<Self::Library, Mistake>;
+
+    /// Opens the card, for so many bytes to write and to read, and tells `port` which card it is.
+    ///
+    /// # Errors
+    ///
+    /// A call failed; everything is closed again.
+    fn open<'l>(
+        &self,
+        library: &'l Self::Library,
+        port: &Port,
+        sizes: [usize; 2],
+    ) -> Result<Box<dyn Card + 'l>, BusError>;
+
+    /// How long opening and closing may take.
+    fn limits(&self) -> [Nanos; 2];
+
+    /// The time-out of an exchange.
+    fn timeout(&self) -> Nanos;
+}
+
+/// A bus that is a card of one vendor.
+pub struct CardBus<V: Vendor> {
+    vendor: V,
+    path: PathBuf,
+    name: String,
+    sizes: [usize; 2],
+    cycles: Cycles,
+    calls: [Arc<str>; 5],
+    /// Stays loaded between attempts: many libraries cannot be loaded twice in a process.
+    library: Option<V::Library>,
+}
+
+impl<V: Vendor> CardBus<V> {
+    /// The bus of the library at `path`, for `line`.
+    pub fn new(vendor: V, path: PathBuf, line: &BusSetup<'_>) -> Self {
+        let file = path.file_name().unwrap_or(path.as_os_str());
+        let file = file.to_string_lossy().into_owned();
+        let call = |what: &str| format!("{what} {file}").into();
+        Self {
+            cycles: Cycles {
+                cycle: line.cycle.unwrap_or(CYCLE),
+                timeout: vendor.timeout(),
+                slow: V::COUNTERS[0],
+            },
+            vendor,
+            calls: [
+                "loading",
+                "opening by",
+                "exchange by",
+                "closing by",
+                "unloading",
+            ]
+            .map(call),
+            path,
+            name: line.name.to_owned(),
+            sizes: sizes(line.role, line.table),
+            library: None,
+        }
+    }
+
+    fn run_watched(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let [load, open, exchange, close, unload] = &self.calls;
+        let [open_limit, close_limit] = self.vendor.limits();
+        port.tell("library", &self.path.to_string_lossy());
+        let library = match &mut self.library {
+            Some(library) => library,
+            none => {
+                let loaded = port.calling(load, LOAD, || self.vendor.load(&self.path));
+                none.insert(loaded.map_err(|Mistake { what, right }| {
+                    BusError::Link(format!(
+                        "the library {}: {what}; {right}",
+                        self.path.display()
+                    ))
+                })?)
+            }
+        };
+        let vendor = &self.vendor;
+        let card = port.calling(open, open_limit, || vendor.open(library, port, self.sizes))?;
+        let mut line = Line {
+            card,
+            output: vec![0; self.sizes[0]].into(),
+            input: vec![0; self.sizes[1]].into(),
+            call: exchange,
+            limit: self.cycles.timeout + CALL,
+            counters: V::COUNTERS,
+        };
+        let ended = self.cycles.serve(&mut line, port, stop);
+        port.calling(close, close_limit, || drop(line));
+        if stop.is_stopped() {
+            // Here, while calls are watched: unloading also runs code of the library.
+            let library = self.library.take();
+            port.calling(unload, close_limit, || drop(library));
+        }
+        ended
+    }
+}
+
+impl<V: Vendor> Free for CardBus<V> {
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let name = self.name.clone();
+        port.watching_calls(&name, |port| self.run_watched(port, stop))
+    }
+
+    fn close_timeout(&self) -> Nanos {
+        // Opening, which may be in progress, uses its time first.
+        let [open, close] = self.vendor.limits();
+        open + close + CALL
+    }
+}
+
+/// An open card, and the bytes of both directions.
+struct Line<'a> {
+    card: Box<dyn Card + 'a>,
+    output: Box<[u8]>,
+    input: Box<[u8]>,
+    call: &'a Arc<str>,
+    limit: Nanos,
+    counters: [&'static str; 3],
+}
+
+impl Exchange for Line<'_> {
+    fn input(&mut self) -> &mut [u8] {
+        &mut self.output
+    }
+
+    fn exchange(&mut self, port: &Port, _stop: &Stop) -> Result<Exchanged, BusError> {
+        let now = port.clock().now();
+        let call = || self.card.exchange(now, &self.output, &mut self.input);
+        let [_, no_peer, again_counter] = self.counters;
+        match port.calling(self.call, self.limit, call)? {
+            Moved::Data { out, back, again } => {
+                if let Some(again) = again {
+                    port.count(again_counter);
+                    let level = log::Level::Debug;
+                    let Meaning { name, words, .. } = again;
+                    port.log(level, "again", format_args!("{name}: {words}"));
+                }
+                Ok(Exchanged::Data {
+                    is_taken: out,
+                    is_fresh: back,
+                    is_alive: out || back,
+                })
+            }
+            Moved::NoPeer(why) => {
+                port.count(no_peer);
+                Ok(Exchanged::NoPeer(why))
+            }
+        }
+    }
+
+    fn output(&self) -> &[u8] {
+        &self.input
+    }
+}

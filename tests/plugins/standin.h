@@ -2,7 +2,8 @@
  *
  * Beside the library two files: `calls`, to which each call is added as a line (the same one again is left out), and
  * `script`, which a test writes: lines "FUNCTION CODE" or "FUNCTION hang". A function named there returns that code
- * instead of doing its work, or does not return while the line is there.
+ * instead of doing its work, or does not return while the line is there; "FUNCTION(ARGUMENT" stands for those of its
+ * calls that have this first argument.
  */
 #define _GNU_SOURCE
 
@@ -52,6 +53,7 @@ static int scripted(const char *function, long *code) {
 static int called(long *code, const char *function, const char *format, ...) {
     static char last[300];
     char arguments[200], line[300];
+    size_t first;
     va_list values;
     va_start(values, format);
     vsnprintf(arguments, sizeof arguments, format, values);
@@ -68,5 +70,7 @@ static int called(long *code, const char *function, const char *format, ...) {
     }
     pthread_mutex_unlock(&lock);
     *code = 0;
-    return scripted(function, code);
+    first = strcspn(line, ",)");
+    line[first] = 0;
+    return scripted(function, code) || scripted(line, code);
 }

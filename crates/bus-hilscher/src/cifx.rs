@@ -13,13 +13,14 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::{
-    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Meaning,
-    Moved, OpenError, Port, Role, Vendor, Verdict,
+    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Moved,
+    OpenError, Port, Role, Vendor, Verdict,
 };
 use tickbus_image::signal::SignalTable;
 
+use crate::answer::Answer;
 use crate::timeout::{millis, read};
-use errors::failing;
+use errors::{failing, moved};
 use library::{Channel, Driver, Library, NAME, OFF, ON};
 
 /// How long the card may take to note that this program is ready or not, and to switch its bus off.
@@ -178,28 +179,6 @@ impl OpenCard<'_> {
     }
 }
 
-/// What a code says of data that were to be moved.
-enum Answer {
-    Moved,
-    Again(&'static Meaning),
-    NoPeer(&'static str),
-}
-
-impl Answer {
-    fn of(function: &str, code: u32) -> Result<Self, BusError> {
-        match Meaning::of(ERRORS, code) {
-            _ if code == 0 => Ok(Self::Moved),
-            Some(Meaning {
-                verdict: Verdict::NoPeer,
-                words,
-                ..
-            }) => Ok(Self::NoPeer(words)),
-            Some(meaning) if meaning.verdict == Verdict::Again => Ok(Self::Again(meaning)),
-            _ => Err(failing(function, code).into()),
-        }
-    }
-}
-
 impl Card for OpenCard<'_> {
     fn exchange(
         &mut self,
@@ -221,11 +200,11 @@ impl Card for OpenCard<'_> {
         };
         if !output.is_empty() {
             let code = self.channel.write(card.write_offset, output, timeout);
-            note(Answer::of("xChannelIOWrite", code)?, &mut out);
+            note(moved("xChannelIOWrite", code)?, &mut out);
         }
         if !input.is_empty() {
             let code = self.channel.read(card.read_offset, input, timeout);
-            note(Answer::of("xChannelIORead", code)?, &mut back);
+            note(moved("xChannelIORead", code)?, &mut back);
         }
         Ok(match no_peer {
             Some(words) => Moved::NoPeer(words),

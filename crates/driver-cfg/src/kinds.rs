@@ -6,6 +6,7 @@ use std::path::Path;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_bus_hilscher as hilscher;
+use tickbus_bus_interbus as interbus;
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
 use tickbus_bus_plugin as plugin;
@@ -118,8 +119,12 @@ kinds! {
     by_hand:
     /// `kind = "profibus-device"`: DP slaves in software on a serial line.
     ProfibusDevice(profibus::Options),
+    /// `kind = "hilscher-cif"`: a card of the generation before.
+    HilscherCif(hilscher::cif::Options),
     /// `kind = "hilscher-cifx"`: a cifX or netX card.
     HilscherCifx(hilscher::cifx::Options),
+    /// `kind = "interbus-ddi"`: an INTERBUS controller board.
+    InterbusDdi(interbus::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
     /// `kind = "mailbox"`: the example of `examples/bus-mailbox`.
@@ -128,7 +133,7 @@ kinds! {
 }
 
 /// Bus kinds that a later version will have.
-const PLANNED: [&str; 4] = ["hilscher-cif", "interbus-ddi", "sdsp", "dispatcher"];
+const PLANNED: [&str; 2] = ["sdsp", "dispatcher"];
 
 impl Options {
     /// The recording that replaces the peer, as named in the driver.cfg.

@@ -210,6 +210,11 @@ pub trait Card {
     ///
     /// The card has to be opened again.
     fn exchange(&mut self, now: Nanos, output: &[u8], input: &mut [u8]) -> Result<Moved, BusError>;
+
+    /// The state of the card, if it has changed.
+    fn news(&mut self) -> Option<String> {
+        None
+    }
 }
 
 /// A library's way to its cards.
@@ -355,7 +360,11 @@ impl Exchange for Line<'_> {
         let now = port.clock().now();
         let call = || self.card.exchange(now, &self.output, &mut self.input);
         let [_, no_peer, again_counter] = self.counters;
-        match port.calling(self.call, self.limit, call)? {
+        let moved = port.calling(self.call, self.limit, call);
+        if let Some(state) = self.card.news() {
+            port.tell("card.state", &state);
+        }
+        match moved? {
             Moved::Data { out, back, again } => {
                 if let Some(again) = again {
                     port.count(again_counter);

@@ -148,4 +148,17 @@ mod tests {
         assert!(error.contains("/no/such/library"), "{error}");
         assert!(!error.contains('\n'), "{error}");
     }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_function_is_found_by_any_of_its_names_in_a_library_that_the_system_finds() {
+        let library = Library::load(Path::new("libc.so.6")).expect("it is there");
+        // SAFETY: nothing is done with the addresses.
+        let [other, none] = [&["_getpid@0", "getpid"][..], &["_getpid@0"]]
+            .map(|names| unsafe { library.function::<*const ()>(names) });
+        assert!(other.is_ok());
+        let right = "name the vendor's own library in `library`, in a version for this program's system and word size";
+        let mistake = Mistake::new("it does not export _getpid@0", right);
+        assert_eq!(none, Err(mistake));
+    }
 }

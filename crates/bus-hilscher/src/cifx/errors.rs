@@ -1,7 +1,9 @@
 //! The error codes of the cifX driver.
 
 use tickbus_fieldbus::Verdict::{Again, Broken, NoPeer, Refused};
-use tickbus_fieldbus::{Failing, Meaning, Verdict};
+use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
+
+use crate::answer::Answer;
 
 const fn row(code: u32, name: &'static str, verdict: Verdict, words: &'static str) -> Meaning {
     Meaning {
@@ -61,4 +63,10 @@ pub(crate) fn failing(function: &str, code: u32) -> Failing {
         &format!("0x{code:08X}"),
         Meaning::of(ERRORS, code),
     )
+}
+
+/// What `code` says of data that `function` was to move.
+pub(crate) fn moved(function: &str, code: u32) -> Result<Answer, BusError> {
+    let told = || failing(function, code);
+    Answer::of(code.cast_signed(), Meaning::of(ERRORS, code), told)
 }

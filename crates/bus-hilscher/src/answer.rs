@@ -1,0 +1,29 @@
+//! What an error code says of data that were to be moved.
+
+use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
+
+pub(crate) enum Answer {
+    Moved,
+    Again(&'static Meaning),
+    NoPeer(&'static str),
+}
+
+impl Answer {
+    /// That of `code` with this meaning; an error if the card has to be opened again, which `failing` tells.
+    pub(crate) fn of(
+        code: i32,
+        meaning: Option<&'static Meaning>,
+        failing: impl FnOnce() -> Failing,
+    ) -> Result<Self, BusError> {
+        match meaning {
+            _ if code == 0 => Ok(Self::Moved),
+            Some(Meaning {
+                verdict: Verdict::NoPeer,
+                words,
+                ..
+            }) => Ok(Self::NoPeer(words)),
+            Some(meaning) if meaning.verdict == Verdict::Again => Ok(Self::Again(meaning)),
+            _ => Err(failing().into()),
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! The bus `hilscher-cif`: the cards before cifX, by the vendor's driver for Windows.
+//!
+//! The old driver for Linux has functions of the same names with other parameters: it is not used here.
+
+mod errors;
+mod library;
+
+pub use errors::{ERRORS, meaning};
+
+use std::path::Path;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::Table;
+use tickbus_fieldbus::{
+    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Moved,
+    OpenError, Port, Role, Vendor, Verdict,
+};
+use tickbus_image::signal::SignalTable;
+
+use crate::answer::Answer;
+use crate::timeout::{millis, read};
+use errors::moved;
+use library::{Area, Board, Driver, Library};
+
+/// The vendor's library.
+const NAME: &str = "CIF32DLL.DLL";
+
+/// How long a reset may take.
+const RESET: Nanos = Nanos::from_secs(5);
+
+/// How long the card may take to note that this program is ready or not.
+const STATE: Nanos = Nanos::from_millis(200);
+
+/// The options of the bus `hilscher-cif`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Library, places and watchdog.
+    pub card: CardOptions,
+    /// The card's number.
+    pub device: u16,
+    /// How the card is reset when it is opened: the mode of the driver's call.
+    pub reset: u16,
+    /// How long the card may take to exchange the process data.
+    pub io_timeout: Nanos,
+}
+
+impl BusKind for Options {
+    const NAME: &'static str = "hilscher-cif";
+
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        let device = table.take("device");
+        let reset = table.take("reset");
+        let io_timeout = table.take("io_timeout");
+        let card = CardOptions::read(table, Some(NAME));
+        let device = device.map_or(Some(0), |value| value.whole(0..=3));
+        let modes = [("coldstart", 2), ("warmstart", 3)];
+        let reset = reset.map_or(Some(3), |value| value.choice("kinds of reset", &modes));
+        let io_timeout = read(io_timeout, Nanos::from_millis(100));
+        Some(Self {
+            card: card?,
+            device: u16::try_from(device?).ok()?,
+            reset: reset?,
+            io_timeout: io_timeout?,
+        })
+    }
+}
+
+impl BusOptions for Options {
+    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
+        let mut parts = vec![format!("device {}", self.device)];
+        parts.extend(self.card.summary(Some(NAME), role, table));
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        if cfg!(not(windows)) && self.card.library.is_none() {
+            return Err(OpenError::Unsupported(
+                "the driver behind \"hilscher-cif\" is for Windows alone; for a cifX card use \"hilscher-cifx\"".to_owned(),
+            ));
+        }
+        let path = self.card.library(NAME, setup.folder)?;
+        let driver = Cif(self.clone());
+        Ok(Bus::Free(Box::new(CardBus::new(driver, path, setup))))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+}
+
+/// The way to the card that the options name.
+struct Cif(Options);
+
+impl Vendor for Cif {
+    const COUNTERS: [&'static str; 3] = [
+        "hilscher-cif.slow_calls",
+        "hilscher-cif.no_com",
+        "hilscher-cif.again",
+    ];
+
+    type Library = Library;
+
+    fn load(&self, path: &Path) -> Result<Self::Library, Mistake> {
+        Library::load(path)
+    }
+
+    fn open<'l>(
+        &self,
+        library: &'l Library,
+        port: &Port,
+        sizes: [usize; 2],
+    ) -> Result<Box<dyn Card + 'l>, BusError> {
+        let board = Board::init(Driver::open(library, self.0.device)?)?;
+        if let Some(firmware) = board.information::<32>(Area::Firmware) {
+            let texts = [&firmware[..16], &firmware[16..]];
+            let texts = texts.map(|part| String::from_utf8_lossy(part).replace('\0', " "));
+            port.tell(
+                "card",
+                &format!("device {}, firmware {}", self.0.device, texts.join(" ")),
+            );
+        }
+        if let Some([kib, ..]) = board.information::<6>(Area::Device) {
+            self.check_sizes(kib, sizes)?;
+        }
+        let mut card = OpenCard {
+            board,
+            is_ready: false,
+            is_watched: false,
+            options: self.0.clone(),
+        };
+        card.start()?;
+        Ok(Box::new(card))
+    }
+
+    fn limits(&self) -> [Nanos; 2] {
+        [
+            RESET + STATE + Nanos::from_secs(2),
+            STATE + Nanos::from_secs(2),
+        ]
+    }
+
+    fn timeout(&self) -> Nanos {
+        self.0.io_timeout
+    }
+}
+
+impl Cif {
+    /// Whether the signals fit into a card with so many KiB of memory: all but the last of them are the two images.
+    fn check_sizes(&self, kib: u8, [writes, reads]: [usize; 2]) -> Result<(), BusError> {
+        let image = usize::from(kib).saturating_sub(1) * 1024 / 2;
+        let card = &self.0.card;
+        for (does, offset, bytes) in [
+            ("writes", card.write_offset, writes),
+            ("reads", card.read_offset, reads),
+        ] {
+            let end = usize::from(offset) + bytes;
+            if end > image {
+                return Err(BusError::Refused(format!(
+                    "this end {does} up to byte {end}, and the card has {image} bytes in each direction; check the \
+                     addresses of the signals, `write_offset` and `read_offset`"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A card, and how far it was started; dropping it goes back the same way.
+struct OpenCard<'l> {
+    board: Board<'l>,
+    is_ready: bool,
+    is_watched: bool,
+    options: Options,
+}
+
+impl OpenCard<'_> {
+    fn start(&mut self) -> Result<(), BusError> {
+        let is_up = |result: Result<(), tickbus_fieldbus::Failing>| match result {
+            // Its bus may come up later.
+            Err(failing) if failing.verdict == Verdict::NoPeer => Ok(()),
+            other => other,
+        };
+        is_up(self.board.reset(self.options.reset, millis(RESET)))?;
+        self.is_ready = true;
+        is_up(self.board.host_state(true, millis(STATE)))?;
+        self.is_watched = self.options.card.watchdog;
+        self.trigger()
+    }
+
+    /// Triggers the card's watchdog, if there is one.
+    fn trigger(&self) -> Result<(), BusError> {
+        if self.is_watched {
+            self.board.watchdog(true)?;
+        }
+        Ok(())
+    }
+}
+
+impl Card for OpenCard<'_> {
+    fn exchange(
+        &mut self,
+        _now: Nanos,
+        output: &[u8],
+        input: &mut [u8],
+    ) -> Result<Moved, BusError> {
+        let Options {
+            card, io_timeout, ..
+        } = &self.options;
+        self.trigger()?;
+        let offsets = [card.write_offset, card.read_offset];
+        let code = self
+            .board
+            .exchange(offsets, output, input, millis(*io_timeout));
+        Ok(match moved(code)? {
+            Answer::Moved => Moved::Data {
+                out: true,
+                back: true,
+                again: None,
+            },
+            Answer::Again(meaning) => Moved::Data {
+                out: false,
+                back: false,
+                again: Some(meaning),
+            },
+            Answer::NoPeer(words) => Moved::NoPeer(words),
+        })
+    }
+}
+
+impl Drop for OpenCard<'_> {
+    fn drop(&mut self) {
+        // What fails now has failed before, or the card is gone: the rest is closed all the same.
+        if self.is_watched {
+            let _ = self.board.watchdog(false);
+        }
+        if self.is_ready {
+            let _ = self.board.host_state(false, millis(STATE));
+        }
+    }
+}

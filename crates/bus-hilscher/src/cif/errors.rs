@@ -1,0 +1,134 @@
+//! The error codes of the CIF driver. Those that the vendor's header gives names have them; the others are described.
+
+use tickbus_fieldbus::Verdict::{Again, Broken, NoPeer, Refused};
+use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
+
+use crate::answer::Answer;
+
+const fn row(code: i32, name: &'static str, verdict: Verdict, words: &'static str) -> Meaning {
+    Meaning {
+        code: code.cast_unsigned(),
+        name,
+        verdict,
+        words,
+    }
+}
+
+const REPORT: &str =
+    "the driver refuses how tickbus calls it; report this with the driver's version";
+const SIZES: &str = "the signals reach beyond the card's process image; check their addresses, `write_offset` and `read_offset`";
+const STATE: &str = "the driver is in another state than its order of calls says; see whether another program uses the card";
+
+/// All codes that have a meaning of their own.
+#[rustfmt::skip]
+pub const ERRORS: &[Meaning] = &[
+    row(-1, "board not initialised", Broken, "the driver does not have this card; check `device`, and the card in the vendor's driver set-up"),
+    row(-2, "error in the init state", Broken, STATE),
+    row(-3, "error in the read state", Broken, STATE),
+    row(-4, "command active", Again, "another call uses the card; see whether another program does"),
+    row(-5, "parameter unknown", Broken, REPORT),
+    row(-6, "wrong driver version", Broken, "library and driver do not belong together; install both anew"),
+    row(-10, "error of access to the dual-port memory", Broken, "the card's memory cannot be reached; see whether the card was removed, and its address in the driver set-up"),
+    row(-11, "DEV_NOT_READY", Broken, "the card is not ready; it starts, or has no firmware"),
+    row(-12, "NOT_RUNNING", Broken, "the card does not run; it starts, or has no configuration: load one with the vendor's tool"),
+    row(-13, "WATCHDOG_FAILED", Broken, "the card's watchdog has tripped, as it was not triggered in time; lengthen its time in the card's configuration, or remove `card_watchdog`"),
+    row(-14, "wrong operating system", Broken, "the driver is not for this version of Windows; install one that is"),
+    row(-15, "SYSERR", Broken, "the card reports an error of its own; switch it off and on, and see its diagnosis"),
+    row(-16, "MAILBOX_FULL", Broken, "the card's mailbox is full; see whether another program uses it"),
+    row(-17, "PUT_TIMEOUT", Broken, "the card took no message in time"),
+    row(-18, "GET_TIMEOUT", Broken, "the card gave no message in time"),
+    row(-19, "GET_NO_MESSAGE", Broken, "the card has no message"),
+    row(-20, "RESET_TIMEOUT", Broken, "the card did not come back from its reset in time"),
+    row(-21, "NO_COM_FLAG", NoPeer, "the card says that its bus does not communicate (NO_COM_FLAG); check that the other end runs, its cable, and that both ends have the same configuration"),
+    row(-22, "EXCHANGE_FAILED", Again, "the card still has the process data to itself; each cycle tries again"),
+    row(-23, "EXCHANGE_TIMEOUT", Again, "the card did not exchange the process data in time; each cycle tries again"),
+    row(-24, "COM_MODE_UNKNOWN", Refused, "the card is configured for a kind of exchange that the driver does not know; choose a buffered one in the card's configuration"),
+    row(-25, "FUNCTION_FAILED", Broken, "the driver gives no reason; see the card's diagnosis"),
+    row(-26, "DPMSIZE_MISMATCH", Broken, "the driver set-up has another size of the card's memory than the card; correct it there"),
+    row(-27, "STATE_MODE_UNKNOWN", Broken, REPORT),
+    row(-28, "HW_PORT_USED", Broken, "another device has the card's address; correct it in the driver set-up"),
+    row(-30, "USR_OPEN_ERROR", Broken, "the vendor's driver does not run on this computer; install it, or start it"),
+    row(-31, "INIT_DRV", Broken, "the driver could not be started; install it anew"),
+    row(-32, "NOT_INITIALIZED", Broken, "the driver has not started this card; check `device`, and the card in the driver set-up"),
+    row(-33, "COMM_ERR", Broken, "library and driver do not understand each other; install both anew"),
+    row(-34, "DEV_NUMBER_INVALID", Refused, "there is no card with this number; check `device`"),
+    row(-35, "info area wrong", Broken, REPORT),
+    row(-36, "number wrong", Broken, REPORT),
+    row(-37, "mode wrong", Broken, REPORT),
+    row(-38, "message pointer NULL", Broken, REPORT),
+    row(-39, "message too short", Broken, REPORT),
+    row(-40, "size wrong", Refused, SIZES),
+    row(-42, "size is 0", Broken, REPORT),
+    row(-43, "size too long", Refused, SIZES),
+    row(-44, "pointer NULL", Broken, REPORT),
+    row(-45, "pointer NULL", Broken, REPORT),
+    row(-46, "send size too long", Refused, SIZES),
+    row(-47, "receive size too long", Refused, SIZES),
+    row(-48, "send pointer NULL", Broken, REPORT),
+    row(-49, "receive pointer NULL", Broken, REPORT),
+];
+
+/// Codes that have a meaning together, by their first and last ones.
+const RANGES: [(i32, i32, Meaning); 4] = [
+    (
+        -83,
+        -80,
+        row(
+            -83,
+            "unknown or unsupported",
+            Refused,
+            "driver or card do not have what was asked for; install a newer driver",
+        ),
+    ),
+    (
+        -105,
+        -100,
+        row(
+            -105,
+            "file error",
+            Broken,
+            "the driver could not use a file; install it anew",
+        ),
+    ),
+    (
+        -128,
+        -110,
+        row(
+            -128,
+            "firmware or configuration",
+            Broken,
+            "firmware or configuration of the card are not in order; load both with the vendor's tool",
+        ),
+    ),
+    (
+        1000,
+        1255,
+        row(
+            1000,
+            "error of the card's operating system",
+            Broken,
+            "what follows the 1000 is its number in the manual of the card's firmware",
+        ),
+    ),
+];
+
+/// The meaning of a code; `None` if tickbus does not know it.
+pub fn meaning(code: i32) -> Option<&'static Meaning> {
+    let together = || {
+        let mut ranges = RANGES.iter();
+        ranges
+            .find(|(first, last, _)| (*first..=*last).contains(&code))
+            .map(|(.., meaning)| meaning)
+    };
+    Meaning::of(ERRORS, code.cast_unsigned()).or_else(together)
+}
+
+/// `function` returned `code`.
+pub(crate) fn failing(function: &str, code: i32) -> Failing {
+    Failing::new(function, &code.to_string(), meaning(code))
+}
+
+/// What `code` says of data that were to be exchanged.
+pub(crate) fn moved(code: i32) -> Result<Answer, BusError> {
+    Answer::of(code, meaning(code), || failing("DevExchangeIO", code))
+}

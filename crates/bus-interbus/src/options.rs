@@ -1,0 +1,83 @@
+//! What a driver.cfg says to the bus.
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::Table;
+use tickbus_fieldbus::{
+    Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, CardOptions, OpenError, Role,
+};
+use tickbus_image::signal::SignalTable;
+
+use super::card::Ddi;
+
+/// The vendor's library; there is none for other systems that tickbus knows.
+const LIBRARY: Option<&str> = if cfg!(windows) {
+    Some("Ibddiwnt.dll")
+} else {
+    None
+};
+
+/// The longest name of a device, in characters.
+const DEVICE_LIMIT: usize = 40;
+
+/// The options of the bus `interbus-ddi`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Library, places and watchdog.
+    pub card: CardOptions,
+    /// The board and its node: the driver's name without `_D` and `_M`.
+    pub device: String,
+    /// The service that activates the configuration, if it is to be requested.
+    pub activate: Option<u16>,
+    /// How long the board may take to answer, and its bus to start.
+    pub start_timeout: Nanos,
+}
+
+impl BusKind for Options {
+    const NAME: &'static str = "interbus-ddi";
+
+    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        let device = table.take("device");
+        let activate = table.take("activate");
+        let start_timeout = table.take("start_timeout");
+        let card = CardOptions::read(table, LIBRARY);
+        let device = device.map_or(Some("IBB1N1"), |value| {
+            let right =
+                "name board and node as the driver does, without _D and _M, such as \"IBB1N1\"";
+            value.label(DEVICE_LIMIT, right)
+        });
+        let activate = activate.map(|value| value.whole(1..=0xFFFF));
+        let start_timeout = start_timeout.map_or(Some(Nanos::from_secs(10)), |value| {
+            value.duration_from(Nanos::from_millis(1), "a bus takes longer to start")
+        });
+        let activate = match activate {
+            None => None,
+            Some(service) => Some(u16::try_from(service?).ok()?),
+        };
+        Some(Self {
+            card: card?,
+            device: device?.to_owned(),
+            activate,
+            start_timeout: start_timeout?,
+        })
+    }
+}
+
+impl BusOptions for Options {
+    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
+        let mut parts = vec![format!("device {}", self.device)];
+        parts.extend(self.card.summary(LIBRARY, role, table));
+        let service = self.activate;
+        parts.extend(service.map(|service| format!("activates by service {service:04X}")));
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let path = (self.card).library(LIBRARY.unwrap_or_default(), setup.folder)?;
+        let driver = Ddi(self.clone());
+        Ok(Bus::Free(Box::new(CardBus::new(driver, path, setup))))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+}

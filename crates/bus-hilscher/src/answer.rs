@@ -23,7 +23,7 @@ impl Answer {
                 ..
             }) => Ok(Self::NoPeer(words)),
             Some(meaning) if meaning.verdict == Verdict::Again => Ok(Self::Again(meaning)),
-            _ => Err(failing().into()),
+            _ => Err(failing().error()),
         }
     }
 }

@@ -13,8 +13,8 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::{
-    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Moved,
-    OpenError, Port, Role, Vendor, Verdict,
+    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing,
+    Moved, OpenError, Port, Role, Vendor, Verdict,
 };
 use tickbus_image::signal::SignalTable;
 
@@ -67,9 +67,9 @@ impl BusKind for Options {
 }
 
 impl BusOptions for Options {
-    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("device {}", self.device)];
-        parts.extend(self.card.summary(Some(NAME), role, table));
+        parts.extend(self.card.summary());
         parts
     }
 
@@ -111,7 +111,8 @@ impl Vendor for Cif {
         port: &Port,
         sizes: [usize; 2],
     ) -> Result<Box<dyn Card + 'l>, BusError> {
-        let board = Board::init(Driver::open(library, self.0.device)?)?;
+        let driver = Driver::open(library, self.0.device).map_err(Failing::error)?;
+        let board = Board::init(driver).map_err(Failing::error)?;
         if let Some(firmware) = board.information::<32>(Area::Firmware) {
             let texts = [&firmware[..16], &firmware[16..]];
             let texts = texts.map(|part| String::from_utf8_lossy(part).replace('\0', " "));
@@ -129,7 +130,7 @@ impl Vendor for Cif {
             is_watched: false,
             options: self.0.clone(),
         };
-        card.start()?;
+        card.start().map_err(Failing::error)?;
         Ok(Box::new(card))
     }
 
@@ -175,8 +176,8 @@ struct OpenCard<'l> {
 }
 
 impl OpenCard<'_> {
-    fn start(&mut self) -> Result<(), BusError> {
-        let is_up = |result: Result<(), tickbus_fieldbus::Failing>| match result {
+    fn start(&mut self) -> Result<(), Failing> {
+        let is_up = |result: Result<(), Failing>| match result {
             // Its bus may come up later.
             Err(failing) if failing.verdict == Verdict::NoPeer => Ok(()),
             other => other,
@@ -189,7 +190,7 @@ impl OpenCard<'_> {
     }
 
     /// Triggers the card's watchdog, if there is one.
-    fn trigger(&self) -> Result<(), BusError> {
+    fn trigger(&self) -> Result<(), Failing> {
         if self.is_watched {
             self.board.watchdog(true)?;
         }
@@ -207,7 +208,7 @@ impl Card for OpenCard<'_> {
         let Options {
             card, io_timeout, ..
         } = &self.options;
-        self.trigger()?;
+        self.trigger().map_err(Failing::error)?;
         let offsets = [card.write_offset, card.read_offset];
         let code = self
             .board

@@ -13,8 +13,8 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::{
-    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Moved,
-    OpenError, Port, Role, Vendor, Verdict,
+    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing,
+    Moved, OpenError, Port, Role, Vendor, Verdict,
 };
 use tickbus_image::signal::SignalTable;
 
@@ -73,9 +73,9 @@ impl BusKind for Options {
 }
 
 impl BusOptions for Options {
-    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("board {} channel {}", self.board, self.channel)];
-        parts.extend(self.card.summary(Some(NAME), role, table));
+        parts.extend(self.card.summary());
         parts
     }
 
@@ -112,9 +112,10 @@ impl Vendor for Cifx {
         port: &Port,
         _sizes: [usize; 2],
     ) -> Result<Box<dyn Card + 'l>, BusError> {
-        let driver = Driver::open(library)?;
+        let driver = Driver::open(library).map_err(Failing::error)?;
+        let channel = Channel::open(driver, &self.0.board, self.0.channel);
         let mut card = OpenCard {
-            channel: Channel::open(driver, &self.0.board, self.0.channel)?,
+            channel: channel.map_err(Failing::error)?,
             is_ready: false,
             is_on: false,
             is_watched: false,
@@ -125,7 +126,7 @@ impl Vendor for Cifx {
             port.tell("card", &information.to_string());
             port.tell("card.state", &information.state());
         }
-        card.start()?;
+        card.start().map_err(Failing::error)?;
         Ok(Box::new(card))
     }
 
@@ -153,7 +154,7 @@ struct OpenCard<'l> {
 }
 
 impl OpenCard<'_> {
-    fn start(&mut self) -> Result<(), BusError> {
+    fn start(&mut self) -> Result<(), Failing> {
         self.is_ready = true;
         self.channel.host_state(ON, millis(STATE))?;
         self.is_on = true;
@@ -168,13 +169,13 @@ impl OpenCard<'_> {
     }
 
     /// Triggers the card's watchdog, if there is one.
-    fn trigger(&self) -> Result<(), BusError> {
+    fn trigger(&self) -> Result<(), Failing> {
         if !self.is_watched {
             return Ok(());
         }
         match self.channel.watchdog(ON) {
             0 => Ok(()),
-            code => Err(failing("xChannelWatchdog", code).into()),
+            code => Err(failing("xChannelWatchdog", code)),
         }
     }
 }
@@ -190,7 +191,7 @@ impl Card for OpenCard<'_> {
             card, io_timeout, ..
         } = &self.options;
         let timeout = millis(*io_timeout);
-        self.trigger()?;
+        self.trigger().map_err(Failing::error)?;
         let (mut out, mut back, mut again) = (false, false, None);
         let mut no_peer = None;
         let mut note = |answer: Answer, moved: &mut bool| match answer {

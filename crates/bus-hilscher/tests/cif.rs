@@ -296,9 +296,7 @@ fn a_system_without_the_driver_is_told_so() {
     let text =
         format!("[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"hilscher-cif\"\n{SIGNALS}");
     let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text).expect("a right file");
-    let refused = tickbus_driver::Driver::open(config, Manual::new())
-        .err()
-        .expect("refused");
+    let refused = tickbus_driver::Driver::open(config, Manual::new()).expect_err("refused");
     assert!(
         refused.to_string().contains("is for Windows alone"),
         "{refused}"

@@ -413,11 +413,8 @@ fn only_what_the_driver_cfg_can_change_is_refused() {
         text: "x".to_owned(),
     };
     let refused = BusError::Refused("x".to_owned());
-    assert_eq!(BusError::from(failing(Verdict::Refused)), refused);
+    assert_eq!(failing(Verdict::Refused).error(), refused);
     for verdict in [Verdict::NoPeer, Verdict::Again, Verdict::Broken] {
-        assert_eq!(
-            BusError::from(failing(verdict)),
-            BusError::Link("x".to_owned())
-        );
+        assert_eq!(failing(verdict).error(), BusError::Link("x".to_owned()));
     }
 }

@@ -113,7 +113,7 @@ impl OpenCard<'_> {
     fn ask(&mut self, now: Nanos) -> Result<(), BusError> {
         let Some(answer) = self.mailbox.receive()? else {
             if self.is_late(now) {
-                return Err(failing("DDI_MXI_RcvMessage", NO_MESSAGE).into());
+                return Err(failing("DDI_MXI_RcvMessage", NO_MESSAGE).error());
             }
             return Ok(());
         };

@@ -4,6 +4,7 @@
 
 mod card;
 mod errors;
+mod kind;
 mod library;
 mod options;
 mod state;

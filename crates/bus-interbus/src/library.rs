@@ -7,7 +7,7 @@ use std::path::Path;
 use std::ptr::from_mut;
 
 use tickbus_base::{Mistake, vendor_functions};
-use tickbus_fieldbus::Failing;
+use tickbus_fieldbus::BusError;
 
 use super::errors::{NO_MESSAGE, failing, low};
 use super::state::State;
@@ -59,10 +59,10 @@ impl Library {
     }
 }
 
-fn check(function: &str, code: u32) -> Result<(), Failing> {
+fn check(function: &str, code: u32) -> Result<(), BusError> {
     match code {
         0 => Ok(()),
-        code => Err(failing(function, code)),
+        code => Err(failing(function, code).error()),
     }
 }
 
@@ -92,7 +92,7 @@ pub(super) struct Node<'l> {
 }
 
 impl<'l> Node<'l> {
-    pub(super) fn open(library: &'l Library, name: &str) -> Result<Self, Failing> {
+    pub(super) fn open(library: &'l Library, name: &str) -> Result<Self, BusError> {
         let functions = &library.0;
         // NUL characters were refused when the driver.cfg was read.
         let name = CString::new(name).unwrap_or_default();
@@ -105,7 +105,7 @@ impl<'l> Node<'l> {
     }
 
     /// Sends a message of these words.
-    pub(super) fn send(&self, words: &[u16]) -> Result<(), Failing> {
+    pub(super) fn send(&self, words: &[u16]) -> Result<(), BusError> {
         let mut block: Vec<u8> = words.iter().flat_map(|word| word.to_be_bytes()).collect();
         let mut message = Message {
             kind: 0,
@@ -120,7 +120,7 @@ impl<'l> Node<'l> {
     }
 
     /// The words of the next message, if there is one.
-    pub(super) fn receive(&self) -> Result<Option<Vec<u16>>, Failing> {
+    pub(super) fn receive(&self) -> Result<Option<Vec<u16>>, BusError> {
         let mut block = [0; BLOCK];
         let mut message = Message {
             kind: 0,
@@ -143,7 +143,7 @@ impl<'l> Node<'l> {
         ))
     }
 
-    pub(super) fn state(&self) -> Result<State, Failing> {
+    pub(super) fn state(&self) -> Result<State, BusError> {
         // Two words, three with a later firmware.
         let mut words = [0_u16; 8];
         // SAFETY: as for `open`; there is room for more than it writes.
@@ -155,7 +155,7 @@ impl<'l> Node<'l> {
         })
     }
 
-    pub(super) fn watchdog(&self, call: WatchDog) -> Result<(), Failing> {
+    pub(super) fn watchdog(&self, call: WatchDog) -> Result<(), BusError> {
         let Functions {
             enable_watchdog,
             trigger_watchdog,
@@ -172,7 +172,7 @@ impl<'l> Node<'l> {
     }
 
     /// Writes process data from `address` on.
-    pub(super) fn write(&self, address: u16, data: &[u8]) -> Result<(), Failing> {
+    pub(super) fn write(&self, address: u16, data: &[u8]) -> Result<(), BusError> {
         let mut access = access(address, data.len(), data.as_ptr().cast_mut());
         // SAFETY: as for `open`; the data have the length that is said, and are not written to.
         check("DDI_DTI_WriteData", unsafe {
@@ -181,7 +181,7 @@ impl<'l> Node<'l> {
     }
 
     /// Reads process data from `address` on.
-    pub(super) fn read(&self, address: u16, data: &mut [u8]) -> Result<(), Failing> {
+    pub(super) fn read(&self, address: u16, data: &mut [u8]) -> Result<(), BusError> {
         let mut access = access(address, data.len(), data.as_mut_ptr());
         // SAFETY: as for `open`; the buffer has the length that is said.
         check("DDI_DTI_ReadData", unsafe {

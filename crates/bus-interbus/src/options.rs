@@ -2,15 +2,10 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{
-    Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, CardOptions, OpenError, Role,
-};
-use tickbus_image::signal::SignalTable;
-
-use super::card::Ddi;
+use tickbus_fieldbus::CardOptions;
 
 /// The vendor's library; there is none for other systems that tickbus knows.
-const LIBRARY: Option<&str> = if cfg!(windows) {
+pub(super) const LIBRARY: Option<&str> = if cfg!(windows) {
     Some("Ibddiwnt.dll")
 } else {
     None
@@ -32,10 +27,9 @@ pub struct Options {
     pub start_timeout: Nanos,
 }
 
-impl BusKind for Options {
-    const NAME: &'static str = "interbus-ddi";
-
-    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+impl Options {
+    /// Reads the keys of the bus.
+    pub fn read(table: &mut Table<'_>) -> Option<Self> {
         let device = table.take("device");
         let activate = table.take("activate");
         let start_timeout = table.take("start_timeout");
@@ -59,25 +53,5 @@ impl BusKind for Options {
             activate,
             start_timeout: start_timeout?,
         })
-    }
-}
-
-impl BusOptions for Options {
-    fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
-        let mut parts = vec![format!("device {}", self.device)];
-        parts.extend(self.card.summary(LIBRARY, role, table));
-        let service = self.activate;
-        parts.extend(service.map(|service| format!("activates by service {service:04X}")));
-        parts
-    }
-
-    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let path = (self.card).library(LIBRARY.unwrap_or_default(), setup.folder)?;
-        let driver = Ddi(self.clone());
-        Ok(Bus::Free(Box::new(CardBus::new(driver, path, setup))))
-    }
-
-    fn cycle(&self) -> Option<Nanos> {
-        Some(CYCLE)
     }
 }

@@ -62,15 +62,15 @@ impl CardOptions {
         })
     }
 
-    /// Parts of the line's summary: the library `vendor` unless another one is named, and the bytes used.
-    pub fn summary(&self, vendor: Option<&str>, role: Role, table: &SignalTable) -> Vec<String> {
-        let [writes, reads] = sizes(role, table);
-        let library = (self.library.as_deref()).unwrap_or(Path::new(vendor.unwrap_or_default()));
-        let mut parts = vec![
-            format!("library {}", library.display()),
-            format!("writes {writes} bytes from {}", self.write_offset),
-            format!("reads {reads} bytes from {}", self.read_offset),
-        ];
+    /// Parts of the line's summary: what differs from the defaults.
+    pub fn summary(&self) -> Vec<String> {
+        let library = self.library.iter();
+        let mut parts: Vec<String> = library
+            .map(|path| format!("library {}", path.display()))
+            .collect();
+        for (does, offset) in [("writes", self.write_offset), ("reads", self.read_offset)] {
+            parts.extend((offset > 0).then(|| format!("{does} from byte {offset} on")));
+        }
         parts.extend(self.watchdog.then(|| "card watchdog".to_owned()));
         parts
     }
@@ -175,13 +175,12 @@ impl Failing {
             },
         }
     }
-}
 
-impl From<Failing> for BusError {
-    fn from(failing: Failing) -> Self {
-        match failing.verdict {
-            Verdict::Refused => Self::Refused(failing.text),
-            _ => Self::Link(failing.text),
+    /// The error of a line that cannot go on because of it.
+    pub fn error(self) -> BusError {
+        match self.verdict {
+            Verdict::Refused => BusError::Refused(self.text),
+            _ => BusError::Link(self.text),
         }
     }
 }
@@ -311,8 +310,8 @@ impl<V: Vendor> CardBus<V> {
         let card = port.calling(open, open_limit, || vendor.open(library, port, self.sizes))?;
         let mut line = Line {
             card,
-            output: vec![0; self.sizes[0]].into(),
-            input: vec![0; self.sizes[1]].into(),
+            writes: vec![0; self.sizes[0]].into(),
+            reads: vec![0; self.sizes[1]].into(),
             call: exchange,
             limit: self.cycles.timeout + CALL,
             counters: V::COUNTERS,
@@ -344,8 +343,8 @@ impl<V: Vendor> Free for CardBus<V> {
 /// An open card, and the bytes of both directions.
 struct Line<'a> {
     card: Box<dyn Card + 'a>,
-    output: Box<[u8]>,
-    input: Box<[u8]>,
+    writes: Box<[u8]>,
+    reads: Box<[u8]>,
     call: &'a Arc<str>,
     limit: Nanos,
     counters: [&'static str; 3],
@@ -353,12 +352,12 @@ struct Line<'a> {
 
 impl Exchange for Line<'_> {
     fn input(&mut self) -> &mut [u8] {
-        &mut self.output
+        &mut self.writes
     }
 
     fn exchange(&mut self, port: &Port, _stop: &Stop) -> Result<Exchanged, BusError> {
         let now = port.clock().now();
-        let call = || self.card.exchange(now, &self.output, &mut self.input);
+        let call = || self.card.exchange(now, &self.writes, &mut self.reads);
         let [_, no_peer, again_counter] = self.counters;
         let moved = port.calling(self.call, self.limit, call);
         if let Some(state) = self.card.news() {
@@ -386,6 +385,6 @@ impl Exchange for Line<'_> {
     }
 
     fn output(&self) -> &[u8] {
-        &self.input
+        &self.reads
     }
 }

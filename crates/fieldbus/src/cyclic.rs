@@ -82,7 +82,6 @@ impl Cycles {
                         (is_running, missing) = (true, "");
                         port.running("the peer is there");
                     }
-                    Ok(Exchanged::Data { .. }) => {}
                     Ok(Exchanged::NoPeer(why)) if is_running => {
                         (is_running, missing) = (false, why);
                         port.lost(&BusError::Link(why.to_owned()), WAITS);
@@ -91,7 +90,7 @@ impl Cycles {
                         missing = why;
                         port.opening(&format!("the bus is open; {why}"));
                     }
-                    Ok(Exchanged::NoPeer(_)) => {}
+                    Ok(Exchanged::Data { .. } | Exchanged::NoPeer(_)) => {}
                     Ok(Exchanged::Stopped) => return Ok(()),
                     Err(error @ BusError::Left(_)) => {
                         is_running = false;

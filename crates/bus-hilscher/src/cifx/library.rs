@@ -4,7 +4,7 @@
 
 use std::ffi::{CString, c_char, c_void};
 use std::path::Path;
-use std::ptr::{from_mut, from_ref, null_mut};
+use std::ptr::{from_mut, null_mut};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use tickbus_base::{Mistake, vendor_functions};
@@ -86,8 +86,8 @@ impl Library {
     pub(super) fn load(path: &Path) -> Result<Arc<Self>, Mistake> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         loaded.retain(|(_, library)| library.strong_count() > 0);
-        let same = loaded.iter().filter(|(of, _)| of == path);
-        if let Some(library) = same.filter_map(|(_, library)| library.upgrade()).next() {
+        let mut same = loaded.iter().filter(|(of, _)| of == path);
+        if let Some(library) = same.find_map(|(_, library)| library.upgrade()) {
             return Ok(library);
         }
         let library = Arc::new(Self {
@@ -123,7 +123,7 @@ impl Library {
             };
             // SAFETY: the type is that of the vendor's header, and the struct lives until it returns; null and zero
             // ask for the defaults.
-            let code = unsafe { (self.start.init)(from_ref(&init)) };
+            let code = unsafe { (self.start.init)(&raw const init) };
             check("cifXDriverInit", code)?;
         }
         *users += 1;

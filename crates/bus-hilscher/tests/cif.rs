@@ -8,7 +8,7 @@ use tickbus_base::time::Manual;
 use tickbus_bus_hilscher::cif::{ERRORS, meaning};
 use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
-use tickbus_conformance::standin::{StandIn, until};
+use tickbus_conformance::standin::{StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::Verdict;
 
@@ -34,7 +34,7 @@ impl Cards {
     fn open(&self, role: &str, clock: &Arc<Manual>) -> End {
         let text = format!(
             "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-             max_age = \"300ms\"\nreconnect = [\"10s\", \"10ms\"]\n{}\n{SIGNALS}",
+             max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{}\n{SIGNALS}",
             self.fieldbus(role),
             self.extra,
         );
@@ -262,7 +262,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back_and_one_that_hangs_goe
             .contains("DevInitBoard returned board not initialised (-1)")
     });
     cards.library.script("DevReset hang\n");
-    let reason = until(&mut device, &clock, "stale", "hung");
+    let reason = until_it_hangs(&device, &clock);
     assert!(
         reason.starts_with("opening by CIF32DLL.DLL has not returned for "),
         "{reason}"

@@ -8,7 +8,7 @@ use tickbus_base::time::Manual;
 use tickbus_bus_hilscher::cifx::ERRORS;
 use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{Bus, End, Liar, SIGNALS, await_that};
-use tickbus_conformance::standin::{StandIn, until};
+use tickbus_conformance::standin::{StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
 
@@ -34,7 +34,7 @@ impl Cards {
     fn open(&self, role: &str, clock: &Arc<Manual>) -> End {
         let text = format!(
             "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-             max_age = \"300ms\"\nreconnect = [\"10s\", \"10ms\"]\n{}\n{SIGNALS}",
+             max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{}\n{SIGNALS}",
             self.fieldbus(role),
             self.extra,
         );
@@ -301,7 +301,7 @@ fn a_call_that_hangs_is_told_and_ends_when_it_returns() {
         let (cards, clock) = (Cards::new(), Manual::new());
         cards.library.script(&format!("{function} hang\n"));
         let mut end = cards.open("device", &clock);
-        let reason = until(&mut end, &clock, "stale", "hung");
+        let reason = until_it_hangs(&end, &clock);
         assert!(
             reason.starts_with(&format!("{by} libcifx.so.3 has not returned for ")),
             "{reason}"

@@ -8,7 +8,8 @@ use std::process::Command;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use tempfile::TempDir;
-use tickbus_base::time::Manual;
+use tickbus_base::time::{Manual, Nanos};
+use tickbus_fieldbus::Cause;
 
 use crate::rig::{CYCLE, End, await_that};
 
@@ -88,4 +89,14 @@ pub fn until(end: &mut End, clock: &Arc<Manual>, state: &str, cause: &str) -> St
         (link.state.name(), link.cause.name()) == (state, cause)
     });
     reason
+}
+
+/// Lets time pass in leaps until a call counts as hung; returns the reason.
+#[track_caller]
+pub fn until_it_hangs(end: &End, clock: &Arc<Manual>) -> String {
+    await_that("it hangs", || {
+        clock.advance(Nanos::from_secs(1));
+        end.link().cause == Cause::Hung
+    });
+    end.link().reason
 }

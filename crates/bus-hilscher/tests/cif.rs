@@ -154,7 +154,7 @@ fn a_call_that_fails_is_named_and_all_before_it_is_undone() {
         let mut end = cards.open("device", &clock);
         let reason = until(&mut end, &clock, "failed", "link");
         let right = format!(
-            "the link failed: {name} returned FUNCTION_FAILED (-25): the driver gives no reason"
+            "the link failed: {name} returned DRV_DEV_FUNCTION_FAILED (-25): the driver gives no reason"
         );
         assert!(reason.starts_with(&right), "{reason}");
         let mut expected: Vec<&str> = all().into_iter().take(index + 1).collect();
@@ -251,7 +251,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back_and_one_that_hangs_goe
     cards.library.script("DevExchangeIO -10\nDevInitBoard -1\n");
     let reason = until(&mut device, &clock, "failed", "link");
     assert!(
-        reason.contains("DevExchangeIO returned error of access"),
+        reason.contains("DevExchangeIO returned DRV_DEV_DPM_ACCESS_ERROR (-10)"),
         "{reason}"
     );
     await_that("it is tried again", || {
@@ -259,7 +259,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back_and_one_that_hangs_goe
         device
             .link()
             .reason
-            .contains("DevInitBoard returned board not initialised (-1)")
+            .contains("DevInitBoard returned DRV_BOARD_NOT_INITIALIZED (-1)")
     });
     cards.library.script("DevReset hang\n");
     let reason = until_it_hangs(&device, &clock);

@@ -163,7 +163,7 @@ fn a_call_that_fails_is_named_and_all_before_it_is_undone() {
         let mut end = cards.open("device", &clock);
         let reason = until(&mut end, &clock, "failed", "link");
         let right = format!(
-            "the link failed: {name} returned FUNCTION_FAILED (0x800A0009): the driver gives"
+            "the link failed: {name} returned CIFX_FUNCTION_FAILED (0x800A0009): the driver gives"
         );
         assert!(reason.starts_with(&right), "{reason}");
         let mut expected: Vec<&str> = OPENING
@@ -278,7 +278,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back() {
         .script("xChannelIORead 0x800B0034\nxDriverOpen 0x800B0030\n");
     let reason = until(&mut device, &clock, "failed", "link");
     assert!(
-        reason.contains("xChannelIORead returned DRIVER_NOT_OPENED"),
+        reason.contains("xChannelIORead returned CIFX_DRV_NOT_OPENED"),
         "{reason}"
     );
     await_that("it is tried again", || {
@@ -286,7 +286,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back() {
         device
             .link()
             .reason
-            .contains("xDriverOpen returned DRIVER_NOT_LOADED")
+            .contains("xDriverOpen returned CIFX_DRV_DRIVER_NOT_LOADED")
     });
     cards.library.script("");
     until(&mut device, &clock, "running", "running");
@@ -330,7 +330,7 @@ fn the_card_s_watchdog_is_started_triggered_and_stopped_in_time() {
     cards.library.script("xChannelWatchdog 0x800C0013\n");
     let reason = until(&mut end, &clock, "failed", "link");
     assert!(
-        reason.contains("xChannelWatchdog returned DEV_WATCHDOG_FAILED"),
+        reason.contains("xChannelWatchdog returned CIFX_DEV_WATCHDOG_FAILED"),
         "{reason}"
     );
     end.driver.close();
@@ -357,7 +357,7 @@ fn signals_that_reach_beyond_the_card_s_image_are_refused() {
         let mut end = cards.open("device", &clock);
         let reason = until(&mut end, &clock, "failed", "refused");
         let right = format!(
-            "refused: {function} returned INVALID_ACCESS_SIZE (0x800A0008): the signals reach"
+            "refused: {function} returned CIFX_INVALID_ACCESS_SIZE (0x800A0008): the signals reach"
         );
         assert!(reason.starts_with(&right), "{reason}");
     }

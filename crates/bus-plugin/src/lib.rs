@@ -1,8 +1,7 @@
 //! The plug-in bus: a vendor's shared library behind the C interface of `include/tickbus_fieldbus.h`.
 //!
 //! `direct` calls the library on the bus thread. `isolated` lets a helper process call it: the image is in
-//! shared memory, and short messages pass the turn. In both cases the same loop (`cycle`) makes the bus
-//! cycles, and the same code (`library`) calls the library.
+//! shared memory, and short messages pass the turn. In both cases the same code (`library`) calls the library.
 
 mod abi;
 #[cfg(unix)]

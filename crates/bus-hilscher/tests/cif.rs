@@ -8,7 +8,7 @@ use tickbus_base::time::Manual;
 use tickbus_bus_hilscher::cif::{ERRORS, meaning};
 use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
-use tickbus_conformance::standin::{StandIn, until, until_it_hangs};
+use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::Verdict;
 
@@ -32,13 +32,7 @@ impl Cards {
     }
 
     fn open(&self, role: &str, clock: &Arc<Manual>) -> End {
-        let text = format!(
-            "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-             max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{}\n{SIGNALS}",
-            self.fieldbus(role),
-            self.extra,
-        );
-        End::open(&text, clock)
+        standin::open(self, role, self.extra, clock)
     }
 }
 
@@ -49,14 +43,9 @@ impl Bus for Cards {
         format!("kind = \"hilscher-cif\"\nlibrary = \"{library}\"\ndevice = {device}")
     }
 
-    /// A driver that returns what no driver returns.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        self.library.script("DevExchangeIO -77\n");
-        Liar {
-            peer: Box::new(Honest(Arc::clone(&self.library))),
-            cause: "link",
-            words: "DevExchangeIO returned -77, a code that tickbus does not know; see the vendor's manual",
-        }
+        let words = "DevExchangeIO returned -77, a code that tickbus does not know; see the vendor's manual";
+        standin::liar(&self.library, "DevExchangeIO -77\n", words)
     }
 
     fn wrong(&self) -> Vec<(&'static str, &'static str)> {
@@ -75,15 +64,6 @@ impl Bus for Cards {
                 "libnone.so; check `library`",
             ),
         ]
-    }
-}
-
-/// Ends the lie.
-struct Honest(Arc<StandIn>);
-
-impl Drop for Honest {
-    fn drop(&mut self) {
-        self.0.script("");
     }
 }
 
@@ -262,11 +242,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back_and_one_that_hangs_goe
             .contains("DevInitBoard returned DRV_BOARD_NOT_INITIALIZED (-1)")
     });
     cards.library.script("DevReset hang\n");
-    let reason = until_it_hangs(&device, &clock);
-    assert!(
-        reason.starts_with("opening by CIF32DLL.DLL has not returned for "),
-        "{reason}"
-    );
+    until_it_hangs(&device, &clock, "opening by CIF32DLL.DLL");
     cards.library.script("");
     until(&mut device, &clock, "running", "running");
 }

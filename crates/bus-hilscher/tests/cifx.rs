@@ -7,8 +7,8 @@ use std::sync::Arc;
 use tickbus_base::time::Manual;
 use tickbus_bus_hilscher::cifx::ERRORS;
 use tickbus_conformance::conformance;
-use tickbus_conformance::rig::{Bus, End, Liar, SIGNALS, await_that};
-use tickbus_conformance::standin::{StandIn, until, until_it_hangs};
+use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
+use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
 
@@ -32,13 +32,7 @@ impl Cards {
     }
 
     fn open(&self, role: &str, clock: &Arc<Manual>) -> End {
-        let text = format!(
-            "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-             max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{}\n{SIGNALS}",
-            self.fieldbus(role),
-            self.extra,
-        );
-        End::open(&text, clock)
+        standin::open(self, role, self.extra, clock)
     }
 }
 
@@ -51,15 +45,9 @@ impl Bus for Cards {
         )
     }
 
-    /// A driver that returns what no driver returns.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        self.library.script("xChannelIORead 0x8BADC0DE\n");
-        let library = Arc::clone(&self.library);
-        Liar {
-            peer: Box::new(Honest(library)),
-            cause: "link",
-            words: "xChannelIORead returned 0x8BADC0DE, a code that tickbus does not know; see the vendor's manual",
-        }
+        let words = "xChannelIORead returned 0x8BADC0DE, a code that tickbus does not know; see the vendor's manual";
+        standin::liar(&self.library, "xChannelIORead 0x8BADC0DE\n", words)
     }
 
     fn wrong(&self) -> Vec<(&'static str, &'static str)> {
@@ -83,15 +71,6 @@ impl Bus for Cards {
                 "libnone.so; check `library`",
             ),
         ]
-    }
-}
-
-/// Ends the lie.
-struct Honest(Arc<StandIn>);
-
-impl Drop for Honest {
-    fn drop(&mut self) {
-        self.0.script("");
     }
 }
 
@@ -130,7 +109,7 @@ fn calls_are_made_in_the_order_of_the_vendor_and_undone_in_the_reverse() {
     let (cards, clock) = (Cards::new(), Manual::new());
     let mut end = cards.open("device", &clock);
     await_that("data are moved", || {
-        clock.advance(tickbus_conformance::rig::CYCLE);
+        clock.advance(CYCLE);
         cards.library.calls().len() > 8
     });
     assert_eq!(end.tick().code, Code::Stale);
@@ -203,13 +182,13 @@ fn each_error_code_at_each_call_is_told_with_its_name_and_what_to_do() {
                     let reason = until(&mut end, &clock, "opening", "waiting");
                     assert!(!reason.contains("returned"), "{reason}");
                     await_that("it is told", || {
-                        clock.advance(tickbus_conformance::rig::CYCLE);
+                        clock.advance(CYCLE);
                         end.link().reason == format!("the bus is open; {words}")
                     });
                 }
                 // The other end is off, which the other direction says.
                 Verdict::Again if is_moving => await_that("it is counted", || {
-                    clock.advance(tickbus_conformance::rig::CYCLE);
+                    clock.advance(CYCLE);
                     end.driver.statistics().contains("\nhilscher-cifx.no_com=")
                 }),
                 Verdict::Refused => {
@@ -242,7 +221,7 @@ fn without_its_bus_a_card_gets_the_data_all_the_same_and_none_of_its_own_count()
         .words;
     device.set("position", 258.0);
     await_that("the value is in the card", || {
-        clock.advance(tickbus_conformance::rig::CYCLE);
+        clock.advance(CYCLE);
         assert_eq!(device.tick().code, Code::Stale);
         let image = std::fs::read(cards.library.file("image")).unwrap_or_default();
         image.len() == 512 && image[2..4] == [1, 2]
@@ -257,7 +236,7 @@ fn without_its_bus_a_card_gets_the_data_all_the_same_and_none_of_its_own_count()
         format!("the link failed: {words}; waiting for the next peer")
     );
     await_that("its data are stale", || {
-        clock.advance(tickbus_conformance::rig::CYCLE);
+        clock.advance(CYCLE);
         device.tick().code == Code::Stale
     });
     assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
@@ -282,7 +261,7 @@ fn a_card_that_was_removed_is_opened_anew_when_it_is_back() {
         "{reason}"
     );
     await_that("it is tried again", || {
-        clock.advance(tickbus_conformance::rig::CYCLE);
+        clock.advance(CYCLE);
         device
             .link()
             .reason
@@ -301,11 +280,8 @@ fn a_call_that_hangs_is_told_and_ends_when_it_returns() {
         let (cards, clock) = (Cards::new(), Manual::new());
         cards.library.script(&format!("{function} hang\n"));
         let mut end = cards.open("device", &clock);
-        let reason = until_it_hangs(&end, &clock);
-        assert!(
-            reason.starts_with(&format!("{by} libcifx.so.3 has not returned for ")),
-            "{reason}"
-        );
+        let what = format!("{by} libcifx.so.3");
+        until_it_hangs(&end, &clock, &what);
         cards.library.script("");
         let _controller = cards.open("controller", &clock);
         until(&mut end, &clock, "running", "running");
@@ -318,7 +294,7 @@ fn the_card_s_watchdog_is_started_triggered_and_stopped_in_time() {
     let mut end = cards.open("device", &clock);
     let watchdog = |trigger: u8| format!("xChannelWatchdog(0, {trigger})");
     await_that("it is triggered", || {
-        clock.advance(tickbus_conformance::rig::CYCLE);
+        clock.advance(CYCLE);
         cards
             .library
             .calls()

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use tickbus_base::time::Manual;
 use tickbus_bus_interbus::ERRORS;
 use tickbus_conformance::conformance;
-use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
-use tickbus_conformance::standin::{StandIn, until, until_it_hangs};
+use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, await_that};
+use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::Verdict;
 
@@ -32,13 +32,7 @@ impl Boards {
     }
 
     fn open(&self, role: &str, clock: &Arc<Manual>) -> End {
-        let text = format!(
-            "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
-             max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{}\n{SIGNALS}",
-            self.fieldbus(role),
-            self.extra,
-        );
-        End::open(&text, clock)
+        standin::open(self, role, self.extra, clock)
     }
 }
 
@@ -49,14 +43,9 @@ impl Bus for Boards {
         format!("kind = \"interbus-ddi\"\nlibrary = \"{library}\"\ndevice = \"IBB{board}N1\"")
     }
 
-    /// A driver that returns what no driver returns.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        self.library.script("GetIBSDiagnostic 0x1234\n");
-        Liar {
-            peer: Box::new(Honest(Arc::clone(&self.library))),
-            cause: "link",
-            words: "GetIBSDiagnostic returned 0x1234, a code that tickbus does not know; see the vendor's manual",
-        }
+        let words = "GetIBSDiagnostic returned 0x1234, a code that tickbus does not know; see the vendor's manual";
+        standin::liar(&self.library, "GetIBSDiagnostic 0x1234\n", words)
     }
 
     fn wrong(&self) -> Vec<(&'static str, &'static str)> {
@@ -79,15 +68,6 @@ impl Bus for Boards {
                 "libnone.so; check `library`",
             ),
         ]
-    }
-}
-
-/// Ends the lie.
-struct Honest(Arc<StandIn>);
-
-impl Drop for Honest {
-    fn drop(&mut self) {
-        self.0.script("");
     }
 }
 
@@ -305,11 +285,7 @@ fn an_answer_that_does_not_come_and_a_call_that_hangs_are_told() {
         "{reason}"
     );
     boards.library.script("DDI_DevOpenNode hang\n");
-    let reason = until_it_hangs(&device, &clock);
-    assert!(
-        reason.starts_with("opening by Ibddiwnt.dll has not returned for "),
-        "{reason}"
-    );
+    until_it_hangs(&device, &clock, "opening by Ibddiwnt.dll");
     boards.library.script("");
     let _controller = boards.open("controller", &clock);
     until(&mut device, &clock, "running", "running");

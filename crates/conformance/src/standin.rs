@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_fieldbus::Cause;
 
-use crate::rig::{CYCLE, End, await_that};
+use crate::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
 
 /// The libraries built so far, by source and switches.
 static BUILT: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
@@ -77,6 +77,36 @@ impl StandIn {
     }
 }
 
+/// A script that ends when it is dropped.
+struct Lie(Arc<StandIn>);
+
+impl Drop for Lie {
+    fn drop(&mut self) {
+        self.0.script("");
+    }
+}
+
+/// A driver that follows this script, which returns what no driver returns: the line says these `words`.
+pub fn liar(library: &Arc<StandIn>, script: &str, words: &'static str) -> Liar {
+    library.script(script);
+    Liar {
+        peer: Box::new(Lie(Arc::clone(library))),
+        cause: "link",
+        words,
+    }
+}
+
+/// Opens the end with `role`, with `extra` lines in its `[fieldbus]` table. A line that fails first shows that for a
+/// while.
+pub fn open(bus: &impl Bus, role: &str, extra: &str, clock: &Arc<Manual>) -> End {
+    let text = format!(
+        "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
+         max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{extra}\n{SIGNALS}",
+        bus.fieldbus(role),
+    );
+    End::open(&text, clock)
+}
+
 /// Lets time pass until the line is in `state` for `cause`; returns the reason.
 #[track_caller]
 pub fn until(end: &mut End, clock: &Arc<Manual>, state: &str, cause: &str) -> String {
@@ -91,12 +121,13 @@ pub fn until(end: &mut End, clock: &Arc<Manual>, state: &str, cause: &str) -> St
     reason
 }
 
-/// Lets time pass in leaps until a call counts as hung; returns the reason.
+/// Lets time pass in leaps until the call `what` counts as hung. Others may for a moment, as they take some time.
 #[track_caller]
-pub fn until_it_hangs(end: &End, clock: &Arc<Manual>) -> String {
-    await_that("it hangs", || {
+pub fn until_it_hangs(end: &End, clock: &Arc<Manual>, what: &str) {
+    let right = format!("{what} has not returned for ");
+    await_that(&right, || {
         clock.advance(Nanos::from_secs(1));
-        end.link().cause == Cause::Hung
+        let link = end.link();
+        link.cause == Cause::Hung && link.reason.starts_with(&right)
     });
-    end.link().reason
 }

@@ -69,6 +69,14 @@ impl fmt::Display for Leaving {
                 f,
                 "master {master} sent another configuration: {why}; give both projects the same modules"
             ),
+            Self::Length {
+                expected,
+                received: 0,
+            } => write!(
+                f,
+                "the master sent no outputs, expected {expected} bytes; if it is in CLEAR, it takes this for a device with \
+                 Fail_Safe: name that device's GSD file with \"gsd\""
+            ),
             Self::Length { expected, received } => write!(
                 f,
                 "the master sent {received} bytes of outputs, expected {expected}; give both projects the same modules"

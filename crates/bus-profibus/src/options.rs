@@ -16,7 +16,7 @@ use tickbus_image::signal::{self, Area, Signal, SignalTable};
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};
 use crate::layout::{Layout, Place};
-use crate::rates::{RATES, Rate};
+use crate::rates::{RATES, Rate, SLOT_TIME_LIMIT};
 pub use station::{Device, StationOptions};
 use station::{check_sizes, read_station};
 
@@ -74,7 +74,7 @@ impl BusKind for Options {
         let device = device.and_then(|value| serial::read_device(&value));
         let rate = baud.map_or(Some(RATES[1]), |value| read_rate(&value));
         let rs485 = rs485.map_or(Some(false), |value| value.boolean());
-        let max_tsdr = max_tsdr.map(|value| value.whole(11..=65_535));
+        let max_tsdr = max_tsdr.map(|value| value.whole(11..=i128::from(SLOT_TIME_LIMIT) - 1));
         let rate = rate?;
         let max_tsdr = match max_tsdr {
             None => rate.max_tsdr,
@@ -181,9 +181,11 @@ impl BusOptions for Options {
     }
 
     fn details(&self, folder: &Path, table: &SignalTable) -> Vec<(String, String)> {
-        let stations = self.stations().zip(&table.stations);
-        let details =
-            stations.map(|(station, signals)| station.details(&self.line, folder, signals));
+        let stations = self.stations().zip(&table.stations).enumerate();
+        let details = stations.map(|(index, (station, signals))| {
+            let has_places = self.have_places(table, index);
+            station.details(&self.line, folder, signals, has_places)
+        });
         details.flatten().flatten().collect()
     }
 

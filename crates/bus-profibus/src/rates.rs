@@ -1,5 +1,8 @@
 //! The rates of the standard.
 
+/// The longest slot time that a master can have, in bits: an answer has to come earlier.
+pub(crate) const SLOT_TIME_LIMIT: u16 = 16_383;
+
 /// One of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Rate {

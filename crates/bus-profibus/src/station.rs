@@ -114,8 +114,11 @@ pub struct Station {
     is_fresh: bool,
     inputs: Vec<u8>,
     outputs: Vec<u8>,
-    /// Outputs that wait for the next SYNC.
-    held: Option<Vec<u8>>,
+    /// They are 0 since CLEAR, or since the last master left, and the machine does not have them.
+    is_cleared: bool,
+    /// Outputs that wait for the next SYNC, if there are any.
+    held: Vec<u8>,
+    is_held: bool,
     /// The last answer to `Data_Exchange` has inputs of which the master has not shown that it has them.
     is_pending: bool,
     last: Last,
@@ -168,7 +171,9 @@ impl Station {
             is_fresh: false,
             inputs: vec![0; identity.configuration.inputs()],
             outputs: vec![0; identity.configuration.outputs()],
-            held: None,
+            is_cleared: true,
+            held: vec![0; identity.configuration.outputs()],
+            is_held: false,
             is_pending: false,
             last: Last::default(),
             identity,
@@ -234,8 +239,7 @@ impl Station {
         if is_owner {
             self.heard = now;
         }
-        let function = request.control.function();
-        match function {
+        match request.control.function() {
             Control::SDN_LOW | Control::SDN_HIGH => {
                 if is_owner && request.dsap == Some(sap::GLOBAL_CONTROL) {
                     self.control(now, request.data, process);
@@ -246,6 +250,10 @@ impl Station {
             Control::FDL_STATUS => return self.append(request, Control::OK, &[], reply),
             Control::SRD_LOW | Control::SRD_HIGH => {}
             _ => return self.append(request, Control::NOT_ACTIVE, &[], reply),
+        }
+        if is_owner && !request.control.counts() {
+            // The master begins anew: it has given up waiting for the last answer.
+            self.is_pending = false;
         }
         if self.is_repeated(request) {
             if is_owner && self.state == State::DataExch {
@@ -345,6 +353,8 @@ impl Station {
             return;
         }
         self.refused = None;
+        // The answer to the last exchange may be the reason why the master begins anew.
+        self.is_pending = false;
         let Some(parameters) = Parameters::read(data) else {
             let why = format!("{} octets, expected at least 7", data.len());
             return self.refuse(now, master, why, process);
@@ -369,16 +379,14 @@ impl Station {
                 let why = "the watchdog is on, and its time is 0".to_owned();
                 return self.refuse(now, master, why, process);
             }
-            let is_unsupported = parameters.sync && !self.identity.sync
-                || parameters.freeze && !self.identity.freeze;
-            self.faults = diagnosis::Faults {
-                not_supported: is_unsupported,
-                ..diagnosis::Faults::default()
-            };
-            if is_unsupported {
+            if parameters.sync && !self.identity.sync || parameters.freeze && !self.identity.freeze
+            {
                 let why = "SYNC or FREEZE, which its GSD does not have".to_owned();
                 self.refuse(now, master, why, process);
-                self.faults.parameters = false;
+                self.faults = diagnosis::Faults {
+                    not_supported: true,
+                    ..diagnosis::Faults::default()
+                };
                 return;
             }
             match self.identity.user.check(parameters.user) {
@@ -386,8 +394,12 @@ impl Station {
                 Ok(Some(unusual)) => log::debug!("station {}: {unusual}", self.address),
                 Err(why) => return self.refuse(now, master, why, process),
             }
+            self.faults = diagnosis::Faults::default();
             self.has_sync = parameters.sync;
             self.has_freeze = parameters.freeze;
+            self.is_synced &= parameters.sync;
+            self.is_held &= parameters.sync;
+            self.is_frozen &= parameters.freeze;
             self.group = parameters.group;
             self.watchdog = watchdog;
             self.fail_safe = self.identity.fail_safe || parameters.fail_safe(self.identity.dpv1);
@@ -395,7 +407,6 @@ impl Station {
             if self.state == State::WaitPrm {
                 self.owner = Some(master);
                 self.state = State::WaitCfg;
-                self.is_pending = false;
                 process.tell(self.address, now, Event::Parameterised { master });
             }
         }
@@ -406,7 +417,10 @@ impl Station {
 
     fn refuse(&mut self, now: Nanos, master: u8, why: String, process: &mut impl Process) {
         self.leave(now, Leaving::Parameters { master, why }, process);
-        self.faults.parameters = true;
+        self.faults = diagnosis::Faults {
+            parameters: true,
+            ..diagnosis::Faults::default()
+        };
         self.refused = Some(master);
     }
 
@@ -437,8 +451,11 @@ impl Station {
         self.is_pending = false;
         self.has_freeze = false;
         self.has_sync = false;
-        self.held = None;
+        self.is_held = false;
         self.outputs.fill(0);
+        self.is_cleared = true;
+        // What was answered in another state is not repeated.
+        self.last.head = None;
         process.tell(self.address, now, Event::Left(why));
     }
 }

@@ -26,7 +26,7 @@ pub struct Parameter {
     /// What it may be.
     pub allowed: Allowed,
     /// What single values mean, in words.
-    pub texts: BTreeMap<i64, String>,
+    pub texts: Arc<BTreeMap<i64, String>>,
     /// Whether an engineer may change it.
     pub is_changeable: bool,
     /// Whether an engineer sees it.
@@ -321,7 +321,7 @@ mod tests {
             kind,
             default,
             allowed,
-            texts: BTreeMap::from([(1, "4 to 20 mA".to_owned())]),
+            texts: Arc::new(BTreeMap::from([(1, "4 to 20 mA".to_owned())])),
             is_changeable: true,
             is_visible: true,
         })

@@ -52,7 +52,7 @@ mod unix {
     use rustix::fs::{Mode, OFlags, open};
     use rustix::termios::{
         ControlModes, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector,
-        SpecialCodeIndex, ioctl_tiocexcl, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
+        SpecialCodeIndex, Termios, ioctl_tiocexcl, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
     };
 
     use super::{Parity, SerialSettings};
@@ -100,6 +100,7 @@ mod unix {
             attributes.special_codes[SpecialCodeIndex::VTIME] = 0;
             attributes.set_speed(settings.baud)?;
             tcsetattr(&port, OptionalActions::Now, &attributes)?;
+            check(&tcgetattr(&port)?, settings, is_pseudo_terminal(device))?;
             if settings.rs485 {
                 switch_direction(&port)?;
             }
@@ -107,6 +108,35 @@ mod unix {
             tcflush(&port, QueueSelector::IOFlush)?;
             Ok(Self(File::from(port)))
         }
+    }
+
+    /// Checks what the port's driver has made of the settings: some round a rate, or leave the parity bit out, without an
+    /// error. A pseudo-terminal has neither.
+    fn check(has: &Termios, settings: SerialSettings, is_pseudo: bool) -> io::Result<()> {
+        if is_pseudo {
+            return Ok(());
+        }
+        let (baud, wanted) = (has.output_speed(), settings.baud);
+        // Receivers tolerate 2 % at each end.
+        if baud.abs_diff(wanted) > wanted / 50 {
+            return Err(io::Error::other(format!("its driver sets {baud} baud")));
+        }
+        let parity = ControlModes::PARENB | ControlModes::PARODD;
+        let wanted = match settings.parity {
+            Parity::Even => ControlModes::PARENB,
+            Parity::Odd => parity,
+            Parity::None => ControlModes::empty(),
+        };
+        if has.control_modes & parity != wanted {
+            return Err(io::Error::other("its driver does not set the parity bit"));
+        }
+        Ok(())
+    }
+
+    fn is_pseudo_terminal(device: &Path) -> bool {
+        device
+            .canonicalize()
+            .is_ok_and(|path| path.starts_with("/dev/pts"))
     }
 
     /// Lets the port's driver switch the direction with RTS, which is on while it sends.
@@ -174,6 +204,40 @@ mod unix {
     impl AsFd for SerialPort {
         fn as_fd(&self) -> BorrowedFd<'_> {
             self.0.as_fd()
+        }
+    }
+
+    #[cfg(test)]
+    mod tests {
+        use super::*;
+
+        #[test]
+        fn a_port_that_was_not_set_as_wanted_is_refused() {
+            let settings = SerialSettings {
+                baud: 19_200,
+                parity: Parity::Even,
+                two_stop_bits: false,
+                rs485: false,
+            };
+            let far =
+                rustix::pty::openpt(rustix::pty::OpenptFlags::RDWR).expect("a pseudo-terminal");
+            let mut has = tcgetattr(&far).expect("a terminal");
+            has.control_modes -= ControlModes::PARODD;
+            has.control_modes |= ControlModes::PARENB;
+            for (baud, is_right) in [
+                (19_200, true),
+                (19_500, true),
+                (18_800, false),
+                (9_600, false),
+            ] {
+                has.set_speed(baud).expect("a rate");
+                assert_eq!(check(&has, settings, false).is_ok(), is_right, "{baud}");
+                assert!(check(&has, settings, true).is_ok());
+            }
+            has.set_speed(19_200).expect("a rate");
+            has.control_modes |= ControlModes::PARODD;
+            let error = check(&has, settings, false).expect_err("odd");
+            assert!(error.to_string().contains("parity"), "{error}");
         }
     }
 }

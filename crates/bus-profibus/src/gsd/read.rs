@@ -41,7 +41,7 @@ struct Reader<'l> {
     own: Open,
     modules: Vec<Open>,
     parameters: BTreeMap<u32, Arc<Parameter>>,
-    texts: BTreeMap<u32, BTreeMap<i64, String>>,
+    texts: BTreeMap<u32, Arc<BTreeMap<i64, String>>>,
     /// The rates, by their names, and what is said of each.
     supported: Vec<u32>,
     waits: BTreeMap<u32, u16>,
@@ -189,7 +189,7 @@ impl Reader<'_> {
                 _ => {}
             }
         }
-        self.texts.insert(reference, texts);
+        self.texts.insert(reference, Arc::new(texts));
         Ok(())
     }
 
@@ -212,7 +212,7 @@ impl Reader<'_> {
             kind,
             default,
             allowed: allowed(described)?,
-            texts: BTreeMap::new(),
+            texts: Arc::default(),
             is_changeable: true,
             is_visible: true,
         };

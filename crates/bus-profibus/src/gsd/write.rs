@@ -1,15 +1,12 @@
 //! Writes the GSD file of a machine of one's own.
 
 use crate::configuration::{SlotModule, hex};
-use crate::rates::RATES;
+use crate::rates::{RATES, SLOT_TIME_LIMIT};
 use crate::station::Identity;
 use crate::telegram::DATA_LIMIT;
 
 /// The longest name that every tool takes, in characters.
 const NAME_LIMIT: usize = 32;
-
-/// The longest slot time that a master can have, in bits: an answer has to come earlier.
-const SLOT_TIME_LIMIT: u64 = 16_383;
 
 /// Rates above are not for software behind a serial port.
 const SOFTWARE_LIMIT: u32 = 500_000;
@@ -145,7 +142,7 @@ impl Machine<'_> {
         RATES.iter().filter_map(|rate| {
             let own = u64::from(self.max_tsdr) * u64::from(rate.baud);
             let wait = own.div_ceil(self.baud.into()).max(rate.max_tsdr.into());
-            let is_feasible = rate.baud <= SOFTWARE_LIMIT && wait < SLOT_TIME_LIMIT;
+            let is_feasible = rate.baud <= SOFTWARE_LIMIT && wait < u64::from(SLOT_TIME_LIMIT);
             (is_feasible || rate.baud == self.baud).then_some((rate.name, wait))
         })
     }

@@ -3,7 +3,8 @@
 use std::ops::Range;
 use std::path::Path;
 
-use tickbus_image::signal;
+use tickbus_base::toml_text::shown;
+use tickbus_image::signal::{self, Area};
 
 use super::station::read_gsd;
 use super::{Device, StationOptions};
@@ -17,6 +18,7 @@ impl StationOptions {
         line: &LineOptions,
         folder: &Path,
         signals: &signal::Station,
+        has_places: [bool; 2],
     ) -> Option<Vec<(String, String)>> {
         let identity = self.identity(folder, signals).ok()?;
         let mut lines = Vec::new();
@@ -25,7 +27,7 @@ impl StationOptions {
         let mut notes = Vec::new();
         if let Device::Gsd { file, .. } = &self.device {
             let gsd = read_gsd(&folder.join(file)).ok()?;
-            let (model, vendor) = (&gsd.model, &gsd.vendor);
+            let (model, vendor) = (shown(&gsd.model), shown(&gsd.vendor));
             let text = format!("station {address}: \"{model}\" of \"{vendor}\", ident {ident:04X}");
             put("device", text);
             let baud = line.settings.baud;
@@ -48,7 +50,7 @@ impl StationOptions {
             put("slots", "any modules that have these sizes".to_owned());
         } else {
             for (slot, module) in (1..).zip(identity.configuration.modules()) {
-                put(&format!("slot {slot}"), in_words(module));
+                put(&format!("slot {slot}"), in_words(module, has_places));
             }
         }
         let defaults = identity.user.defaults();
@@ -65,17 +67,22 @@ impl StationOptions {
     }
 }
 
-/// A module: its name, its identifiers, and where its bytes are.
-fn in_words(module: &SlotModule) -> String {
+/// A module: its name, its identifiers, and where its bytes are in the image; in the telegrams, if signals of the area
+/// have places of their own.
+fn in_words(module: &SlotModule, has_places: [bool; 2]) -> String {
     let name = if module.name.is_empty() {
         String::new()
     } else {
-        format!("\"{}\", ", module.name)
+        format!("\"{}\", ", shown(&module.name))
     };
-    let areas = [("%I", &module.inputs), ("%Q", &module.outputs)];
+    let areas = [
+        (Area::Input, &module.inputs),
+        (Area::Output, &module.outputs),
+    ];
     let bytes: Vec<String> = areas
         .into_iter()
-        .filter_map(|(area, range)| bytes(area, range))
+        .zip(has_places)
+        .filter_map(|((area, range), has_places)| bytes(area, range, has_places))
         .collect();
     let bytes = if bytes.is_empty() {
         "no I/O".to_owned()
@@ -85,10 +92,17 @@ fn in_words(module: &SlotModule) -> String {
     format!("{name}{}: {bytes}", hex(&module.identifiers))
 }
 
-fn bytes(area: &str, range: &Range<usize>) -> Option<String> {
-    let last = range.end.checked_sub(1)?;
-    match last.checked_sub(range.start)? {
-        0 => Some(format!("{area}B{last}")),
-        _ => Some(format!("{area}B{} to {area}B{last}", range.start)),
-    }
+fn bytes(area: Area, range: &Range<usize>, has_places: bool) -> Option<String> {
+    let (first, last) = (range.start, range.end.checked_sub(1)?);
+    let is_one = last.checked_sub(first)? == 0;
+    let (letter, name) = match area {
+        Area::Input => ('I', "inputs"),
+        Area::Output => ('Q', "outputs"),
+    };
+    Some(match (has_places, is_one) {
+        (false, true) => format!("%{letter}B{last}"),
+        (false, false) => format!("%{letter}B{first} to %{letter}B{last}"),
+        (true, true) => format!("byte {last} of the {name}"),
+        (true, false) => format!("bytes {first} to {last} of the {name}"),
+    })
 }

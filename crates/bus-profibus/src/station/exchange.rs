@@ -41,7 +41,7 @@ impl Station {
             return self.append(request, Control::NOT_ACTIVE, &[], reply);
         }
         // A master that goes on to the next exchange has the answer to the last one.
-        if std::mem::take(&mut self.is_pending) && request.control.counts() {
+        if std::mem::take(&mut self.is_pending) {
             process.delivered(self.address);
         }
         let clear = Clear {
@@ -52,11 +52,17 @@ impl Station {
         if clear.is_on() {
             process.alive(self.address, now);
         } else if self.is_synced {
-            self.held = Some(request.data.to_vec());
-            process.alive(self.address, now);
+            self.held.copy_from_slice(request.data);
+            self.is_held = true;
+            if self.is_cleared {
+                // The machine still has the outputs from before CLEAR, or before the outage.
+                self.hand_over(now, process);
+            } else {
+                process.alive(self.address, now);
+            }
         } else {
             self.outputs.copy_from_slice(request.data);
-            process.outputs(self.address, now, &self.outputs);
+            self.hand_over(now, process);
         }
         if self.is_frozen {
             self.is_pending = std::mem::take(&mut self.is_fresh);
@@ -92,12 +98,9 @@ impl Station {
         self.set_clear(now, clear, process);
         if self.has_sync {
             // Every SYNC lets the outputs through that have waited for it; UNSYNC does so for good.
-            if (has(4) || has(5))
-                && let Some(held) = self.held.take()
-                && !clear.is_on()
-            {
-                self.outputs.copy_from_slice(&held);
-                process.outputs(self.address, now, &self.outputs);
+            if (has(4) || has(5)) && std::mem::take(&mut self.is_held) && !clear.is_on() {
+                self.outputs.copy_from_slice(&self.held);
+                self.hand_over(now, process);
             }
             self.is_synced = !has(4) && (has(5) || self.is_synced);
         }
@@ -111,6 +114,12 @@ impl Station {
         }
     }
 
+    /// Hands the outputs to the machine.
+    fn hand_over(&mut self, now: Nanos, process: &mut impl Process) {
+        self.is_cleared = false;
+        process.outputs(self.address, now, &self.outputs);
+    }
+
     /// The master goes to CLEAR or leaves it.
     fn set_clear(&mut self, now: Nanos, clear: Clear, process: &mut impl Process) {
         let before = std::mem::replace(&mut self.clear, clear);
@@ -119,7 +128,8 @@ impl Station {
         }
         if clear.is_on() {
             self.outputs.fill(0);
-            self.held = None;
+            self.is_cleared = true;
+            self.is_held = false;
             process.tell(self.address, now, Event::Cleared);
         } else {
             process.tell(self.address, now, Event::Operates);

@@ -479,3 +479,68 @@ fn unknown_services_and_set_slave_add_are_refused() {
     let came = rig.raw(Some(60), 0x4E, &[]);
     assert_eq!(came, refused(), "no service of DP");
 }
+
+#[test]
+fn what_was_answered_before_the_watchdog_is_not_repeated_after_it() {
+    let mut rig = Rig::exchanging(identity(), 0x08, 10);
+    let control = rig.toggle();
+    assert_eq!(rig.raw(None, control, &[1, 2]), data(&[0, 0]));
+    rig.now = Nanos::from_secs(1);
+    assert_eq!(rig.raw(None, control, &[1, 2]), refused());
+    assert_eq!(rig.station.state(), State::WaitPrm);
+    assert_eq!(rig.raw(None, control, &[1, 2]), refused());
+}
+
+#[test]
+fn an_answer_that_the_master_never_got_does_not_count_when_it_begins_anew() {
+    for asked in [60, 61] {
+        let mut rig = Rig::exchanging(identity(), 0, 0);
+        rig.exchange(&[1, 2]);
+        // The answer is lost, and so are those to the repetitions.
+        let prm = [LOCK, 0, 1, 11, 0x80, 0xE0, 0];
+        let first: &[u8] = if asked == 61 { &prm } else { &[] };
+        rig.raw(Some(asked), 0x6D, first);
+        rig.control = 0x5D;
+        rig.exchange(&[1, 2]);
+        assert_eq!(rig.machine.delivered, 0, "service {asked}");
+        rig.exchange(&[1, 2]);
+        assert_eq!(rig.machine.delivered, 1, "service {asked}");
+    }
+}
+
+#[test]
+fn outputs_from_before_clear_do_not_come_back_under_sync() {
+    let mut rig = Rig::exchanging(identity(), 0x20, 0);
+    rig.exchange(&[1, 2]);
+    for command in [0x20, 0x02, 0x00] {
+        rig.control(command, 0);
+    }
+    rig.exchange(&[5, 6]);
+    assert_eq!(rig.machine.outputs.last(), Some(&vec![0, 0]), "held");
+    rig.control(0x20, 0);
+    assert_eq!(rig.machine.outputs.last(), Some(&vec![5, 6]));
+}
+
+#[test]
+fn parameters_without_sync_end_it() {
+    let mut rig = Rig::exchanging(identity(), 0x20, 0);
+    rig.control(0x20, 0);
+    rig.exchange(&[1, 2]);
+    assert_eq!(rig.parameterise(LOCK, 0), Came::Short);
+    rig.exchange(&[3, 4]);
+    assert_eq!(rig.machine.outputs.last(), Some(&vec![3, 4]));
+}
+
+#[test]
+fn a_refusal_takes_back_what_the_diagnosis_said_before() {
+    let mut rig = Rig::new(identity());
+    rig.parameterise(LOCK, 0);
+    rig.ask(62, &[0x50]);
+    let faults = |rig: &mut Rig| match rig.ask(60, &[]) {
+        Came::Data(_, data) => data[0] & 0x54,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(faults(&mut rig), 0x04, "the configuration");
+    rig.ask(61, &[LOCK, 0, 1, 11, 0x12, 0x34, 0]);
+    assert_eq!(faults(&mut rig), 0x40, "the parameters alone");
+}

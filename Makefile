@@ -1,16 +1,19 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-peeler test bench soak lint dist build setup clean
+.PHONY: help demo demo-peeler demo-profibus test bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 demo: ## build, then watch the PLC program run the rig: three cycles, one jam, one PLC killed
 	@exec tools/demo
 
 demo-peeler: ## build, then watch two PLCs peel blocks of wood to veneer over the link of 2018
 	@exec tools/demo-peeler
+
+demo-profibus: ## build, then watch the PLC program run the rig over PROFIBUS, by a master that others wrote
+	@exec tools/demo-profibus
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test

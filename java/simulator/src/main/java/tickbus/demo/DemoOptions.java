@@ -13,13 +13,14 @@ import tickbus.simulator.TickMode;
  * @param report where the report goes
  * @param recording what the driver records, null for no page about it
  * @param plc the tickbus executable that is the PLC, null if the PLC is started by other means
+ * @param plcCommand the arguments with which it becomes the PLC, null for the rig's program at the driver's address
  * @param mode how ticks follow one another
  * @param stepNanos simulation step size
  * @param cycles cycles to complete
  * @param timeLimitNanos longest simulation time
  */
-record DemoOptions(Path drivers, Path control, Path report, Path recording, Path plc, TickMode mode, long stepNanos,
-        int cycles, long timeLimitNanos) {
+record DemoOptions(Path drivers, Path control, Path report, Path recording, Path plc, List<String> plcCommand,
+        TickMode mode, long stepNanos, int cycles, long timeLimitNanos) {
     static final String USAGE = """
             usage: demo --drivers DIR --control FILE --report FILE [options]
 
@@ -34,6 +35,8 @@ record DemoOptions(Path drivers, Path control, Path report, Path recording, Path
               --plc FILE         the tickbus executable: it runs the PLC program, and connects to the
                                  address that the driver listens at; without it, the driver itself
                                  hosts the program (kind = "loopback" in driver.cfg)
+              --plc-command LINE what follows the executable, where the PLC has a driver.cfg of its own:
+                                 "plc rig --config plc.cfg"; words are separated by blanks
               --mode MODE        real-time (default), or best-effort: as fast as possible, for a PLC
                                  program that runs on simulation time (mode = "stepped" in driver.cfg)
               --step TIME        simulation step size (default 2ms)
@@ -46,10 +49,12 @@ record DemoOptions(Path drivers, Path control, Path report, Path recording, Path
 
     static DemoOptions read(String[] args) {
         Arguments arguments = new Arguments(args, List.of("--drivers", "--control", "--report", "--recording", "--plc",
-                "--mode", "--step", "--cycles", "--time-limit"), List.of());
+                "--plc-command", "--mode", "--step", "--cycles", "--time-limit"), List.of());
         return new DemoOptions(arguments.path("--drivers"), arguments.path("--control"), arguments.path("--report"),
                 arguments.has("--recording") ? arguments.path("--recording") : null,
-                arguments.has("--plc") ? arguments.path("--plc") : null, arguments.choice("--mode", Arguments.MODES, "real-time"), arguments.duration("--step", "2ms"),
+                arguments.has("--plc") ? arguments.path("--plc") : null,
+                arguments.has("--plc-command") ? arguments.words("--plc-command") : null,
+                arguments.choice("--mode", Arguments.MODES, "real-time"), arguments.duration("--step", "2ms"),
                 arguments.count("--cycles", 3), arguments.duration("--time-limit", "2min"));
     }
 

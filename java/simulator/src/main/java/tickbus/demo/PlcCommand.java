@@ -2,6 +2,7 @@ package tickbus.demo;
 
 import controlinterface.ControlInterfaceDeviceDriver;
 import java.nio.file.Path;
+import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.locks.LockSupport;
 import tickbus.simulator.DeviceDriverFolder;
@@ -25,6 +26,12 @@ public final class PlcCommand {
 
     /** The PLC program of the rig as a process that connects to a driver, which must be listening. */
     static Plc process(DemoOptions options, ControlInterfaceDeviceDriver driver) {
+        if (options.plcCommand() != null) {
+            List<String> command = new ArrayList<>(List.of(options.plc().toString()));
+            command.addAll(options.plcCommand());
+            command.addAll(hosting());
+            return new PlcProcess(() -> command, STATISTICS_NANOS, options.report().resolveSibling("plc.log"));
+        }
         Path cfg = DeviceDriverFolder.scan(options.drivers()).configurations().get(driver.id());
         Path log = options.report().resolveSibling("plc.log");
         return process(options.plc(), PROGRAM, cfg, driver, log);
@@ -46,8 +53,15 @@ public final class PlcCommand {
     }
 
     private static List<String> command(Path executable, String program, Path cfg, String address) {
-        return List.of(executable.toString(), "plc", program, "--config", cfg.toString(), "--address", address,
-                "--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
+        List<String> command = new ArrayList<>(List.of(executable.toString(), "plc", program, "--config",
+                cfg.toString(), "--address", address));
+        command.addAll(hosting());
+        return command;
+    }
+
+    /** What every PLC process is told. */
+    private static List<String> hosting() {
+        return List.of("--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
     }
 
     /** The address on which a driver listens; its driver.cfg may leave the port to the system. */

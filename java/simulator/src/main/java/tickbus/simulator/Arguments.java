@@ -61,6 +61,16 @@ public final class Arguments {
     }
 
     /**
+     * The words of a value.
+     *
+     * @param name with its dashes
+     * @return what stands between its blanks
+     */
+    public List<String> words(String name) {
+        return List.of(values.getOrDefault(name, "").strip().split(" +"));
+    }
+
+    /**
      * A path that must be given.
      *
      * @param name with its dashes

@@ -18,7 +18,7 @@ final class PlcMain {
                 System.out.println("driver closed");
             }
         };
-        DemoOptions options = new DemoOptions(Path.of("none"), Path.of(args[0]), Path.of(args[1]), null, null,
+        DemoOptions options = new DemoOptions(Path.of("none"), Path.of(args[0]), Path.of(args[1]), null, null, null,
                 TickMode.REAL_TIME, 2_000_000, 1000, Long.MAX_VALUE);
         System.exit(Demo.run(options, () -> new DriverSet(List.of(plc)), HostedPlc::new, System.out, System.err));
     }

@@ -1,0 +1,19 @@
+//! A serial line without hardware, for the demo: prints the names of its two ends, and lasts until stdin ends.
+
+#[cfg(unix)]
+#[path = "../../../../tests/peers/pty.rs"]
+mod pty;
+
+#[cfg(unix)]
+fn main() {
+    let line = pty::Line::new();
+    println!("{} {}", line.end(0).display(), line.end(1).display());
+    // Whoever started it holds the other end of stdin, and closes it at the latest by ending.
+    let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+}
+
+#[cfg(not(unix))]
+fn main() {
+    eprintln!("profibus-line: pseudo-terminals need a Unix");
+    std::process::exit(1);
+}

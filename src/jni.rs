@@ -249,7 +249,7 @@ fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jin
 fn inject(env: &mut Env<'_>, handle: jlong, fault: &JString<'_>) -> Result<jint, Failure> {
     let text = fault.try_to_string(env)?;
     let config = with(handle, |device| device.config())?;
-    let id = tickbus_fieldbus::faults::read_one(&text, &config.table)
+    let id = tickbus_fieldbus::faults::read_one(&text, config.fault_scope())
         .and_then(|fault| match with(handle, |device| device.inject(&fault)) {
             Ok(injected) => injected.map(Ok),
             Err(failure) => Ok(Err(failure)),

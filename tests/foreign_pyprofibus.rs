@@ -22,7 +22,7 @@ fn main() -> ExitCode {
         ("pyprofibus_reads_gsd_files_as_we_do", reads),
         #[cfg(unix)]
         (
-            "pyprofibus_takes_our_gsd_files_and_exchanges_at_every_rate_of_user_space",
+            "pyprofibus_takes_our_gsd_files_exchanges_and_reads_diagnoses_at_every_rate_of_user_space",
             exchanges,
         ),
     ])
@@ -60,7 +60,10 @@ fn exchanges() -> Result<(), Absent> {
             "[driver]\nid = 1\nname = \"encoder\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
              baud = {baud}\nmax_tsdr = 60000\nmax_age = \"5s\"\naddress = 8\n{device}\n\
              [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
-             [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n"
+             [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n\
+             [[fault]]\nkind = \"diagnosis\"\nslot = 1\nchannel = 3\nerror = \"line-break\"\n\
+             while = \"out > {}\"\n",
+            100 << 24
         );
         if gsd == own {
             write_gsd(folder.path(), &text, own);
@@ -77,6 +80,12 @@ fn exchanges() -> Result<(), Absent> {
             machine.set("in", value);
         });
         assert!(told.contains("profibus_master: ok exchanges="), "{told}");
+        // Ext_Diag, the watchdog, the master; and at last a block about a channel.
+        let diagnoses = told.trim().rsplit('=').next().expect("a word");
+        let (first, last) = diagnoses.split_once(',').expect("two diagnoses");
+        assert!(first.starts_with("000c0002") && first.len() == 12, "{told}");
+        assert!(last.starts_with("080c0002") && last.len() == 18, "{told}");
+        assert_eq!(last[12..14], *"80", "{told}");
         println!("{baud} baud, {module}: {}", told.trim());
     }
     Ok(())

@@ -35,6 +35,7 @@ fn line(dpv1: bool, mut stream: &[u8]) {
             freeze: true,
             fail_safe: address == 4,
             dpv1,
+            max_diagnosis: DATA_LIMIT,
         };
         Station::new(address, identity)
     };

@@ -2,7 +2,8 @@
 
 profibus_master.py DEVICE BAUD ADDRESS GSD MODULE
 
-The station has 4 bytes each way and brings the outputs back on the inputs. The last line has the number of exchanges.
+The station has 4 bytes each way and brings the outputs back on the inputs. The last line has the number of exchanges, and
+the diagnoses that it has sent while data were exchanged, each as it differs from the one before.
 """
 
 import os
@@ -11,6 +12,7 @@ import tempfile
 import time
 
 import pyprofibus
+from pyprofibus.dp import DpTelegram_SlaveDiag_Con
 
 CONF = """
 [PROFIBUS]
@@ -56,7 +58,24 @@ def open_master(arguments):
     return master, slaves[0]
 
 
+def note_diagnoses():
+    """pyprofibus keeps the standard's part alone, so the telegrams are looked at where they arrive."""
+    seen = []
+    read = DpTelegram_SlaveDiag_Con.fromFdlTelegram.__func__
+
+    def note(cls, telegram):
+        octets = bytes(telegram.du).hex()
+        # Before that the station is not ready.
+        if not telegram.du[0] & 0x02 and octets not in seen[-1:]:
+            seen.append(octets)
+        return read(cls, telegram)
+
+    DpTelegram_SlaveDiag_Con.fromFdlTelegram = classmethod(note)
+    return seen
+
+
 def main():
+    diagnoses = note_diagnoses()
     master, slave = open_master(sys.argv[1:])
     exchanges = 0
     for number in range(1, 201):
@@ -73,7 +92,7 @@ def main():
             if time.monotonic() > limit:
                 sys.exit(f"{came} came back of {sent}")
     master.destroy()
-    print(f"profibus_master: ok exchanges={exchanges}")
+    print(f"profibus_master: ok exchanges={exchanges} diagnoses={','.join(diagnoses)}")
 
 
 main()

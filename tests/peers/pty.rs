@@ -1,12 +1,12 @@
-//! A serial line without hardware: two pseudo-terminals, and a thread that copies what is written to one of
-//! them to the other.
+//! A serial line without hardware: pseudo-terminals, and a thread that copies what is written to one of them to all
+//! others, unharmed or not.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -17,33 +17,79 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// The line; dropping it ends it.
 pub(crate) struct Line {
-    /// The names of its two ends.
-    pub ends: [PathBuf; 2],
+    /// The names of its ends.
+    ends: Vec<PathBuf>,
     over: Arc<AtomicBool>,
+    harm: Arc<Harm>,
     thread: Option<JoinHandle<()>>,
     /// Kept open, so that it does not hang up between two programs.
-    _kept: [OwnedFd; 2],
+    _kept: Vec<OwnedFd>,
+}
+
+/// What the line does to the bytes that it carries.
+#[derive(Default)]
+struct Harm {
+    /// One piece of so many is damaged; 0 for none.
+    each: AtomicUsize,
+    pieces: AtomicUsize,
+}
+
+impl Harm {
+    /// Flips a bit, cuts the last byte off, or puts noise in front.
+    fn befall(&self, piece: &mut Vec<u8>) {
+        let each = self.each.load(Ordering::Relaxed);
+        let number = self.pieces.fetch_add(1, Ordering::Relaxed);
+        if each == 0 || !number.is_multiple_of(each) || piece.len() < 3 {
+            return;
+        }
+        let which = number / each;
+        match which % 4 {
+            0 => drop(piece.pop()),
+            1 => drop(piece.splice(0..0, [0x00, 0x68, 0xFF])),
+            _ => {
+                let bit = which % (8 * piece.len());
+                piece[bit / 8] ^= 1 << (bit % 8);
+            }
+        }
+    }
 }
 
 impl Line {
+    /// A line with two ends.
     pub(crate) fn new() -> Self {
-        let [one, other] = [end(), end()];
+        Self::with_ends(2)
+    }
+
+    pub(crate) fn with_ends(count: usize) -> Self {
+        let all: Vec<End> = std::iter::repeat_with(end).take(count).collect();
         let over = Arc::new(AtomicBool::new(false));
+        let harm = Arc::new(Harm::default());
+        let (mut ends, mut masters, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+        for end in all {
+            ends.push(end.name);
+            masters.push(end.master);
+            kept.push(end.kept);
+        }
         let thread = std::thread::spawn({
-            let over = Arc::clone(&over);
-            let mut masters = [one.master, other.master];
+            let (over, harm) = (Arc::clone(&over), Arc::clone(&harm));
             move || {
                 while !over.load(Ordering::Relaxed) {
-                    carry(&mut masters);
+                    carry(&mut masters, &harm);
                 }
             }
         });
         Self {
-            ends: [one.name, other.name],
+            ends,
             over,
+            harm,
             thread: Some(thread),
-            _kept: [one.kept, other.kept],
+            _kept: kept,
         }
+    }
+
+    /// From now on damages one piece of so many; 0 for none.
+    pub(crate) fn damage_each(&self, count: usize) {
+        self.harm.each.store(count, Ordering::Relaxed);
     }
 
     pub(crate) fn end(&self, index: usize) -> &Path {
@@ -86,24 +132,30 @@ fn end() -> End {
     }
 }
 
-fn carry(masters: &mut [File; 2]) {
+fn carry(masters: &mut [File], harm: &Harm) {
     let patience = Timespec {
         tv_sec: 0,
         tv_nsec: 20_000_000,
     };
-    let ready = {
-        let mut fds = [
-            PollFd::new(&masters[0], PollFlags::IN),
-            PollFd::new(&masters[1], PollFlags::IN),
-        ];
+    let ready: Vec<bool> = {
+        let watch = |master| PollFd::new(master, PollFlags::IN);
+        let mut fds: Vec<PollFd<'_>> = masters.iter().map(watch).collect();
         let _ = poll(&mut fds, Some(&patience));
-        fds.map(|fd| fd.revents().contains(PollFlags::IN))
+        let is_ready = |fd: &PollFd<'_>| fd.revents().contains(PollFlags::IN);
+        fds.iter().map(is_ready).collect()
     };
-    for (from, ready) in ready.into_iter().enumerate() {
+    for (from, _) in ready.iter().enumerate().filter(|(_, ready)| **ready) {
         let mut bytes = [0; 1024];
-        if ready && let Ok(count) = masters[from].read(&mut bytes) {
-            // When the line is full, data are lost, as on a real one.
-            let _ = masters[1 - from].write_all(&bytes[..count]);
+        let Ok(count) = masters[from].read(&mut bytes) else {
+            continue;
+        };
+        let mut piece = bytes[..count].to_vec();
+        harm.befall(&mut piece);
+        for (to, master) in masters.iter_mut().enumerate() {
+            if to != from {
+                // When the line is full, data are lost, as on a real one.
+                let _ = master.write_all(&piece);
+            }
         }
     }
 }

@@ -178,6 +178,19 @@ impl Configuration {
         self.outputs
     }
 
+    /// What a channel of the module in `slot`, from 1, is, as a diagnosis tells it: 1 for inputs, 2 for outputs, 3 for both;
+    /// and 1 for bits, 5 for words.
+    pub(crate) fn channel_kind(&self, slot: usize) -> (u8, u8) {
+        let module = slot.checked_sub(1).and_then(|at| self.modules.get(at));
+        let first = module.and_then(|module| module.identifiers.first());
+        match first {
+            Some(first) if first & 0x30 != 0 => {
+                ((first & 0x30) >> 4, if first & 0x40 == 0 { 1 } else { 5 })
+            }
+            _ => (3, 1),
+        }
+    }
+
     /// Why a master that expects the modules in `received` does not mean this station; `None` if it does.
     pub fn difference(&self, received: &[u8]) -> Option<String> {
         if received == self.bytes {

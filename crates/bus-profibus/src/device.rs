@@ -1,5 +1,6 @@
 //! The bus: carries bytes between the serial port and the stations, and frames between these and the image.
 
+mod diagnosis;
 #[cfg(unix)]
 mod line;
 

@@ -23,5 +23,5 @@ pub use event::{Event, Leaving};
 pub use gsd::{DiagnosisArea, DiagnosisTexts, Gsd, GsdError, Module, Slot};
 pub use options::{Device, Options, StationOptions};
 pub use segment::{Heard, Segment, Taken};
-pub use station::{Identity, Process, State, Station};
+pub use station::{Diagnosed, Identity, Process, State, Station};
 pub use user_parameters::{Allowed, Parameter, ParameterBlock, ParameterKind, UserParameters};

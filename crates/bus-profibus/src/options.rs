@@ -132,6 +132,10 @@ impl BusOptions for Options {
         ))))
     }
 
+    fn has_diagnosis(&self) -> bool {
+        true
+    }
+
     fn has_addresses(&self) -> bool {
         true
     }

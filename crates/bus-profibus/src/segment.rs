@@ -205,7 +205,7 @@ mod tests {
     use crate::configuration::Configuration;
     use crate::event::Event;
     use crate::station::Identity;
-    use crate::telegram::Control;
+    use crate::telegram::{Control, DATA_LIMIT};
     use crate::user_parameters::UserParameters;
 
     struct Nothing;
@@ -230,6 +230,7 @@ mod tests {
                 freeze: true,
                 fail_safe: false,
                 dpv1: false,
+                max_diagnosis: DATA_LIMIT,
             };
             Station::new(*address, identity)
         };

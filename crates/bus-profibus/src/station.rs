@@ -67,6 +67,17 @@ pub struct Identity {
     pub fail_safe: bool,
     /// Whether the first octets of the user's parameters are those of DPV1.
     pub dpv1: bool,
+    /// The most octets of its diagnosis, with the 6 of the standard.
+    pub max_diagnosis: usize,
+}
+
+/// An extended diagnosis.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Diagnosed {
+    /// Its blocks, as the standard has them.
+    pub blocks: Vec<Vec<u8>>,
+    /// The station cannot exchange data properly until it is over (`Stat_Diag`): the master goes on reading it.
+    pub is_static: bool,
 }
 
 /// The states of a DP slave; `Power_On` is before it is made.
@@ -103,6 +114,10 @@ pub struct Station {
     faults: diagnosis::Faults,
     /// The extended diagnosis that the machine has raised; empty if there is none.
     extended: Vec<u8>,
+    /// There is more of it than fits.
+    has_more: bool,
+    /// The machine cannot exchange data properly until its diagnosis is taken back.
+    is_static: bool,
     /// The owner has not read the diagnosis yet.
     is_news: bool,
     has_freeze: bool,
@@ -162,6 +177,8 @@ impl Station {
             fail_safe: false,
             faults: diagnosis::Faults::default(),
             extended: Vec::new(),
+            has_more: false,
+            is_static: false,
             is_news: false,
             has_freeze: false,
             has_sync: false,
@@ -212,18 +229,26 @@ impl Station {
         }
     }
 
-    /// Raises an extended diagnosis, blocks as the standard has them, or takes it back by an empty one. The master is
-    /// told with the next data that there is something to read.
-    ///
-    /// # Panics
-    ///
-    /// When it is longer than 238 octets.
-    pub fn diagnose(&mut self, blocks: &[u8]) {
-        assert!(blocks.len() <= diagnosis::EXTENDED_LIMIT, "it does not fit");
-        if self.extended != blocks {
-            self.extended = blocks.to_vec();
-            self.is_news = true;
+    /// Raises an extended diagnosis, or takes it back by an empty one. The master is told with the next data that there is
+    /// something to read. Blocks for which the device has no room are left out, and the master is told that there are more.
+    pub fn diagnose(&mut self, diagnosed: &Diagnosed) {
+        let room = diagnosis::room(self.identity.max_diagnosis);
+        let mut extended = Vec::new();
+        let mut has_more = false;
+        for block in &diagnosed.blocks {
+            if extended.len() + block.len() <= room {
+                extended.extend_from_slice(block);
+            } else {
+                has_more = true;
+            }
         }
+        let is_news = self.extended != extended
+            || self.has_more != has_more
+            || self.is_static != diagnosed.is_static;
+        self.extended = extended;
+        self.has_more = has_more;
+        self.is_static = diagnosed.is_static;
+        self.is_news |= is_news;
     }
 
     /// Takes a request to this station or to all, and appends its answer, if it has any.

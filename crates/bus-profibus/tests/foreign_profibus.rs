@@ -10,6 +10,7 @@
 mod peer;
 #[path = "../../../tests/peers/pty.rs"]
 mod pty;
+mod rig;
 
 use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
@@ -17,132 +18,28 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::time::Duration;
 
 use peer::{Master, Project, SLOT, Seen, Slave};
-use profirust::Baudrate;
 use profirust::dp::PeripheralEvent;
+use rig::{
+    ADDRESS, IDENT, OnPort, RATES, device, device_at, exchange, project, project_at, slave, until,
+    until_exchanging,
+};
 use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance as conformance;
-use tickbus_conformance::rig::{Bus, End, Liar, await_that, config, logged};
+use tickbus_conformance::rig::{End, await_that, config, logged};
 use tickbus_driver::Code;
 use tickbus_fieldbus::LinkState;
-
-const ADDRESS: u8 = 8;
-const IDENT: u16 = 0x80E0;
 
 /// What a PLC's tool sends to `remote_io.gsd` with its first three modules.
 const REMOTE_IO_PARAMETERS: [u8; 10] = [0xC0, 0, 0, 0, 0, 0x11, 0xFF, 0xFF, 0xFF, 0xFE];
 
-/// The kind for the rig, on this port.
-struct OnPort(String);
-
-impl Bus for OnPort {
-    fn fieldbus(&self, _role: &str) -> String {
-        format!(
-            "kind = \"profibus-device\"\ndevice = \"{}\"\nbaud = 500000\nmax_tsdr = {}\n\
-             address = {ADDRESS}\nident = {IDENT:#06x}\nconfig = [0x52, 0x62]",
-            self.0,
-            SLOT - 1000,
-        )
-    }
-
-    fn liar(&self, _clock: &std::sync::Arc<Manual>) -> Liar {
-        unreachable!("a master that lies is met below")
-    }
-
-    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
-        vec![
-            (
-                "kind = \"profibus-device\"\ndevice = \"x\"\nbaud = 9601\naddress = 3\nident = 1",
-                "9601 is no rate of PROFIBUS",
-            ),
-            (
-                "kind = \"profibus-device\"\ndevice = \"x\"\naddress = 3\ngsd = \"none.gsd\"",
-                "cannot read the GSD file",
-            ),
-            (
-                "kind = \"profibus-device\"\ndevice = \"x\"\naddress = 3\nident = 1\nconfig = [0x50]",
-                "the signals have 1 bytes of %Q, and the station 0",
-            ),
-        ]
-    }
-}
-
-fn device(line: &pty::Line) -> End {
-    device_at(line, 500_000)
-}
-
-fn device_at(line: &pty::Line, baud: u32) -> End {
-    let bus = OnPort(line.end(0).display().to_string());
-    let text = config(&bus, "device", "");
-    let text = text.replace("baud = 500000", &format!("baud = {baud}"));
-    End::open(&text, &Monotonic::shared())
-}
-
-fn slave() -> Slave {
-    Slave {
-        address: ADDRESS,
-        ident: IDENT,
-        parameters: &[],
-        config: &[0x52, 0x62],
-        inputs: 6,
-        outputs: 6,
-    }
-}
-
-fn project() -> Project {
-    Project {
-        baud: Baudrate::B500000,
-        slot: SLOT,
-        watchdog: Some(profirust::time::Duration::from_millis(500)),
-        slaves: vec![slave()],
-        damages: None,
-    }
-}
-
-/// Ticks until `done` holds.
-#[track_caller]
-fn until(device: &mut End, what: &str, mut done: impl FnMut(&mut End) -> bool) {
-    await_that(what, || {
-        device.tick();
-        std::thread::sleep(Duration::from_micros(500));
-        done(device)
-    });
-}
-
-#[track_caller]
-fn until_exchanging(device: &mut End, master: &Master) {
-    let before = master.first(|seen| seen.exchanges);
-    until(device, "data are exchanged", |device| {
-        let goes = master.first(|seen| seen.exchanges) > before;
-        goes && device.tick().code == Code::Fresh && device.link().state == LinkState::Running
-    });
-}
-
-/// Each end sends a number to the other.
-#[track_caller]
-fn exchange(device: &mut End, master: &Master, number: u8) {
-    device.set("position", f64::from(number));
-    master.first(|seen| seen.outputs[2..4].copy_from_slice(&[0, number]));
-    until(device, "both numbers arrive", |device| {
-        let came = master.first(|seen| seen.inputs.get(2..4) == Some(&[0, number]));
-        came && device.get("speed") == f64::from(number)
-    });
-}
-
 #[test]
 fn it_is_started_up_and_exchanges_both_ways_at_every_rate_of_user_space() {
-    for (baud, rate, slot) in [
-        (Baudrate::B9600, 9_600, 500),
-        (Baudrate::B19200, 19_200, 1_000),
-        (Baudrate::B187500, 187_500, 4_000),
-        (Baudrate::B500000, 500_000, SLOT),
-    ] {
+    for rate in RATES {
         let line = pty::Line::new();
-        let mut device = device_at(&line, rate);
+        let mut device = device_at(&line, rate.1);
         let project = Project {
-            baud,
-            slot,
             watchdog: None,
-            ..project()
+            ..project_at(rate)
         };
         let master = Master::run(line.end(1), project);
         until_exchanging(&mut device, &master);
@@ -199,49 +96,55 @@ fn pulses_of_one_tick_and_of_one_exchange_arrive() {
 }
 
 #[test]
-fn a_slave_that_is_lost_comes_back() {
-    let line = pty::Line::new();
-    let mut first = device(&line);
-    let master = Master::run(line.end(1), project());
-    until_exchanging(&mut first, &master);
-    for number in [1, 2] {
-        exchange(&mut first, &master, number);
-        first.driver.close();
-        await_that("the master has noticed", || {
-            std::thread::sleep(Duration::from_millis(1));
-            master.first(|seen| seen.has(PeripheralEvent::Offline))
-        });
-        master.first(|seen| seen.events.clear());
-        first = device(&line);
+fn a_slave_that_is_lost_comes_back_at_every_rate() {
+    for rate in RATES {
+        let line = pty::Line::new();
+        let mut first = device_at(&line, rate.1);
+        let master = Master::run(line.end(1), project_at(rate));
         until_exchanging(&mut first, &master);
-        exchange(&mut first, &master, number + 10);
+        for number in [1, 2] {
+            exchange(&mut first, &master, number);
+            first.driver.close();
+            await_that("the master has noticed", || {
+                std::thread::sleep(Duration::from_millis(1));
+                master.first(|seen| seen.has(PeripheralEvent::Offline))
+            });
+            master.first(|seen| seen.events.clear());
+            first = device_at(&line, rate.1);
+            until_exchanging(&mut first, &master);
+            exchange(&mut first, &master, number + 10);
+        }
     }
 }
 
 #[test]
-fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_back() {
-    let line = pty::Line::new();
-    let bus = OnPort(line.end(0).display().to_string());
-    // So long that only the watchdog can be the reason.
-    let text = config(&bus, "device", "").replace("\"300ms\"", "\"60s\"");
-    let mut device = End::open(&text, &Monotonic::shared());
-    for number in [3, 4] {
-        let master = Master::run(line.end(1), project());
-        until_exchanging(&mut device, &master);
-        exchange(&mut device, &master, number);
-        drop(master);
-        until(&mut device, "the station is stale", |device| {
-            device.tick().code == Code::Stale
-        });
-        assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
-        assert!(
-            device.tick().age < Nanos::from_secs(60),
-            "young, and invalid"
-        );
-        let link = device.link();
-        assert_ne!(link.state, LinkState::Running);
-        let words = "station 8: the master has been silent for longer than 500";
-        assert!(link.reason.contains(words), "{}", link.reason);
+fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_back_at_every_rate()
+{
+    for rate in RATES {
+        let line = pty::Line::new();
+        let bus = OnPort(line.end(0).display().to_string());
+        // So long that only the watchdog can be the reason.
+        let text = config(&bus, "device", "").replace("\"300ms\"", "\"60s\"");
+        let text = text.replace("baud = 500000", &format!("baud = {}", rate.1));
+        let mut device = End::open(&text, &Monotonic::shared());
+        for number in [3, 4] {
+            let master = Master::run(line.end(1), project_at(rate));
+            until_exchanging(&mut device, &master);
+            exchange(&mut device, &master, number);
+            drop(master);
+            until(&mut device, "the station is stale", |device| {
+                device.tick().code == Code::Stale
+            });
+            assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
+            assert!(
+                device.tick().age < Nanos::from_secs(60),
+                "young, and invalid"
+            );
+            let link = device.link();
+            assert_ne!(link.state, LinkState::Running);
+            let words = "station 8: the master has been silent for longer than 500";
+            assert!(link.reason.contains(words), "{}", link.reason);
+        }
     }
 }
 
@@ -263,72 +166,48 @@ fn the_master_gets_fail_safe_values_while_the_simulation_stands_still() {
 }
 
 #[test]
-fn a_wrong_ident_and_a_wrong_configuration_are_told_in_words_and_mended() {
+fn a_wrong_ident_and_a_wrong_configuration_are_told_in_words_and_mended_at_every_rate() {
     logged::expect("refused: station 8");
-    let line = pty::Line::new();
-    let mut device = device(&line);
-    for (wrong, event, words) in [
-        (
-            Slave {
-                ident: 0x1234,
-                ..slave()
-            },
-            PeripheralEvent::ParameterError,
-            "expected ident 80E0, received 1234",
-        ),
-        (
-            Slave {
-                config: &[0x52, 0x61],
-                ..slave()
-            },
-            PeripheralEvent::ConfigError,
-            "slot 2: expected 62 (6 bytes of outputs), received 61 (4 bytes of outputs)",
-        ),
-    ] {
-        let mistaken = Project {
-            slaves: vec![wrong],
-            ..project()
-        };
-        let master = Master::run(line.end(1), mistaken);
-        until(&mut device, "it is told", |device| {
-            let link = device.link();
-            link.cause.name() == "refused" && link.reason.contains(words)
-        });
-        await_that("the master has read it", || {
-            std::thread::sleep(Duration::from_millis(1));
-            master.first(|seen| seen.has(event))
-        });
-        master.first(|seen| assert_eq!(seen.exchanges, 0));
-        drop(master);
-        let master = Master::run(line.end(1), project());
-        until_exchanging(&mut device, &master);
+    for rate in RATES {
+        let line = pty::Line::new();
+        let mut device = device_at(&line, rate.1);
+        for (wrong, event, words) in [
+            (
+                Slave {
+                    ident: 0x1234,
+                    ..slave()
+                },
+                PeripheralEvent::ParameterError,
+                "expected ident 80E0, received 1234",
+            ),
+            (
+                Slave {
+                    config: &[0x52, 0x61],
+                    ..slave()
+                },
+                PeripheralEvent::ConfigError,
+                "slot 2: expected 62 (6 bytes of outputs), received 61 (4 bytes of outputs)",
+            ),
+        ] {
+            let mistaken = Project {
+                slaves: vec![wrong],
+                ..project_at(rate)
+            };
+            let master = Master::run(line.end(1), mistaken);
+            until(&mut device, "it is told", |device| {
+                let link = device.link();
+                link.cause.name() == "refused" && link.reason.contains(words)
+            });
+            await_that("the master has read it", || {
+                std::thread::sleep(Duration::from_millis(1));
+                master.first(|seen| seen.has(event))
+            });
+            master.first(|seen| assert_eq!(seen.exchanges, 0));
+            drop(master);
+            let master = Master::run(line.end(1), project_at(rate));
+            until_exchanging(&mut device, &master);
+        }
     }
-}
-
-#[test]
-fn damaged_and_cut_telegrams_are_repeated_and_never_believed() {
-    let line = pty::Line::new();
-    let mut device = device(&line);
-    let noisy = Project {
-        damages: Some(9),
-        ..project()
-    };
-    let master = Master::run(line.end(1), noisy);
-    until_exchanging(&mut device, &master);
-    let mut last = 0;
-    for number in 1..=30 {
-        // The same number twice, so that a torn or damaged telegram would show.
-        master.first(|seen| seen.outputs[2..6].copy_from_slice(&[0, number, 0, number]));
-        until(&mut device, "it arrives", |device| {
-            let (speed, echo) = (device.get("speed"), device.get("echo"));
-            assert_eq!(speed, echo);
-            assert!([f64::from(last), f64::from(number), -1.0].contains(&speed) || last == 0);
-            speed == f64::from(number)
-        });
-        last = number;
-    }
-    let damaged = device.statistic("profibus-device.damaged");
-    assert_ne!(damaged, "0");
 }
 
 /// Five devices of three kinds, two of them by a GSD file, as one driver on one line.

@@ -100,6 +100,14 @@ impl Config {
         Ok(config)
     }
 
+    /// What its faults are read for.
+    pub fn fault_scope(&self) -> faults::Scope<'_> {
+        faults::Scope {
+            table: &self.table,
+            has_diagnosis: self.bus.has_diagnosis(),
+        }
+    }
+
     /// Adds the faults in the file at `path`.
     ///
     /// # Errors
@@ -108,7 +116,7 @@ impl Config {
     pub fn add_faults(&mut self, path: &Path) -> Result<(), Mistakes> {
         let text = load_text(path)?;
         let file = path.display().to_string();
-        let more = faults::read_file(&file, &text, &self.table)?;
+        let more = faults::read_file(&file, &text, self.fault_scope())?;
         if self.faults.len() + more.len() > faults::LIMIT {
             let what = format!("there are {} faults", self.faults.len() + more.len());
             let right = format!("a driver has at most {}", faults::LIMIT);
@@ -241,8 +249,14 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
     if let Some(table) = &table {
         axis::resolve(&mut axes, table);
     }
+    let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
+    let scope = table.as_ref().map(|table| faults::Scope {
+        table,
+        // What is wrong with the bus is reported already.
+        has_diagnosis: bus.is_none_or(|bus| bus.has_diagnosis()),
+    });
     let faults = faults
-        .map(|value| faults::read_sections(value.tables("[[fault]]"), table.as_ref()))
+        .map(|value| faults::read_sections(value.tables("[[fault]]"), scope))
         .unwrap_or_default();
 
     let (driver, fieldbus) = (driver?, fieldbus?);

@@ -40,7 +40,7 @@ impl Driver {
     ///
     /// With every mistake in the text; or when too many faults wait or are active.
     pub fn inject_text(&mut self, text: &str) -> Result<u32, Mistakes> {
-        let fault = faults::read_one(text, &self.config.table)?;
+        let fault = faults::read_one(text, self.config.fault_scope())?;
         self.inject_read(&fault)
     }
 

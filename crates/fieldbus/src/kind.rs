@@ -84,6 +84,11 @@ pub trait BusOptions {
         false
     }
 
+    /// Whether stations report to their master what is wrong with them, which an injected fault can be.
+    fn has_diagnosis(&self) -> bool {
+        false
+    }
+
     /// Takes the lines of `[fieldbus.at]`, and reports invalid addresses; for buses that [have
     /// them](Self::has_addresses).
     fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {

@@ -21,7 +21,7 @@ use tickbus_image::{BusEnd, Event};
 
 use super::validity::Validity;
 use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role, Watch};
-use crate::faults::FaultBoard;
+use crate::faults::{Diagnosis, FaultBoard};
 use faults::FaultLayer;
 use image::{ImagePort, Report};
 
@@ -225,6 +225,13 @@ impl Port {
     /// Reports a write by the peer, for buses on which every write matters.
     pub fn event(&mut self, event: Event) {
         self.faults.event(event, &mut self.image);
+    }
+
+    /// What the stations report to their master by injected faults, if that has changed since the last call; for buses
+    /// that [have a diagnosis](super::BusOptions::has_diagnosis).
+    pub fn take_diagnoses(&mut self, now: Nanos) -> Option<&[Diagnosis]> {
+        self.faults.attend(now, &mut self.image);
+        self.faults.take_diagnoses()
     }
 
     /// When the port itself has to act next, by a call of [`observe`](Self::observe); [`Nanos::MAX`] for

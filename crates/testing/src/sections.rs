@@ -382,7 +382,7 @@ impl Reader<'_> {
         let fault = |value: Value<'_>| {
             let section = value.table("fault", RIGHT)?;
             // If it cannot be read, its mistakes were reported.
-            let fault = faults::read_sections(vec![section], Some(self.table)).pop()?;
+            let fault = faults::read_sections(vec![section], Some(self.table.into())).pop()?;
             Some((fault, value.place()))
         };
         let read: Vec<_> = values.into_iter().map(fault).collect();

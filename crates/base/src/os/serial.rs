@@ -104,6 +104,7 @@ mod unix {
             if settings.rs485 {
                 switch_direction(&port)?;
             }
+            ask_for_low_latency(&port);
             ioctl_tiocexcl(&port)?;
             tcflush(&port, QueueSelector::IOFlush)?;
             Ok(Self(File::from(port)))
@@ -138,6 +139,61 @@ mod unix {
             .canonicalize()
             .is_ok_and(|path| path.starts_with("/dev/pts"))
     }
+
+    /// Asks the port's driver to hand bytes over as they come: those of some USB adapters collect them for 16 ms otherwise.
+    /// A port that does not know of this works all the same.
+    #[cfg(target_os = "linux")]
+    #[allow(unsafe_code, reason = "no crate of ours wraps these requests")]
+    fn ask_for_low_latency(port: &impl AsFd) {
+        use std::ffi::{c_int, c_uint, c_ulong, c_ushort};
+
+        use rustix::ioctl::{Setter, Updater, ioctl};
+
+        /// `struct serial_struct` of linux/tty.h.
+        #[repr(C)]
+        struct Serial {
+            head: [c_int; 4],
+            flags: c_int,
+            sizes: [c_int; 3],
+            close_delay: c_ushort,
+            io_type: [u8; 2],
+            hub6: c_int,
+            closing_waits: [c_ushort; 2],
+            iomem_base: usize,
+            iomem_reg_shift: c_ushort,
+            port_high: c_uint,
+            iomap_base: c_ulong,
+        }
+
+        const TIOCGSERIAL: rustix::ioctl::Opcode = 0x541E;
+        const TIOCSSERIAL: rustix::ioctl::Opcode = 0x541F;
+        const LOW_LATENCY: c_int = 1 << 13;
+
+        let mut serial = Serial {
+            head: [0; 4],
+            flags: 0,
+            sizes: [0; 3],
+            close_delay: 0,
+            io_type: [0; 2],
+            hub6: 0,
+            closing_waits: [0; 2],
+            iomem_base: 0,
+            iomem_reg_shift: 0,
+            port_high: 0,
+            iomap_base: 0,
+        };
+        // SAFETY: the request writes one `serial_struct`, whose layout `Serial` has, and keeps no pointer to it.
+        let is_read =
+            unsafe { ioctl(port, Updater::<TIOCGSERIAL, Serial>::new(&mut serial)) }.is_ok();
+        if is_read && serial.flags & LOW_LATENCY == 0 {
+            serial.flags |= LOW_LATENCY;
+            // SAFETY: likewise, read.
+            let _ = unsafe { ioctl(port, Setter::<TIOCSSERIAL, Serial>::new(serial)) };
+        }
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn ask_for_low_latency(_port: &impl AsFd) {}
 
     /// Lets the port's driver switch the direction with RTS, which is on while it sends.
     #[cfg(target_os = "linux")]

@@ -7,6 +7,7 @@ use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
+use super::diagnosis::diagnosed;
 use super::{LineOptions, Machine, StationSetup, Stations};
 use crate::segment::{Segment, Taken};
 use crate::station::Station;
@@ -30,6 +31,7 @@ pub(super) fn serve(
         .map(|setup| Station::new(setup.address, setup.identity.clone()));
     let mut line = Line {
         options,
+        setups,
         segment: Segment::new(options.settings.baud, stations.collect()),
         stations: Stations::new(setups, port),
         reply: Vec::new(),
@@ -42,6 +44,8 @@ pub(super) fn serve(
 
 struct Line<'a> {
     options: &'a LineOptions,
+    /// In the order of the signal table.
+    setups: &'a [StationSetup],
     segment: Segment,
     stations: Stations,
     /// The answer being sent, and how much of it the system has accepted.
@@ -63,6 +67,14 @@ impl Caller for Line<'_> {
         // A line that is down by an injected fault carries nothing.
         if !port.is_up(now) {
             return Ok(());
+        }
+        if let Some(all) = port.take_diagnoses(now) {
+            for (index, setup) in self.setups.iter().enumerate() {
+                let own = all.iter().filter(|diagnosis| diagnosis.station == index);
+                let told = diagnosed(&setup.identity.configuration, own);
+                let station = self.segment.station_mut(setup.address);
+                station.expect("it is one of them").diagnose(&told);
+            }
         }
         let mut machine = Machine {
             stations: &mut self.stations,

@@ -66,6 +66,7 @@ impl Gsd {
             freeze: self.freeze,
             fail_safe: self.fail_safe,
             dpv1: self.dpv1,
+            max_diagnosis: self.max_diagnosis.unwrap_or(DATA_LIMIT),
         })
     }
 

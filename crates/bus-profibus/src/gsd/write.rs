@@ -193,6 +193,7 @@ mod tests {
             freeze: true,
             fail_safe: false,
             dpv1: false,
+            max_diagnosis: 244,
         };
         let modules = [0x50, 0x60, 0x50, 0x93, 0xC1, 0x43, 0x81, 0xAA];
         let conveyor = own(Configuration::of_bytes(&modules).expect("whole"));

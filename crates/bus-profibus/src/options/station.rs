@@ -141,6 +141,7 @@ pub(super) fn plain(
         freeze: true,
         fail_safe: false,
         dpv1: false,
+        max_diagnosis: DATA_LIMIT,
     }
 }
 

@@ -5,8 +5,10 @@ use super::{State, Station};
 /// The octets of the standard's part.
 const STANDARD: usize = 6;
 
-/// The most octets of extended diagnosis.
-pub(super) const EXTENDED_LIMIT: usize = crate::telegram::DATA_LIMIT - STANDARD;
+/// The octets of extended diagnosis of a device that has room for so many in all.
+pub(super) fn room(most: usize) -> usize {
+    most.clamp(STANDARD, crate::telegram::DATA_LIMIT) - STANDARD
+}
 
 /// What was wrong with the last parameters or configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,19 +26,20 @@ impl Station {
         out.push(
             flag(1, self.state != State::DataExch)
                 | flag(2, self.faults.configuration)
-                | flag(3, !self.extended.is_empty())
+                | flag(3, !self.extended.is_empty() || self.has_more)
                 | flag(4, self.faults.not_supported)
                 | flag(6, self.faults.parameters),
         );
         // Bit 2 is always set by a slave.
         out.push(
             flag(0, waits)
+                | flag(1, self.is_static)
                 | flag(2, true)
                 | flag(3, self.watchdog.is_some())
                 | flag(4, self.is_frozen)
                 | flag(5, self.is_synced),
         );
-        out.push(0);
+        out.push(flag(7, self.has_more));
         // 255: no master.
         out.push(self.owner.unwrap_or(0xFF));
         out.extend(self.identity.ident.to_be_bytes());

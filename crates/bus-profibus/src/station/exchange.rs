@@ -72,12 +72,12 @@ impl Station {
             }
             self.is_pending = true;
         }
-        let control = if self.is_news {
+        let control = if self.is_news || self.is_static {
             Control::DATA_HIGH
         } else {
             Control::DATA_LOW
         };
-        if self.inputs.is_empty() && !self.is_news {
+        if self.inputs.is_empty() && control == Control::DATA_LOW {
             append_short_ack(reply);
         } else {
             self.append(request, control, &self.inputs, reply);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::Gsd;
-use crate::telegram::Telegram;
+use crate::telegram::{DATA_LIMIT, Telegram};
 
 const MASTER: u8 = 2;
 const SLAVE: u8 = 8;
@@ -65,6 +65,7 @@ fn identity() -> Identity {
         freeze: true,
         fail_safe: false,
         dpv1: false,
+        max_diagnosis: DATA_LIMIT,
     }
 }
 
@@ -140,6 +141,13 @@ impl Rig {
     fn control(&mut self, command: u8, groups: u8) {
         let came = self.raw(Some(58), 0x46, &[command, groups]);
         assert_eq!(came, Came::Nothing);
+    }
+
+    fn diagnose(&mut self, blocks: &[&[u8]], is_static: bool) {
+        self.station.diagnose(&Diagnosed {
+            blocks: blocks.iter().map(|block| block.to_vec()).collect(),
+            is_static,
+        });
     }
 
     fn diagnosis(&mut self) -> Vec<u8> {
@@ -421,14 +429,39 @@ fn freeze_holds_the_inputs_and_sync_the_outputs_of_the_groups_they_are_for() {
 #[test]
 fn a_diagnosis_is_announced_once_and_read() {
     let mut rig = Rig::exchanging(identity(), 0, 0);
-    rig.station.diagnose(&[0x03, 0x11, 0x22]);
+    rig.diagnose(&[&[0x03, 0x11, 0x22]], false);
     assert_eq!(rig.exchange(&[1, 2]), Came::Data(0x0A, vec![0, 0]));
     let expected = [0x08, 0x04, 0, MASTER, 0x80, 0xE0, 0x03, 0x11, 0x22];
     assert_eq!(rig.diagnosis(), expected);
     assert_eq!(rig.exchange(&[1, 2]), data(&[0, 0]));
-    rig.station.diagnose(&[]);
+    rig.diagnose(&[], false);
     assert_eq!(rig.exchange(&[1, 2]), Came::Data(0x0A, vec![0, 0]));
     assert_eq!(rig.diagnosis().len(), 6);
+}
+
+#[test]
+fn a_diagnosis_that_does_not_fit_says_so_and_a_static_one_goes_on_until_it_is_over() {
+    let small = Identity {
+        max_diagnosis: 10,
+        ..identity()
+    };
+    let mut rig = Rig::exchanging(small, 0, 0);
+    let high = Came::Data(0x0A, vec![0, 0]);
+    rig.diagnose(&[&[0x03, 0x11, 0x22], &[0x81, 0x40, 0x26]], false);
+    assert_eq!(rig.exchange(&[1, 2]), high);
+    let told = rig.diagnosis();
+    assert_eq!(told[..3], [0x08, 0x04, 0x80], "Ext_Diag_Overflow");
+    assert_eq!(told[6..], [0x03, 0x11, 0x22], "no half blocks");
+    rig.diagnose(&[&[0x03, 0x11, 0x22]], true);
+    for _ in 0..3 {
+        assert_eq!(rig.exchange(&[1, 2]), high);
+        assert_eq!(rig.diagnosis()[..3], [0x08, 0x06, 0x00], "Stat_Diag");
+    }
+    assert_eq!(rig.machine.outputs.last(), Some(&vec![1, 2]));
+    rig.diagnose(&[], false);
+    assert_eq!(rig.exchange(&[1, 2]), high, "that it is over is news, too");
+    assert_eq!(rig.diagnosis(), [0x00, 0x04, 0, MASTER, 0x80, 0xE0]);
+    assert_eq!(rig.exchange(&[1, 2]), data(&[0, 0]));
 }
 
 #[test]
@@ -441,7 +474,7 @@ fn a_station_without_inputs_acknowledges_shortly_unless_it_has_a_diagnosis() {
     rig.parameterise(LOCK, 0);
     rig.ask(62, &[0x20]);
     assert_eq!(rig.exchange(&[1]), Came::Short);
-    rig.station.diagnose(&[0x02, 0x11]);
+    rig.diagnose(&[&[0x02, 0x11]], false);
     assert_eq!(rig.exchange(&[1]), Came::Data(0x0A, Vec::new()));
 }
 

@@ -1,19 +1,20 @@
 //! profirust, a DP master that somebody else wrote, on one end of a pseudo-terminal.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
-use std::fs::{File, OpenOptions};
-use std::io::{Read as _, Write as _};
-use std::os::unix::fs::OpenOptionsExt as _;
+#[path = "../../../../tests/peers/dp_phy.rs"]
+mod dp_phy;
+
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 
 use profirust::Baudrate;
-use profirust::dp::{DpMaster, Peripheral, PeripheralEvent, PeripheralOptions};
+use profirust::dp::{DiagnosticFlags, DpMaster, Peripheral, PeripheralEvent, PeripheralOptions};
 use profirust::fdl::{FdlActiveStation, ParametersBuilder};
-use profirust::phy::ProfibusPhy;
 use profirust::time::{Duration, Instant};
+
+use dp_phy::Pty;
 
 /// The time for an answer in the master's project, in bits: a pseudo-terminal has no wire, and a busy machine needs time.
 pub const SLOT: u16 = 6_000;
@@ -33,11 +34,11 @@ pub struct Slave {
 #[derive(Clone, Debug)]
 pub struct Project {
     pub baud: Baudrate,
+    /// The master's address.
+    pub address: u8,
     pub slot: u16,
     pub watchdog: Option<Duration>,
     pub slaves: Vec<Slave>,
-    /// Damages every so many telegrams, in either direction.
-    pub damages: Option<usize>,
 }
 
 /// What the master knows of one station.
@@ -50,6 +51,10 @@ pub struct Seen {
     /// Rising edges of the lowest bit of the inputs.
     pub edges: usize,
     pub events: Vec<PeripheralEvent>,
+    /// The flags of the last diagnosis, and its extended part.
+    pub diagnosis: (u16, Vec<u8>),
+    /// How often the diagnosis was read.
+    pub diagnoses: usize,
 }
 
 impl Seen {
@@ -73,7 +78,7 @@ impl Master {
         });
         let seen = Arc::new(Mutex::new(seen.collect()));
         let over = Arc::new(AtomicBool::new(false));
-        let phy = Pty::open(end, &project);
+        let phy = Pty::open(end, project.baud).expect("the other end");
         let thread = std::thread::spawn({
             let (seen, over) = (Arc::clone(&seen), Arc::clone(&over));
             move || run(phy, &project, &seen, &over)
@@ -120,11 +125,11 @@ fn run(mut phy: Pty, project: &Project, seen: &Mutex<Vec<Seen>>, over: &AtomicBo
             dp.add(slave.with_diag_buffer(vec![0; 64]))
         })
         .collect();
-    let mut parameters = ParametersBuilder::new(2, project.baud);
+    let mut parameters = ParametersBuilder::new(project.address, project.baud);
     parameters
         .slot_bits(project.slot)
         .max_retry_limit(3)
-        .highest_station_address(3);
+        .highest_station_address(4);
     if let Some(time) = project.watchdog {
         parameters.watchdog_timeout(time);
     }
@@ -148,91 +153,18 @@ fn run(mut phy: Pty, project: &Project, seen: &Mutex<Vec<Seen>>, over: &AtomicBo
             } else {
                 seen.events.push(event);
             }
+            if event == PeripheralEvent::Diagnostics
+                && let Some(told) = slave.last_diagnostics()
+            {
+                let extended = told.extended_diagnostics.raw_diag_buffer();
+                // It keeps the last one beyond its end.
+                let is_there = told.flags.contains(DiagnosticFlags::EXT_DIAG);
+                let extended = extended.filter(|_| is_there);
+                seen.diagnosis = (told.flags.bits(), extended.unwrap_or_default().to_vec());
+                seen.diagnoses += 1;
+            }
             slave.pi_q_mut().copy_from_slice(&seen.outputs);
         }
         std::thread::sleep(std::time::Duration::from_micros(50));
-    }
-}
-
-/// A pseudo-terminal as profirust wants it. It has to pretend that bytes take their time on the wire.
-struct Pty {
-    file: File,
-    baud: Baudrate,
-    inbox: Vec<u8>,
-    busy_until: Instant,
-    damages: Option<usize>,
-    telegrams: usize,
-}
-
-impl Pty {
-    fn open(end: &Path, project: &Project) -> Self {
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .custom_flags(i32::try_from(rustix::fs::OFlags::NONBLOCK.bits()).expect("a flag"))
-            .open(end)
-            .expect("the other end");
-        Self {
-            file,
-            baud: project.baud,
-            inbox: Vec::new(),
-            busy_until: Instant::ZERO,
-            damages: project.damages,
-            telegrams: 0,
-        }
-    }
-
-    /// Flips a bit of every so many telegrams, or cuts the last octet off.
-    fn damage(&mut self, bytes: &mut Vec<u8>) {
-        self.telegrams += 1;
-        let Some(each) = self.damages else { return };
-        if self.telegrams.is_multiple_of(each) && bytes.len() > 3 {
-            let which = self.telegrams / each;
-            if which.is_multiple_of(3) {
-                bytes.pop();
-            } else {
-                let bit = which % (8 * bytes.len());
-                bytes[bit / 8] ^= 1 << (bit % 8);
-            }
-        }
-    }
-}
-
-impl ProfibusPhy for Pty {
-    fn poll_transmission(&mut self, now: Instant) -> bool {
-        now < self.busy_until
-    }
-
-    fn transmit_data<F, R>(&mut self, now: Instant, fill: F) -> R
-    where
-        F: FnOnce(&mut [u8]) -> (usize, R),
-    {
-        let mut buffer = [0; 256];
-        let (length, result) = fill(&mut buffer);
-        if length > 0 {
-            let mut bytes = buffer[..length].to_vec();
-            self.damage(&mut bytes);
-            self.file.write_all(&bytes).expect("a short telegram");
-            let bits = u32::try_from(11 * length).expect("a short telegram");
-            self.busy_until = now + self.baud.bits_to_time(bits);
-        }
-        result
-    }
-
-    fn receive_data<F, R>(&mut self, _now: Instant, take: F) -> R
-    where
-        F: FnOnce(&[u8]) -> (usize, R),
-    {
-        let mut buffer = [0; 256];
-        if let Ok(count) = self.file.read(&mut buffer) {
-            let mut bytes = buffer[..count].to_vec();
-            if count > 0 {
-                self.damage(&mut bytes);
-            }
-            self.inbox.extend(bytes);
-        }
-        let (taken, result) = take(&self.inbox);
-        self.inbox.drain(..taken);
-        result
     }
 }

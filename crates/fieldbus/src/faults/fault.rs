@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Condition;
+use super::{Condition, Diagnosis};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
@@ -63,6 +63,8 @@ pub enum LineEffect {
     LinkDown,
     /// The station with this index does not respond.
     StationDown(usize),
+    /// A station reports something to its master.
+    Diagnosis(Diagnosis),
 }
 
 /// Which frames are affected, as seen from this end.
@@ -129,6 +131,7 @@ impl Fault {
             Effect::Line(LineEffect::Duplicate(..)) => "duplicate",
             Effect::Line(LineEffect::LinkDown) => "link-down",
             Effect::Line(LineEffect::StationDown(_)) => "station-down",
+            Effect::Line(LineEffect::Diagnosis(_)) => "diagnosis",
         }
     }
 
@@ -195,6 +198,10 @@ fn troubled(trouble: LineEffect, table: &SignalTable) -> String {
         LineEffect::StationDown(station) => {
             format!("the station \"{}\" is gone", table.stations[station].name)
         }
+        LineEffect::Diagnosis(diagnosis) => match &*table.stations[diagnosis.station].name {
+            "" => format!("the station reports {}", diagnosis.finding),
+            name => format!("the station \"{name}\" reports {}", diagnosis.finding),
+        },
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::ring::Ring;
-use super::{FaultBoard, LineEffect, LineFault, Phase};
+use super::{Diagnosis, FaultBoard, LineEffect, LineFault, Phase};
 use tickbus_base::time::Nanos;
 
 /// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
@@ -47,6 +47,9 @@ pub struct LineFaults {
     repeats: bool,
     /// The active faults, as text.
     active: String,
+    /// What the stations report, in the order of the faults, and whether that is new.
+    diagnoses: Vec<Diagnosis>,
+    is_diagnosis_new: bool,
 }
 
 /// The part of the line that belongs to one station.
@@ -136,6 +139,8 @@ impl LineFaults {
             fate: Fate::Passes(1),
             repeats: false,
             active: String::new(),
+            diagnoses: Vec::new(),
+            is_diagnosis_new: false,
         }
     }
 
@@ -158,6 +163,7 @@ impl LineFaults {
         let room = titles.map(|fault| fault.cell.title_len() + 2).sum();
         self.active.clear();
         self.active.reserve(room);
+        self.diagnoses.reserve(self.faults.len() + 1);
         self.faults.push(fault);
     }
 
@@ -169,6 +175,16 @@ impl LineFaults {
         for wire in &mut self.stations {
             (wire.dead, wire.came, wire.went) = (false, true, true);
         }
+        let mut diagnoses = 0;
+        let mut report = |diagnosis, all: &mut Vec<Diagnosis>| {
+            let is_new = all.get(diagnoses) != Some(&diagnosis);
+            if is_new {
+                all.truncate(diagnoses);
+                all.push(diagnosis);
+            }
+            diagnoses += 1;
+            is_new
+        };
         self.faults.retain(|fault| {
             let phase = fault.cell.phase();
             if phase == Phase::Active {
@@ -181,11 +197,16 @@ impl LineFaults {
                             wire.dead = true;
                         }
                     }
+                    LineEffect::Diagnosis(own) => {
+                        self.is_diagnosis_new |= report(own, &mut self.diagnoses);
+                    }
                     LineEffect::Drop(..) | LineEffect::Duplicate(..) => {}
                 }
             }
             phase != Phase::Over
         });
+        self.is_diagnosis_new |= self.diagnoses.len() > diagnoses;
+        self.diagnoses.truncate(diagnoses);
         self.sum = sum;
         self.active.clear();
         for fault in &self.faults {
@@ -391,6 +412,11 @@ impl LineFaults {
         let fronts = rings.filter_map(|ring| ring.front());
         let dues = fronts.map(|(taken, _)| taken + self.sum.delay);
         dues.min().unwrap_or(Nanos::MAX)
+    }
+
+    /// What the stations report to their masters, if that has changed since the last call.
+    pub fn take_diagnoses(&mut self) -> Option<&[Diagnosis]> {
+        std::mem::take(&mut self.is_diagnosis_new).then_some(&self.diagnoses)
     }
 
     /// The active faults, as text: `"cable" (link-down)`.

@@ -8,6 +8,7 @@
 mod board;
 mod cell;
 mod condition;
+mod diagnosis;
 mod fault;
 mod line_fault;
 mod line_faults;
@@ -23,11 +24,12 @@ mod tick_time;
 pub use board::FaultBoard;
 pub use cell::{FaultStatus, Phase};
 pub use condition::{Condition, unknown};
+pub use diagnosis::{ChannelError, Diagnosis, Finding, Octets};
 pub use fault::{Begin, Direction, Effect, Fault, Lasts, LineEffect, SignalEffect};
 pub use line_fault::LineFault;
 pub use line_faults::{Fate, LineFaults, Shape};
 pub use list::{Faults, Slots};
-pub use section::{LIMIT, read_file, read_one, read_sections};
+pub use section::{LIMIT, Scope, read_file, read_one, read_sections};
 pub use tick_time::TickTime;
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use tickbus_image::signal::section::NAME_LIMIT;
 pub const LIMIT: usize = 64;
 
 /// The kinds of faults, and the keys that belong to each.
-const KINDS: [(&str, &[&str]); 10] = [
+const KINDS: [(&str, &[&str]); 11] = [
     ("stuck", &["signal", "value"]),
     ("invert", &["signal"]),
     ("offset", &["signal", "by"]),
@@ -23,7 +23,30 @@ const KINDS: [(&str, &[&str]); 10] = [
     ("duplicate", &["chance", "direction", "seed"]),
     ("link-down", &[]),
     ("station-down", &["station"]),
+    (
+        "diagnosis",
+        &["station", "slot", "channel", "error", "octets", "static"],
+    ),
 ];
+
+/// What faults are read for.
+#[derive(Clone, Copy, Debug)]
+pub struct Scope<'a> {
+    /// The stations and signals of the driver.
+    pub table: &'a SignalTable,
+    /// Whether its bus [has a diagnosis](crate::BusOptions::has_diagnosis).
+    pub has_diagnosis: bool,
+}
+
+/// A driver whose bus has none.
+impl<'a> From<&'a SignalTable> for Scope<'a> {
+    fn from(table: &'a SignalTable) -> Self {
+        Self {
+            table,
+            has_diagnosis: false,
+        }
+    }
+}
 
 const KIND: &str = "write the kind of fault, such as kind = \"stuck\"";
 /// The remedy where a signal should be named.
@@ -34,13 +57,18 @@ const SIGNAL: &str = "name the signal that is wrong, such as signal = \"LA1 bott
 /// # Errors
 ///
 /// With every mistake in the text.
-pub fn read_file(file: &str, text: &str, table: &SignalTable) -> Result<Vec<Fault>, Mistakes> {
+pub fn read_file<'a>(
+    file: &str,
+    text: &str,
+    scope: impl Into<Scope<'a>>,
+) -> Result<Vec<Fault>, Mistakes> {
+    let scope = Some(scope.into());
     let mut collector = Collector::new(file, text);
     let faults = read_text(&mut collector, text, |mut root| {
         let sections = root.require("fault", "write [[fault]] sections");
         root.finish();
         let sections = sections.map(|value| value.tables("[[fault]]"));
-        Some(read_sections(sections.unwrap_or_default(), Some(table)))
+        Some(read_sections(sections.unwrap_or_default(), scope))
     });
     match collector.finish() {
         Some(mistakes) => Err(mistakes),
@@ -53,12 +81,13 @@ pub fn read_file(file: &str, text: &str, table: &SignalTable) -> Result<Vec<Faul
 /// # Errors
 ///
 /// With every mistake in the text; they call the file `fault`.
-pub fn read_one(text: &str, table: &SignalTable) -> Result<Fault, Mistakes> {
+pub fn read_one<'a>(text: &str, scope: impl Into<Scope<'a>>) -> Result<Fault, Mistakes> {
+    let scope = Some(scope.into());
     let mut collector = Collector::new("fault", text);
     let fault = read_text(&mut collector, text, |root| {
         let has_sections = root.all().any(|(key, _)| key == "fault");
         if !has_sections {
-            return read(root, Some(table));
+            return read(root, scope);
         }
         let mut root = root;
         let sections = root.take("fault")?.tables("[[fault]]");
@@ -68,7 +97,7 @@ pub fn read_one(text: &str, table: &SignalTable) -> Result<Fault, Mistakes> {
         }
         sections
             .into_iter()
-            .find_map(|section| read(section, Some(table)))
+            .find_map(|section| read(section, scope))
     });
     match collector.finish() {
         Some(mistakes) => Err(mistakes),
@@ -76,9 +105,9 @@ pub fn read_one(text: &str, table: &SignalTable) -> Result<Fault, Mistakes> {
     }
 }
 
-/// Reads `[[fault]]` sections and reports their mistakes. Without a table, checks only what does not need
+/// Reads `[[fault]]` sections and reports their mistakes. Without a scope, checks only what does not need
 /// one.
-pub fn read_sections(sections: Vec<Table<'_>>, table: Option<&SignalTable>) -> Vec<Fault> {
+pub fn read_sections(sections: Vec<Table<'_>>, scope: Option<Scope<'_>>) -> Vec<Fault> {
     if let Some(first) = sections.get(LIMIT) {
         first.wrong(
             format!("there are {} faults", sections.len()),
@@ -89,7 +118,7 @@ pub fn read_sections(sections: Vec<Table<'_>>, table: Option<&SignalTable>) -> V
     let mut faults: Vec<Fault> = Vec::new();
     for mut section in sections {
         let name = section.take("name");
-        let Some(fault) = read(section, table) else {
+        let Some(fault) = read(section, scope) else {
             continue;
         };
         let twin = faults.iter().any(|other| other.name == fault.name);
@@ -112,6 +141,7 @@ pub fn read_sections(sections: Vec<Table<'_>>, table: Option<&SignalTable>) -> V
 
 /// The keys of a section.
 struct Keys<'a> {
+    kind: Option<Value<'a>>,
     name: Option<Value<'a>>,
     signal: Option<Value<'a>>,
     value: Option<Value<'a>>,
@@ -120,6 +150,11 @@ struct Keys<'a> {
     chance: Option<Value<'a>>,
     direction: Option<Value<'a>>,
     station: Option<Value<'a>>,
+    slot: Option<Value<'a>>,
+    channel: Option<Value<'a>>,
+    error: Option<Value<'a>>,
+    octets: Option<Value<'a>>,
+    static_: Option<Value<'a>>,
     seed: Option<Value<'a>>,
     at: Option<Value<'a>>,
     tick: Option<Value<'a>>,
@@ -133,6 +168,7 @@ struct Keys<'a> {
 impl<'a> Keys<'a> {
     fn take(table: &mut Table<'a>) -> Self {
         Self {
+            kind: table.require("kind", KIND),
             name: table.take("name"),
             signal: table.take("signal"),
             value: table.take("value"),
@@ -141,6 +177,11 @@ impl<'a> Keys<'a> {
             chance: table.take("chance"),
             direction: table.take("direction"),
             station: table.take("station"),
+            slot: table.take("slot"),
+            channel: table.take("channel"),
+            error: table.take("error"),
+            octets: table.take("octets"),
+            static_: table.take("static"),
             seed: table.take("seed"),
             at: table.take("at"),
             tick: table.take("tick"),
@@ -153,7 +194,7 @@ impl<'a> Keys<'a> {
     }
 
     /// The keys that only some kinds have.
-    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 8] {
+    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 13] {
         [
             ("signal", self.signal.as_ref()),
             ("value", self.value.as_ref()),
@@ -162,16 +203,21 @@ impl<'a> Keys<'a> {
             ("chance", self.chance.as_ref()),
             ("direction", self.direction.as_ref()),
             ("station", self.station.as_ref()),
+            ("slot", self.slot.as_ref()),
+            ("channel", self.channel.as_ref()),
+            ("error", self.error.as_ref()),
+            ("octets", self.octets.as_ref()),
+            ("static", self.static_.as_ref()),
             ("seed", self.seed.as_ref()),
         ]
     }
 }
 
 /// Reads one section.
-fn read(mut section: Table<'_>, table: Option<&SignalTable>) -> Option<Fault> {
-    let kind = section.require("kind", KIND);
+fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
+    let table = scope.map(|scope| scope.table);
     let keys = Keys::take(&mut section);
-    let known = kind.as_ref().and_then(kind_of);
+    let known = keys.kind.as_ref().and_then(kind_of);
     if let Some(kind) = known {
         match kind {
             "offset" => drop(section.require("by", "say by how much, such as by = 2.5")),
@@ -191,6 +237,14 @@ fn read(mut section: Table<'_>, table: Option<&SignalTable>) -> Option<Fault> {
 
     if let Some(kind) = known {
         check_keys(kind, &keys);
+    }
+    if let (Some("diagnosis"), Some(value), Some(scope)) = (known, &keys.kind, scope)
+        && !scope.has_diagnosis
+    {
+        value.wrong(
+            "a station of this bus has no diagnosis",
+            "remove the fault; \"profibus-device\" has one",
+        );
     }
     let begin = read_begin(&keys, table);
     let lasts = read_lasts(&keys);

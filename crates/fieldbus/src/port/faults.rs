@@ -7,7 +7,7 @@ use tickbus_base::time::Nanos;
 use tickbus_image::{BusStation, Event};
 
 use super::image::{ImagePort, Report};
-use crate::faults::{Fate, FaultBoard, LineFaults, Shape};
+use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape};
 use crate::{Cause, LinkState, LinkStatus};
 
 /// Passes everything on to an [`ImagePort`], and distorts it while line faults are active. Until the first one is
@@ -183,6 +183,12 @@ impl FaultLayer {
         if !self.line.as_deref().is_some_and(is_hidden) {
             port.touch(station, now);
         }
+    }
+
+    /// What the stations report, if that has changed since the last call.
+    #[inline]
+    pub(super) fn take_diagnoses(&mut self) -> Option<&[Diagnosis]> {
+        self.line.as_mut()?.take_diagnoses()
     }
 
     /// The peer wrote, on a bus on which every write matters.

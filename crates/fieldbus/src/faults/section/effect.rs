@@ -2,7 +2,10 @@
 
 use super::{Keys, SIGNAL};
 use crate::faults::condition::unknown;
-use crate::faults::{Direction, Effect, LineEffect, SignalEffect, measure};
+use crate::faults::diagnosis::OCTET_LIMIT;
+use crate::faults::{
+    ChannelError, Diagnosis, Direction, Effect, Finding, LineEffect, Octets, SignalEffect, measure,
+};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
 use tickbus_image::signal::section::{slot_of, value_limits, value_range};
@@ -32,10 +35,14 @@ pub(super) fn read_effect(
             line(LineEffect::Duplicate(chance?, direction?))
         }
         "link-down" => line(LineEffect::LinkDown),
-        "station-down" => line(LineEffect::StationDown(read_station(
-            keys.station.as_ref()?,
-            table?,
-        )?)),
+        "station-down" => {
+            let station = keys.station.as_ref()?;
+            let right = "write kind = \"link-down\"";
+            line(LineEffect::StationDown(read_station(
+                station, table?, right,
+            )?))
+        }
+        "diagnosis" => line(LineEffect::Diagnosis(read_diagnosis(keys, table?, whole)?)),
         _ => read_change(kind, keys, table, whole),
     }
 }
@@ -82,13 +89,81 @@ fn read_direction(keys: &Keys<'_>) -> Option<Direction> {
         .map_or(Some(Direction::Both), choose)
 }
 
-fn read_station(value: &Value<'_>, table: &SignalTable) -> Option<usize> {
+/// The most slots and channels of a station that a diagnosis tells apart.
+const DIAGNOSIS_LIMIT: i128 = 64;
+
+fn read_diagnosis(keys: &Keys<'_>, table: &SignalTable, whole: bool) -> Option<Diagnosis> {
+    let small = |value: &Value<'_>, range| {
+        let number = value.whole(range)?;
+        u8::try_from(number).ok()
+    };
+    let station = match &keys.station {
+        Some(value) => read_station(value, table, "remove \"station\""),
+        None if table.stations.len() > 1 => {
+            if let (Some(value), true) = (&keys.kind, whole) {
+                value.wrong("it is not said whose diagnosis it is", "name the station");
+            }
+            None
+        }
+        None => Some(0),
+    };
+    let is_static = keys.static_.as_ref().map_or(Some(false), Value::boolean);
+    let slot = keys
+        .slot
+        .as_ref()
+        .map(|slot| small(slot, 1..=DIAGNOSIS_LIMIT));
+    let channel = keys.channel.as_ref();
+    let channel = channel.map(|channel| small(channel, 0..=DIAGNOSIS_LIMIT - 1));
+    let error = keys.error.as_ref();
+    let error = error.map(|error| error.choice("errors", &ChannelError::ALL));
+    let octets = keys.octets.as_ref().map(read_octets);
+    let finding = match (octets, slot, channel, error) {
+        (Some(octets), None, None, None) => Finding::Device(octets?),
+        (None, Some(slot), None, None) => Finding::Module(slot?),
+        (None, Some(slot), Some(channel), error) => Finding::Channel {
+            slot: slot?,
+            channel: channel?,
+            error: error.unwrap_or(Some(ChannelError::Error))?,
+        },
+        _ => {
+            if let (Some(value), true) = (&keys.kind, whole) {
+                value.wrong(
+                    "it is not said what the station reports",
+                    "write slot = 2, or slot, channel = 0 and error = \"line-break\", or octets = [0x11] of the device's \
+                     own",
+                );
+            }
+            return None;
+        }
+    };
+    Some(Diagnosis {
+        station: station?,
+        finding,
+        is_static: is_static?,
+    })
+}
+
+fn read_octets(value: &Value<'_>) -> Option<Octets> {
+    let octets = value.list("write the octets, such as [0x11, 0x22]")?;
+    let octets = octets
+        .iter()
+        .map(|octet| u8::try_from(octet.whole(0..=255)?).ok());
+    let octets: Vec<u8> = octets.collect::<Option<_>>()?;
+    let all = Octets::new(&octets);
+    if all.is_none() {
+        value.wrong(
+            format!("there are {} octets", octets.len()),
+            format!("write 1 to {OCTET_LIMIT}"),
+        );
+    }
+    all
+}
+
+/// The station that a value names; `right` says what to do where there is but one.
+fn read_station(value: &Value<'_>, table: &SignalTable, right: &str) -> Option<usize> {
     let name = value.text("write the name of a [[station]] in quotes")?;
     if let [_] = &table.stations[..] {
-        value.wrong(
-            "this driver has one station only",
-            "write kind = \"link-down\"",
-        );
+        value.wrong("this driver has one station only", right);
         return None;
     }
     let names: Vec<&str> = table.stations.iter().map(|s| s.name.as_str()).collect();

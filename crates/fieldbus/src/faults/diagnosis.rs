@@ -1,0 +1,110 @@
+//! What a device reports of itself to its master, on buses that have a diagnosis.
+
+use std::fmt;
+
+/// The most octets of a device's own.
+pub(super) const OCTET_LIMIT: usize = 32;
+
+/// One thing that a station reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Diagnosis {
+    /// The station, by its index in the signal table.
+    pub station: usize,
+    /// What is wrong.
+    pub finding: Finding,
+    /// It cannot exchange data properly until this is over: the master goes on reading the diagnosis.
+    pub is_static: bool,
+}
+
+/// What is wrong with a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Finding {
+    /// Octets of the device's own, as its manual has them.
+    Device(Octets),
+    /// Something about the module in this slot, from 1.
+    Module(u8),
+    /// A channel of the module in a slot, from 1; channels count from 0.
+    Channel {
+        /// The slot.
+        slot: u8,
+        /// The channel.
+        channel: u8,
+        /// What is wrong with it.
+        error: ChannelError,
+    },
+}
+
+/// A few octets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Octets {
+    all: [u8; OCTET_LIMIT],
+    length: usize,
+}
+
+impl Octets {
+    /// These octets; `None` if there are none, or too many.
+    pub fn new(octets: &[u8]) -> Option<Self> {
+        let mut all = [0; OCTET_LIMIT];
+        all.get_mut(..octets.len())?.copy_from_slice(octets);
+        let length = octets.len();
+        (length > 0).then_some(Self { all, length })
+    }
+
+    /// All of them.
+    pub fn get(&self) -> &[u8] {
+        &self.all[..self.length]
+    }
+}
+
+/// What is wrong with a channel; the numbers are those of PROFIBUS DP.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "their names say it")]
+pub enum ChannelError {
+    ShortCircuit = 1,
+    Undervoltage = 2,
+    Overvoltage = 3,
+    Overload = 4,
+    Overtemperature = 5,
+    LineBreak = 6,
+    UpperLimit = 7,
+    LowerLimit = 8,
+    Error = 9,
+}
+
+impl ChannelError {
+    /// All of them, with the names that a fault has for them.
+    pub(super) const ALL: [(&'static str, Self); 9] = [
+        ("short-circuit", Self::ShortCircuit),
+        ("undervoltage", Self::Undervoltage),
+        ("overvoltage", Self::Overvoltage),
+        ("overload", Self::Overload),
+        ("overtemperature", Self::Overtemperature),
+        ("line-break", Self::LineBreak),
+        ("upper-limit", Self::UpperLimit),
+        ("lower-limit", Self::LowerLimit),
+        ("error", Self::Error),
+    ];
+}
+
+/// `line-break at channel 3 of slot 2`.
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Device(octets) => {
+                let octets = octets.get().iter().map(|octet| format!("{octet:02X}"));
+                f.write_str(&octets.collect::<Vec<_>>().join(" "))
+            }
+            Self::Module(slot) => write!(f, "slot {slot}"),
+            Self::Channel {
+                slot,
+                channel,
+                error,
+            } => {
+                let all = ChannelError::ALL;
+                let name = all.iter().find(|(_, other)| other == error);
+                let name = name.map_or("error", |(name, _)| name);
+                write!(f, "{name} at channel {channel} of slot {slot}")
+            }
+        }
+    }
+}

@@ -7,7 +7,7 @@
 use libfuzzer_sys::fuzz_target;
 use tickbus_base::time::Nanos;
 use tickbus_bus_profibus::telegram::{DATA_LIMIT, Telegram};
-use tickbus_bus_profibus::{Configuration, Event, Gsd, Identity, Process, Segment, Station, UserParameters};
+use tickbus_bus_profibus::{Configuration, Diagnosed, Event, Gsd, Identity, Process, Segment, Station, UserParameters};
 
 fuzz_target!(|data: &[u8]| {
     let Some((first, rest)) = data.split_first() else {
@@ -35,7 +35,7 @@ fn line(dpv1: bool, mut stream: &[u8]) {
             freeze: true,
             fail_safe: address == 4,
             dpv1,
-            max_diagnosis: DATA_LIMIT,
+            max_diagnosis: 6 + usize::from(address),
         };
         Station::new(address, identity)
     };
@@ -52,6 +52,12 @@ fn line(dpv1: bool, mut stream: &[u8]) {
         if piece.is_empty() {
             break;
         }
+        // Some of the time a device is broken.
+        let diagnosed = Diagnosed {
+            blocks: vec![vec![0x42, 1]; usize::from(pause % 3)],
+            is_static: pause % 5 == 0,
+        };
+        segment.station_mut(3).expect("it is there").diagnose(&diagnosed);
         let Ok(heard) = segment.hear(now, piece, &mut Machine, &mut reply) else {
             return;
         };

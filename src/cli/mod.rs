@@ -12,6 +12,8 @@ mod mirror;
 mod plc;
 #[cfg(unix)]
 mod plugin_helper;
+#[cfg(unix)]
+mod profibus;
 mod report;
 mod test;
 
@@ -38,6 +40,8 @@ enum Command {
     Import(import::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
+    #[cfg(unix)]
+    Profibus(profibus::Arguments),
     Report(report::Arguments),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
@@ -86,6 +90,8 @@ pub fn main() -> ExitCode {
         Command::Import(arguments) => import::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
+        #[cfg(unix)]
+        Command::Profibus(arguments) => profibus::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Test(arguments) => test::run(&arguments),
         #[cfg(unix)]

@@ -4,11 +4,14 @@
 //! a function of its state, the time and a request, to an answer; a [`Segment`] has all stations of a line, and finds the
 //! telegrams among the bytes. [`Gsd`] says from its maker's file which device a station is.
 
+pub mod advice;
 mod configuration;
 mod device;
 mod event;
+mod finder;
 mod gsd;
 mod layout;
+pub mod monitor;
 mod options;
 mod parameters;
 mod rates;

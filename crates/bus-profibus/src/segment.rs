@@ -2,23 +2,16 @@
 
 use tickbus_base::time::Nanos;
 
+use crate::finder::{Finder, Found, bits};
 use crate::station::{Process, Station};
 use crate::telegram::{BROADCAST, Frame, Telegram};
-
-/// A telegram that is not complete after so long a pause never will be, however late a driver hands over its bytes.
-const PATIENCE: Nanos = Nanos::from_millis(50);
-
-/// The silence, in bit times, that precedes every request.
-const SILENCE: i64 = 33;
 
 /// The stations on a line, and what has arrived of the next telegram.
 #[derive(Debug)]
 pub struct Segment {
     baud: u32,
     stations: Vec<(Station, Listening)>,
-    buffer: Vec<u8>,
-    /// When the last bytes arrived.
-    heard: Nanos,
+    finder: Finder,
 }
 
 /// Whether an address is known to be free.
@@ -62,8 +55,7 @@ impl Segment {
         Self {
             baud,
             stations: silent.collect(),
-            buffer: Vec::new(),
-            heard: Nanos(0),
+            finder: Finder::new(baud),
         }
     }
 
@@ -80,7 +72,7 @@ impl Segment {
 
     /// The time of this many bits.
     pub fn bits(&self, count: i64) -> Nanos {
-        Nanos(count * 1_000_000_000 / i64::from(self.baud))
+        bits(self.baud, count)
     }
 
     /// When a station acts by itself; [`Nanos::MAX`] for never.
@@ -109,94 +101,79 @@ impl Segment {
         process: &mut impl Process,
         reply: &mut Vec<u8>,
     ) -> Result<Heard, Taken> {
-        let pause = now - self.heard;
-        self.heard = now;
-        let begins_anew = pause > self.bits(SILENCE)
-            && matches!(Telegram::parse(bytes), Ok(Some((Telegram::Frame(_), _))));
         let mut heard = Heard::default();
-        if !self.buffer.is_empty() && (pause > PATIENCE || begins_anew) {
-            self.buffer.clear();
-            heard.damaged += 1;
-        }
-        self.buffer.extend_from_slice(bytes);
-        let buffer = std::mem::take(&mut self.buffer);
-        let mut rest = &buffer[..];
-        let mut is_damaged = false;
-        loop {
-            match Telegram::parse(rest) {
-                Ok(None) => break,
-                Ok(Some((telegram, length))) => {
-                    rest = &rest[length..];
-                    is_damaged = false;
+        let Self {
+            finder,
+            stations,
+            baud,
+        } = self;
+        finder.hear(now, bytes, |found| {
+            match found {
+                Found::Damaged => heard.damaged += 1,
+                Found::Telegram(telegram, _) => {
                     reply.clear();
-                    heard.answer = self.telegram(now, &telegram, process, reply)?;
-                }
-                Err(_) => {
-                    heard.damaged += usize::from(!is_damaged);
-                    is_damaged = true;
-                    rest = &rest[1..];
+                    listen(stations, &telegram)?;
+                    let answer = serve(stations, now, &telegram, process, reply);
+                    heard.answer = answer.map(|(address, wait)| (address, bits(*baud, wait)));
                 }
             }
-        }
-        let is_read = buffer.len() - rest.len();
-        self.buffer = buffer;
-        self.buffer.drain(..is_read);
+            Ok(())
+        })?;
         Ok(heard)
     }
+}
 
-    fn telegram(
-        &mut self,
-        now: Nanos,
-        telegram: &Telegram<'_>,
-        process: &mut impl Process,
-        reply: &mut Vec<u8>,
-    ) -> Result<Option<(u8, Nanos)>, Taken> {
-        self.listen(telegram)?;
-        let Telegram::Frame(frame) = telegram else {
-            return Ok(None);
-        };
-        if !frame.control.is_request() {
-            return Ok(None);
-        }
-        let mut answer = None;
-        for (station, listening) in &mut self.stations {
-            let address = station.address();
-            if frame.destination == BROADCAST {
-                station.request(now, frame, process, reply);
-            } else if frame.destination == address && *listening != Listening::Free {
-                *listening = Listening::Asked;
-            } else if frame.destination == address {
-                station.request(now, frame, process, reply);
-                answer = Some((address, i64::from(station.min_tsdr())));
-            }
-        }
-        let answer = answer.filter(|_| !reply.is_empty());
-        Ok(answer.map(|(address, bits)| (address, self.bits(bits))))
+/// Whom a telegram is for; the station that answers, if any does, with its wait in bits.
+fn serve(
+    stations: &mut [(Station, Listening)],
+    now: Nanos,
+    telegram: &Telegram<'_>,
+    process: &mut impl Process,
+    reply: &mut Vec<u8>,
+) -> Option<(u8, i64)> {
+    let Telegram::Frame(frame) = telegram else {
+        return None;
+    };
+    if !frame.control.is_request() {
+        return None;
     }
+    let mut answer = None;
+    for (station, listening) in stations {
+        let address = station.address();
+        if frame.destination == BROADCAST {
+            station.request(now, frame, process, reply);
+        } else if frame.destination == address && *listening != Listening::Free {
+            *listening = Listening::Asked;
+        } else if frame.destination == address {
+            station.request(now, frame, process, reply);
+            answer = Some((address, i64::from(station.min_tsdr())));
+        }
+    }
+    answer.filter(|_| !reply.is_empty())
+}
 
-    /// Finds out whether the addresses are free: a request to each has to remain without an answer once.
-    fn listen(&mut self, telegram: &Telegram<'_>) -> Result<(), Taken> {
-        for (station, listening) in &mut self.stations {
-            let address = station.address();
-            let is_answered = match telegram {
-                Telegram::Frame(Frame {
-                    source, control, ..
-                }) if !control.is_request() => *source == address,
-                Telegram::ShortAck => *listening == Listening::Asked,
-                _ => {
-                    if *listening == Listening::Asked {
-                        *listening = Listening::Free;
-                    }
-                    false
+/// Finds out whether the addresses are free: a request to each has to remain without an answer once.
+fn listen(stations: &mut [(Station, Listening)], telegram: &Telegram<'_>) -> Result<(), Taken> {
+    for (station, listening) in stations {
+        let address = station.address();
+        let is_answered = match telegram {
+            Telegram::Frame(Frame {
+                source, control, ..
+            }) if !control.is_request() => *source == address,
+            Telegram::ShortAck => *listening == Listening::Asked,
+            _ => {
+                if *listening == Listening::Asked {
+                    *listening = Listening::Free;
                 }
-            };
-            // An adapter may echo what is sent here; nothing is before an address is free.
-            if is_answered && *listening != Listening::Free {
-                return Err(Taken { address });
+                false
             }
+        };
+        // An adapter may echo what is sent here; nothing is before an address is free.
+        if is_answered && *listening != Listening::Free {
+            return Err(Taken { address });
         }
-        Ok(())
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -204,6 +181,7 @@ mod tests {
     use super::*;
     use crate::configuration::Configuration;
     use crate::event::Event;
+    use crate::finder::{PATIENCE, SILENCE};
     use crate::station::Identity;
     use crate::telegram::{Control, DATA_LIMIT};
     use crate::user_parameters::UserParameters;

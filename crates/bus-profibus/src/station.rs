@@ -13,16 +13,16 @@ use crate::user_parameters::UserParameters;
 use exchange::Clear;
 
 /// The service access points of a slave, and that of a master.
-mod sap {
-    pub(super) const RD_INP: u8 = 56;
-    pub(super) const RD_OUTP: u8 = 57;
-    pub(super) const GLOBAL_CONTROL: u8 = 58;
-    pub(super) const GET_CFG: u8 = 59;
-    pub(super) const SLAVE_DIAG: u8 = 60;
-    pub(super) const SET_PRM: u8 = 61;
-    pub(super) const CHK_CFG: u8 = 62;
+pub(crate) mod sap {
+    pub(crate) const RD_INP: u8 = 56;
+    pub(crate) const RD_OUTP: u8 = 57;
+    pub(crate) const GLOBAL_CONTROL: u8 = 58;
+    pub(crate) const GET_CFG: u8 = 59;
+    pub(crate) const SLAVE_DIAG: u8 = 60;
+    pub(crate) const SET_PRM: u8 = 61;
+    pub(crate) const CHK_CFG: u8 = 62;
     /// Of a master, for all of these.
-    pub(super) const MASTER: u8 = 62;
+    pub(crate) const MASTER: u8 = 62;
 }
 
 /// The time in bits before an answer, as long as the master has set no other.

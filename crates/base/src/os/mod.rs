@@ -6,6 +6,8 @@ mod log;
 mod own_file;
 mod poll;
 mod poll_set;
+#[cfg(unix)]
+mod pseudo_terminal;
 mod serial;
 #[cfg(unix)]
 mod shared_memory;
@@ -17,6 +19,8 @@ pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_st
 pub use own_file::own_file;
 pub use poll::Interest;
 pub use poll_set::{PollSet, Ready};
+#[cfg(unix)]
+pub use pseudo_terminal::PseudoTerminal;
 #[cfg(unix)]
 pub use serial::SerialPort;
 pub use serial::{Parity, SerialSettings};

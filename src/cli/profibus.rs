@@ -1,0 +1,28 @@
+//! `tickbus profibus`: what is on a PROFIBUS line, and which times its project should have.
+
+mod advise;
+mod monitor;
+
+use clap::Subcommand;
+
+use super::Outcome;
+
+/// Look at a PROFIBUS line.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Monitor(monitor::Arguments),
+    Advise(advise::Arguments),
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    match &arguments.command {
+        Command::Monitor(arguments) => monitor::run(arguments),
+        Command::Advise(arguments) => advise::run(arguments),
+    }
+}

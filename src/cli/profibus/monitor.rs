@@ -1,0 +1,205 @@
+//! `tickbus profibus monitor DEVICE`: who talks to whom.
+
+use std::fs::File;
+use std::io::{self, BufWriter, ErrorKind, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::cli::Outcome;
+use crate::cli::host::span;
+use tickbus_base::os::{Interest, Parity, PollSet, SerialPort, SerialSettings};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
+use tickbus_bus_profibus::monitor::{Heard, Monitor, words};
+use tickbus_fieldbus::serial;
+
+/// How often the table is printed.
+const EVERY: Nanos = Nanos::from_secs(1);
+
+/// The number of PROFIBUS in the list of link types of pcap files.
+const LINKTYPE_PROFIBUS_DL: u32 = 257;
+
+/// Listen to a line: its stations, their states, and what goes wrong; never says a word itself.
+///
+/// Each second in which something happened, the stations are printed: how far each has come, requests, answers, those that
+/// were missing, repeated or late, and how long answers took, as this machine saw it.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The system's name of the serial port.
+    device: PathBuf,
+
+    /// Bits per second.
+    #[arg(long, value_name = "NUMBER", default_value_t = 19_200)]
+    baud: u32,
+
+    /// Print every telegram in words.
+    #[arg(long)]
+    telegrams: bool,
+
+    /// Write every telegram in words to this file.
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+
+    /// Write every telegram to this file, for Wireshark.
+    #[arg(long, value_name = "FILE")]
+    pcap: Option<PathBuf>,
+
+    /// Stop after this time; without it, on Ctrl-C.
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    duration: Option<Nanos>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    match listen(arguments) {
+        Ok(()) => Outcome::Done,
+        Err(why) => {
+            eprintln!("profibus: {why}");
+            Outcome::BusFailed
+        }
+    }
+}
+
+/// Where telegrams go.
+struct Keep {
+    prints: bool,
+    log: Option<BufWriter<File>>,
+    pcap: Option<BufWriter<File>>,
+}
+
+fn listen(arguments: &Arguments) -> Result<(), String> {
+    let settings = SerialSettings {
+        baud: arguments.baud,
+        parity: Parity::Even,
+        two_stop_bits: false,
+        rs485: false,
+    };
+    if arguments.baud == 0 {
+        return Err("a line has a speed; write --baud 19200".to_owned());
+    }
+    let device = arguments.device.display().to_string();
+    let mut port = serial::open(&device, settings).map_err(|error| error.to_string())?;
+    let create = |file: &Option<PathBuf>| file.as_deref().map(create).transpose();
+    let mut keep = Keep {
+        prints: arguments.telegrams,
+        log: create(&arguments.log)?,
+        pcap: create(&arguments.pcap)?,
+    };
+    keep.begin().map_err(|error| error.to_string())?;
+    let stop = Stop::new();
+    let handler = {
+        let stop = stop.clone();
+        move || stop.stop()
+    };
+    ctrlc::set_handler(handler).map_err(|error| format!("Ctrl-C cannot be caught: {error}"))?;
+    watch(arguments, &mut port, &mut keep, &stop)
+        .map_err(|error| serial::gone(&device, error).to_string())
+}
+
+fn create(file: &Path) -> Result<BufWriter<File>, String> {
+    let made = File::create(file).map(BufWriter::new);
+    made.map_err(|error| format!("cannot write {}: {error}", file.display()))
+}
+
+fn watch(
+    arguments: &Arguments,
+    port: &mut SerialPort,
+    keep: &mut Keep,
+    stop: &Stop,
+) -> io::Result<()> {
+    let clock = Monotonic::shared();
+    let begun = clock.now();
+    let end = arguments.duration.map_or(Nanos::MAX, |span| begun + span);
+    let mut set = PollSet::new(stop)?;
+    set.add(0, port, Interest::Read)?;
+    let mut monitor = Monitor::new(arguments.baud);
+    let (mut next, mut told) = (begun + EVERY, String::new());
+    let mut bytes = [0; 4096];
+    while !stop.is_stopped() && clock.now() < end {
+        set.wait(&*clock, next.min(end))?;
+        let now = clock.now();
+        match port.read(&mut bytes) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(count) => {
+                let mut kept = Ok(());
+                monitor.hear(now, &bytes[..count], |heard| {
+                    if kept.is_ok() {
+                        kept = keep.one(now - begun, heard);
+                    }
+                });
+                kept?;
+            }
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+        }
+        if now >= next || now >= end {
+            next = now + EVERY;
+            let table = monitor.table();
+            if table != told {
+                write!(
+                    io::stdout().lock(),
+                    "{} s\n{table}\n",
+                    (now - begun).0 / 1_000_000_000
+                )?;
+                told = table;
+            }
+            keep.flush()?;
+        }
+    }
+    // What came since.
+    let table = monitor.table();
+    if table != told {
+        write!(io::stdout().lock(), "{table}")?;
+    }
+    keep.flush()
+}
+
+impl Keep {
+    /// The head of the pcap file: nanoseconds, version 2.4.
+    fn begin(&mut self) -> io::Result<()> {
+        let Some(pcap) = &mut self.pcap else {
+            return Ok(());
+        };
+        for word in [0xA1B2_3C4D, 0x0004_0002, 0, 0, 0xFFFF, LINKTYPE_PROFIBUS_DL] {
+            pcap.write_all(&u32::to_le_bytes(word))?;
+        }
+        Ok(())
+    }
+
+    fn one(&mut self, at: Nanos, heard: &Heard<'_>) -> io::Result<()> {
+        if self.prints || self.log.is_some() {
+            let said = heard.telegram.as_ref().map(words).unwrap_or_default();
+            let both = if said.is_empty() || heard.note.is_empty() {
+                ""
+            } else {
+                "  # "
+            };
+            let line = format!(
+                "{:>14.6}  {said}{both}{}\n",
+                at.as_micros() / 1e6,
+                heard.note
+            );
+            if self.prints {
+                io::stdout().lock().write_all(line.as_bytes())?;
+            }
+            if let Some(log) = &mut self.log {
+                log.write_all(line.as_bytes())?;
+            }
+        }
+        let Some(pcap) = self.pcap.as_mut().filter(|_| !heard.bytes.is_empty()) else {
+            return Ok(());
+        };
+        let now = system_time();
+        let length = u32::try_from(heard.bytes.len()).unwrap_or(u32::MAX);
+        // Seconds in 32 bits, as the format has them.
+        let seconds = u32::try_from(now.as_secs()).unwrap_or(u32::MAX);
+        for word in [seconds, now.subsec_nanos(), length, length] {
+            pcap.write_all(&word.to_le_bytes())?;
+        }
+        pcap.write_all(heard.bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        for file in [&mut self.log, &mut self.pcap].into_iter().flatten() {
+            file.flush()?;
+        }
+        Ok(())
+    }
+}

@@ -1,9 +1,10 @@
 """Drives a PROFIBUS station with pyprofibus, which also reads the station's GSD file.
 
-profibus_master.py DEVICE BAUD ADDRESS GSD MODULE
+profibus_master.py DEVICE BAUD ADDRESS GSD MODULE [SECONDS]
 
 The station has 4 bytes each way and brings the outputs back on the inputs. The last line has the number of exchanges, and
-the diagnoses that it has sent while data were exchanged, each as it differs from the one before.
+the diagnoses that it has sent while data were exchanged, each as it differs from the one before. With SECONDS it only counts
+the exchanges in so many seconds, whatever comes back.
 """
 
 import os
@@ -74,9 +75,22 @@ def note_diagnoses():
     return seen
 
 
+def count(master, slave, seconds):
+    exchanges, end = 0, None
+    while end is None or time.monotonic() < end:
+        slave.setMasterOutData(bytearray([1, 2, 3, 4]))
+        master.run()
+        exchanges += slave.getMasterInData() is not None
+        if end is None and exchanges:
+            end = time.monotonic() + seconds
+    print(f"profibus_master: ok exchanges={exchanges}")
+
+
 def main():
     diagnoses = note_diagnoses()
-    master, slave = open_master(sys.argv[1:])
+    master, slave = open_master(sys.argv[1:6])
+    if len(sys.argv) > 6:
+        return count(master, slave, float(sys.argv[6]))
     exchanges = 0
     for number in range(1, 201):
         sent = bytearray([number, 255 - number, 0x10, number ^ 0x55])

@@ -245,7 +245,7 @@ mod tests {
         let mut notes = Vec::new();
         for (number, bytes) in (1..).zip(telegrams) {
             monitor.hear(Nanos::from_millis(number), bytes, |heard| {
-                notes.push(heard.note)
+                notes.push(heard.note);
             });
         }
         notes

@@ -6,11 +6,18 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fd::OwnedFd;
+use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 /// The far end of a pseudo-terminal, whose near end can be opened as a serial port.
 #[derive(Debug)]
-pub struct PseudoTerminal(File);
+pub struct PseudoTerminal {
+    far: File,
+    /// Kept open, so that the line does not hang up before another one opens it.
+    _near: OwnedFd,
+}
 
 impl PseudoTerminal {
     /// A new one, and the system's name of its near end.
@@ -24,10 +31,16 @@ impl PseudoTerminal {
         unlockpt(&far)?;
         let name = ptsname(&far, Vec::new())?.into_string();
         let name = name.map_err(|_| io::ErrorKind::InvalidData)?;
-        Ok((Self(far.into()), name.into()))
+        let near = open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())?;
+        // By default a terminal echoes its input.
+        let mut attributes = tcgetattr(&near)?;
+        attributes.make_raw();
+        tcsetattr(&near, OptionalActions::Now, &attributes)?;
+        let far = File::from(far);
+        Ok((Self { far, _near: near }, name.into()))
     }
 
-    /// Reads what arrives within `patience`; 0 bytes if nothing does, or while the near end is not open.
+    /// Reads what arrives within `patience`; 0 bytes if nothing does.
     ///
     /// # Errors
     ///
@@ -37,25 +50,45 @@ impl PseudoTerminal {
             tv_sec: i64::try_from(patience.as_secs()).unwrap_or(i64::MAX),
             tv_nsec: patience.subsec_nanos().into(),
         };
-        let mut fds = [PollFd::new(&self.0, PollFlags::IN)];
-        poll(&mut fds, Some(&timeout))?;
-        if fds[0].revents().contains(PollFlags::IN) {
-            return self.0.read(bytes);
+        let mut fds = [PollFd::new(&self.far, PollFlags::IN)];
+        if poll(&mut fds, Some(&timeout))? == 0 {
+            return Ok(0);
         }
-        if fds[0].revents().contains(PollFlags::HUP) {
-            // It does not wait by itself then.
-            std::thread::sleep(patience);
-        }
-        Ok(0)
+        self.far.read(bytes)
     }
 }
 
 impl Write for PseudoTerminal {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.write(bytes)
+        self.far.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
+        self.far.flush()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_go_both_ways_and_nothing_is_echoed() {
+        let (mut far, near) = PseudoTerminal::open().expect("a pseudo-terminal");
+        let mut options = std::fs::OpenOptions::new();
+        let mut near = options.read(true).write(true).open(near).expect("a port");
+        let mut bytes = [0; 8];
+        far.write_all(&[1, 0x0D, 3]).expect("a line");
+        assert_eq!(near.read(&mut bytes).ok(), Some(3));
+        assert_eq!(bytes[..3], [1, 0x0D, 3]);
+        assert_eq!(
+            far.read_within(&mut bytes, Duration::from_millis(1)).ok(),
+            Some(0)
+        );
+        near.write_all(&[4]).expect("a line");
+        assert_eq!(
+            far.read_within(&mut bytes, Duration::from_secs(20)).ok(),
+            Some(1)
+        );
     }
 }

@@ -6,7 +6,7 @@ mod line;
 
 use tickbus_base::os::SerialSettings;
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::{BusError, Free, PlcState, Port, Receipt};
+use tickbus_fieldbus::{BusError, Cause, Free, PlcState, Port, Receipt};
 
 use crate::event::{Event, Leaving};
 use crate::layout::Layout;
@@ -115,6 +115,14 @@ struct Machine<'a> {
     port: &'a mut Port,
 }
 
+const fn cause(why: &Leaving) -> Cause {
+    match why {
+        Leaving::Watchdog(_) => Cause::Link,
+        Leaving::Released { .. } => Cause::Left,
+        _ => Cause::Refused,
+    }
+}
+
 impl Machine<'_> {
     /// The index of the station in the signal table.
     fn index(&self, address: u8) -> usize {
@@ -139,9 +147,9 @@ impl Machine<'_> {
             );
             return;
         }
-        let error = match why {
-            Leaving::Watchdog(_) => BusError::Link(text),
-            Leaving::Released { .. } => BusError::Left(text),
+        let error = match cause(why) {
+            Cause::Link => BusError::Link(text),
+            Cause::Left => BusError::Left(text),
             _ => BusError::Refused(text),
         };
         self.port.lost(&error, WAITS);
@@ -149,6 +157,11 @@ impl Machine<'_> {
 }
 
 impl Process for Machine<'_> {
+    fn is_up(&mut self, station: u8, now: Nanos) -> bool {
+        let index = self.index(station);
+        self.port.is_station_up(index, now)
+    }
+
     fn inputs(&mut self, station: u8, now: Nanos, inputs: &mut [u8]) -> bool {
         let index = self.index(station);
         let Some(mut frames) = self.port.take(index..index + 1, now) else {
@@ -203,7 +216,8 @@ impl Process for Machine<'_> {
                 self.stations.all[index].receipt = None;
                 if std::mem::take(&mut self.stations.all[index].exchanges) {
                     // The outputs are cleared at once, however recent they are.
-                    self.port.plc_state(index, now, PlcState::Stop);
+                    let reason = format!("station {station}: {why}");
+                    self.port.station_left(index, now, cause(&why), &reason);
                     self.tell_exchanging();
                 }
                 self.left(station, &why);

@@ -86,4 +86,9 @@ impl Finder {
         self.buffer.drain(..is_read);
         Ok(())
     }
+
+    /// Whether the next telegram has begun, and is not complete.
+    pub(crate) fn has_begun(&self) -> bool {
+        !self.buffer.is_empty()
+    }
 }

@@ -109,7 +109,15 @@ impl Segment {
         } = self;
         finder.hear(now, bytes, |found| {
             match found {
-                Found::Damaged => heard.damaged += 1,
+                Found::Damaged => {
+                    heard.damaged += 1;
+                    // What follows may be a part of a telegram: it proves nothing.
+                    for (_, listening) in &mut *stations {
+                        if *listening == Listening::Asked {
+                            *listening = Listening::Silent;
+                        }
+                    }
+                }
                 Found::Telegram(telegram, _) => {
                     reply.clear();
                     listen(stations, &telegram)?;
@@ -119,6 +127,10 @@ impl Segment {
             }
             Ok(())
         })?;
+        if finder.has_begun() {
+            reply.clear();
+            heard.answer = None;
+        }
         Ok(heard)
     }
 }
@@ -143,7 +155,9 @@ fn serve(
         if frame.destination == BROADCAST {
             station.request(now, frame, process, reply);
         } else if frame.destination == address && *listening != Listening::Free {
-            *listening = Listening::Asked;
+            if frame.control.is_answered() {
+                *listening = Listening::Asked;
+            }
         } else if frame.destination == address {
             station.request(now, frame, process, reply);
             answer = Some((address, i64::from(station.min_tsdr())));
@@ -300,6 +314,35 @@ mod tests {
         let mut twice = status(9);
         twice.extend(status(3));
         assert_eq!(hear(&mut line, Nanos(0), &twice), Some(3));
+    }
+
+    #[test]
+    fn a_request_behind_which_the_next_telegram_begins_is_not_answered() {
+        let mut line = free(&[3]);
+        let next = frame(9, 2, 0x7D, None, &[1, 2]);
+        for cut in 1..next.len() {
+            let mut bytes = status(3);
+            bytes.extend_from_slice(&next[..cut]);
+            assert_eq!(hear(&mut line, Nanos(0), &bytes), None, "{cut}");
+            assert_eq!(hear(&mut line, Nanos(0), &next[cut..]), None, "{cut}");
+        }
+    }
+
+    #[test]
+    fn what_nobody_answers_and_what_follows_noise_say_nothing_about_an_address() {
+        let mut line = segment(&[3]);
+        let control = frame(3, 2, 0x46, Some(58), &[0, 0]);
+        assert_eq!(hear(&mut line, Nanos(0), &control), None);
+        assert_eq!(hear(&mut line, Nanos(0), &[0xDC, 2, 2]), None);
+        assert_eq!(hear(&mut line, Nanos(0), &status(3)), None, "it listens on");
+        let mut reply = Vec::new();
+        let noise = line.hear(Nanos(0), &[0x33, 0xE5], &mut Nothing, &mut reply);
+        assert_eq!(noise.expect("no answer of another device").damaged, 1);
+        assert_eq!(
+            hear(&mut line, Nanos(0), &status(3)),
+            None,
+            "it listens again"
+        );
     }
 
     #[test]

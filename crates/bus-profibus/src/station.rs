@@ -30,6 +30,11 @@ const MIN_TSDR: u8 = 11;
 
 /// What stands behind a station: the machine.
 pub trait Process {
+    /// Whether the station takes part in the line's traffic at all; a device without power does not.
+    fn is_up(&mut self, _station: u8, _now: Nanos) -> bool {
+        true
+    }
+
     /// Fills in what the station sends now. `false`: it is lost on the way, so nothing is to be sent.
     fn inputs(&mut self, station: u8, now: Nanos, inputs: &mut [u8]) -> bool;
 
@@ -260,6 +265,9 @@ impl Station {
         reply: &mut Vec<u8>,
     ) {
         self.turn(now, process);
+        if !process.is_up(self.address, now) {
+            return;
+        }
         let is_owner = self.owner == Some(request.source);
         if is_owner {
             self.heard = now;

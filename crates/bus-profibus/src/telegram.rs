@@ -90,6 +90,11 @@ impl Control {
         self.0 & 0x10 != 0
     }
 
+    /// Whether a request is answered: SDN is not.
+    pub const fn is_answered(self) -> bool {
+        !matches!(self.function(), Self::SDN_LOW | Self::SDN_HIGH)
+    }
+
     /// The function of a request.
     pub const fn function(self) -> u8 {
         self.0 & 0x0F

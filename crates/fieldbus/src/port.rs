@@ -227,6 +227,24 @@ impl Port {
         self.faults.event(event, &mut self.image);
     }
 
+    /// The peer of `station` exchanges no data any more, and this is why: as [`plc_state`](Self::plc_state) with
+    /// [`PlcState::Stop`], with a cause and a reason of the bus's own.
+    pub fn station_left(&mut self, station: usize, now: Nanos, cause: Cause, why: &str) {
+        self.image.station_left(station, now, cause, why);
+    }
+
+    /// Whether the line can carry anything to and from this station at `now`.
+    pub fn is_station_up(&mut self, station: usize, now: Nanos) -> bool {
+        self.faults.attend(now, &mut self.image);
+        !self.faults.is_cut(station)
+    }
+
+    /// Lets the next [`take_diagnoses`](Self::take_diagnoses) report what it reported before, for stations that begin
+    /// anew.
+    pub fn report_diagnoses_anew(&mut self) {
+        self.faults.report_diagnoses_anew();
+    }
+
     /// What the stations report to their master by injected faults, if that has changed since the last call; for buses
     /// that [have a diagnosis](super::BusOptions::has_diagnosis).
     pub fn take_diagnoses(&mut self, now: Nanos) -> Option<&[Diagnosis]> {

@@ -38,6 +38,8 @@ struct Station {
     /// Its name in the driver.cfg; empty if there is only one.
     name: String,
     plc: Option<PlcState>,
+    /// Why its peer is gone, if the bus has said so.
+    left: Option<(Cause, String)>,
     /// Its PLC has stopped, and nothing has arrived since it last reported running.
     is_stopped: bool,
 }
@@ -122,8 +124,14 @@ impl Validity {
     pub(super) fn plc_state(&mut self, station: usize, state: PlcState) -> bool {
         let station = &mut self.stations[station];
         let is_news = station.plc.replace(state) != Some(state);
+        station.left = None;
         station.is_stopped |= state == PlcState::Stop;
         is_news
+    }
+
+    /// Why the peer of a station that [has stopped](Self::plc_state) is gone.
+    pub(super) fn station_left(&mut self, station: usize, cause: Cause, why: &str) {
+        self.stations[station].left = Some((cause, why.to_owned()));
     }
 
     /// A whole frame of `station` arrived at `now`. Returns whether the validity of its data changes.
@@ -191,6 +199,9 @@ impl Validity {
         let Some((first, others)) = stopped.split_first() else {
             return self.standstill();
         };
+        if let Some(left) = stopped.iter().find_map(|station| station.left.clone()) {
+            return Some(left);
+        }
         let mut reason = if first.name.is_empty() {
             "the PLC".to_owned()
         } else {
@@ -265,6 +276,30 @@ mod tests {
         status.write(at(0), &mut statistics);
         let text = statistics.to_string();
         text.lines().any(|told| told == line)
+    }
+
+    #[test]
+    fn a_station_that_its_peer_left_is_stale_for_that_reason_until_it_runs_again() {
+        let (tick, mut port, status) = line(&["a", "b"]);
+        port.running("the peer is there");
+        for station in [0, 1] {
+            port.plc_state(station, at(0), PlcState::Run);
+            port.received(station, at(1), &[1]);
+        }
+        port.station_left(1, at(2), Cause::Link, "its master is silent");
+        assert!(tick.stations[0].is_valid() && !tick.stations[1].is_valid());
+        let link = status.link();
+        assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Link));
+        assert_eq!(link.reason, "its master is silent");
+        port.plc_state(1, at(3), PlcState::Run);
+        port.received(1, at(3), &[2]);
+        assert!(tick.stations[1].is_valid());
+        assert_eq!(status.link().state, LinkState::Running);
+        port.plc_state(1, at(4), PlcState::Stop);
+        assert!(
+            status.link().reason.contains("in STOP"),
+            "no longer the reason of before"
+        );
     }
 
     #[test]

@@ -38,7 +38,11 @@ pub(super) fn serve(
         written: 0,
         not_before: Nanos(0),
         not_after: Nanos(0),
+        is_offered: false,
     };
+    // Stations that begin anew have neither masters nor diagnoses.
+    port.tell("exchanging", "none");
+    port.report_diagnoses_anew();
     call.run(&mut line, port, stop)
 }
 
@@ -54,6 +58,8 @@ struct Line<'a> {
     /// When its first byte may go out.
     not_before: Nanos,
     not_after: Nanos,
+    /// Whether the system could have taken its first byte.
+    is_offered: bool,
 }
 
 impl Line<'_> {
@@ -111,6 +117,7 @@ impl Caller for Line<'_> {
             port,
         };
         self.segment.turn(now, &mut machine);
+        self.is_offered = now >= self.not_before;
         Ok(())
     }
 
@@ -133,7 +140,12 @@ impl Caller for Line<'_> {
         let stale = port.stale_at(port.clock().now());
         let deadline = self.segment.deadline().min(stale);
         if self.begins() {
-            deadline.min(self.not_before)
+            // What was offered and not taken waits for the system, until it is late.
+            deadline.min(if self.is_offered {
+                self.not_after + Nanos(1)
+            } else {
+                self.not_before
+            })
         } else {
             deadline
         }

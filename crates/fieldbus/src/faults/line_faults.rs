@@ -167,6 +167,11 @@ impl LineFaults {
         self.faults.push(fault);
     }
 
+    /// Lets the diagnoses count as new.
+    pub fn report_diagnoses_anew(&mut self) {
+        self.is_diagnosis_new = true;
+    }
+
     /// Looks up which faults are active.
     pub fn look(&mut self) {
         let mut sum = Sum::default();

@@ -185,6 +185,18 @@ impl FaultLayer {
         }
     }
 
+    /// Whether nothing goes to this station, and nothing comes from it.
+    #[inline]
+    pub(super) fn is_cut(&self, station: usize) -> bool {
+        self.line.as_ref().is_some_and(|line| line.is_cut(station))
+    }
+
+    pub(super) fn report_diagnoses_anew(&mut self) {
+        if let Some(line) = &mut self.line {
+            line.report_diagnoses_anew();
+        }
+    }
+
     /// What the stations report, if that has changed since the last call.
     #[inline]
     pub(super) fn take_diagnoses(&mut self) -> Option<&[Diagnosis]> {

@@ -79,11 +79,23 @@ impl ImagePort {
         if !self.validity.plc_state(station, state) {
             return;
         }
-        for (key, fact) in self.validity.facts() {
-            self.status.tell(key, fact);
-        }
+        self.tell_facts();
         if state == PlcState::Stop {
             self.update_validity(station, now);
+        }
+    }
+
+    /// The peer of a station is gone, for this reason.
+    pub(super) fn station_left(&mut self, station: usize, now: Nanos, cause: Cause, why: &str) {
+        self.validity.plc_state(station, PlcState::Stop);
+        self.validity.station_left(station, cause, why);
+        self.tell_facts();
+        self.update_validity(station, now);
+    }
+
+    fn tell_facts(&self) {
+        for (key, fact) in self.validity.facts() {
+            self.status.tell(key, fact);
         }
     }
 

@@ -199,7 +199,7 @@ mod line {
     fn device(line: &pty::Line) -> Driver {
         let text = format!(
             "[driver]\nid = 1\nname = \"encoder\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{}\"\n\
-             baud = 500000\nmax_tsdr = 60000\nmax_age = \"5s\"\naddress = 8\ngsd = \"{ROOT}/tests/gsd/encoder.gsd\"\n\
+             baud = 500000\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\ngsd = \"{ROOT}/tests/gsd/encoder.gsd\"\n\
              [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
              [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n",
             line.end(0).display()

@@ -58,7 +58,7 @@ fn exchanges() -> Result<(), Absent> {
         let port = line.end(0).display();
         let text = format!(
             "[driver]\nid = 1\nname = \"encoder\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{port}\"\n\
-             baud = {baud}\nmax_tsdr = 60000\nmax_age = \"5s\"\naddress = 8\n{device}\n\
+             baud = {baud}\nmax_tsdr = 16000\nmax_age = \"5s\"\naddress = 8\n{device}\n\
              [[signal]]\nname = \"out\"\naddress = \"%QD0\"\ntype = \"UDINT\"\n\
              [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n\
              [[fault]]\nkind = \"diagnosis\"\nslot = 1\nchannel = 3\nerror = \"line-break\"\n\

@@ -208,7 +208,14 @@ impl Card for OpenCard<'_> {
         let Options {
             card, io_timeout, ..
         } = &self.options;
-        self.trigger().map_err(Failing::error)?;
+        match self.trigger() {
+            // The exchange says so, too, and the next cycle triggers it again.
+            Err(Failing {
+                verdict: Verdict::Again | Verdict::NoPeer,
+                ..
+            }) => {}
+            other => other.map_err(Failing::error)?,
+        }
         let offsets = [card.write_offset, card.read_offset];
         let code = self
             .board

@@ -191,7 +191,14 @@ impl Card for OpenCard<'_> {
             card, io_timeout, ..
         } = &self.options;
         let timeout = millis(*io_timeout);
-        self.trigger().map_err(Failing::error)?;
+        match self.trigger() {
+            // The exchange says so, too, and the next cycle triggers it again.
+            Err(Failing {
+                verdict: Verdict::Again | Verdict::NoPeer,
+                ..
+            }) => {}
+            other => other.map_err(Failing::error)?,
+        }
         let (mut out, mut back, mut again) = (false, false, None);
         let mut no_peer = None;
         let mut note = |answer: Answer, moved: &mut bool| match answer {

@@ -2,15 +2,16 @@
 #![cfg(target_os = "linux")]
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
+use std::path::Path;
 use std::sync::Arc;
 
 use tickbus_base::time::Manual;
 use tickbus_bus_hilscher::cifx::ERRORS;
 use tickbus_conformance::conformance;
-use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
+use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that, pass};
 use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
-use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
+use tickbus_fieldbus::{BusError, Cause, Failing, Meaning, Verdict};
 
 /// Two cards whose process images are joined.
 struct Cards {
@@ -303,6 +304,15 @@ fn the_card_s_watchdog_is_started_triggered_and_stopped_in_time() {
             .count()
             > 3
     });
+    // Another program's call is active for a moment.
+    cards.library.script("xChannelWatchdog 0x800B0004\n");
+    let before = cards.library.calls().len();
+    await_that("it goes on", || {
+        clock.advance(CYCLE);
+        end.tick();
+        cards.library.calls().len() > before + 20
+    });
+    assert!(!cards.library.calls().contains(&CLOSING[0].to_owned()));
     cards.library.script("xChannelWatchdog 0x800C0013\n");
     let reason = until(&mut end, &clock, "failed", "link");
     assert!(
@@ -321,6 +331,58 @@ fn the_card_s_watchdog_is_started_triggered_and_stopped_in_time() {
         .rposition(|call| *call == watchdog(0))
         .expect("it was stopped");
     assert_eq!(calls[last + 1..], CLOSING);
+}
+
+#[test]
+fn inputs_that_never_arrive_are_stale_although_the_card_takes_outputs() {
+    let (cards, clock) = (Cards::new(), Manual::new());
+    let mut device = cards.open("device", &clock);
+    let _controller = cards.open("controller", &clock);
+    until(&mut device, &clock, "running", "running");
+    cards.library.script("xChannelIORead 0x800C0022\n");
+    // Time waits for the bus threads here: the line is not stale because these are late.
+    for _ in 0..400 {
+        pass(&clock, 2);
+        device.tick();
+    }
+    assert_eq!(device.link().cause, Cause::Silent);
+    cards.library.script("");
+    until(&mut device, &clock, "running", "running");
+}
+
+/// The same cards, by another path to the same library.
+struct Detour<'a>(&'a Cards);
+
+impl Bus for Detour<'_> {
+    fn fieldbus(&self, role: &str) -> String {
+        let path = self.0.library.file("");
+        let folder = path.parent().and_then(Path::file_name).expect("a folder");
+        let folder = folder.to_str().expect("a name");
+        let there = format!("{folder}/../{folder}/");
+        self.0.fieldbus(role).replace(&format!("{folder}/"), &there)
+    }
+
+    fn liar(&self, _clock: &Arc<Manual>) -> Liar {
+        unreachable!("it is no bus of the suite")
+    }
+
+    fn wrong(&self) -> Vec<(&'static str, &'static str)> {
+        Vec::new()
+    }
+}
+
+#[test]
+fn one_library_by_two_paths_is_started_once() {
+    let (cards, clock) = (Cards::new(), Manual::new());
+    let mut device = cards.open("device", &clock);
+    let mut controller = standin::open(&Detour(&cards), "controller", "", &clock);
+    until(&mut device, &clock, "running", "running");
+    until(&mut controller, &clock, "running", "running");
+    let calls = cards.library.calls();
+    let starts = calls
+        .iter()
+        .filter(|call| call.starts_with("cifXDriverInit"));
+    assert_eq!(starts.count(), 1);
 }
 
 #[test]

@@ -334,9 +334,9 @@ impl<V: Vendor> Free for CardBus<V> {
     }
 
     fn close_timeout(&self) -> Nanos {
-        // Opening, which may be in progress, uses its time first.
+        // What is in progress uses its time first; then the card is closed, and the library unloaded.
         let [open, close] = self.vendor.limits();
-        open + close + CALL
+        (LOAD + open).max(self.cycles.timeout + CALL) + close.times(2) + CALL
     }
 }
 
@@ -374,7 +374,8 @@ impl Exchange for Line<'_> {
                 Ok(Exchanged::Data {
                     is_taken: out,
                     is_fresh: back,
-                    is_alive: out || back,
+                    // A card that takes data and hands none over says nothing of the PLC.
+                    is_alive: back || out && self.reads.is_empty(),
                 })
             }
             Moved::NoPeer(why) => {

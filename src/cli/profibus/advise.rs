@@ -32,7 +32,7 @@ pub(super) struct Arguments {
     file: PathBuf,
 
     /// How many requests are answered.
-    #[arg(long, value_name = "NUMBER", default_value_t = 5000)]
+    #[arg(long, value_name = "NUMBER", default_value_t = 5000, value_parser = clap::value_parser!(u32).range(1..))]
     count: u32,
 }
 
@@ -57,11 +57,12 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     let line = PseudoTerminal::open().map(|(line, device)| {
         options.line.device = device.display().to_string();
         options.line.settings.baud = BAUD;
-        // However late it is, it counts.
+        // The latest that the rate here allows.
         options.line.max_tsdr = u16::MAX;
         line
     });
     config.record = None;
+    config.faults.clear();
     let replies = match line.and_then(|line| measure(config, line, address, arguments.count)) {
         Ok(replies) => replies,
         Err(error) => {
@@ -144,6 +145,10 @@ fn measure(
             // An answer in pieces ends here.
             while line.read_within(&mut answer, PAUSE)? > 0 {}
         } else {
+            // Once it has listened, no answer is one that came too late.
+            if replies.count() > 0 {
+                replies.record(clock.now() - sent);
+            }
             vain += 1;
             if vain > 20 {
                 let link = driver.link();

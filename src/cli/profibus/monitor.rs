@@ -14,8 +14,9 @@ use tickbus_fieldbus::serial;
 /// How often the table is printed.
 const EVERY: Nanos = Nanos::from_secs(1);
 
-/// The number of PROFIBUS in the list of link types of pcap files.
-const LINKTYPE_PROFIBUS_DL: u32 = 257;
+/// The link type of pcap files for formats of one's own. That of PROFIBUS, 257, is registered, but Wireshark opens no
+/// file with it.
+const LINKTYPE_USER0: u32 = 147;
 
 /// Listen to a line: its stations, their states, and what goes wrong; never says a word itself.
 ///
@@ -89,8 +90,19 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
         move || stop.stop()
     };
     ctrlc::set_handler(handler).map_err(|error| format!("Ctrl-C cannot be caught: {error}"))?;
-    watch(arguments, &mut port, &mut keep, &stop)
-        .map_err(|error| serial::gone(&device, error).to_string())
+    match watch(arguments, &mut port, &mut keep, &stop) {
+        Err(Ending::Port(error)) => Err(serial::gone(&device, error).to_string()),
+        // Nobody reads on: as after Ctrl-C.
+        Err(Ending::Output(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        Err(Ending::Output(error)) => Err(format!("cannot write any more: {error}")),
+        Ok(()) => Ok(()),
+    }
+}
+
+/// Why it ends before its time.
+enum Ending {
+    Port(io::Error),
+    Output(io::Error),
 }
 
 fn create(file: &Path) -> Result<BufWriter<File>, String> {
@@ -103,20 +115,20 @@ fn watch(
     port: &mut SerialPort,
     keep: &mut Keep,
     stop: &Stop,
-) -> io::Result<()> {
+) -> Result<(), Ending> {
     let clock = Monotonic::shared();
     let begun = clock.now();
     let end = arguments.duration.map_or(Nanos::MAX, |span| begun + span);
-    let mut set = PollSet::new(stop)?;
-    set.add(0, port, Interest::Read)?;
+    let mut set = PollSet::new(stop).map_err(Ending::Port)?;
+    set.add(0, port, Interest::Read).map_err(Ending::Port)?;
     let mut monitor = Monitor::new(arguments.baud);
     let (mut next, mut told) = (begun + EVERY, String::new());
     let mut bytes = [0; 4096];
     while !stop.is_stopped() && clock.now() < end {
-        set.wait(&*clock, next.min(end))?;
+        set.wait(&*clock, next.min(end)).map_err(Ending::Port)?;
         let now = clock.now();
         match port.read(&mut bytes) {
-            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(0) => return Err(Ending::Port(ErrorKind::UnexpectedEof.into())),
             Ok(count) => {
                 let mut kept = Ok(());
                 monitor.hear(now, &bytes[..count], |heard| {
@@ -124,31 +136,29 @@ fn watch(
                         kept = keep.one(now - begun, heard);
                     }
                 });
-                kept?;
+                kept.map_err(Ending::Output)?;
             }
             Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-            Err(error) => return Err(error),
+            Err(error) => return Err(Ending::Port(error)),
         }
         if now >= next || now >= end {
             next = now + EVERY;
             let table = monitor.table();
             if table != told {
-                write!(
-                    io::stdout().lock(),
-                    "{} s\n{table}\n",
-                    (now - begun).0 / 1_000_000_000
-                )?;
+                let seconds = (now - begun).0 / 1_000_000_000;
+                let shown = write!(io::stdout().lock(), "{seconds} s\n{table}\n");
+                shown.map_err(Ending::Output)?;
                 told = table;
             }
-            keep.flush()?;
+            keep.flush().map_err(Ending::Output)?;
         }
     }
     // What came since.
     let table = monitor.table();
     if table != told {
-        write!(io::stdout().lock(), "{table}")?;
+        write!(io::stdout().lock(), "{table}").map_err(Ending::Output)?;
     }
-    keep.flush()
+    keep.flush().map_err(Ending::Output)
 }
 
 impl Keep {
@@ -157,7 +167,7 @@ impl Keep {
         let Some(pcap) = &mut self.pcap else {
             return Ok(());
         };
-        for word in [0xA1B2_3C4D, 0x0004_0002, 0, 0, 0xFFFF, LINKTYPE_PROFIBUS_DL] {
+        for word in [0xA1B2_3C4D, 0x0004_0002, 0, 0, 0xFFFF, LINKTYPE_USER0] {
             pcap.write_all(&u32::to_le_bytes(word))?;
         }
         Ok(())

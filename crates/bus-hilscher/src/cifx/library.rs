@@ -79,25 +79,27 @@ pub(super) struct Library {
     users: Mutex<usize>,
 }
 
-/// The libraries that are loaded, by their paths.
-static LOADED: Mutex<Vec<(std::path::PathBuf, Weak<Library>)>> = Mutex::new(Vec::new());
+/// The libraries that are loaded. Each is known by the address of a function of its: two paths may be of one.
+static LOADED: Mutex<Vec<(usize, Weak<Library>)>> = Mutex::new(Vec::new());
 
 impl Library {
     pub(super) fn load(path: &Path) -> Result<Arc<Self>, Mistake> {
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         loaded.retain(|(_, library)| library.strong_count() > 0);
-        let mut same = loaded.iter().filter(|(of, _)| of == path);
+        let functions = Functions::load(path)?;
+        let address = functions.driver_open as usize;
+        let mut same = loaded.iter().filter(|(of, _)| *of == address);
         if let Some(library) = same.find_map(|(_, library)| library.upgrade()) {
             return Ok(library);
         }
         let library = Arc::new(Self {
-            functions: Functions::load(path)?,
+            functions,
             #[cfg(not(windows))]
             start: Start::load(path)?,
             #[cfg(not(windows))]
             users: Mutex::new(0),
         });
-        loaded.push((path.to_owned(), Arc::downgrade(&library)));
+        loaded.push((address, Arc::downgrade(&library)));
         Ok(library)
     }
 

@@ -25,8 +25,16 @@ const BYTES: usize = 64;
 fn main() -> ExitCode {
     foreign::main(&[
         ("pymodbus_drives_our_server", pymodbus_drives_our_server),
+        (
+            "pymodbus_drives_our_server_with_rtu_over_tcp",
+            pymodbus_drives_our_server_with_rtu,
+        ),
         ("pymodbus_meets_units_and_gateways", pymodbus_meets_units),
         ("our_client_drives_pymodbus", our_client_drives_pymodbus),
+        (
+            "our_client_drives_pymodbus_with_rtu_over_tcp",
+            our_client_drives_pymodbus_with_rtu,
+        ),
         (
             "our_client_writes_only_into_the_device_that_was_named",
             our_client_writes_only_where_it_may,
@@ -130,15 +138,19 @@ fn pymodbus(script: &str) -> Result<Command, Absent> {
 }
 
 fn pymodbus_drives_our_server() -> Result<(), Absent> {
+    pymodbus_drives("tcp", "")
+}
+
+fn pymodbus_drives_our_server_with_rtu() -> Result<(), Absent> {
+    pymodbus_drives("rtu-over-tcp", "framing = \"rtu\"\n")
+}
+
+fn pymodbus_drives(mode: &str, framing: &str) -> Result<(), Absent> {
     let mut client = pymodbus("modbus_client.py")?;
     let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
-    let mut machine = open(server, &signals());
+    let mut machine = open(&format!("{server}\n{framing}"), &signals());
     let address = machine.address_for("pymodbus", &pymodbus_version());
-    client.args([
-        "tcp",
-        &address.ip().to_string(),
-        &address.port().to_string(),
-    ]);
+    client.args([mode, &address.ip().to_string(), &address.port().to_string()]);
     let told = machine.mirror_until_the_end_of(client);
     assert!(told.contains("modbus_client: ok checks="), "{told}");
     machine.until("the last write is through", |machine| {
@@ -206,11 +218,15 @@ impl Server {
     }
 
     fn tcp() -> Result<(Self, SocketAddr), Absent> {
+        Self::at_address("tcp")
+    }
+
+    fn at_address(mode: &str) -> Result<(Self, SocketAddr), Absent> {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("it is bound");
         drop(listener);
         let (ip, port) = (address.ip().to_string(), address.port().to_string());
-        Ok((Self::start(&["tcp", &ip, &port])?, address))
+        Ok((Self::start(&[mode, &ip, &port])?, address))
     }
 }
 
@@ -288,6 +304,22 @@ fn our_client_drives_pymodbus() -> Result<(), Absent> {
     let _server = Server::start(&["tcp", &ip, &port])?;
     machine.set("i 0", 99.0);
     machine.until("the value is back", |machine| machine.get("q 0") == 99.0);
+    Ok(())
+}
+
+fn our_client_drives_pymodbus_with_rtu() -> Result<(), Absent> {
+    let (_server, address) = Server::at_address("rtu-over-tcp")?;
+    let client = format!(
+        "kind = \"modbus-client\"\naddress = \"{address}\"\nframing = \"rtu\"\n{ALLOWED}\n"
+    );
+    for (keys, count) in [
+        ("inputs = \"offset:0\"", 64),
+        ("inputs = \"offset:0\"\nread_write = false", 150),
+        ("inputs = \"coil:1\"\noutputs = \"coil:1\"", 10),
+    ] {
+        let machine = loop_through(&format!("{client}{keys}"), count);
+        machine.end.driver.close();
+    }
     Ok(())
 }
 

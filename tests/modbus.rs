@@ -24,7 +24,7 @@ use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
 use conformance::rig::{MAX_AGE, await_that, logged, pass};
-use modbus::{Tcp, request};
+use modbus::{Tcp, request, rtu_request};
 use modbus_plc::{Habit, Plc};
 use peers::{Alone, client, is_closed, leave};
 use socket2::SockRef;
@@ -34,6 +34,7 @@ use tickbus::time::Nanos;
 
 conformance!(device_serves, crate::Tcp::device_serves());
 conformance!(controller_serves, crate::Tcp::controller_serves());
+conformance!(device_serves_rtu, crate::Tcp::device_serves_rtu());
 
 /// A Device that listens on a port chosen by the system, with the signals of the suite: `speed` is holding
 /// register 1.
@@ -611,12 +612,68 @@ fn function_3_reads_the_inputs_behind_the_outputs() {
     assert_eq!(ask(&mut stream, 3, &[6, 4, 1, 0, 1]), [0x86, 2]);
 }
 
+/// Of several units behind one device server this end is two.
+#[test]
+fn rtu_over_tcp_is_served_as_on_a_serial_line() {
+    let mut device = Alone::open(
+        "[driver]\nid = 1\nname = \"device\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n\
+         framing = \"rtu\"\n[[station]]\nname = \"a\"\nunit = 3\n[[station]]\nname = \"b\"\nunit = 7\n\
+         [[signal]]\nname = \"press\"\nstation = \"a\"\naddress = \"%QW0\"\n\
+         [[signal]]\nname = \"oven\"\nstation = \"b\"\naddress = \"%QW0\"\n",
+    );
+    device.end.tick();
+    let mut honest = client(device.address());
+    let mut is_answered = |requests: &[u8], expected: &[u8]| {
+        honest.write_all(requests).expect("the server reads");
+        let mut answer = vec![0; expected.len()];
+        honest.read_exact(&mut answer).expect("an answer");
+        assert_eq!(answer, expected);
+    };
+    let [five, six, nine] = [(3, 5), (7, 6), (7, 9)].map(|(unit, value)| {
+        let pdu = [6, 0, 0, 0, value];
+        rtu_request(unit, &pdu)
+    });
+    // Units that are another device's, and the broadcast, are not answered.
+    let others = rtu_request(4, &[6, 0, 0, 0, 8]);
+    is_answered(
+        &[&five[..], &others, &six].concat(),
+        &[&five[..], &six].concat(),
+    );
+    device.until("both have theirs", |end| {
+        end.get("press") == 5.0 && end.get("oven") == 6.0
+    });
+    let all = rtu_request(0, &[6, 0, 0, 0, 2]);
+    is_answered(&[&all[..], &nine].concat(), &nine);
+    device.until("both have the broadcast", |end| {
+        end.get("press") == 2.0 && end.get("oven") == 9.0
+    });
+    assert_eq!(device.end.statistic("modbus-server.unknown_unit"), "1");
+    // A function that is refused, in pieces.
+    let refused = rtu_request(3, &[0x91, 1]);
+    let (begin, end) = (&rtu_request(3, &[17])[..2], &rtu_request(3, &[17])[2..]);
+    is_answered(begin, &[]);
+    is_answered(end, &refused);
+    let mut damaged = five.clone();
+    damaged[5] ^= 1;
+    for (dropped, bytes) in [("1", &damaged[..]), ("2", &[3, 66])] {
+        let mut liar = client(device.address());
+        liar.write_all(bytes).expect("the server reads");
+        await_that("it is disconnected", || is_closed(&liar));
+        is_answered(&five, &five);
+        assert_eq!(device.end.statistic("clients.dropped"), dropped);
+    }
+    honest.write_all(&damaged).expect("the server reads");
+    device.until("the reason is known", |end| {
+        end.link()
+            .reason
+            .contains("its telegram has a wrong checksum")
+    });
+}
+
 /// A line whose receiver stays enabled while sending.
 #[cfg(unix)]
 #[test]
 fn a_server_on_a_line_that_echoes_answers_each_request_once() {
-    use tickbus::fieldbus::modbus::rtu;
-
     let line = pty::Line::new();
     // A slow line, because the test's clock runs faster than the pseudo-terminal.
     let slow = "unit = 1\necho = true\nbaud = 50\nsilence = \"1ms\"";
@@ -632,8 +689,7 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
         .open(line.end(1))
         .expect("the other end");
     for speed in [5_u8, 6, 6, 7] {
-        let mut request = Vec::new();
-        rtu::append(1, &mut request, |pdu| pdu.extend([6, 0, 1, 0, speed]));
+        let request = rtu_request(1, &[6, 0, 1, 0, speed]);
         master.write_all(&request).expect("a line");
         let mut reader = master.try_clone().expect("a handle");
         let (answered, answers) = std::sync::mpsc::channel();

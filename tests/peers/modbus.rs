@@ -5,16 +5,18 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use tickbus::fieldbus::modbus::rtu;
 use tickbus::time::Manual;
 
 use crate::conformance::rig::{Bus, Liar, logged};
 use crate::peers::{Ending, leave, own_address};
 
-/// Modbus TCP at an address used by one test only.
+/// Modbus TCP, or RTU over TCP, at an address used by one test only.
 pub struct Tcp {
     pub address: SocketAddr,
     /// The role of the end that serves.
     server: &'static str,
+    framing: &'static str,
 }
 
 impl Tcp {
@@ -23,6 +25,15 @@ impl Tcp {
         Self {
             address: own_address(),
             server: "device",
+            framing: "tcp",
+        }
+    }
+
+    /// The same with RTU over TCP.
+    pub fn device_serves_rtu() -> Self {
+        Self {
+            framing: "rtu",
+            ..Self::device_serves()
         }
     }
 
@@ -31,20 +42,21 @@ impl Tcp {
         Self {
             address: own_address(),
             server: "controller",
+            framing: "tcp",
         }
     }
 }
 
 impl Bus for Tcp {
     fn fieldbus(&self, role: &str) -> String {
-        let address = self.address;
+        let address = format!("\"{}\"\nframing = \"{}\"", self.address, self.framing);
         if role == self.server {
-            return format!("kind = \"modbus-server\"\naddress = \"{address}\"");
+            return format!("kind = \"modbus-server\"\naddress = {address}");
         }
         // A driver of the suite is named after its role. Its clock does not wait for a server that has not
         // been scheduled, hence the long time-out.
         format!(
-            "kind = \"modbus-client\"\naddress = \"{address}\"\nwrite_to = \"tickbus {}\"\n\
+            "kind = \"modbus-client\"\naddress = {address}\nwrite_to = \"tickbus {}\"\n\
              timeout = \"1h\"",
             self.server
         )
@@ -61,6 +73,16 @@ impl Bus for Tcp {
             listener
         });
         let serves = listener.is_some();
+        let (half, begun) = match self.framing {
+            "rtu" => (
+                rtu_request(1, &[3, 0, 0, 0, 1])[..5].to_vec(),
+                "left in the middle of a telegram, after 5 bytes of it",
+            ),
+            _ => (
+                request(1, 1, &[3, 0, 0, 0, 1])[..9].to_vec(),
+                "left in the middle of a telegram, after 9 bytes of it",
+            ),
+        };
         let thread = std::thread::spawn({
             let over = Arc::clone(&over);
             move || {
@@ -70,7 +92,7 @@ impl Bus for Tcp {
                         None => TcpStream::connect(address),
                     };
                     match (met, serves) {
-                        (Ok(stream), false) => ask_half(stream),
+                        (Ok(stream), false) => ask_half(stream, &half),
                         (Ok(stream), true) => answer_with_too_little(stream),
                         (Err(_), _) => std::thread::yield_now(),
                     }
@@ -80,7 +102,7 @@ impl Bus for Tcp {
         let words = if serves {
             "its answer has 3 bytes behind the function code"
         } else {
-            "left in the middle of a telegram, after 9 bytes of it"
+            begun
         };
         Liar {
             peer: Box::new(Ending {
@@ -152,9 +174,8 @@ impl Bus for Tcp {
 }
 
 /// Requests holding registers, but omits the last bytes of the request.
-fn ask_half(mut stream: TcpStream) {
-    let whole = request(1, 1, &[3, 0, 0, 0, 1]);
-    let _ = stream.write_all(&whole[..9]);
+fn ask_half(mut stream: TcpStream, half: &[u8]) {
+    let _ = stream.write_all(half);
     leave(stream);
 }
 
@@ -182,5 +203,12 @@ pub fn request(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
     bytes.extend(length.to_be_bytes());
     bytes.push(unit);
     bytes.extend(pdu);
+    bytes
+}
+
+/// The bytes of a telegram with RTU.
+pub fn rtu_request(unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    rtu::append(unit, &mut bytes, |to| to.extend_from_slice(pdu));
     bytes
 }

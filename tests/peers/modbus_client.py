@@ -1,14 +1,15 @@
 """Drives a Modbus server with pymodbus: every function, and what the server has to refuse.
 
-modbus_client.py tcp HOST PORT | modbus_client.py rtu DEVICE
+modbus_client.py tcp HOST PORT | modbus_client.py rtu-over-tcp HOST PORT | modbus_client.py rtu DEVICE
 
-The server has 64 bytes each way and brings each byte of %Q back on the byte of %I at the same offset; on a serial
-line it is unit 1. The last line has the number of checks.
+The server has 64 bytes each way and brings each byte of %Q back on the byte of %I at the same offset; with RTU
+it is unit 1. The last line has the number of checks.
 """
 
 import sys
 import time
 
+from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
 checks = 0
@@ -94,7 +95,10 @@ def main():
             given = client.read_holding_registers(0, count=1, device_id=unit)
             check(f"unit {unit}", (given.isError(), given.dev_id), (False, unit))
     else:
-        client = ModbusSerialClient(sys.argv[2], baudrate=115200, parity="N", stopbits=1, retries=0)
+        if sys.argv[1] == "rtu":
+            client = ModbusSerialClient(sys.argv[2], baudrate=115200, parity="N", stopbits=1, retries=0)
+        else:
+            client = ModbusTcpClient(sys.argv[2], port=int(sys.argv[3]), framer=FramerType.RTU, retries=0)
         check("open", client.connect(), True)
         client.write_register(20, 4711, device_id=0, no_response_expected=True)
         # The turnaround delay that the specification asks of a client after a broadcast.

@@ -1,6 +1,6 @@
 """A Modbus server by pymodbus, with all four tables.
 
-modbus_server.py tcp HOST PORT | modbus_server.py rtu DEVICE
+modbus_server.py tcp HOST PORT | modbus_server.py rtu-over-tcp HOST PORT | modbus_server.py rtu DEVICE
 
 Input register n is 7 n, discrete input n is on where n is a multiple of 3; coils and holding registers are zero.
 """
@@ -23,9 +23,10 @@ async def main():
     context = ModbusServerContext(devices=device)
     identity = ModbusDeviceIdentification(
         info_name={"VendorName": "ACME", "ProductCode": "PLC 7", "MajorMinorRevision": "1.2"})
-    if sys.argv[1] == "tcp":
+    if sys.argv[1] != "rtu":
+        framer = FramerType.SOCKET if sys.argv[1] == "tcp" else FramerType.RTU
         server = ModbusTcpServer(
-            context, identity=identity, address=(sys.argv[2], int(sys.argv[3])))
+            context, identity=identity, framer=framer, address=(sys.argv[2], int(sys.argv[3])))
     else:
         server = ModbusSerialServer(
             context, identity=identity, framer=FramerType.RTU, port=sys.argv[2], baudrate=115200, parity="N")

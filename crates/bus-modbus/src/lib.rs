@@ -1,4 +1,4 @@
-//! Modbus over TCP and, as RTU, over a serial line; server and client.
+//! Modbus over TCP and, as RTU, over a serial line or TCP; server and client.
 //!
 //! The codec knows no port and no image: [`answer()`] is the server's half, which takes a request and makes
 //! the answer using [`Tables`]; [`Request`] is the client's half. [`mbap`] and [`rtu`] frame their PDUs as

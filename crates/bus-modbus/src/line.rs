@@ -1,4 +1,4 @@
-//! The line in a driver.cfg: a TCP address or a serial port.
+//! The line in a driver.cfg: a TCP address, with one of two framings, or a serial port.
 
 use std::fmt;
 
@@ -19,6 +19,8 @@ const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
 pub enum Line {
     /// Modbus TCP.
     Tcp(Address),
+    /// RTU telegrams over TCP, as serial device servers carry them.
+    RtuOverTcp(Address),
     /// Modbus RTU over a serial port.
     Serial(Serial),
 }
@@ -40,6 +42,7 @@ impl fmt::Display for Line {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Tcp(address) => address.fmt(f),
+            Self::RtuOverTcp(address) => write!(f, "{address} (RTU over TCP)"),
             Self::Serial(serial) => {
                 write!(f, "{} at {}", serial.device, serial.settings)?;
                 f.write_str(if serial.echo { ", which echoes" } else { "" })
@@ -56,7 +59,8 @@ impl Serial {
 }
 
 impl Line {
-    /// Replaces the address or the serial line of the driver.cfg, if `check` accepts the new address.
+    /// Replaces the address or the serial line of the driver.cfg, if `check` accepts the new address. The
+    /// framing of an address stays.
     ///
     /// # Errors
     ///
@@ -68,11 +72,14 @@ impl Line {
     ) -> Result<(), Mistake> {
         let address: Address = address.parse()?;
         check(&address)?;
-        *self = Self::Tcp(address);
+        *self = match self {
+            Self::RtuOverTcp(_) => Self::RtuOverTcp(address),
+            Self::Tcp(_) | Self::Serial(_) => Self::Tcp(address),
+        };
         Ok(())
     }
 
-    /// Reads `address`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without
+    /// Reads `address` and `framing`, or `device`, `baud`, `parity`, `stop_bits`, `silence`, `echo` and `rs485`; without
     /// any of these, the default address. `check` checks an address stated in the driver.cfg.
     pub(super) fn read(
         table: &mut Table<'_>,
@@ -80,6 +87,7 @@ impl Line {
         check: impl FnOnce(&Address) -> Result<(), Mistake>,
     ) -> Option<Self> {
         let stated = table.take("address");
+        let framing = table.take("framing");
         let device = table.take("device");
         let serial = ["baud", "parity", "stop_bits", "silence", "echo", "rs485"]
             .map(|key| (key, table.take(key)));
@@ -94,8 +102,17 @@ impl Line {
                     );
                 }
             }
+            let framings = [("tcp", false), ("rtu", true)];
+            let is_rtu = framing.map_or(Some(false), |value| value.choice("framings", &framings));
+            let framed = |address| {
+                Some(if is_rtu? {
+                    Self::RtuOverTcp(address)
+                } else {
+                    Self::Tcp(address)
+                })
+            };
             let Some(value) = stated else {
-                return Some(Self::Tcp(address));
+                return framed(address);
             };
             let text =
                 value.text("write a host and a port in quotes, such as \"127.0.0.1:1502\"")?;
@@ -104,7 +121,7 @@ impl Line {
                 Ok(address)
             });
             return match read {
-                Ok(address) => Some(Self::Tcp(address)),
+                Ok(address) => framed(address),
                 Err(mistake) => {
                     value.refuse(mistake);
                     None
@@ -115,6 +132,12 @@ impl Line {
             value.wrong(
                 "\"address\" stands beside \"device\"",
                 "remove one of the two: \"address\" is for Modbus TCP, \"device\" for RTU over a serial port",
+            );
+        }
+        if let Some(value) = &framing {
+            value.wrong(
+                "\"framing\" stands beside \"device\"",
+                "remove one of the two: a serial port has RTU in any case, and \"framing\" is for an \"address\"",
             );
         }
         let device = serial_port::read_device(&device);

@@ -1,6 +1,6 @@
-//! Modbus RTU: telegrams with a checksum, delimited by silence.
+//! Modbus RTU: telegrams with a checksum, delimited by silence, or in a TCP stream by their length.
 
-use super::PDU_LIMIT;
+use super::{Function, PDU_LIMIT};
 use tickbus_base::time::Nanos;
 
 /// Bytes of the checksum.
@@ -72,6 +72,52 @@ pub fn parse(telegram: &[u8]) -> Option<(u8, &[u8])> {
     }
     let (body, sum) = telegram.split_last_chunk::<CHECKSUM>()?;
     (checksum(body) == *sum).then(|| (body[0], &body[1..]))
+}
+
+/// Why bytes in a stream are not a telegram. Nothing there tells where the next one begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StreamError {
+    /// A telegram with this function code has no known length, or none that is possible.
+    #[error(
+        "its telegram has the function {0} and no length that is known; check that it speaks RTU over TCP"
+    )]
+    Length(u8),
+    /// The checksum does not belong to the bytes before it.
+    #[error(
+        "its telegram has a wrong checksum; check that it speaks RTU over TCP, and whether a serial line behind it \
+         is disturbed"
+    )]
+    Checksum,
+}
+
+/// A telegram of a stream: unit, PDU, and the length of the whole, in bytes.
+pub type Streamed<'a> = (u8, &'a [u8], usize);
+
+/// The telegram at the start of a stream's `bytes`; `None` if it is not complete yet. `length` gives the length of a PDU, in bytes, once enough of its beginning is there.
+///
+/// # Errors
+///
+/// The bytes cannot become a telegram.
+pub fn split(
+    bytes: &[u8],
+    length: impl FnOnce(&[u8]) -> Option<usize>,
+) -> Result<Option<Streamed<'_>>, StreamError> {
+    let [_, pdu @ ..] = bytes else {
+        return Ok(None);
+    };
+    let Some(&code) = pdu.first() else {
+        return Ok(None);
+    };
+    let end = match length(pdu) {
+        Some(length) if length <= PDU_LIMIT => 1 + length + CHECKSUM,
+        None if Function::of(code).is_some() && bytes.len() < ADU_LIMIT => return Ok(None),
+        _ => return Err(StreamError::Length(code)),
+    };
+    let Some(telegram) = bytes.get(..end) else {
+        return Ok(None);
+    };
+    let (unit, pdu) = parse(telegram).ok_or(StreamError::Checksum)?;
+    Ok(Some((unit, pdu, end)))
 }
 
 /// Splits the bytes on a line into telegrams, by the silence between them.
@@ -192,6 +238,7 @@ impl Echo {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::answer;
 
     /// A request for two holding registers of unit 1, found in many manuals.
     const READ: [u8; 8] = [1, 3, 0, 0, 0, 2, 0xC4, 0x0B];
@@ -217,6 +264,51 @@ mod tests {
             wrong[bit / 8] ^= 1 << (bit % 8);
             assert_eq!(parse(&wrong), None, "bit {bit}");
         }
+    }
+
+    #[test]
+    fn telegrams_in_a_stream_are_split_by_their_length_wherever_it_is_cut() {
+        let mut stream = Vec::new();
+        // Every function has another length; 7, 8, 17 and 24 are of the standard, and refused here.
+        let requests: [&[u8]; 9] = [
+            &[3, 0, 0, 0, 2],
+            &[7],
+            &[15, 0, 0, 0, 9, 2, 1, 1],
+            &[8, 0, 0, 0, 0],
+            &[17],
+            &[22, 0, 1, 0, 0xF2, 0, 0x25],
+            &[23, 0, 0, 0, 4, 0, 0, 0, 1, 2, 7, 8],
+            &[24, 0, 0],
+            &[43, 14, 1, 0],
+        ];
+        for pdu in requests {
+            append(9, &mut stream, |to| to.extend_from_slice(pdu));
+        }
+        let mut rest = &stream[..];
+        for pdu in requests {
+            let whole = 1 + pdu.len() + CHECKSUM;
+            for cut in 0..whole {
+                assert_eq!(split(&rest[..cut], answer::length), Ok(None), "{cut}");
+            }
+            assert_eq!(split(rest, answer::length), Ok(Some((9, pdu, whole))));
+            rest = &rest[whole..];
+        }
+        assert!(rest.is_empty());
+    }
+
+    #[test]
+    fn what_cannot_be_a_telegram_of_a_stream_is_told_as_soon_as_it_can_be() {
+        let mut damaged = READ;
+        damaged[3] ^= 1;
+        for (bytes, expected) in [
+            (&damaged[..], StreamError::Checksum),
+            (&[1, 66], StreamError::Length(66)),
+            (&[1, 0x83], StreamError::Length(0x83)),
+            (&[1, 16, 0, 0, 0, 127, 254], StreamError::Length(16)),
+        ] {
+            assert_eq!(split(bytes, answer::length), Err(expected));
+        }
+        assert_eq!(split(&damaged[..7], answer::length), Ok(None));
     }
 
     #[test]

@@ -10,7 +10,7 @@ const IDENTITY_LIMIT: usize = 1000;
 pub(super) enum UnitRange {
     /// All that fit into a byte.
     Tcp,
-    /// On a serial line 0 is the broadcast, and numbers above 247 are reserved.
+    /// With RTU 0 is the broadcast, and numbers above 247 are reserved.
     Serial,
     /// As `Serial`, for a server: it has to know which requests on the line are addressed to it.
     ServedOnSerial,

@@ -88,18 +88,23 @@ impl ModbusClient {
 
 impl Free for ModbusClient {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
-        match self.options.line.clone() {
-            Line::Tcp(address) => {
+        let line = self.options.line.clone();
+        match line {
+            Line::Tcp(ref address) | Line::RtuOverTcp(ref address) => {
                 let patience = port.max_age().times(PATIENCE);
-                let Some((mut call, peer)) = dial(&address, patience, port, stop)? else {
+                let Some((mut call, peer)) = dial(address, patience, port, stop)? else {
                     return Ok(());
                 };
                 port.opening(&format!(
                     "connected with {peer}; waiting for its first answer"
                 ));
-                let framing = Framing::Tcp {
-                    transaction: 0,
-                    inbox: Vec::new(),
+                let inbox = Vec::new();
+                let framing = match line {
+                    Line::RtuOverTcp(_) => Framing::RtuOverTcp { inbox },
+                    _ => Framing::Tcp {
+                        transaction: 0,
+                        inbox,
+                    },
                 };
                 let mut session = self.session(framing, peer.to_string(), port, port.clock().now());
                 call.run(&mut session, port, stop)

@@ -68,7 +68,7 @@ impl ClientOptions {
         let write_to = table.take("write_to");
 
         let units = match &line {
-            Some(Line::Serial(_)) => UnitRange::Serial,
+            Some(Line::Serial(_) | Line::RtuOverTcp(_)) => UnitRange::Serial,
             _ => UnitRange::Tcp,
         };
         let stations = Stations::read(units, unit.as_ref());
@@ -193,7 +193,7 @@ impl ClientOptions {
     pub(super) fn capabilities(&self) -> Capabilities {
         let gap = match self.line {
             Line::Tcp(_) => usize::MAX,
-            Line::Serial(_) => SERIAL_GAP,
+            Line::Serial(_) | Line::RtuOverTcp(_) => SERIAL_GAP,
         };
         Capabilities::new(self.combine, gap)
     }

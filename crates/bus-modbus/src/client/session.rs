@@ -5,6 +5,7 @@ mod identify;
 mod station;
 mod trouble;
 
+use std::fmt;
 use std::io;
 use std::ops::Range;
 
@@ -30,6 +31,11 @@ pub(super) enum Framing {
     Tcp {
         /// The last transaction number.
         transaction: u16,
+        /// The received part of the next telegram.
+        inbox: Vec<u8>,
+    },
+    /// By their length alone: RTU in a TCP stream.
+    RtuOverTcp {
         /// The received part of the next telegram.
         inbox: Vec<u8>,
     },
@@ -170,12 +176,17 @@ impl Caller for ClientSession<'_> {
 
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         match &mut self.framing {
-            Framing::Tcp { inbox, .. } => {
+            Framing::Tcp { inbox, .. } | Framing::RtuOverTcp { inbox } => {
                 let mut all = std::mem::take(inbox);
                 all.extend_from_slice(bytes);
-                let rest = self.read_telegrams(&all, now, port)?;
+                let rest = match self.framing {
+                    Framing::Tcp { .. } => self.read_telegrams(&all, now, port)?,
+                    _ => self.read_rtu_telegrams(&all, now, port)?,
+                };
                 all.drain(..rest);
-                if let Framing::Tcp { inbox, .. } = &mut self.framing {
+                if let Framing::Tcp { inbox, .. } | Framing::RtuOverTcp { inbox } =
+                    &mut self.framing
+                {
                     *inbox = all;
                 }
                 Ok(())
@@ -222,11 +233,11 @@ impl Caller for ClientSession<'_> {
         let peer = &self.peer;
         match self.framing {
             Framing::Rtu { .. } => gone(peer, "it was closed"),
-            Framing::Tcp { .. } if asked_identity => BusError::Left(format!(
+            _ if asked_identity => BusError::Left(format!(
                 "{peer} closed the connection when it was asked who it is (function 43); if it does so again, it is \
                  not asked any more"
             )),
-            Framing::Tcp { .. } => BusError::Left(format!(
+            _ => BusError::Left(format!(
                 "{peer} closed the connection; if it serves one client at a time, end the other one"
             )),
         }
@@ -240,7 +251,7 @@ impl Caller for ClientSession<'_> {
         let peer = &self.peer;
         match self.framing {
             Framing::Rtu { .. } => gone(peer, error),
-            Framing::Tcp { .. } => BusError::Link(format!(
+            _ => BusError::Link(format!(
                 "the connection with {peer} broke ({error}); see whether the server still runs"
             )),
         }
@@ -248,36 +259,75 @@ impl Caller for ClientSession<'_> {
 }
 
 impl ClientSession<'_> {
-    /// An RTU telegram arrived.
+    /// An RTU telegram arrived over a serial line.
     fn telegram(&mut self, telegram: &[u8], now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let Some(asking) = &self.asking else {
-            return Ok(());
-        };
-        let (station, code) = (asking.station, asking.code);
-        let is_identity = matches!(asking.what, Asked::Identity { .. });
-        let unit = self.stations[station].unit;
         self.clear();
-        match rtu::parse(telegram) {
-            Some((from, pdu)) if from == unit && pdu[0] & !EXCEPTION_BIT == code => {
-                self.answered(pdu, now, port)
+        if let Some((from, pdu)) = rtu::parse(telegram) {
+            return self.undamaged(from, pdu, now, port);
+        }
+        port.count("modbus-client.damaged");
+        let what = "gave a damaged answer";
+        if let Some(Asking {
+            station,
+            what: Asked::Identity { .. },
+            ..
+        }) = self.asking
+        {
+            self.is_unclear(station, what, port);
+        }
+        self.miss(what, now, port)
+    }
+
+    /// An undamaged RTU telegram arrived.
+    fn undamaged(
+        &mut self,
+        from: u8,
+        pdu: &[u8],
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let asked = self.asking.as_ref();
+        let asked = asked.map(|asking| (asking.station, asking.code));
+        let asked = asked.filter(|(station, _)| self.stations[*station].unit == from);
+        match asked {
+            Some((_, code)) if pdu[0] & !EXCEPTION_BIT == code => {
+                return self.answered(pdu, now, port);
             }
-            // A late answer to an earlier request; the expected one may still arrive.
-            Some((from, pdu)) => {
-                port.count("modbus-client.unasked");
-                if from == unit && pdu[0] == Function::DeviceIdentification.code() {
-                    self.doubt(station);
-                }
-                Ok(())
+            Some((station, _)) if pdu[0] == Function::DeviceIdentification.code() => {
+                self.doubt(station);
             }
-            None => {
-                port.count("modbus-client.damaged");
-                let what = "gave a damaged answer";
-                if is_identity {
-                    self.is_unclear(station, what, port);
+            _ => {}
+        }
+        // A late answer to an earlier request; the expected one may still arrive.
+        port.count("modbus-client.unasked");
+        Ok(())
+    }
+
+    /// Takes all complete RTU telegrams of a TCP stream; returns their number of bytes.
+    fn read_rtu_telegrams(
+        &mut self,
+        bytes: &[u8],
+        now: Nanos,
+        port: &mut Port,
+    ) -> Result<usize, BusError> {
+        let mut taken = 0;
+        loop {
+            match rtu::split(&bytes[taken..], length) {
+                Ok(Some((from, pdu, length))) => {
+                    taken += length;
+                    self.undamaged(from, pdu, now, port)?;
                 }
-                self.miss(what, now, port)
+                Ok(None) => return Ok(taken),
+                Err(error) => return Err(self.violated(error)),
             }
         }
+    }
+
+    /// Not a telegram arrived over TCP. This end closes the connection now; if it was asking for the identity,
+    /// that counts as if the device had closed it.
+    fn violated(&mut self, error: impl fmt::Display) -> BusError {
+        self.hung_up();
+        BusError::Protocol(format!("of {}: {error}", self.peer))
     }
 
     fn clear(&mut self) {
@@ -298,12 +348,7 @@ impl ClientSession<'_> {
             let (telegram, length) = match Telegram::parse(&bytes[taken..]) {
                 Ok(Some(parsed)) => parsed,
                 Ok(None) => return Ok(taken),
-                Err(error) => {
-                    // This end closes the connection now; if it was asking for the identity, that counts as
-                    // if the device had closed it.
-                    self.hung_up();
-                    return Err(BusError::Protocol(format!("of {}: {error}", self.peer)));
-                }
+                Err(error) => return Err(self.violated(error)),
             };
             taken += length;
             let Framing::Tcp { transaction, .. } = &self.framing else {
@@ -436,6 +481,10 @@ impl ClientSession<'_> {
                 *transaction = transaction.wrapping_add(1);
                 mbap::append(*transaction, polled.unit, request, |pdu| write(polled, pdu));
                 self.pdu = mbap::HEADER..request.len();
+            }
+            Framing::RtuOverTcp { .. } => {
+                rtu::append(polled.unit, request, |pdu| write(polled, pdu));
+                self.pdu = 1..request.len() - rtu::CHECKSUM;
             }
             Framing::Rtu {
                 inbox,

@@ -34,9 +34,10 @@ impl ModbusServer {
 impl Free for ModbusServer {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         match &self.options.line {
-            Line::Tcp(address) => {
+            Line::Tcp(address) | Line::RtuOverTcp(address) => {
                 let mut service = TcpService {
                     units: &mut self.units,
+                    is_rtu: matches!(self.options.line, Line::RtuOverTcp(_)),
                     clients: self.options.clients,
                     patience: port.max_age(),
                 };

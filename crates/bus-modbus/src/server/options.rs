@@ -40,7 +40,7 @@ impl ServerOptions {
         let clients = table.take("clients");
 
         let units = match &line {
-            Some(Line::Serial(_)) => UnitRange::ServedOnSerial,
+            Some(Line::Serial(_) | Line::RtuOverTcp(_)) => UnitRange::ServedOnSerial,
             _ => UnitRange::Tcp,
         };
         let stations = Stations::read(units, unit.as_ref());

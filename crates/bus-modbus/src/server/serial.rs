@@ -2,7 +2,6 @@
 
 use std::io;
 
-use crate::Function;
 use crate::function::EXCEPTION_BIT;
 use crate::line::Serial;
 use crate::rtu::{self, Echo, Framer};
@@ -11,10 +10,7 @@ use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Carried, ServedUnits};
-
-/// The unit number that addresses all units.
-const BROADCAST: u8 = 0;
+use super::units::{BROADCAST, Carried, ServedUnits};
 
 /// After this many consecutive requests that equal the previous answer, the log explains the setting for a
 /// line with echo. (A client that writes one value repeatedly looks the same, and is answered as usual.)
@@ -107,11 +103,7 @@ impl Server<'_> {
             *written = 0;
             *carried = None;
             if number == BROADCAST {
-                if Function::of(pdu[0]).is_some_and(Function::writes) {
-                    let mut nobody_hears = Vec::new();
-                    for station in 0..units.len() {
-                        units.answer(station, now, pdu, writes, &mut nobody_hears, port);
-                    }
+                if units.broadcast(now, pdu, writes, port) {
                     port.running("a client is talking");
                 }
                 return;

@@ -1,20 +1,21 @@
-//! The units of a server over Modbus TCP.
+//! The units of a server over TCP, with either framing.
 
 use crate::mbap::{self, ADU_LIMIT, Telegram};
-use crate::{Exception, refuse};
+use crate::{Exception, answer, refuse, rtu};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{Carried, ServedUnits};
+use super::units::{BROADCAST, Carried, ServedUnits};
 
 /// The most unconfirmed answers remembered per client.
 const REMEMBERED: usize = 64;
 
-/// Modbus TCP as a service for many clients.
+/// Modbus TCP, or RTU over TCP, as a service for many clients.
 #[derive(Debug)]
 pub(super) struct TcpService<'a> {
     pub(super) units: &'a mut ServedUnits,
+    pub(super) is_rtu: bool,
     pub(super) clients: usize,
     pub(super) patience: Nanos,
 }
@@ -28,12 +29,57 @@ pub(super) struct Client {
     writes: Box<[bool]>,
 }
 
+impl Client {
+    fn remember(&mut self, carried: Option<Carried>) {
+        if let Some(carried) = carried
+            && self.carried.len() < REMEMBERED
+        {
+            self.carried.push(carried);
+        }
+    }
+}
+
+impl TcpService<'_> {
+    /// As [`telegram`](Service::telegram), for RTU.
+    fn rtu_telegram(
+        &mut self,
+        client: &mut Client,
+        now: Nanos,
+        bytes: &[u8],
+        reply: &mut Vec<u8>,
+        port: &mut Port,
+    ) -> Result<usize, BusError> {
+        let split = rtu::split(bytes, answer::length);
+        let split = split.map_err(|error| BusError::Protocol(error.to_string()))?;
+        let Some((unit, pdu, length)) = split else {
+            return Ok(0);
+        };
+        let writes = &mut client.writes;
+        if unit == BROADCAST {
+            self.units.broadcast(now, pdu, writes, port);
+        } else if let Some(station) = self.units.station(unit) {
+            let carried = rtu::append(unit, reply, |reply| {
+                self.units.answer(station, now, pdu, writes, reply, port)
+            });
+            client.remember(carried);
+        } else {
+            // It may be the unit of another device on the same serial line.
+            port.count("modbus-server.unknown_unit");
+        }
+        Ok(length)
+    }
+}
+
 impl Service for TcpService<'_> {
     type Client = Client;
 
     fn limits(&self) -> Limits {
         Limits {
-            telegram: ADU_LIMIT,
+            telegram: if self.is_rtu {
+                rtu::ADU_LIMIT
+            } else {
+                ADU_LIMIT
+            },
             clients: self.clients,
             patience: self.patience,
         }
@@ -54,6 +100,9 @@ impl Service for TcpService<'_> {
         reply: &mut Vec<u8>,
         port: &mut Port,
     ) -> Result<usize, BusError> {
+        if self.is_rtu {
+            return self.rtu_telegram(client, now, bytes, reply, port);
+        }
         let parsed = Telegram::parse(bytes);
         let parsed = parsed.map_err(|error| BusError::Protocol(error.to_string()))?;
         let Some((telegram, length)) = parsed else {
@@ -73,11 +122,7 @@ impl Service for TcpService<'_> {
             refuse(pdu[0], Exception::GATEWAY_TARGET_FAILED, reply);
             None
         });
-        if let Some(carried) = carried
-            && client.carried.len() < REMEMBERED
-        {
-            client.carried.push(carried);
-        }
+        client.remember(carried);
         Ok(length)
     }
 

@@ -7,6 +7,9 @@ use tickbus_image::signal::fail_safe_frame;
 use super::ServerOptions;
 use crate::{Done, Exception, Function, Identification, Map, Tables, answer};
 
+/// The unit number that addresses all units, with RTU.
+pub(super) const BROADCAST: u8 = 0;
+
 /// The units of a server, and the values that clients have written to them.
 #[derive(Debug)]
 pub(super) struct ServedUnits {
@@ -144,6 +147,25 @@ impl ServedUnits {
             generation: unit.generation,
             receipt: receipt?.bits(station, read?),
         })
+    }
+
+    /// Carries out a broadcast that arrived at `now`, for all units, and returns whether its function may
+    /// be broadcast; it has no answer.
+    pub(super) fn broadcast(
+        &mut self,
+        now: Nanos,
+        pdu: &[u8],
+        writes: &mut [bool],
+        port: &mut Port,
+    ) -> bool {
+        if !Function::of(pdu[0]).is_some_and(Function::writes) {
+            return false;
+        }
+        let mut nobody_hears = Vec::new();
+        for station in 0..self.len() {
+            self.answer(station, now, pdu, writes, &mut nobody_hears, port);
+        }
+        true
     }
 
     /// A client has received an answer that carries this.

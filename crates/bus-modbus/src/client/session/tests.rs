@@ -1,3 +1,5 @@
+mod stream;
+
 use std::sync::Arc;
 
 use super::*;
@@ -118,6 +120,15 @@ fn tcp() -> Framing {
     }
 }
 
+/// An RTU telegram of this unit, whose register has the value 7.
+fn seven(unit: u8) -> Vec<u8> {
+    let mut telegram = Vec::new();
+    rtu::append(unit, &mut telegram, |pdu| {
+        pdu.extend_from_slice(&[3, 2, 0, 7]);
+    });
+    telegram
+}
+
 /// A connection, and the far end of it.
 struct Line<'a> {
     poll: ClientSession<'a>,
@@ -137,7 +148,7 @@ impl Line<'_> {
             if !telegram.is_empty() {
                 self.poll.wrote(self.now, telegram.len(), self.port);
                 return match self.poll.framing {
-                    Framing::Rtu { .. } => {
+                    Framing::Rtu { .. } | Framing::RtuOverTcp { .. } => {
                         let (unit, pdu) = rtu::parse(&telegram).expect("a telegram");
                         (unit, pdu.to_vec())
                     }
@@ -164,7 +175,7 @@ impl Line<'_> {
     fn answer_as(&mut self, unit: u8, pdu: &[u8]) {
         let mut telegram = Vec::new();
         match self.poll.framing {
-            Framing::Rtu { .. } => {
+            Framing::Rtu { .. } | Framing::RtuOverTcp { .. } => {
                 rtu::append(unit, &mut telegram, |bytes| bytes.extend_from_slice(pdu));
             }
             Framing::Tcp { .. } => {
@@ -641,8 +652,7 @@ fn a_stray_byte_behind_an_answer_does_it_no_harm() {
     let mut line = client.connect(serial());
     for _ in 0..2 {
         assert_eq!(line.asked(), READ);
-        let mut telegram = Vec::new();
-        rtu::append(1, &mut telegram, |pdu| pdu.extend_from_slice(&[3, 2, 0, 7]));
+        let mut telegram = seven(1);
         telegram.push(0);
         line.hear(&telegram).expect("it goes on");
         assert_eq!(line.status.link().cause.name(), "running");

@@ -75,7 +75,7 @@ impl ClientSession<'_> {
         let rest = REST.times(trouble.rest);
         let mut stations = self.stations.iter();
         if stations.all(|polled| polled.trouble.kind == Some(Kind::Silent)) {
-            if matches!(self.framing, Framing::Tcp { .. }) {
+            if !matches!(self.framing, Framing::Rtu { .. }) {
                 return Err(error);
             }
             // They keep no other station waiting, and are tried at once so that a repaired line is noticed.

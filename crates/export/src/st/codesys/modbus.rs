@@ -19,6 +19,15 @@ pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, lis
             "Device tree: Modbus COM, {} > Modbus Client, COM Port > for each unit below a Modbus Server, COM Port.",
             serial.settings
         )],
+        (Line::RtuOverTcp(address), _) => vec![format!(
+            "Modbus RTU with {}, on a serial port that a serial device server, as a TCP client, joins with {} and port {}.",
+            match editor {
+                Editor::Codesys => "Modbus COM > Modbus Client, COM Port in the device tree",
+                Editor::TwinCat => "ModbusRtuMasterV2 of TF6255",
+            },
+            dialled(address),
+            address.port
+        )],
         (Line::Tcp(address), Editor::TwinCat) => vec![
             format!(
                 "Install TF6250 (Modbus TCP) with its licence on the target; References > Add library: Tc2_ModbusSrv. \
@@ -62,7 +71,7 @@ pub(super) fn link(config: &Config, options: &ServerOptions, editor: Editor, lis
         );
     }
     let mut link = Link::of_steps(steps);
-    if let Line::Tcp(address) = &options.line {
+    if let Line::Tcp(address) | Line::RtuOverTcp(address) = &options.line {
         link.notes.extend(loopback_note(address));
     }
     link

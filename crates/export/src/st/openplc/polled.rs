@@ -100,6 +100,11 @@ fn place(line: &Line) -> String {
             "as Generic Modbus TCP Device with the address of the simulation's computer and port {}",
             address.port
         ),
+        Line::RtuOverTcp(address) => format!(
+            "as Generic Modbus RTU Device on a serial port that a serial device server, as a TCP client, joins with the \
+             simulation's computer and port {}",
+            address.port
+        ),
         Line::Serial(serial) => format!(
             "as Generic Modbus RTU Device on the port that is wired to the simulation's, {}",
             serial.settings

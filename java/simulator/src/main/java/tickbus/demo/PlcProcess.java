@@ -148,7 +148,8 @@ public final class PlcProcess implements Plc {
     public void kill() {
         Life now = life;
         now.killed = true;
-        now.process.destroyForcibly();
+        // Process.destroyForcibly would also close its output, of which the last part may not be read yet.
+        now.process.toHandle().destroyForcibly();
         now.await("was not dead " + SECONDS_TO_DIE + " s after it was killed");
     }
 

@@ -147,7 +147,8 @@ impl Vendor for Cif {
 }
 
 impl Cif {
-    /// Whether the signals fit into a card with so many KiB of memory: all but the last of them are the two images.
+    /// Checks that the signals fit into a card with this many KiB of memory: the last KiB is the card's own, the rest
+    /// holds the two images.
     fn check_sizes(&self, kib: u8, [writes, reads]: [usize; 2]) -> Result<(), BusError> {
         let image = usize::from(kib).saturating_sub(1) * 1024 / 2;
         let card = &self.0.card;

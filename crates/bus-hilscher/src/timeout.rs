@@ -6,7 +6,7 @@ use tickbus_base::toml_text::Value;
 /// The longest one: a card that is silent for longer is not coming.
 const LIMIT: Nanos = Nanos::from_secs(600);
 
-/// Reads a time-out of whole milliseconds; `default` where there is none.
+/// Reads a time-out of whole milliseconds; without one it is `default`.
 pub(crate) fn read(value: Option<Value<'_>>, default: Nanos) -> Option<Nanos> {
     let Some(value) = value else {
         return Some(default);

@@ -339,7 +339,8 @@ fn inputs_that_never_arrive_are_stale_although_the_card_takes_outputs() {
     let mut device = cards.open("device", &clock);
     let _controller = cards.open("controller", &clock);
     until(&mut device, &clock, "running", "running");
-    cards.library.script("xChannelIORead 0x800C0022\n");
+    // The other end reads on, so that this one can write.
+    cards.library.script("xChannelIORead(0 0x800C0022\n");
     // Time waits for the bus threads here: the line is not stale because these are late.
     for _ in 0..400 {
         pass(&clock, 2);

@@ -4,7 +4,7 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::CardOptions;
 
-/// The vendor's library; there is none for other systems that tickbus knows.
+/// The vendor's library on Windows; on other systems `library` has to name one.
 pub(super) const LIBRARY: Option<&str> = if cfg!(windows) {
     Some("Ibddiwnt.dll")
 } else {

@@ -5,16 +5,11 @@ use std::fmt::Write as _;
 use tickbus_base::time::{Nanos, TimeHistogram};
 
 use crate::finder::bits;
-use crate::rates::{RATES, Rate};
+use crate::rates::{RATES, Rate, SLOT_TIME_LIMIT};
+use crate::station::MIN_TSDR;
 
-/// A slot time has at most so many bits.
-const SLOT_LIMIT: i64 = 16_383;
-
-/// The slot time is longer than the longest wait for an answer by at least so many bits.
+/// The slot time exceeds the longest wait for an answer by at least this many bits.
 const BEHIND: i64 = 15;
-
-/// A station waits for so many bits before it answers, unless its master has set another time.
-const WAIT: i64 = 11;
 
 /// Above this rate a serial port is not for PROFIBUS.
 const FASTEST: u32 = 500_000;
@@ -44,15 +39,16 @@ pub fn advise(replies: &TimeHistogram, held_back: Nanos) -> Vec<Advice> {
 
 fn advise_rate(rate: &Rate, replies: &TimeHistogram, held_back: Nanos) -> Advice {
     let baud = i64::from(rate.baud);
-    let limit = bits(rate.baud, i64::from(rate.max_tsdr) - WAIT) - held_back;
+    let wait = i64::from(MIN_TSDR);
+    let limit = bits(rate.baud, i64::from(rate.max_tsdr) - wait) - held_back;
     let steps = replies.steps().filter(|(longest, _)| *longest <= limit);
     let in_time: u64 = steps.map(|(_, count)| count).sum();
     // The longest one that was seen is not the longest there is.
     let longest = replies.longest() + held_back;
-    let needed = (longest.0 + longest.0 / 4).saturating_mul(baud) / 1_000_000_000 + 1 + WAIT;
+    let needed = (longest.0 + longest.0 / 4).saturating_mul(baud) / 1_000_000_000 + 1 + wait;
     let max_tsdr = needed.max(rate.max_tsdr.into()).next_multiple_of_ten();
     let slot = (max_tsdr + BEHIND).next_multiple_of_ten();
-    let fits = slot <= SLOT_LIMIT;
+    let fits = slot <= i64::from(SLOT_TIME_LIMIT);
     let small = |bits: i64| u16::try_from(bits).ok();
     #[expect(clippy::cast_precision_loss, reason = "a share to three digits")]
     let in_time = in_time as f64 / replies.count().max(1) as f64;

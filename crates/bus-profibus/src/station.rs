@@ -26,7 +26,7 @@ pub(crate) mod sap {
 }
 
 /// The time in bits before an answer, as long as the master has set no other.
-const MIN_TSDR: u8 = 11;
+pub(crate) const MIN_TSDR: u8 = 11;
 
 /// What stands behind a station: the machine.
 pub trait Process {

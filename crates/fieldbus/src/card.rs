@@ -139,6 +139,20 @@ pub struct Meaning {
 }
 
 impl Meaning {
+    /// The words for a code that only a mistake in tickbus can lead to.
+    pub const REPORT: &str =
+        "the driver refuses how tickbus calls it; report this with the driver's version";
+
+    /// An entry of a table.
+    pub const fn new(code: u32, name: &'static str, verdict: Verdict, words: &'static str) -> Self {
+        Self {
+            code,
+            name,
+            verdict,
+            words,
+        }
+    }
+
     /// The entry of `table` for `code`.
     pub fn of(table: &'static [Self], code: u32) -> Option<&'static Self> {
         table.iter().find(|meaning| meaning.code == code)

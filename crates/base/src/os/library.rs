@@ -44,7 +44,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// There is none of them: the first name, and what to do.
+    /// The library exports none of these names: says the first one, and what to do.
     ///
     /// # Safety
     ///

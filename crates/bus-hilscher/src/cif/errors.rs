@@ -6,16 +6,9 @@ use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
 use crate::answer::Answer;
 
 const fn row(code: i32, name: &'static str, verdict: Verdict, words: &'static str) -> Meaning {
-    Meaning {
-        code: code.cast_unsigned(),
-        name,
-        verdict,
-        words,
-    }
+    Meaning::new(code.cast_unsigned(), name, verdict, words)
 }
 
-const REPORT: &str =
-    "the driver refuses how tickbus calls it; report this with the driver's version";
 const SIZES: &str = "the signals reach beyond the card's process image; check their addresses, `write_offset` and `read_offset`";
 const STATE: &str = "the driver is in another state than its order of calls says; see whether another program uses the card";
 
@@ -26,7 +19,7 @@ pub const ERRORS: &[Meaning] = &[
     row(-2, "DRV_INIT_STATE_ERROR", Broken, STATE),
     row(-3, "DRV_READ_STATE_ERROR", Broken, STATE),
     row(-4, "DRV_CMD_ACTIVE", Again, "another call uses the card; see whether another program does"),
-    row(-5, "DRV_PARAMETER_UNKNOWN", Broken, REPORT),
+    row(-5, "DRV_PARAMETER_UNKNOWN", Broken, Meaning::REPORT),
     row(-6, "DRV_WRONG_DRIVER_VERSION", Broken, "library and driver do not belong together; install both anew"),
     row(-10, "DRV_DEV_DPM_ACCESS_ERROR", Broken, "the card's memory cannot be reached; see whether the card was removed, and its address in the driver set-up"),
     row(-11, "DRV_DEV_NOT_READY", Broken, "the card is not ready; it starts, or has no firmware"),
@@ -45,27 +38,27 @@ pub const ERRORS: &[Meaning] = &[
     row(-24, "DRV_DEV_COM_MODE_UNKNOWN", Refused, "the card is configured for a kind of exchange that the driver does not know; choose a buffered one in the card's configuration"),
     row(-25, "DRV_DEV_FUNCTION_FAILED", Broken, "the driver gives no reason; see the card's diagnosis"),
     row(-26, "DRV_DEV_DPMSIZE_MISMATCH", Broken, "the driver set-up has another size of the card's memory than the card; correct it there"),
-    row(-27, "DRV_DEV_STATE_MODE_UNKNOWN", Broken, REPORT),
+    row(-27, "DRV_DEV_STATE_MODE_UNKNOWN", Broken, Meaning::REPORT),
     row(-28, "HW_PORT_USED", Broken, "something else has the hardware port of the card; see the driver set-up"),
     row(-30, "DRV_USR_OPEN_ERROR", Broken, "the vendor's driver does not run on this computer; install it, or start it"),
     row(-31, "DRV_USR_INIT_DRV_ERROR", Broken, "the driver could not be started; install it anew"),
     row(-32, "DRV_USR_NOT_INITIALIZED", Broken, "the driver has not started this card; check `device`, and the card in the driver set-up"),
     row(-33, "DRV_USR_COMM_ERR", Broken, "library and driver do not understand each other; install both anew"),
     row(-34, "DRV_USR_DEV_NUMBER_INVALID", Refused, "there is no card with this number; check `device`"),
-    row(-35, "DRV_USR_INFO_AREA_INVALID", Broken, REPORT),
-    row(-36, "DRV_USR_NUMBER_INVALID", Broken, REPORT),
-    row(-37, "DRV_USR_MODE_INVALID", Broken, REPORT),
-    row(-38, "DRV_USR_MSG_BUF_NULL_PTR", Broken, REPORT),
-    row(-39, "DRV_USR_MSG_BUF_TOO_SHORT", Broken, REPORT),
+    row(-35, "DRV_USR_INFO_AREA_INVALID", Broken, Meaning::REPORT),
+    row(-36, "DRV_USR_NUMBER_INVALID", Broken, Meaning::REPORT),
+    row(-37, "DRV_USR_MODE_INVALID", Broken, Meaning::REPORT),
+    row(-38, "DRV_USR_MSG_BUF_NULL_PTR", Broken, Meaning::REPORT),
+    row(-39, "DRV_USR_MSG_BUF_TOO_SHORT", Broken, Meaning::REPORT),
     row(-40, "DRV_USR_SIZE_INVALID", Refused, SIZES),
-    row(-42, "DRV_USR_SIZE_ZERO", Broken, REPORT),
+    row(-42, "DRV_USR_SIZE_ZERO", Broken, Meaning::REPORT),
     row(-43, "DRV_USR_SIZE_TOO_LONG", Refused, SIZES),
-    row(-44, "DRV_USR_DEV_PTR_NULL", Broken, REPORT),
-    row(-45, "DRV_USR_BUF_PTR_NULL", Broken, REPORT),
+    row(-44, "DRV_USR_DEV_PTR_NULL", Broken, Meaning::REPORT),
+    row(-45, "DRV_USR_BUF_PTR_NULL", Broken, Meaning::REPORT),
     row(-46, "DRV_USR_SENDSIZE_TOO_LONG", Refused, SIZES),
     row(-47, "DRV_USR_RECVSIZE_TOO_LONG", Refused, SIZES),
-    row(-48, "DRV_USR_SENDBUF_PTR_NULL", Broken, REPORT),
-    row(-49, "DRV_USR_RECVBUF_PTR_NULL", Broken, REPORT),
+    row(-48, "DRV_USR_SENDBUF_PTR_NULL", Broken, Meaning::REPORT),
+    row(-49, "DRV_USR_RECVBUF_PTR_NULL", Broken, Meaning::REPORT),
 ];
 
 /// Codes that have a meaning together, by their first and last ones.

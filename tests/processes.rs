@@ -5,12 +5,13 @@
 use std::io::{BufRead as _, BufReader, Lines};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration};
 
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
+use tickbus_conformance::rig::await_that;
 use tickbus_test_log as logged;
 
 const SIGNALS: &str = r#"
@@ -111,15 +112,6 @@ fn statistic(driver: &Driver, key: &str) -> Option<String> {
         .lines()
         .find_map(|line| line.strip_prefix(&format!("{key}=")));
     found.map(str::to_owned)
-}
-
-#[track_caller]
-fn await_that(what: &str, mut done: impl FnMut() -> bool) {
-    let limit = Instant::now() + Duration::from_secs(20);
-    while !done() {
-        assert!(Instant::now() < limit, "waited 20 s in vain until {what}");
-        std::thread::yield_now();
-    }
 }
 
 fn device() -> (logged::Watch, Driver, Vec<Slot>, String) {
@@ -244,7 +236,7 @@ fn a_machine_that_does_not_answer_ends_the_measurement_with_code_3() {
         scope.spawn(|| {
             while !over.load(std::sync::atomic::Ordering::Relaxed) {
                 driver.exchange(Nanos::ZERO, &mut slots);
-                std::thread::yield_now();
+                std::thread::sleep(Duration::from_millis(1));
             }
         });
         let ended = Process::start(&[

@@ -19,6 +19,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::record::{Recording, Tick};
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Manual, Nanos};
+use tickbus_conformance::rig::Looks;
 use tickbus_test_log as logged;
 
 /// A folder with driver.cfg files and recordings; deleted with the test.
@@ -423,8 +424,9 @@ fn a_recording_of_a_free_bus_replays_value_by_value() {
             }
             plc.exchange(0);
             clock.advance(Nanos::from_millis(1));
+            let mut looks = Looks::default();
             while !clock.is_settled(2) {
-                std::thread::yield_now();
+                looks.pause();
             }
         }
         device.machine();
@@ -480,8 +482,9 @@ fn stale_data_are_stale_again_in_a_replay() {
     plc.exchange(0);
     for tick in 2..300 {
         clock.advance(Nanos::from_millis(1));
+        let mut looks = Looks::default();
         while !clock.is_settled(if tick < 100 { 2 } else { 1 }) {
-            std::thread::yield_now();
+            looks.pause();
         }
         codes.push(device.exchange(tick).code);
         if tick == 99 {

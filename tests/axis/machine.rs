@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use tickbus::driver::Driver;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
+use tickbus_conformance::rig::Looks;
 use tickbus_test_log as logged;
 
 use crate::parse;
@@ -83,10 +84,11 @@ impl Machine {
     #[track_caller]
     pub(crate) fn until(&mut self, what: &str, is: impl Fn(&Self) -> bool) {
         let begun = Instant::now();
+        let mut looks = Looks::default();
         while !is(self) {
             assert!(begun.elapsed() < Duration::from_secs(20), "{what}");
             self.tick();
-            std::thread::yield_now();
+            looks.pause();
         }
     }
 }

@@ -243,7 +243,6 @@ impl Rig {
                 self.controller.driver.statistics(),
                 self.device.driver.statistics(),
             );
-            std::thread::yield_now();
         }
     }
 
@@ -264,8 +263,26 @@ impl Rig {
 pub fn pass(clock: &Manual, ends: usize) {
     clock.advance(CYCLE);
     let limit = Instant::now() + Duration::from_millis(20);
+    let mut looks = Looks::default();
     while !clock.is_settled(ends) && Instant::now() < limit {
-        std::thread::yield_now();
+        looks.pause();
+    }
+}
+
+/// The pauses between looks at what another thread does: short ones at first; then a wait that lasts leaves the processor
+/// to those who work.
+#[derive(Debug, Default)]
+pub struct Looks(u32);
+
+impl Looks {
+    /// The pause after a look in vain.
+    pub fn pause(&mut self) {
+        self.0 += 1;
+        if self.0 < 20 {
+            std::thread::yield_now();
+        } else {
+            std::thread::sleep(Duration::from_micros(100));
+        }
     }
 }
 
@@ -276,12 +293,13 @@ const VAIN: Duration = Duration::from_secs(20);
 #[track_caller]
 pub fn await_that(what: &str, mut done: impl FnMut() -> bool) {
     let limit = Instant::now() + VAIN;
+    let mut looks = Looks::default();
     while !done() {
         assert!(
             Instant::now() < limit,
             "waited {VAIN:?} in vain until {what}"
         );
-        std::thread::yield_now();
+        looks.pause();
     }
 }
 

@@ -1,0 +1,54 @@
+//! All clients in this process: the same server, without a connection.
+
+use tickbus_base::time::{Clock as _, Monotonic, Stop};
+
+use crate::local::Locals;
+use crate::logic::Logic;
+use crate::server::Server;
+use crate::{Cause, Ended, Outcome, Pacing, Participant, Settings};
+
+/// Runs these participants, one after another in each step, until the run ends.
+///
+/// The start condition of `settings` must fit them. A run without a number of steps ends when a participant, or the
+/// logic, fails; to control it from outside, use a [`Server`].
+///
+/// # Errors
+///
+/// Why there was no run, or why it was broken off.
+pub fn run(
+    settings: Settings,
+    participants: Vec<&mut dyn Participant>,
+    logic: Logic<'_>,
+) -> Result<Outcome, Ended> {
+    if settings.paused {
+        let reason = "a run in one process cannot begin paused: nobody could resume it";
+        return Err(Ended::before(Cause::Configuration, reason));
+    }
+    let clock = Monotonic::shared();
+    // Who hangs, hangs this thread, so without a pace nobody asks for the time.
+    let is_paced = settings.pacing != Pacing::Fast;
+    let mut now = clock.now();
+    let mut server = Server::new(settings, logic, now)
+        .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
+    let mut locals = Locals::join(&mut server, now, participants);
+    loop {
+        while let Some((seat, message)) = server.poll() {
+            locals.take(seat, &message);
+        }
+        if let Some(outcome) = server.outcome() {
+            return outcome.clone();
+        }
+        if let Some(missing) = server.missing() {
+            let reason = format!("the start condition still waits for {missing}");
+            let waits = Ended::before(Cause::Configuration, reason);
+            return Err(locals.refusal().cloned().unwrap_or(waits));
+        }
+        if is_paced {
+            now = clock.now();
+        }
+        if !locals.run(&mut server, now) {
+            clock.wait_until(server.deadline(), &Stop::new());
+            server.tick(clock.now());
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! SDSP: a server hands out virtual time, and its clients run in lock-step.
+//!
+//! Each client declares the variables that it writes and reads, and runs once per step of its own, a whole multiple of
+//! the server's. All clients of a step see one snapshot; what they write is committed at once, when the last of them
+//! has written. So the result does not depend on who answers first, nor on the speed of the computer, and two runs are
+//! equal to the last bit: [`TraceHash`] tells.
+//!
+//! [`Participant`] is what a client implements; it then takes part in this process, over TCP or through shared memory.
+
+mod barrier;
+mod declaration;
+mod hosting;
+mod local;
+mod outcome;
+mod participant;
+mod run_file;
+mod settings;
+mod shared_data;
+
+pub mod client;
+pub mod hash;
+
+pub mod in_process;
+pub mod logic;
+pub mod server;
+#[cfg(unix)]
+pub mod shared_memory;
+pub mod tcp;
+pub mod wire;
+
+pub use barrier::State;
+pub use declaration::{Declaration, Variable, is_raw};
+pub use hash::TraceHash;
+pub use hosting::{Controls, Hosting, hear};
+pub use logic::Logic;
+pub use outcome::{Cause, Ended, Outcome};
+pub use participant::{Participant, Step};
+pub use run_file::{Meeting, RunFile};
+pub use settings::{Pacing, Settings, StartCondition};

@@ -22,6 +22,8 @@ pub mod hash;
 
 pub mod in_process;
 pub mod logic;
+#[cfg(feature = "script")]
+pub mod script;
 pub mod server;
 #[cfg(unix)]
 pub mod shared_memory;

@@ -40,6 +40,7 @@ struct Registered {
     is_complete: bool,
 }
 
+#[derive(Clone)]
 enum When {
     Start,
     Time,
@@ -154,21 +155,21 @@ fn offer_registration(engine: &mut Engine, registered: &Arc<Mutex<Registered>>) 
             Ok(())
         },
     );
-    let plain: [(&str, fn() -> When); 2] =
-        [("on_start", || When::Start), ("on_time", || When::Time)];
-    for (name, when) in plain {
+    for (name, when) in [("on_start", When::Start), ("on_time", When::Time)] {
         let into = Arc::clone(registered);
         engine.register_fn(name, move |function: FnPtr| -> Result<(), Failed> {
-            open(&into)?.hooks.push((when(), function));
+            open(&into)?.hooks.push((when.clone(), function));
             Ok(())
         });
     }
-    let named: [(&str, fn(String) -> When); 2] =
-        [("on_change", When::Change), ("on_read", When::Read)];
-    for (name, when) in named {
+    for name in ["on_change", "on_read"] {
         let into = Arc::clone(registered);
         let register = move |of: &str, function: FnPtr| -> Result<(), Failed> {
-            open(&into)?.hooks.push((when(of.to_owned()), function));
+            let when = match name {
+                "on_change" => When::Change(of.to_owned()),
+                _ => When::Read(of.to_owned()),
+            };
+            open(&into)?.hooks.push((when, function));
             Ok(())
         };
         engine.register_fn(name, register);

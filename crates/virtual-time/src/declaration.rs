@@ -1,0 +1,180 @@
+//! What a client declares before the run.
+
+use std::collections::HashSet;
+use std::num::NonZeroU32;
+
+use tickbus_base::Mistake;
+use tickbus_image::signal::DataType;
+
+/// The longest name of a client or variable, in bytes of UTF-8.
+pub(crate) const LONGEST_NAME: usize = 255;
+
+/// The most variables that one client may write, and the most that it may read.
+pub(crate) const MOST_VARIABLES: usize = 65_535;
+
+/// What a client tells the server before the run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Declaration {
+    /// Its name, which no other client has: 1 to 255 bytes. The order of the names is the order of the clients.
+    pub name: String,
+    /// How many steps of the server one step of this client takes.
+    pub multiple: NonZeroU32,
+    /// The variables that it writes, at most 65535. No one else writes them.
+    pub writes: Vec<Variable>,
+    /// The names of the variables that it reads, at most 65535; they may be its own.
+    pub reads: Vec<String>,
+}
+
+/// A variable that all clients may read and one writes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Variable {
+    /// Its name, which no other variable of the run has: 1 to 255 bytes.
+    pub name: String,
+    /// The type of its values.
+    pub data_type: DataType,
+}
+
+impl Variable {
+    /// A variable of this name and type.
+    pub fn new(name: impl Into<String>, data_type: DataType) -> Self {
+        let name = name.into();
+        Self { name, data_type }
+    }
+}
+
+impl Declaration {
+    /// A client of this name that runs at every step, and as yet writes and reads nothing.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            multiple: NonZeroU32::MIN,
+            writes: Vec::new(),
+            reads: Vec::new(),
+        }
+    }
+
+    /// Checks what can be checked without knowing the other clients.
+    ///
+    /// # Errors
+    ///
+    /// A name that is not allowed, a variable that is written or read twice, or too many of them.
+    pub fn check(&self) -> Result<(), Mistake> {
+        check_name("client", &self.name)?;
+        let writes = self.writes.iter().map(|variable| &variable.name);
+        check_all("writes", &self.name, writes)?;
+        check_all("reads", &self.name, self.reads.iter())
+    }
+}
+
+fn check_all<'a>(
+    does: &str,
+    client: &str,
+    names: impl ExactSizeIterator<Item = &'a String>,
+) -> Result<(), Mistake> {
+    if names.len() > MOST_VARIABLES {
+        return Err(Mistake::new(
+            format!("client \"{client}\" {does} {} variables", names.len()),
+            format!("at most {MOST_VARIABLES} are possible; split it into several clients"),
+        ));
+    }
+    let mut seen = HashSet::new();
+    for name in names {
+        check_name("variable", name)?;
+        if !seen.insert(name) {
+            return Err(Mistake::new(
+                format!("client \"{client}\" {does} the variable \"{name}\" twice"),
+                "name it once",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Checks the name of a client or variable.
+pub(crate) fn check_name(of: &str, name: &str) -> Result<(), Mistake> {
+    let refuse = |what: &str| {
+        let shown = tickbus_base::toml_text::shown(name);
+        let right = format!(
+            "a name has 1 to {LONGEST_NAME} bytes, no control characters, and no blanks around it"
+        );
+        Err(Mistake::new(
+            format!("the name \"{shown}\" of a {of} {what}"),
+            right,
+        ))
+    };
+    if name.is_empty() {
+        return refuse("is empty");
+    }
+    if name.len() > LONGEST_NAME {
+        return refuse("is too long");
+    }
+    if name.chars().any(char::is_control) {
+        return refuse("has a control character in it");
+    }
+    if name.trim() != name {
+        return refuse("has blanks around it");
+    }
+    Ok(())
+}
+
+/// Whether `slot` holds a raw value of this type: integers and bit strings extended to 64 bits by their sign or by
+/// zeros, BOOL as 0 or 1, REAL as the 32 bits of its number, LREAL as the 64 bits.
+pub const fn is_raw(data_type: DataType, slot: u64) -> bool {
+    let unused = 64 - data_type.width().bits();
+    if data_type.is_signed() {
+        (slot << unused).cast_signed() >> unused == slot.cast_signed()
+    } else {
+        slot << unused >> unused == slot
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slot_holds_what_its_type_can() {
+        for (data_type, right, wrong) in [
+            (DataType::Bool, vec![0, 1], vec![2, u64::MAX]),
+            (DataType::Byte, vec![0, 255], vec![256, u64::MAX]),
+            (
+                DataType::Sint,
+                vec![127, 0_u64.wrapping_sub(128)],
+                vec![128, 255],
+            ),
+            (
+                DataType::Dint,
+                vec![0x7FFF_FFFF, 0xFFFF_FFFF_8000_0000],
+                vec![0x8000_0000],
+            ),
+            (
+                DataType::Real,
+                vec![u64::from(1.5_f32.to_bits())],
+                vec![1.5_f64.to_bits()],
+            ),
+            (DataType::Lreal, vec![u64::MAX], vec![]),
+            (DataType::Lint, vec![u64::MAX], vec![]),
+        ] {
+            assert!(right.iter().all(|&slot| is_raw(data_type, slot)));
+            assert!(!wrong.iter().any(|&slot| is_raw(data_type, slot)));
+        }
+    }
+
+    #[test]
+    fn names_that_cannot_be_are_refused() {
+        let long = "x".repeat(256);
+        for (name, part) in [
+            ("", "is empty"),
+            (" a", "blanks around"),
+            ("a\n", "control character"),
+            (&*long, "too long"),
+        ] {
+            let told = Declaration::new(name).check().expect_err(name).to_string();
+            assert!(told.contains(part), "{told}");
+        }
+        let mut twice = Declaration::new("a");
+        twice.reads = vec!["x".to_owned(), "x".to_owned()];
+        let told = twice.check().expect_err("twice").to_string();
+        assert!(told.contains("reads the variable \"x\" twice"), "{told}");
+    }
+}

@@ -1,0 +1,73 @@
+//! The trace hash: whether two runs were the same.
+
+use std::fmt;
+use std::hash::Hasher as _;
+
+use siphasher::sip::SipHasher24;
+
+use crate::{Declaration, Step, Variable};
+
+/// The hash over all commits of a run: equal for runs that are equal to the last bit.
+///
+/// It is SipHash-2-4 with a key of zeros over the stream that docs/sdsp.md describes, so other programs can compute
+/// it from a trace of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TraceHash(pub u64);
+
+impl fmt::Display for TraceHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+/// Hashes a run while it goes on; allocates nothing.
+#[derive(Clone, Debug)]
+pub struct Trace(SipHasher24);
+
+impl Trace {
+    /// The hash of a run without commits: of the server's step, of the clients in their order, and of the variables
+    /// that the server's logic writes.
+    pub fn new(step: i64, clients: &[Declaration], logic: &[Variable]) -> Self {
+        let mut trace = Self(SipHasher24::new());
+        trace.word(step.cast_unsigned());
+        trace.word(clients.len() as u64);
+        for client in clients {
+            trace.text(&client.name);
+            trace.word(client.multiple.get().into());
+            trace.variables(&client.writes);
+        }
+        trace.variables(logic);
+        trace
+    }
+
+    /// Adds a commit: all variables with their new values, changed or not.
+    pub fn commit(&mut self, step: Step, values: &[u64]) {
+        self.word(step.sequence);
+        self.word(step.time.0.cast_unsigned());
+        for value in values {
+            self.word(*value);
+        }
+    }
+
+    /// The hash of what was added so far.
+    pub fn hash(&self) -> TraceHash {
+        TraceHash(self.0.finish())
+    }
+
+    fn variables(&mut self, variables: &[Variable]) {
+        self.word(variables.len() as u64);
+        for variable in variables {
+            self.text(&variable.name);
+            self.text(variable.data_type.name());
+        }
+    }
+
+    fn text(&mut self, text: &str) {
+        self.word(text.len() as u64);
+        self.0.write(text.as_bytes());
+    }
+
+    fn word(&mut self, word: u64) {
+        self.0.write(&word.to_le_bytes());
+    }
+}

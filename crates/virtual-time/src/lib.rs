@@ -1,0 +1,21 @@
+//! SDSP: a server hands out virtual time, and its clients run in lock-step.
+//!
+//! Each client declares the variables that it writes and reads, and runs once per step of its own, a whole multiple of
+//! the server's. All clients of a step see one snapshot; what they write is committed at once, when the last of them
+//! has written. So the result does not depend on who answers first, nor on the speed of the computer, and two runs are
+//! equal to the last bit: [`TraceHash`] tells.
+//!
+//! [`Participant`] is what a client implements; it then takes part in this process, over TCP or through shared memory.
+
+mod declaration;
+mod outcome;
+mod participant;
+mod settings;
+
+pub mod hash;
+
+pub use declaration::{Declaration, Variable, is_raw};
+pub use hash::TraceHash;
+pub use outcome::{Cause, Ended, Outcome};
+pub use participant::{Participant, Step};
+pub use settings::{Pacing, Settings, StartCondition};

@@ -10,8 +10,12 @@
 //! `page` shows the paths side by side. `docs/virtual-time.md` explains the experiment.
 
 pub mod controller;
+pub mod experiment;
 pub mod free_wheeling;
 pub mod metrics;
+pub mod page;
+pub mod participants;
 pub mod path;
 pub mod plant;
 pub mod random;
+pub mod wall_clock;

@@ -7,15 +7,22 @@
 //!
 //! [`Participant`] is what a client implements; it then takes part in this process, over TCP or through shared memory.
 
+mod barrier;
 mod declaration;
 mod outcome;
 mod participant;
 mod settings;
+mod shared_data;
 
 pub mod hash;
+pub mod in_process;
+pub mod logic;
+pub mod server;
 
+pub use barrier::State;
 pub use declaration::{Declaration, Variable, is_raw};
 pub use hash::TraceHash;
+pub use logic::Logic;
 pub use outcome::{Cause, Ended, Outcome};
 pub use participant::{Participant, Step};
 pub use settings::{Pacing, Settings, StartCondition};

@@ -97,6 +97,10 @@ impl Ended {
 
 impl fmt::Display for Ended {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.cause == Cause::Refused {
+            f.write_str("the server refused this client")?;
+            return write!(f, ": {}", self.reason);
+        }
         match self.steps {
             0 => f.write_str("the run ended before its first step")?,
             1 => f.write_str("the run ended after 1 step")?,

@@ -1,5 +1,6 @@
 //! What a server is told before the run.
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 
 /// How a server runs.
@@ -51,6 +52,44 @@ impl Settings {
             paused: false,
             hang: Nanos::from_secs(10),
             join: Nanos::MAX,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks what does not concern the clients.
+    pub(crate) fn check(&self) -> Result<(), Mistake> {
+        for (name, span) in [
+            ("step", self.step),
+            ("hang", self.hang),
+            ("join", self.join),
+        ] {
+            if span <= Nanos::ZERO {
+                let what = format!("the span \"{name}\" is {span}");
+                return Err(Mistake::new(what, "it must be longer than no time at all"));
+            }
+        }
+        match self.pacing {
+            Pacing::Times(factor) if !(factor.is_finite() && factor > 0.0) => Err(Mistake::new(
+                format!("the pace is {factor} times real time"),
+                "a pace is a number above zero, such as 1 for real time",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Pacing {
+    /// The wall-clock time between two steps of `step`; `None` without a limit.
+    pub(crate) fn interval(self, step: Nanos) -> Option<Nanos> {
+        match self {
+            Self::Fast => None,
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_precision_loss,
+                reason = "a cast to integers saturates, and a nanosecond more or less is no matter"
+            )]
+            Self::Times(factor) => Some(Nanos(((step.0 as f64 / factor) as i64).max(1))),
         }
     }
 }

@@ -1,0 +1,318 @@
+//! The states of a run, from the initial write on, and the data that pass through them; who is connected how does not
+//! matter here.
+
+use std::ops::Range;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::DataType;
+
+use crate::hash::Trace;
+use crate::logic::{Access, Hook, Logic};
+use crate::shared_data::SharedData;
+use crate::{Declaration, Outcome, Step};
+
+/// Where a run is. The names are those of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum State {
+    /// Clients join.
+    Start,
+    /// The clients initialise their variables; the time is one step below 0.
+    InitialWrite,
+    /// All writes are committed; which clients are due in the next step is fixed now.
+    PreRead,
+    /// The clients that are due read; at the end of it time moves on.
+    Read,
+    /// They run.
+    PreWrite,
+    /// They finish their runs and write.
+    Write,
+    /// The run has ended.
+    Ended,
+}
+
+/// A run whose clients are known by their places in the order of their names.
+#[derive(Debug)]
+pub(crate) struct Barrier<'l> {
+    length: Nanos,
+    state: State,
+    step: Step,
+    members: Vec<Member>,
+    data: SharedData,
+    logic: Logic<'l>,
+    /// The variables of the hooks for changes, in their order, each with its hook.
+    change_calls: Vec<(usize, usize)>,
+    /// The clients and the hooks for reads, in the order in which they are called.
+    read_calls: Vec<(usize, usize)>,
+    trace: Trace,
+    owing: usize,
+}
+
+#[derive(Debug)]
+struct Member {
+    declaration: Declaration,
+    writes: Range<usize>,
+    reads: Box<[u32]>,
+    read_types: Box<[DataType]>,
+    /// What it reads in this step.
+    snapshot: Box<[u64]>,
+    /// The number of the step in which it runs next.
+    next_update: u64,
+    is_due: bool,
+    /// It has not answered yet.
+    owes: bool,
+}
+
+impl<'l> Barrier<'l> {
+    /// A run of these clients, in the state of the initial write.
+    pub(crate) fn new(
+        length: Nanos,
+        mut clients: Vec<Declaration>,
+        logic: Logic<'l>,
+    ) -> Result<Self, Mistake> {
+        clients.sort_by(|a, b| a.name.cmp(&b.name));
+        let data = SharedData::new(&clients, &logic.variables)?;
+        let trace = Trace::new(length.0, &clients, &logic.variables);
+        let place = |of: &str, name: &str| {
+            let what = format!("the server's logic hangs on {of} of the variable \"{name}\"");
+            data.find_for(name)
+                .map_err(|right| Mistake::new(format!("{what}, which nobody writes"), right))
+        };
+        let mut change_calls = Vec::new();
+        for (hook, (name, _)) in logic.change.iter().enumerate() {
+            let at = place("changes", name)?;
+            if data.is_of_logic(at) {
+                return Err(Mistake::new(
+                    format!("the server's logic hangs on changes of its own variable \"{name}\""),
+                    "do what follows from it where it is written",
+                ));
+            }
+            change_calls.push((at, hook));
+        }
+        change_calls.sort_unstable();
+        for (name, _) in &logic.read {
+            place("reads", name)?;
+        }
+        let mut read_calls = Vec::new();
+        for (at, client) in clients.iter().enumerate() {
+            for read in &client.reads {
+                let hooks = logic.read.iter().enumerate();
+                let hooks = hooks.filter(|(_, (name, _))| name == read);
+                read_calls.extend(hooks.map(|(hook, _)| (at, hook)));
+            }
+        }
+        let mut from = 0;
+        let member = |declaration: Declaration| {
+            let writes = from..from + declaration.writes.len();
+            from = writes.end;
+            let find = |name| data.find(name).expect("checked with the data");
+            let reads: Box<[u32]> = (declaration.reads.iter())
+                .map(|name| u32::try_from(find(name)).expect("fewer variables than that"))
+                .collect();
+            let types = (reads.iter()).map(|at| data.variable(*at as usize).data_type);
+            Member {
+                writes,
+                read_types: types.collect(),
+                snapshot: vec![0; reads.len()].into(),
+                reads,
+                next_update: 1,
+                is_due: true,
+                owes: true,
+                declaration,
+            }
+        };
+        let members: Vec<Member> = clients.into_iter().map(member).collect();
+        Ok(Self {
+            length,
+            state: State::InitialWrite,
+            step: Step {
+                sequence: 0,
+                time: Nanos::ZERO - length,
+            },
+            owing: members.len(),
+            members,
+            data,
+            logic,
+            change_calls,
+            read_calls,
+            trace,
+        })
+    }
+
+    /// Calls the hooks for the start.
+    pub(crate) fn start(&mut self) -> Result<(), String> {
+        let (data, step) = (&mut self.data, self.step);
+        let hooks = self.logic.start.iter_mut();
+        call_all(hooks, data, step)
+    }
+
+    pub(crate) const fn state(&self) -> State {
+        self.state
+    }
+
+    /// The step that runs, or ran last.
+    pub(crate) const fn step(&self) -> Step {
+        self.step
+    }
+
+    /// How many steps were committed.
+    pub(crate) const fn steps(&self) -> u64 {
+        match self.state {
+            State::PreWrite | State::Read | State::Write => self.step.sequence - 1,
+            _ => self.step.sequence,
+        }
+    }
+
+    pub(crate) fn outcome(&self) -> Outcome {
+        Outcome {
+            steps: self.step.sequence,
+            time: self.step.time,
+            hash: self.trace.hash(),
+        }
+    }
+
+    /// What a client has declared.
+    pub(crate) fn declaration(&self, client: usize) -> &Declaration {
+        &self.members[client].declaration
+    }
+
+    /// The types of what a client reads.
+    pub(crate) fn read_types(&self, client: usize) -> &[DataType] {
+        &self.members[client].read_types
+    }
+
+    /// What a client reads in this step.
+    pub(crate) fn snapshot(&self, client: usize) -> &[u64] {
+        &self.members[client].snapshot
+    }
+
+    /// The clients that have not answered yet.
+    pub(crate) fn owing(&self) -> impl Iterator<Item = usize> {
+        let members = self.members.iter().enumerate();
+        members.filter_map(|(at, member)| member.owes.then_some(at))
+    }
+
+    /// The clients that are due in this step.
+    pub(crate) fn due(&self) -> impl Iterator<Item = usize> {
+        let members = self.members.iter().enumerate();
+        members.filter_map(|(at, member)| member.is_due.then_some(at))
+    }
+
+    /// Whether nobody is waited for.
+    pub(crate) const fn is_synchronised(&self) -> bool {
+        self.owing == 0
+    }
+
+    /// A client has finished its run of the step `sequence`; the error tells how it violates the protocol.
+    pub(crate) fn done(
+        &mut self,
+        client: usize,
+        sequence: u64,
+        values: impl ExactSizeIterator<Item = u64>,
+    ) -> Result<(), String> {
+        let member = &mut self.members[client];
+        let now = self.step.sequence;
+        if sequence != now {
+            return Err(format!("answered step {sequence} in step {now}"));
+        }
+        if !member.owes {
+            return Err(if member.is_due {
+                format!("answered step {sequence} twice")
+            } else {
+                format!("answered step {sequence}, in which it was not due")
+            });
+        }
+        if values.len() != member.writes.len() {
+            return Err(format!(
+                "wrote {} values in step {sequence}, expected {}, one for each variable that it declared",
+                values.len(),
+                member.writes.len()
+            ));
+        }
+        let staged = self.data.stage(member.writes.clone(), values);
+        staged.map_err(|why| format!("wrote a wrong value in step {sequence}: {why}"))?;
+        member.owes = false;
+        self.owing -= 1;
+        Ok(())
+    }
+
+    /// Commits what all have written, and fixes who is due next.
+    pub(crate) fn commit(&mut self) -> Result<(), String> {
+        debug_assert!(self.is_synchronised(), "a client still runs");
+        self.data.begin_commit();
+        for (at, hook) in &self.change_calls {
+            if self.data.changes(*at) {
+                let mut access = Access {
+                    data: &mut self.data,
+                    step: self.step,
+                    reader: None,
+                };
+                (self.logic.change[*hook].1)(&mut access)?;
+            }
+        }
+        self.data.end_commit();
+        self.trace.commit(self.step, self.data.committed());
+        self.state = State::PreRead;
+        let next = self.step.sequence + 1;
+        for member in &mut self.members {
+            member.is_due = member.next_update <= next;
+        }
+        Ok(())
+    }
+
+    /// Takes the next step as far as to the runs of the clients that are due.
+    pub(crate) fn begin_step(&mut self) -> Result<(), String> {
+        debug_assert_eq!(self.state, State::PreRead, "a step begins between two");
+        self.state = State::Read;
+        for member in &mut self.members {
+            if member.is_due {
+                self.data.read(&member.reads, &mut member.snapshot);
+            }
+        }
+        let step = Step {
+            sequence: self.step.sequence + 1,
+            time: self.step.time + self.length,
+        };
+        for (client, hook) in &self.read_calls {
+            let member = &self.members[*client];
+            if member.is_due {
+                let mut access = Access {
+                    data: &mut self.data,
+                    step: self.step,
+                    reader: Some(&member.declaration.name),
+                };
+                (self.logic.read[*hook].1)(&mut access)?;
+            }
+        }
+        self.step = step;
+        call_all(self.logic.time.iter_mut(), &mut self.data, step)?;
+        self.state = State::PreWrite;
+        self.owing = 0;
+        for member in &mut self.members {
+            member.owes = member.is_due;
+            if member.is_due {
+                self.owing += 1;
+                let multiple = u64::from(member.declaration.multiple.get());
+                member.next_update = step.sequence + multiple;
+            }
+        }
+        self.state = State::Write;
+        Ok(())
+    }
+}
+
+fn call_all<'h, 'l: 'h>(
+    hooks: impl Iterator<Item = &'h mut Hook<'l>>,
+    data: &mut SharedData,
+    step: Step,
+) -> Result<(), String> {
+    let mut access = Access {
+        data,
+        step,
+        reader: None,
+    };
+    for hook in hooks {
+        hook(&mut access)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,536 @@
+//! The server, without I/O: state, time and messages in; messages and the next deadline out.
+
+mod joining;
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::{Nanos, Pace};
+use tickbus_image::signal::DataType;
+
+use crate::barrier::{Barrier, State};
+use crate::logic::Logic;
+use crate::{Cause, Declaration, Ended, Outcome, Settings, Step};
+use joining::Joining;
+
+/// How many states are passed in a row, where no client is due, before anything else is done.
+const EMPTY_STATES: usize = 1000;
+
+/// How long the clients may take to finish a step after the run was stopped.
+const STOP_PATIENCE: Nanos = Nanos::from_secs(1);
+
+/// What a server may be asked to do while it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// Begins no more steps.
+    Pause,
+    /// Runs this many steps, and then pauses.
+    Step(u64),
+    /// Runs on.
+    Run,
+    /// Ends the run after the step that is under way; a client that does not finish it within a second is not waited for.
+    Stop,
+}
+
+/// A message of the server to one client.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ToClient<'a> {
+    /// Everyone has joined. The client answers with its initial values, as those of step 0.
+    Start {
+        /// The virtual time of one step of the server.
+        step: Nanos,
+        /// The types of the variables that it reads, in the order of its declaration.
+        reads: &'a [DataType],
+    },
+    /// The client runs, and answers with what it writes.
+    Step {
+        /// The step.
+        step: Step,
+        /// What it reads, in the order of its declaration.
+        reads: &'a [u64],
+    },
+    /// The run has ended, or the client does not take part in it. Nothing follows.
+    End(&'a Result<Outcome, Ended>),
+}
+
+/// A server for one run.
+///
+/// The owner of the connections gives each a seat by [`connected`](Self::connected), reports what arrives, fetches the
+/// messages by [`poll`](Self::poll) until there are none, and calls [`tick`](Self::tick) when
+/// [`deadline`](Self::deadline) has come. A seat is free again when its client was [lost](Self::lost), or its
+/// [`ToClient::End`] was fetched; the owner then forgets the connection. The run is over when there is an
+/// [`outcome`](Self::outcome) and no message is left.
+#[derive(Debug)]
+pub struct Server<'l> {
+    settings: Settings,
+    phase: Phase<'l>,
+    seats: Vec<Seat>,
+    outbox: VecDeque<Out>,
+    /// The end of a client that was refused, while its message is fetched.
+    refused: Result<Outcome, Ended>,
+    /// When the clients could begin to join, or were last asked for something.
+    asked: Nanos,
+    is_paused: bool,
+    /// How many steps are run in spite of the pause.
+    singles: u64,
+    /// By when the run has to have ended.
+    stop_by: Option<Nanos>,
+    pace: Option<Pace>,
+}
+
+#[derive(Debug)]
+enum Phase<'l> {
+    Joining(Joining, Logic<'l>),
+    /// With the seats of the clients.
+    Running(Box<Barrier<'l>>, Vec<usize>),
+    Ended(Result<Outcome, Ended>),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Seat {
+    Free,
+    /// Connected at this time, and has not joined.
+    Silent(Nanos),
+    /// Joined; the run has not started.
+    Joined,
+    /// The client of this number.
+    Client(usize),
+    /// Gets its end next.
+    Leaving,
+}
+
+#[derive(Debug)]
+enum Out {
+    Start(usize),
+    Step(usize),
+    End(usize),
+    Refused(usize, Box<Ended>),
+}
+
+impl<'l> Server<'l> {
+    /// A server that waits for its clients from `now` on.
+    ///
+    /// # Errors
+    ///
+    /// The settings make no sense.
+    pub fn new(settings: Settings, logic: Logic<'l>, now: Nanos) -> Result<Self, Mistake> {
+        settings.check()?;
+        let joining = Joining::new(&settings.start)?;
+        Ok(Self {
+            is_paused: settings.paused,
+            phase: Phase::Joining(joining, logic),
+            settings,
+            seats: Vec::new(),
+            outbox: VecDeque::new(),
+            refused: Err(Ended::before(Cause::Refused, "")),
+            asked: now,
+            singles: 0,
+            stop_by: None,
+            pace: None,
+        })
+    }
+
+    /// Where the run is.
+    pub fn state(&self) -> State {
+        match &self.phase {
+            Phase::Joining(..) => State::Start,
+            Phase::Running(barrier, _) => barrier.state(),
+            Phase::Ended(_) => State::Ended,
+        }
+    }
+
+    /// The step that runs, or ran last; `None` before the start and after the end.
+    pub fn step(&self) -> Option<Step> {
+        match &self.phase {
+            Phase::Running(barrier, _) => Some(barrier.step()),
+            _ => None,
+        }
+    }
+
+    /// Whether no further step begins.
+    pub fn is_paused(&self) -> bool {
+        self.is_paused && self.singles == 0
+    }
+
+    /// How the run ended, once it has.
+    pub fn outcome(&self) -> Option<&Result<Outcome, Ended>> {
+        match &self.phase {
+            Phase::Ended(outcome) => Some(outcome),
+            _ => None,
+        }
+    }
+
+    /// The name of the client at `seat`, once it has joined.
+    pub fn name(&self, seat: usize) -> Option<&str> {
+        match (&self.phase, self.seats[seat]) {
+            (Phase::Joining(joining, _), Seat::Joined) => joining.name(seat),
+            (Phase::Running(barrier, _), Seat::Client(client)) => {
+                Some(&barrier.declaration(client).name)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whom the start waits for, for people; `None` once everyone has joined.
+    pub fn missing(&self) -> Option<String> {
+        match &self.phase {
+            Phase::Joining(joining, _) => Some(joining.missing()),
+            _ => None,
+        }
+    }
+
+    /// Somebody has connected; the answer is its seat.
+    pub fn connected(&mut self, now: Nanos) -> usize {
+        let free = self.seats.iter().position(|seat| *seat == Seat::Free);
+        let seat = free.unwrap_or_else(|| {
+            self.seats.push(Seat::Free);
+            self.seats.len() - 1
+        });
+        self.seats[seat] = Seat::Silent(now);
+        seat
+    }
+
+    /// The client at `seat` declares what it writes and reads.
+    pub fn join(&mut self, now: Nanos, seat: usize, declaration: Declaration) {
+        match self.seats[seat] {
+            Seat::Silent(_) => {}
+            Seat::Joined | Seat::Client(_) => return self.violated(seat, "joined twice"),
+            Seat::Free | Seat::Leaving => return,
+        }
+        let name = declaration.name.clone();
+        let refused = match &mut self.phase {
+            Phase::Joining(joining, _) => joining.join(seat, declaration),
+            Phase::Running(barrier, _) => Err(format!(
+                "the run has started, and is at step {}; start it again with this client",
+                barrier.step().sequence
+            )),
+            Phase::Ended(_) => Err("the run has ended".to_owned()),
+        };
+        if let Err(reason) = refused {
+            return self.refuse(seat, Some(name), Cause::Refused, &reason);
+        }
+        self.seats[seat] = Seat::Joined;
+        if let Phase::Joining(joining, _) = &self.phase
+            && joining.is_complete()
+        {
+            self.start(now);
+        }
+    }
+
+    /// The client at `seat` has finished its run of the step `sequence` (0: the initial write), and writes `values`.
+    pub fn done(
+        &mut self,
+        now: Nanos,
+        seat: usize,
+        sequence: u64,
+        values: impl ExactSizeIterator<Item = u64>,
+    ) {
+        let (Seat::Client(client), Phase::Running(barrier, _)) =
+            (self.seats[seat], &mut self.phase)
+        else {
+            return self.violated(seat, "answered before it was asked");
+        };
+        if let Err(reason) = barrier.done(client, sequence, values) {
+            return self.violated(seat, &reason);
+        }
+        if barrier.is_synchronised() {
+            self.advance(now);
+        }
+    }
+
+    /// The client at `seat` says that it cannot, or need not, go on.
+    pub fn gave_up(&mut self, seat: usize, reason: &str) {
+        match self.seats[seat] {
+            Seat::Client(_) => self.blame(seat, Cause::Failed, &format!("gave up: {reason}")),
+            Seat::Free | Seat::Leaving => {}
+            Seat::Silent(_) | Seat::Joined => {
+                self.refuse(seat, None, Cause::Refused, "it gave up before the start");
+            }
+        }
+    }
+
+    /// The connection of the client at `seat` is gone, and so is the seat.
+    pub fn lost(&mut self, seat: usize, reason: &str) {
+        match std::mem::replace(&mut self.seats[seat], Seat::Free) {
+            Seat::Client(client) => {
+                if let Phase::Running(barrier, _) = &self.phase {
+                    let client = barrier.declaration(client).name.clone();
+                    self.end_for(Cause::Lost, Some(client), format!("was lost: {reason}"));
+                }
+            }
+            Seat::Joined => {
+                if let Phase::Joining(joining, _) = &mut self.phase {
+                    joining.remove(seat);
+                }
+            }
+            Seat::Free | Seat::Silent(_) | Seat::Leaving => {}
+        }
+        self.outbox.retain(|out| out.seat() != seat);
+    }
+
+    /// The client at `seat` violates the protocol: it is excluded, or, once the run has started, ends it.
+    pub fn violated(&mut self, seat: usize, reason: &str) {
+        match self.seats[seat] {
+            Seat::Client(_) => self.blame(seat, Cause::Protocol, reason),
+            Seat::Silent(_) | Seat::Joined => {
+                let name = self.name(seat).map(str::to_owned);
+                self.refuse(seat, name, Cause::Protocol, reason);
+            }
+            Seat::Free | Seat::Leaving => {}
+        }
+    }
+
+    /// Pauses, steps, runs on or stops.
+    pub fn control(&mut self, now: Nanos, control: Control) {
+        match control {
+            Control::Pause => (self.is_paused, self.singles) = (true, 0),
+            Control::Step(count) => {
+                self.singles = if self.is_paused { self.singles } else { 0 };
+                self.is_paused = true;
+                self.singles = self.singles.saturating_add(count);
+            }
+            Control::Run => (self.is_paused, self.singles) = (false, 0),
+            Control::Stop => match &self.phase {
+                Phase::Joining(joining, _) => {
+                    let reason = format!("stopped while it waited for {}", joining.missing());
+                    self.end_for(Cause::Stopped, None, reason);
+                }
+                Phase::Running(..) => {
+                    self.stop_by.get_or_insert(now + STOP_PATIENCE);
+                }
+                Phase::Ended(_) => {}
+            },
+        }
+        self.advance(now);
+    }
+
+    /// When [`tick`](Self::tick) has something to do, if nothing happens before; a time that has passed means at once.
+    pub fn deadline(&self) -> Nanos {
+        let silent = self.seats.iter().filter_map(|seat| match seat {
+            Seat::Silent(since) => Some(*since + self.settings.hang),
+            _ => None,
+        });
+        let silent = silent.min().unwrap_or(Nanos::MAX);
+        silent.min(match &self.phase {
+            Phase::Joining(..) => self.asked + self.settings.join,
+            Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
+                match (self.is_paused(), &self.pace) {
+                    (true, _) => Nanos::MAX,
+                    (false, Some(pace)) => pace.due(),
+                    // There were too many empty steps in a row.
+                    (false, None) => Nanos::ZERO,
+                }
+            }
+            Phase::Running(barrier, _) if barrier.is_synchronised() => Nanos::ZERO,
+            Phase::Running(..) => {
+                let hang = self.asked + self.settings.hang;
+                hang.min(self.stop_by.unwrap_or(Nanos::MAX))
+            }
+            Phase::Ended(_) => Nanos::MAX,
+        })
+    }
+
+    /// Does what is due at `now`: the next step, or the end of somebody's patience.
+    pub fn tick(&mut self, now: Nanos) {
+        let hang = self.settings.hang;
+        for seat in 0..self.seats.len() {
+            if matches!(self.seats[seat], Seat::Silent(since) if now >= since + hang) {
+                let reason = format!("did not join within {hang}");
+                self.refuse(seat, None, Cause::Hung, &reason);
+            }
+        }
+        match &self.phase {
+            Phase::Joining(joining, _) if now >= self.asked + self.settings.join => {
+                let (limit, missing) = (self.settings.join, joining.missing());
+                let reason = format!("still waiting for {missing}, after {limit}");
+                self.end_for(Cause::Hung, None, reason);
+            }
+            Phase::Running(barrier, _) if !barrier.is_synchronised() => {
+                if now >= self.asked + hang {
+                    self.end_of_patience(Cause::Hung, &format!("within {hang}"));
+                } else if self.stop_by.is_some_and(|by| now >= by) {
+                    let limit = format!("within {STOP_PATIENCE} after the run was stopped");
+                    self.end_of_patience(Cause::Stopped, &limit);
+                }
+            }
+            _ => {}
+        }
+        self.advance(now);
+    }
+
+    /// The next message, and the seat that it is for.
+    pub fn poll(&mut self) -> Option<(usize, ToClient<'_>)> {
+        let out = self.outbox.pop_front()?;
+        let seat = out.seat();
+        let message = match (out, &self.phase, self.seats[seat]) {
+            (Out::Step(_), Phase::Running(barrier, _), Seat::Client(client)) => ToClient::Step {
+                step: barrier.step(),
+                reads: barrier.snapshot(client),
+            },
+            (Out::Start(_), Phase::Running(barrier, _), Seat::Client(client)) => ToClient::Start {
+                step: self.settings.step,
+                reads: barrier.read_types(client),
+            },
+            (Out::Refused(_, ended), ..) => {
+                self.seats[seat] = Seat::Free;
+                self.refused = Err(*ended);
+                ToClient::End(&self.refused)
+            }
+            (Out::End(_), Phase::Ended(outcome), _) => {
+                self.seats[seat] = Seat::Free;
+                ToClient::End(outcome)
+            }
+            (out, ..) => unreachable!("{out:?} does not outlive its phase"),
+        };
+        Some((seat, message))
+    }
+
+    /// Everyone has joined.
+    fn start(&mut self, now: Nanos) {
+        let ended = Phase::Ended(Err(Ended::before(Cause::Configuration, "")));
+        let Phase::Joining(joining, logic) = std::mem::replace(&mut self.phase, ended) else {
+            unreachable!("a run starts once");
+        };
+        let (seats, clients) = joining.into_clients();
+        let mut barrier = match Barrier::new(self.settings.step, clients, logic) {
+            Ok(barrier) => barrier,
+            Err(mistake) => {
+                return self.end_for(Cause::Configuration, None, mistake.to_string());
+            }
+        };
+        let started = barrier.start();
+        for (client, seat) in seats.iter().enumerate() {
+            self.seats[*seat] = Seat::Client(client);
+            self.outbox.push_back(Out::Start(*seat));
+        }
+        self.asked = now;
+        self.phase = Phase::Running(Box::new(barrier), seats);
+        if let Err(reason) = started {
+            self.end_for(Cause::Logic, None, of_logic(&reason));
+        }
+    }
+
+    /// Goes on as far as possible.
+    fn advance(&mut self, now: Nanos) {
+        for _ in 0..EMPTY_STATES {
+            let Phase::Running(barrier, seats) = &mut self.phase else {
+                return;
+            };
+            if !barrier.is_synchronised() {
+                return;
+            }
+            if barrier.state() != State::PreRead {
+                if let Err(reason) = barrier.commit() {
+                    return self.end_for(Cause::Logic, None, of_logic(&reason));
+                }
+                continue;
+            }
+            let Step { sequence, time } = barrier.step();
+            if self.stop_by.is_some() || self.settings.steps == Some(sequence) {
+                let outcome = barrier.outcome();
+                return self.end(Ok(outcome));
+            }
+            if time.0.checked_add(self.settings.step.0).is_none() {
+                let reason = "virtual time has no room for a further step".to_owned();
+                return self.end_for(Cause::Configuration, None, reason);
+            }
+            if self.is_paused && self.singles == 0 {
+                return;
+            }
+            if let Some(interval) = self.settings.pacing.interval(self.settings.step) {
+                let pace = self.pace.get_or_insert_with(|| Pace::new(now, interval));
+                if !pace.take(now) {
+                    return;
+                }
+            }
+            self.singles = self.singles.saturating_sub(1);
+            self.asked = now;
+            if let Err(reason) = barrier.begin_step() {
+                return self.end_for(Cause::Logic, None, of_logic(&reason));
+            }
+            let due = barrier.due().map(|client| Out::Step(seats[client]));
+            self.outbox.extend(due);
+        }
+    }
+
+    /// Ends the run for a client that has not answered.
+    fn end_of_patience(&mut self, cause: Cause, limit: &str) {
+        let Phase::Running(barrier, _) = &self.phase else {
+            return;
+        };
+        let mut owing = barrier
+            .owing()
+            .map(|client| &*barrier.declaration(client).name);
+        let client = owing.next().map(str::to_owned);
+        let others: Vec<String> = owing.map(|name| format!("\"{name}\"")).collect();
+        let others = match &*others {
+            [] => String::new(),
+            _ => format!("; neither have {}", others.join(", ")),
+        };
+        let reason = match barrier.step().sequence {
+            0 => format!("has not sent its initial values {limit}{others}"),
+            sequence => format!("has not finished step {sequence} {limit}{others}"),
+        };
+        self.end_for(cause, client, reason);
+    }
+
+    fn blame(&mut self, seat: usize, cause: Cause, reason: &str) {
+        let client = self.name(seat).map(str::to_owned);
+        self.end_for(cause, client, reason.to_owned());
+    }
+
+    fn end_for(&mut self, cause: Cause, client: Option<String>, reason: String) {
+        let steps = match &self.phase {
+            Phase::Running(barrier, _) => barrier.steps(),
+            _ => 0,
+        };
+        self.end(Err(Ended {
+            cause,
+            client,
+            reason,
+            steps,
+        }));
+    }
+
+    /// Ends the run for everyone; a step that was not sent yet is sent to no one.
+    fn end(&mut self, outcome: Result<Outcome, Ended>) {
+        self.outbox
+            .retain(|out| matches!(out, Out::Refused(..) | Out::End(_)));
+        for (at, seat) in self.seats.iter_mut().enumerate() {
+            if !matches!(seat, Seat::Free | Seat::Leaving) {
+                *seat = Seat::Leaving;
+                self.outbox.push_back(Out::End(at));
+            }
+        }
+        self.phase = Phase::Ended(outcome);
+    }
+
+    /// Lets a client that has not started take no part.
+    fn refuse(&mut self, seat: usize, client: Option<String>, cause: Cause, reason: &str) {
+        if let Phase::Joining(joining, _) = &mut self.phase {
+            joining.remove(seat);
+        }
+        self.seats[seat] = Seat::Leaving;
+        let ended = Ended {
+            client,
+            ..Ended::before(cause, reason)
+        };
+        self.outbox.push_back(Out::Refused(seat, Box::new(ended)));
+    }
+}
+
+impl Out {
+    const fn seat(&self) -> usize {
+        match self {
+            Self::Start(seat) | Self::Step(seat) | Self::End(seat) | Self::Refused(seat, _) => {
+                *seat
+            }
+        }
+    }
+}
+
+fn of_logic(reason: &str) -> String {
+    format!("the server's logic failed: {reason}")
+}

@@ -1,0 +1,117 @@
+//! Who has joined, and who may.
+
+use tickbus_base::Mistake;
+
+use crate::declaration::check_name;
+use crate::{Declaration, StartCondition};
+
+/// The most clients of one run.
+pub(crate) const MOST_CLIENTS: usize = 1000;
+
+/// The clients that have joined before the start.
+#[derive(Debug)]
+pub(super) struct Joining {
+    condition: StartCondition,
+    /// By seats, in the order in which they came: the run must not depend on it.
+    joined: Vec<(usize, Declaration)>,
+}
+
+impl Joining {
+    pub(super) fn new(condition: &StartCondition) -> Result<Self, Mistake> {
+        let count = match condition {
+            StartCondition::Names(names) => {
+                for (at, name) in names.iter().enumerate() {
+                    check_name("client", name)?;
+                    if names[..at].contains(name) {
+                        let what = format!("the client \"{name}\" is expected twice");
+                        return Err(Mistake::new(what, "name each client once"));
+                    }
+                }
+                names.len()
+            }
+            StartCondition::Count(count) => *count,
+        };
+        if !(1..=MOST_CLIENTS).contains(&count) {
+            return Err(Mistake::new(
+                format!("{count} clients are expected"),
+                format!("a run has 1 to {MOST_CLIENTS} clients"),
+            ));
+        }
+        Ok(Self {
+            condition: condition.clone(),
+            joined: Vec::new(),
+        })
+    }
+
+    /// Takes a client in, or tells why it may not join.
+    pub(super) fn join(&mut self, seat: usize, declaration: Declaration) -> Result<(), String> {
+        declaration.check().map_err(|mistake| mistake.to_string())?;
+        let name = &declaration.name;
+        if self.joined.iter().any(|(_, other)| other.name == *name) {
+            return Err(format!(
+                "a client of the name \"{name}\" has joined already; give this one another name"
+            ));
+        }
+        if let StartCondition::Names(names) = &self.condition
+            && !names.contains(name)
+        {
+            return Err(format!(
+                "no client of the name \"{name}\" is expected; expected are {}",
+                listed(names.iter())
+            ));
+        }
+        self.joined.push((seat, declaration));
+        Ok(())
+    }
+
+    /// The client at `seat` is gone.
+    pub(super) fn remove(&mut self, seat: usize) {
+        self.joined.retain(|(other, _)| *other != seat);
+    }
+
+    /// The name of the client at `seat`.
+    pub(super) fn name(&self, seat: usize) -> Option<&str> {
+        let joined = self.joined.iter().find(|(other, _)| *other == seat);
+        joined.map(|(_, declaration)| declaration.name.as_str())
+    }
+
+    /// Whether the start condition is met.
+    pub(super) fn is_complete(&self) -> bool {
+        self.joined.len()
+            == match &self.condition {
+                StartCondition::Names(names) => names.len(),
+                StartCondition::Count(count) => *count,
+            }
+    }
+
+    /// Whom it waits for, for people.
+    pub(super) fn missing(&self) -> String {
+        match &self.condition {
+            StartCondition::Names(names) => {
+                let is_here = |name: &&String| self.joined.iter().any(|(_, d)| d.name == **name);
+                listed(names.iter().filter(|name| !is_here(name)))
+            }
+            StartCondition::Count(count) => {
+                format!(
+                    "{} of {count} clients; joined have: {}",
+                    count - self.joined.len(),
+                    listed(self.joined.iter().map(|(_, declaration)| &declaration.name))
+                )
+            }
+        }
+    }
+
+    /// The clients with their seats, in the order of their names.
+    pub(super) fn into_clients(mut self) -> (Vec<usize>, Vec<Declaration>) {
+        self.joined.sort_by(|a, b| a.1.name.cmp(&b.1.name));
+        self.joined.into_iter().unzip()
+    }
+}
+
+fn listed<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
+    if names.is_empty() {
+        return "none".to_owned();
+    }
+    names.join(", ")
+}

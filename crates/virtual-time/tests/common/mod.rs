@@ -1,0 +1,110 @@
+//! Clients for tests.
+
+#![allow(dead_code, reason = "each test uses some of it")]
+
+use std::num::NonZeroU32;
+
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::DataType;
+use tickbus_virtual_time::{Declaration, Participant, Settings, StartCondition, Step, Variable};
+
+/// A client that is a function.
+pub(crate) struct Client<F> {
+    pub(crate) declaration: Declaration,
+    run: F,
+}
+
+/// A client that runs every `multiple` steps, writes ULINTs and runs `run`.
+pub(crate) fn client<F: FnMut(Step, &[u64], &mut [u64]) -> Result<(), String>>(
+    name: &str,
+    multiple: u32,
+    writes: &[&str],
+    reads: &[&str],
+    run: F,
+) -> Client<F> {
+    let mut declaration = Declaration::new(name);
+    declaration.multiple = NonZeroU32::new(multiple).expect("above zero");
+    let ulint = |name: &&str| Variable::new(*name, DataType::Ulint);
+    declaration.writes = writes.iter().map(ulint).collect();
+    declaration.reads = reads.iter().map(|name| (*name).to_owned()).collect();
+    Client { declaration, run }
+}
+
+impl<F: FnMut(Step, &[u64], &mut [u64]) -> Result<(), String>> Participant for Client<F> {
+    fn declare(&self) -> Declaration {
+        self.declaration.clone()
+    }
+
+    fn initial(&mut self, _: &mut [u64]) {}
+
+    fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
+        (self.run)(step, reads, writes)
+    }
+}
+
+/// A chaotic client: what it writes depends on every bit that it reads and has written, so that any difference between
+/// two runs stays.
+pub(crate) struct Mixer {
+    declaration: Declaration,
+    state: u64,
+}
+
+/// The mixers `m0` to `m(count - 1)`, each with its own multiple, each reading the two variables of all of them.
+pub(crate) fn mixers(count: u32) -> Vec<Mixer> {
+    let variable = |at: u32| [format!("x{at}"), format!("y{at}")];
+    (0..count)
+        .map(|at| {
+            let mut declaration = Declaration::new(format!("m{at}"));
+            declaration.multiple = NonZeroU32::new(1 + at % 3).expect("above zero");
+            let [x, y] = variable(at);
+            declaration.writes = vec![
+                Variable::new(x, DataType::Lword),
+                Variable::new(y, DataType::Uint),
+            ];
+            declaration.reads = (0..count).flat_map(variable).collect();
+            Mixer {
+                declaration,
+                state: u64::from(at) + 1,
+            }
+        })
+        .collect()
+}
+
+impl Participant for Mixer {
+    fn declare(&self) -> Declaration {
+        self.declaration.clone()
+    }
+
+    fn initial(&mut self, writes: &mut [u64]) {
+        writes[0] = self.state;
+    }
+
+    fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
+        let time = step.time.0.cast_unsigned();
+        for read in reads.iter().chain([&step.sequence, &time]) {
+            let mixed = (self.state ^ read).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            self.state = mixed.rotate_left(29);
+        }
+        writes[0] = self.state;
+        writes[1] = self.state & 0xFFFF;
+        Ok(())
+    }
+}
+
+/// Steps of 1 ms, this many, with clients of these names.
+pub(crate) fn settings(steps: u64, names: &[&str]) -> Settings {
+    let names = names.iter().map(|name| (*name).to_owned()).collect();
+    Settings {
+        steps: Some(steps),
+        ..Settings::new(Nanos::from_millis(1), StartCondition::Names(names))
+    }
+}
+
+/// Settings for this many mixers.
+pub(crate) fn mixer_settings(steps: u64, count: u32) -> Settings {
+    let start = StartCondition::Names((0..count).map(|at| format!("m{at}")).collect());
+    Settings {
+        steps: Some(steps),
+        ..Settings::new(Nanos::from_millis(1), start)
+    }
+}

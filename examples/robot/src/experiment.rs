@@ -10,10 +10,10 @@ pub const LOCK_STEP_ERROR: f64 = 0.346_411_671_372_834_46;
 pub enum Kind {
     /// A common virtual time.
     LockStep,
-    /// Nothing, in a model.
-    Model,
-    /// Nothing, in fact.
-    WallClock,
+    /// In a model, an OPC link that hands over at this interval, in milliseconds.
+    Model(i64),
+    /// The same in fact, on the wall clock.
+    WallClock(i64),
 }
 
 /// Several runs of one kind.
@@ -50,8 +50,9 @@ impl Experiment {
 ///
 /// What does not.
 pub fn verdict(experiments: &[Experiment]) -> Result<(), String> {
-    let of = |kind| experiments.iter().filter(move |e| e.kind == kind);
-    let mut hashes = of(Kind::LockStep).flat_map(|e| &e.hashes);
+    let (lock_step, free): (Vec<_>, Vec<_>) =
+        experiments.iter().partition(|of| of.kind == Kind::LockStep);
+    let mut hashes = lock_step.iter().flat_map(|e| &e.hashes);
     if let Some(first) = hashes.next()
         && let Some(other) = hashes.find(|hash| *hash != first)
     {
@@ -59,7 +60,7 @@ pub fn verdict(experiments: &[Experiment]) -> Result<(), String> {
             "two runs in lock-step have the trace hashes {first} and {other}"
         ));
     }
-    for experiment in of(Kind::LockStep) {
+    for experiment in lock_step {
         let Metrics {
             largest_error,
             difference,
@@ -78,7 +79,7 @@ pub fn verdict(experiments: &[Experiment]) -> Result<(), String> {
             ));
         }
     }
-    for experiment in of(Kind::Model).chain(of(Kind::WallClock)) {
+    for experiment in free {
         if experiment.metrics.error <= LOCK_STEP_ERROR {
             return Err(format!(
                 "{}: E is {} mm, no more than in lock-step",
@@ -87,4 +88,60 @@ pub fn verdict(experiments: &[Experiment]) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::CORNERS;
+
+    /// A run that is this far off at its end.
+    fn off(by: f64) -> Run {
+        vec![CORNERS[0], [CORNERS[5][0] + by, CORNERS[5][1]]]
+    }
+
+    #[track_caller]
+    fn assert_refused(kind: Kind, runs: Vec<Run>, hashes: &[&str], part: &str) {
+        let hashes = hashes.iter().map(|&hash| hash.to_owned()).collect();
+        let experiment = Experiment {
+            hashes,
+            ..Experiment::new("x", kind, runs)
+        };
+        let told = verdict(&[experiment]).expect_err("it is refused");
+        assert!(told.contains(part), "{told}");
+    }
+
+    #[test]
+    fn a_run_that_is_not_as_it_must_be_is_noticed() {
+        let right = || off(LOCK_STEP_ERROR);
+        assert_eq!(
+            verdict(&[Experiment::new("x", Kind::LockStep, vec![right()])]),
+            Ok(())
+        );
+        assert_refused(
+            Kind::LockStep,
+            vec![right(); 2],
+            &["a", "b"],
+            "hashes a and b",
+        );
+        let part = "two runs differ by";
+        assert_refused(
+            Kind::LockStep,
+            vec![right(), off(LOCK_STEP_ERROR + 1e-12)],
+            &[],
+            part,
+        );
+        assert_refused(
+            Kind::LockStep,
+            vec![off(LOCK_STEP_ERROR + 2e-9)],
+            &[],
+            "and should be 0.346",
+        );
+        assert_refused(
+            Kind::WallClock(50),
+            vec![off(0.3)],
+            &[],
+            "no more than in lock-step",
+        );
+    }
 }

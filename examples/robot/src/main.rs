@@ -1,65 +1,47 @@
-//! The demo: runs everything, and writes the page.
+//! The robot's experiment as a command: the demo, and plant and PLC as processes of their own.
 
-use std::fs::File;
-use std::io::BufWriter;
+mod demo;
 
-use tickbus_base::time::{Monotonic, Nanos};
-use tickbus_robot::experiment::{Experiment, Kind};
-use tickbus_robot::page::{self, Picture};
-use tickbus_robot::{free_wheeling, wall_clock};
+use std::path::PathBuf;
+use std::process::ExitCode;
 
-fn main() {
-    let mut all = Vec::new();
-    for update in [10, 50, 100] {
-        let runs = (1..=10)
-            .map(|seed| free_wheeling::run(seed, Nanos::from_millis(update), 4702))
-            .collect();
-        all.push(Experiment::new(
-            format!("free-wheeling model, OPC each {update} ms"),
-            Kind::Model,
-            runs,
-        ));
+use clap::{Parser, Subcommand};
+
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    about = "A servo robot and its PLC, in lock-step and free-wheeling"
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run all experiments, and write the page about them
+    Demo {
+        /// Where the page goes
+        #[arg(long, value_name = "FILE", default_value = "robot.html")]
+        page: PathBuf,
+        /// How many runs each experiment has
+        #[arg(long, value_name = "COUNT", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=100))]
+        runs: u32,
+    },
+}
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Demo { page, runs } => demo::run(&page, runs),
+    };
+    match outcome {
+        Ok(line) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Err(reason) => {
+            println!("robot: failed reason={reason}");
+            ExitCode::FAILURE
+        }
     }
-    let clock = Monotonic::shared();
-    for update in [10, 50] {
-        let runs = std::thread::scope(|scope| {
-            let runs: Vec<_> = (0..10)
-                .map(|_| scope.spawn(|| wall_clock::run(&*clock, Nanos::from_millis(update), 4702)))
-                .collect();
-            runs.into_iter()
-                .map(|run| run.join().expect("no panic"))
-                .collect()
-        });
-        all.push(Experiment::new(
-            format!("wall clock {update}"),
-            Kind::WallClock,
-            runs,
-        ));
-    }
-    for e in &all {
-        println!("{} {:?}", e.name, e.metrics);
-    }
-    let pictures = [
-        Picture {
-            heading: "a",
-            of: &all[0],
-            caption: ".",
-        },
-        Picture {
-            heading: "Free",
-            of: &all[1],
-            caption: ".",
-        },
-        Picture {
-            heading: "Wall",
-            of: &all[4],
-            caption: ".",
-        },
-    ];
-    page::write(
-        &pictures,
-        &all,
-        &mut BufWriter::new(File::create("/tmp/C/page.html").unwrap()),
-    )
-    .unwrap();
 }

@@ -7,7 +7,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use tickbus_report::STYLE;
 
 use crate::experiment::{Experiment, Kind, LOCK_STEP_ERROR};
-use crate::metrics::thinned;
+use crate::metrics::{Metrics, thinned};
 use crate::path::{CORNERS, Point};
 
 const OWN_STYLE: &str = include_str!("page.css");
@@ -91,12 +91,15 @@ fn facts(experiments: &[Experiment]) -> Markup {
     let equal = hashes()
         .filter(|hash| Some(*hash) == hashes().next())
         .count();
+    let largest = lock_step()
+        .map(|of| of.metrics.largest_error)
+        .fold(0.0, f64::max);
     let class = if equal == runs { "good" } else { "bad" };
     html! {
         div class=(class) { dt { "Equal to the last bit, in lock-step" } dd { (equal) " of " (runs) " runs" } }
         div class=(class) { dt { "Trace hash" } dd.hash { (hashes().next().map_or("", String::as_str)) } }
         div { dt { "Steps of 1 ms, each run" } dd { (steps.unwrap_or(0)) } }
-        div { dt { "Off the path at most, in lock-step" } dd { (mm(Kind::LockStep, lock_step().map(|e| e.metrics.largest_error).fold(0.0, f64::max))) } }
+        div { dt { "Off the path at most, in lock-step" } dd { (millimetres(Kind::LockStep, largest)) " mm" } }
     }
 }
 
@@ -183,8 +186,8 @@ fn beside(ends: &[Point]) -> Point {
     let inwards = [250.0 - middle[0], 120.0 - middle[1]];
     let length = (inwards[0] * inwards[0] + inwards[1] * inwards[1]).sqrt();
     [
-        middle[0] + 45.0 * inwards[0] / length,
-        -(middle[1] + 45.0 * inwards[1] / length) + 9.0,
+        middle[0] + 52.0 * inwards[0] / length,
+        -(middle[1] + 52.0 * inwards[1] / length) + 9.0,
     ]
 }
 
@@ -199,12 +202,12 @@ fn line(points: &[Point]) -> String {
 
 fn table(experiments: &[Experiment]) -> Markup {
     html! {
+        p.note {
+            "E: largest distance from the commanded path. D: largest distance of two runs at equal simulation time. G: largest \
+             distance between the paths of two runs, whatever the time. All in mm."
+        }
         div.wide tabindex="0" {
             table {
-                caption {
-                    "E: largest distance from the commanded path, mean of the runs and largest. D: largest distance of two runs at \
-                     equal simulation time. G: largest distance between the paths of two runs, whatever the time."
-                }
                 thead {
                     tr {
                         th scope="col" { "experiment" }
@@ -213,11 +216,12 @@ fn table(experiments: &[Experiment]) -> Markup {
                 }
                 tbody {
                     @for of in experiments {
+                        @let Metrics { error, largest_error, difference, deviation } = of.metrics;
                         tr {
                             th.name scope="row" { (of.name) }
                             td.n { (of.runs.len()) }
-                            @for value in [of.metrics.error, of.metrics.largest_error, of.metrics.difference, of.metrics.deviation] {
-                                td.n { (mm(of.kind, value)) }
+                            @for value in [error, largest_error, difference, deviation] {
+                                td.n { (millimetres(of.kind, value)) }
                             }
                         }
                     }
@@ -245,11 +249,51 @@ fn meaning(pictures: &[Picture<'_>]) -> Markup {
 }
 
 /// A length. In lock-step all digits are the same in every run, and an exact zero is said to be one.
-fn mm(of: Kind, value: f64) -> String {
+fn millimetres(of: Kind, value: f64) -> String {
     match of {
         Kind::LockStep if value == 0.0 => "0".to_owned(),
-        Kind::LockStep => format!("{value:.7} mm"),
-        _ if value < 10.0 => format!("{value:.2} mm"),
-        _ => format!("{value:.1} mm"),
+        Kind::LockStep => format!("{value:.7}"),
+        _ if value < 10.0 => format!("{value:.2}"),
+        _ => format!("{value:.1}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn experiment(kind: Kind, runs: Vec<Vec<Point>>) -> Experiment {
+        Experiment::new("<b>", kind, runs)
+    }
+
+    #[test]
+    fn the_page_shows_each_run_and_loads_nothing() {
+        let run: Vec<Point> = (0..=200).map(|z| [0.0, f64::from(z)]).collect();
+        let off: Vec<Point> = run.iter().map(|&[x, z]| [x - 110.0, z]).collect();
+        let mut lock_step = experiment(Kind::LockStep, vec![run.clone(), run.clone()]);
+        lock_step.hashes = vec!["00ff".to_owned(); 2];
+        let experiments = [lock_step, experiment(Kind::WallClock(50), vec![run, off])];
+        let pictures = experiments.each_ref().map(|of| Picture {
+            heading: "a & b",
+            of,
+            caption: "c",
+        });
+        let mut page = Vec::new();
+        write(&pictures, &experiments, &mut page).expect("memory does not fail");
+        let page = String::from_utf8(page).expect("it is UTF-8");
+        assert_eq!(page.matches("class=\"run\"").count(), 4);
+        assert!(page.contains("2 of 2 runs") && page.contains("00ff"));
+        // The second experiment is 110 mm off in one of two runs.
+        for figure in [">55.0<", ">110.0<", ">0<"] {
+            assert!(page.contains(figure), "{figure}");
+        }
+        assert!(
+            page.contains("viewBox=\"-130 -320 650 340\""),
+            "room for all runs"
+        );
+        assert!(page.contains("a &amp; b") && !page.contains("<b>"));
+        for outside in ["://", "url(", "src=", "<script", "@import"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
     }
 }

@@ -4,6 +4,8 @@
 #[derive(Clone, Copy, Debug)]
 pub struct Random(u64);
 
+const TWO_TO_53: f64 = 9_007_199_254_740_992.0;
+
 impl Random {
     /// The sequence of a seed.
     pub fn new(seed: u64) -> Self {
@@ -17,7 +19,7 @@ impl Random {
         let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
         let unit = ((mixed ^ (mixed >> 31)) >> 11) as f64;
-        unit / (1_u64 << 53) as f64
+        unit / TWO_TO_53
     }
 
     /// The next number, evenly distributed between two.
@@ -42,7 +44,7 @@ mod tests {
         // The first outputs of the reference implementation are 6457827717110365317 and 3203168211198807973.
         for expected in [6_457_827_717_110_365_317_u64, 3_203_168_211_198_807_973] {
             #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
-            let expected = (expected >> 11) as f64 / (1_u64 << 53) as f64;
+            let expected = (expected >> 11) as f64 / TWO_TO_53;
             assert_eq!(random.unit().to_bits(), expected.to_bits());
         }
     }

@@ -1,0 +1,40 @@
+//! The robot in lock-step: every run the same, whoever is first and however busy the computer.
+
+use tickbus_robot::experiment::{Experiment, Kind, verdict};
+use tickbus_robot::load::Load;
+use tickbus_robot::lock_step;
+use tickbus_robot::metrics::Run;
+use tickbus_robot::participants::STEPS;
+use tickbus_virtual_time::{Ended, Outcome};
+
+/// The trace hash of the run. A client in another language must give the same, as `java/sdsp` does.
+const HASH: &str = "9e758daaecadc30e";
+
+/// Ten runs on busy processors, told whether the PLC is first.
+#[track_caller]
+fn assert_all_equal(one: impl Fn(bool) -> Result<(Run, Outcome), Ended>) {
+    let _load = Load::on_all_processors();
+    let runs = (0..10).map(|number| one(number % 3 == 0).expect("it runs"));
+    let (runs, outcomes): (Vec<Run>, Vec<Outcome>) = runs.unzip();
+    for outcome in outcomes {
+        assert_eq!(outcome.steps, STEPS as u64);
+        assert_eq!(outcome.time.0, 4_701_000_000);
+        assert_eq!(outcome.hash.to_string(), HASH);
+    }
+    let bits = |run: &Run| {
+        run.iter()
+            .flatten()
+            .map(|x| x.to_bits())
+            .collect::<Vec<_>>()
+    };
+    for run in &runs[1..] {
+        assert_eq!(bits(run), bits(&runs[0]));
+    }
+    let experiment = Experiment::new("lock-step", Kind::LockStep, runs);
+    assert_eq!(verdict(&[experiment]), Ok(()));
+}
+
+#[test]
+fn in_one_process_all_runs_are_equal() {
+    assert_all_equal(lock_step::in_process);
+}

@@ -9,19 +9,25 @@
 
 mod barrier;
 mod declaration;
+mod hosting;
 mod outcome;
 mod participant;
 mod settings;
 mod shared_data;
 
+pub mod client;
 pub mod hash;
+
 pub mod in_process;
 pub mod logic;
 pub mod server;
+pub mod tcp;
+pub mod wire;
 
 pub use barrier::State;
 pub use declaration::{Declaration, Variable, is_raw};
 pub use hash::TraceHash;
+pub use hosting::{Controls, Hosting, hear};
 pub use logic::Logic;
 pub use outcome::{Cause, Ended, Outcome};
 pub use participant::{Participant, Step};

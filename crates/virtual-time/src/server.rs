@@ -8,6 +8,7 @@ use std::collections::VecDeque;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace};
+use tickbus_base::toml_text::shown;
 use tickbus_image::signal::DataType;
 
 use crate::barrier::{Barrier, State};
@@ -68,6 +69,7 @@ pub struct Server<'l> {
     phase: Phase<'l>,
     seats: Vec<Seat>,
     outbox: VecDeque<Out>,
+    news: VecDeque<String>,
     /// The end of a client that was refused, while its message is fetched.
     refused: Result<Outcome, Ended>,
     /// When the clients could begin to join, or were last asked for something.
@@ -124,6 +126,7 @@ impl<'l> Server<'l> {
             settings,
             seats: Vec::new(),
             outbox: VecDeque::new(),
+            news: VecDeque::new(),
             refused: Err(Ended::before(Cause::Refused, "")),
             asked: now,
             singles: 0,
@@ -181,6 +184,26 @@ impl<'l> Server<'l> {
         }
     }
 
+    /// The seat of the first client, in the order of their names, that owes an answer.
+    pub fn awaited(&self) -> Option<usize> {
+        match &self.phase {
+            Phase::Running(barrier, seats) => barrier.owing().next().map(|client| seats[client]),
+            _ => None,
+        }
+    }
+
+    /// The next line for people about what has happened: who joined, who was refused and why, that the run starts.
+    pub fn news(&mut self) -> Option<String> {
+        self.news.pop_front()
+    }
+
+    /// Ends the run for a reason of its host.
+    pub fn abort(&mut self, cause: Cause, reason: &str) {
+        if self.outcome().is_none() {
+            self.end_for(cause, None, reason.to_owned());
+        }
+    }
+
     /// Somebody has connected; the answer is its seat.
     pub fn connected(&mut self, now: Nanos) -> usize {
         let free = self.seats.iter().position(|seat| *seat == Seat::Free);
@@ -212,6 +235,7 @@ impl<'l> Server<'l> {
             return self.refuse(seat, Some(name), Cause::Refused, &reason);
         }
         self.seats[seat] = Seat::Joined;
+        self.news.push_back(format!("client \"{name}\" has joined"));
         if let Phase::Joining(joining, _) = &self.phase
             && joining.is_complete()
         {
@@ -262,6 +286,9 @@ impl<'l> Server<'l> {
             }
             Seat::Joined => {
                 if let Phase::Joining(joining, _) = &mut self.phase {
+                    let name = joining.name(seat).unwrap_or_default();
+                    self.news
+                        .push_back(format!("client \"{name}\" is gone again: {reason}"));
                     joining.remove(seat);
                 }
             }
@@ -400,6 +427,8 @@ impl<'l> Server<'l> {
                 return self.end_for(Cause::Configuration, None, mistake.to_string());
             }
         };
+        self.news
+            .push_back("all have joined: the run starts".to_owned());
         let started = barrier.start();
         for (client, seat) in seats.iter().enumerate() {
             self.seats[*seat] = Seat::Client(client);
@@ -513,6 +542,11 @@ impl<'l> Server<'l> {
             joining.remove(seat);
         }
         self.seats[seat] = Seat::Leaving;
+        let who = match &client {
+            Some(name) => format!("client \"{}\"", shown(name)),
+            None => "a client without a name".to_owned(),
+        };
+        self.news.push_back(format!("{who} was refused: {reason}"));
         let ended = Ended {
             client,
             ..Ended::before(cause, reason)

@@ -1,0 +1,228 @@
+//! The client, without I/O: frames of the server in; what it asks for, and frames for it, out.
+
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::DataType;
+
+use crate::wire::{self, FromServer};
+use crate::{Cause, Declaration, Ended, Outcome, Participant, Step};
+
+/// What the server asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// The initial values.
+    Initial,
+    /// A step, with [`Client::reads`].
+    Step(Step),
+    /// Nothing more.
+    End(Result<Outcome, Ended>),
+}
+
+/// One client of a run.
+#[derive(Debug)]
+pub struct Client {
+    declaration: Declaration,
+    /// The step that it owes an answer to.
+    owes: Option<u64>,
+    /// The step that it ran last; `None` before the initial write.
+    ran: Option<u64>,
+    step: Nanos,
+    read_types: Vec<DataType>,
+    reads: Vec<u64>,
+    out: Vec<u8>,
+}
+
+impl Client {
+    /// A client with this declaration, whose join is to be [sent](Self::frame).
+    ///
+    /// # Errors
+    ///
+    /// The declaration breaks a rule.
+    pub fn new(declaration: Declaration) -> Result<Self, Mistake> {
+        declaration.check()?;
+        let mut out = Vec::new();
+        wire::join(&mut out, &declaration)
+            .map_err(|what| Mistake::new(what, "or make several clients of it"))?;
+        Ok(Self {
+            reads: vec![0; declaration.reads.len()],
+            declaration,
+            owes: None,
+            ran: None,
+            step: Nanos::ZERO,
+            read_types: Vec::new(),
+            out,
+        })
+    }
+
+    /// What it has declared.
+    pub const fn declaration(&self) -> &Declaration {
+        &self.declaration
+    }
+
+    /// The virtual time of one step of the server; zero before the start.
+    pub const fn server_step(&self) -> Nanos {
+        self.step
+    }
+
+    /// The types of what it reads, in the order of its declaration; none before the start.
+    pub fn read_types(&self) -> &[DataType] {
+        &self.read_types
+    }
+
+    /// What it reads in this step.
+    pub fn reads(&self) -> &[u64] {
+        &self.reads
+    }
+
+    /// The frame to be sent: first the join, then what was made last.
+    pub fn frame(&self) -> &[u8] {
+        &self.out
+    }
+
+    /// Takes a frame of the server, without its header.
+    ///
+    /// # Errors
+    ///
+    /// The server violates the protocol.
+    pub fn receive(&mut self, frame: &[u8]) -> Result<Asked, Ended> {
+        let ran = self.ran.unwrap_or(0);
+        let violated = |what: String| {
+            let reason = format!("the server violates the protocol: it {what}");
+            Ended {
+                steps: ran.saturating_sub(1),
+                ..Ended::before(Cause::Protocol, reason)
+            }
+        };
+        let message = wire::from_server(frame).map_err(violated)?;
+        if let FromServer::End(outcome) = message {
+            self.owes = None;
+            return Ok(Asked::End(outcome));
+        }
+        if let Some(owed) = self.owes {
+            return Err(violated(format!("went on before step {owed} was answered")));
+        }
+        let expected = self.declaration.reads.len();
+        let count = |count: usize| match count {
+            count if count == expected => Ok(()),
+            count => Err(violated(format!(
+                "sent {count} values, expected {expected}"
+            ))),
+        };
+        match message {
+            FromServer::Start { step, reads } => {
+                if self.ran.is_some() {
+                    return Err(violated("started twice".to_owned()));
+                }
+                count(reads.len())?;
+                (self.step, self.read_types) = (step, reads);
+                self.owes = Some(0);
+                Ok(Asked::Initial)
+            }
+            FromServer::Step { step, reads } => {
+                if self.ran.is_none_or(|ran| step.sequence <= ran) {
+                    let sequence = step.sequence;
+                    let what = format!("asked for step {sequence} out of order");
+                    return Err(violated(what));
+                }
+                count(reads.iter().len())?;
+                for (slot, read) in self.reads.iter_mut().zip(reads.iter()) {
+                    *slot = read;
+                }
+                self.owes = Some(step.sequence);
+                Ok(Asked::Step(step))
+            }
+            FromServer::End(_) => unreachable!("dealt with above"),
+        }
+    }
+
+    /// Makes the answer to what was asked: the frame is then to be [sent](Self::frame).
+    ///
+    /// # Panics
+    ///
+    /// When nothing was asked, or `writes` has not one value per variable of [`Declaration::writes`].
+    pub fn answer(&mut self, writes: &[u64]) {
+        let sequence = self.owes.take().expect("the server has asked");
+        assert_eq!(writes.len(), self.declaration.writes.len(), "values");
+        self.ran = Some(sequence);
+        self.out.clear();
+        wire::done(&mut self.out, sequence, writes);
+    }
+
+    /// Makes the frame that says why it does not go on.
+    pub fn give_up(&mut self, reason: &str) {
+        self.out.clear();
+        wire::give_up(&mut self.out, reason);
+    }
+}
+
+/// A way to a server, of which a client waits for one frame at a time.
+pub(crate) trait Line {
+    /// Sends a frame. If that fails, receiving says so.
+    fn send(&mut self, frame: &[u8]);
+
+    /// Waits for the next frame, and gives it without its header.
+    fn receive(&mut self) -> Result<&[u8], Ended>;
+}
+
+/// A client with its line to the server; it blocks while it waits.
+#[derive(Debug)]
+pub(crate) struct Caller<L> {
+    pub(crate) client: Client,
+    pub(crate) line: L,
+}
+
+impl<L: Line> Caller<L> {
+    /// Joins.
+    pub(crate) fn join(client: Client, mut line: L) -> Self {
+        line.send(client.frame());
+        Self { client, line }
+    }
+
+    /// Waits for what the server asks.
+    pub(crate) fn wait(&mut self) -> Result<Asked, Ended> {
+        let frame = self.line.receive()?;
+        let asked = self.client.receive(frame);
+        if let Err(ended) = &asked {
+            self.give_up(&ended.reason.clone());
+        }
+        asked
+    }
+
+    /// Answers it.
+    pub(crate) fn answer(&mut self, writes: &[u64]) {
+        self.client.answer(writes);
+        self.line.send(self.client.frame());
+    }
+
+    /// Tells the server why this client leaves.
+    pub(crate) fn give_up(&mut self, reason: &str) {
+        self.client.give_up(reason);
+        self.line.send(self.client.frame());
+    }
+
+    /// Lets `participant` take part until the run ends.
+    pub(crate) fn run(&mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+        let mut writes = vec![0; self.client.declaration.writes.len()];
+        loop {
+            match self.wait()? {
+                Asked::Initial => participant.initial(&mut writes),
+                Asked::Step(step) => {
+                    let ran = participant.run(step, self.client.reads(), &mut writes);
+                    if let Err(reason) = ran {
+                        self.give_up(&reason);
+                        // The server answers with the end, which has the number of steps.
+                        continue;
+                    }
+                }
+                Asked::End(outcome) => return outcome,
+            }
+            self.answer(&writes);
+        }
+    }
+}
+
+/// The client of a participant.
+pub(crate) fn client_of(participant: &dyn Participant) -> Result<Client, Ended> {
+    Client::new(participant.declare())
+        .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))
+}

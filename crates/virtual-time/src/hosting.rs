@@ -1,0 +1,79 @@
+//! What a server that runs on a thread of its own has to do with the rest of its process.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tickbus_base::time::{Clock, Nanos, Stop};
+
+use crate::server::{Control, Server};
+use crate::wire::{self, FromClient};
+
+/// Controls a server from other threads. Clones control the same server.
+#[derive(Clone, Debug, Default)]
+pub struct Controls {
+    asked: Arc<Mutex<Vec<Control>>>,
+    stop: Stop,
+}
+
+impl Controls {
+    /// Controls of a server that also stops when `stop` does.
+    pub fn new(stop: &Stop) -> Self {
+        let asked = Arc::default();
+        let stop = stop.clone();
+        Self { asked, stop }
+    }
+
+    /// Asks the server for something; it does so within some 20 ms.
+    pub fn send(&self, control: Control) {
+        self.lock().push(control);
+        self.stop.wake();
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Control>> {
+        // A list is in order after every single change.
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The token that wakes the server's thread.
+    pub(crate) const fn stop(&self) -> &Stop {
+        &self.stop
+    }
+
+    /// Passes on what was asked.
+    pub(crate) fn apply(&self, now: Nanos, server: &mut Server<'_>) {
+        for control in self.lock().drain(..) {
+            server.control(now, control);
+        }
+        if self.stop.is_stopped() {
+            server.control(now, Control::Stop);
+        }
+    }
+}
+
+/// What a server needs besides its settings.
+pub struct Hosting<'h> {
+    /// The wall clock, for pacing and for patience.
+    pub clock: &'h dyn Clock,
+    /// How other threads control it.
+    pub controls: &'h Controls,
+    /// Is given a line for people about every event: who joins, who is refused and why, that the run starts.
+    pub news: &'h mut dyn FnMut(&str),
+}
+
+impl fmt::Debug for Hosting<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Hosting").finish_non_exhaustive()
+    }
+}
+
+/// Passes a frame of the client at `seat`, without its header, to the server.
+pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
+    match wire::from_client(frame) {
+        Ok(FromClient::Done { sequence, writes }) => {
+            server.done(now, seat, sequence, writes.iter());
+        }
+        Ok(FromClient::Join(declaration)) => server.join(now, seat, declaration),
+        Ok(FromClient::GiveUp(reason)) => server.gave_up(seat, reason),
+        Err(why) => server.violated(seat, &why),
+    }
+}

@@ -1,0 +1,8 @@
+//! Clients over TCP: one message each way per client and step.
+
+mod client;
+mod connection;
+mod server;
+
+pub use client::{Connection, connect, join};
+pub use server::Listener;

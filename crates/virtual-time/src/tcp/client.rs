@@ -1,0 +1,153 @@
+//! The client: it blocks while it waits for the server.
+
+use std::io::{self, Read as _, Write as _};
+use std::net::TcpStream;
+
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::tcp::{Address, is_for_later, prepare};
+
+use crate::client::{Asked, Caller, Client, Line, client_of};
+use crate::{Cause, Ended, Outcome, Participant, wire};
+
+/// How long a read blocks before it is asked whether to stop.
+const LOOK: Nanos = Nanos::from_millis(50);
+
+/// How long the server's machine may be silent, on the level of TCP.
+const PATIENCE: Nanos = Nanos::from_secs(10);
+
+/// Lets `participant` take part in the run of the server at `address`, until its end.
+///
+/// # Errors
+///
+/// There is no server, it refuses this client, or the run was broken off.
+pub fn join(address: &Address, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+    let client = client_of(participant)?;
+    connect(address, client, &Stop::new())?.run(participant)
+}
+
+/// Connects with the server at `address`, and joins. When `stop` is stopped, the client leaves the run.
+///
+/// # Errors
+///
+/// There is no server.
+pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connection, Ended> {
+    let stream = open(address).map_err(|error| {
+        let reason = format!(
+            "no server can be reached at {address} ({error}); start it first, or correct the address"
+        );
+        Ended::before(Cause::Lost, reason)
+    })?;
+    let line = TcpLine {
+        stream,
+        stop: stop.clone(),
+        buffer: vec![0; 4096],
+        start: 0,
+        end: 0,
+    };
+    Ok(Connection(Caller::join(client, line)))
+}
+
+fn open(address: &Address) -> io::Result<TcpStream> {
+    let stream = TcpStream::connect(address.to_string())?;
+    prepare(&stream, PATIENCE)?;
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(LOOK.to_duration()))?;
+    Ok(stream)
+}
+
+/// A client's connection with its server, for a simulation that calls instead of being called: [`wait`](Self::wait) for
+/// a step, run it, [`answer`](Self::answer).
+#[derive(Debug)]
+pub struct Connection(Caller<TcpLine>);
+
+impl Connection {
+    /// The client: what it declared, and what it reads in the step that was asked for.
+    pub const fn client(&self) -> &Client {
+        &self.0.client
+    }
+
+    /// Waits for what the server asks next, for any time: the server may be paused.
+    ///
+    /// # Errors
+    ///
+    /// The connection is lost, the server violates the protocol, or this client was stopped.
+    pub fn wait(&mut self) -> Result<Asked, Ended> {
+        self.0.wait()
+    }
+
+    /// Answers what was asked, with one value per variable of the declaration's writes. If the connection is lost, the
+    /// next [`wait`](Self::wait) says so.
+    ///
+    /// # Panics
+    ///
+    /// When nothing was asked, or the number of values is another one.
+    pub fn answer(&mut self, writes: &[u64]) {
+        self.0.answer(writes);
+    }
+
+    /// Tells the server why this client does not go on. The run ends for everyone; [`wait`](Self::wait) gives the end.
+    pub fn give_up(&mut self, reason: &str) {
+        self.0.give_up(reason);
+    }
+
+    /// Lets `participant` take part, until the end of the run.
+    ///
+    /// # Errors
+    ///
+    /// The run was broken off.
+    pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+        self.0.run(participant)
+    }
+}
+
+#[derive(Debug)]
+struct TcpLine {
+    stream: TcpStream,
+    stop: Stop,
+    buffer: Vec<u8>,
+    start: usize,
+    end: usize,
+}
+
+fn lost(what: impl std::fmt::Display) -> Ended {
+    Ended::before(Cause::Lost, format!("the server was lost: {what}"))
+}
+
+impl Line for TcpLine {
+    fn send(&mut self, frame: &[u8]) {
+        // If this fails, the server may have said why before: its last words are read next, or that it is lost.
+        let _ = self.stream.write_all(frame);
+    }
+
+    fn receive(&mut self) -> Result<&[u8], Ended> {
+        loop {
+            let arrived = wire::frame_length(&self.buffer[self.start..self.end]);
+            let violated = |what| {
+                let reason = format!("the server violates the protocol: it {what}");
+                Ended::before(Cause::Protocol, reason)
+            };
+            if let Some(length) = arrived.map_err(violated)?
+                && length <= self.end - self.start
+            {
+                let frame = self.start + wire::HEADER..self.start + length;
+                self.start = frame.end;
+                return Ok(&self.buffer[frame]);
+            }
+            self.buffer.copy_within(self.start..self.end, 0);
+            (self.start, self.end) = (0, self.end - self.start);
+            if self.end == self.buffer.len() {
+                self.buffer.resize(2 * self.end, 0);
+            }
+            match self.stream.read(&mut self.buffer[self.end..]) {
+                Ok(0) => return Err(lost("it closed the connection")),
+                Ok(count) => self.end += count,
+                Err(error) if is_for_later(&error) => {
+                    if self.stop.is_stopped() {
+                        return Err(Ended::before(Cause::Stopped, "this client was stopped"));
+                    }
+                }
+                Err(error) => return Err(lost(error)),
+            }
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! The server's end of one connection.
+
+use std::io::{self, Read as _, Write as _};
+use std::net::TcpStream;
+
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::tcp::{close_gracefully, is_for_later, prepare};
+
+use crate::server::ToClient;
+use crate::wire;
+
+/// How long a read or write blocks at most.
+pub(super) const BLOCKED: Nanos = Nanos::from_millis(20);
+
+/// The buffer for what arrives, at first.
+const BUFFER: usize = 4096;
+
+/// A connection with its buffers. The socket blocks, but for 20 ms at most: in the steady state the server then reads
+/// an answer by one call, without asking first whether it is there.
+#[derive(Debug)]
+pub(super) struct Connection {
+    pub(super) stream: TcpStream,
+    buffer: Vec<u8>,
+    /// What has arrived and was not taken yet.
+    start: usize,
+    end: usize,
+    out: Vec<u8>,
+    written: usize,
+}
+
+/// What a read brought.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Arrived {
+    Something,
+    NothingYet,
+    /// The connection is gone, for this reason.
+    Gone(String),
+}
+
+impl Connection {
+    /// A connection whose peer may leave sent data unacknowledged for `patience`.
+    pub(super) fn new(stream: TcpStream, patience: Nanos) -> io::Result<Self> {
+        prepare(&stream, patience)?;
+        stream.set_nonblocking(false)?;
+        stream.set_read_timeout(Some(BLOCKED.to_duration()))?;
+        stream.set_write_timeout(Some(BLOCKED.to_duration()))?;
+        Ok(Self {
+            stream,
+            buffer: vec![0; BUFFER],
+            start: 0,
+            end: 0,
+            out: Vec::with_capacity(BUFFER),
+            written: 0,
+        })
+    }
+
+    /// Reads once.
+    pub(super) fn read(&mut self) -> Arrived {
+        if self.start == self.end {
+            (self.start, self.end) = (0, 0);
+        } else if self.start > 0 {
+            self.buffer.copy_within(self.start..self.end, 0);
+            (self.start, self.end) = (0, self.end - self.start);
+        }
+        if self.end == self.buffer.len() {
+            // Frames have a limit, so this ends; and it takes as many bytes of the peer as of ours.
+            self.buffer.resize(2 * self.end, 0);
+        }
+        match self.stream.read(&mut self.buffer[self.end..]) {
+            Ok(0) => Arrived::Gone("it closed the connection".to_owned()),
+            Ok(count) => {
+                self.end += count;
+                Arrived::Something
+            }
+            Err(error) if is_for_later(&error) => Arrived::NothingYet,
+            Err(error) => Arrived::Gone(error.to_string()),
+        }
+    }
+
+    /// Takes the next frame that is complete, without its header.
+    pub(super) fn frame(&mut self) -> Result<Option<&[u8]>, String> {
+        let arrived = &self.buffer[self.start..self.end];
+        let frame = wire::frame(arrived)?;
+        if let Some(frame) = frame {
+            self.start += wire::HEADER + frame.len();
+        }
+        Ok(frame)
+    }
+
+    /// Sends a message, or as much of it as the system takes.
+    pub(super) fn send(&mut self, message: &ToClient<'_>) -> io::Result<()> {
+        wire::to_client(&mut self.out, message);
+        self.write()
+    }
+
+    /// Writes what is left.
+    pub(super) fn write(&mut self) -> io::Result<()> {
+        while self.is_blocked() {
+            match self.stream.write(&self.out[self.written..]) {
+                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+                Ok(count) => self.written += count,
+                Err(error) if is_for_later(&error) => return Ok(()),
+                Err(error) => return Err(error),
+            }
+        }
+        self.out.clear();
+        self.written = 0;
+        Ok(())
+    }
+
+    /// Whether something is left to be written.
+    pub(super) fn is_blocked(&self) -> bool {
+        self.written < self.out.len()
+    }
+
+    /// Makes reads and writes return at once from now on.
+    pub(super) fn never_block(&self) {
+        // If this fails, the connection has failed, and will say so.
+        let _ = self.stream.set_nonblocking(true);
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.never_block();
+        close_gracefully(&self.stream);
+    }
+}

@@ -1,0 +1,291 @@
+//! The server: one thread for all connections.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+
+use tickbus_base::os::{Interest, PollSet};
+use tickbus_base::time::Nanos;
+use tickbus_fieldbus::tcp::{Address, is_of_the_client};
+
+use super::connection::{Arrived, BLOCKED, Connection};
+use crate::hosting::{Hosting, hear};
+use crate::server::ToClient;
+use crate::{Cause, Ended, Logic, Outcome, Settings, server};
+
+/// The key of the listener in the poll set; a client's key is its seat.
+const LISTENER: usize = usize::MAX - 1;
+
+/// The most connections at a time; further ones are closed at once.
+const MOST: usize = 1100;
+
+/// At most this many clients are accepted per turn.
+const ACCEPTS: usize = 32;
+
+/// How often everything else is looked after while steps follow each other.
+const ROUND: Nanos = Nanos::from_millis(10);
+
+/// How long no client is accepted after the system had no socket.
+const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// How long a client may take to read that the run has ended.
+const FAREWELL: Nanos = Nanos::from_secs(1);
+
+/// A server that listens for its clients.
+#[derive(Debug)]
+pub struct Listener {
+    listener: TcpListener,
+    address: SocketAddr,
+}
+
+impl Listener {
+    /// Listens on `address`; port 0 lets the system choose one.
+    ///
+    /// # Errors
+    ///
+    /// The host is unknown, or the address cannot be listened on.
+    pub fn bind(address: &Address) -> io::Result<Self> {
+        let listener = TcpListener::bind(address.to_string())?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        Ok(Self { listener, address })
+    }
+
+    /// The address that it listens on.
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Waits for the clients and runs until the end.
+    ///
+    /// # Errors
+    ///
+    /// Why there was no run, or why it was broken off.
+    pub fn run(
+        self,
+        settings: Settings,
+        logic: Logic<'_>,
+        hosting: Hosting<'_>,
+    ) -> Result<Outcome, Ended> {
+        let cannot = |error: io::Error| {
+            let reason = format!("the system cannot wait for sockets: {error}");
+            Ended::before(Cause::System, reason)
+        };
+        let now = hosting.clock.now();
+        let patience = settings.hang;
+        let server = server::Server::new(settings, logic, now)
+            .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
+        let mut set = PollSet::new(hosting.controls.stop()).map_err(cannot)?;
+        set.add(LISTENER, &self.listener, Interest::Read)
+            .map_err(cannot)?;
+        let mut host = Host {
+            server,
+            hosting,
+            listener: self.listener,
+            set,
+            patience,
+            connections: Vec::new(),
+            leaving: Vec::new(),
+            accept_paused_until: None,
+            looked: now,
+        };
+        let outcome = host.run();
+        for seat in 0..host.connections.len() {
+            host.leave(seat, now);
+        }
+        outcome
+    }
+}
+
+struct Host<'l, 'h> {
+    server: server::Server<'l>,
+    hosting: Hosting<'h>,
+    listener: TcpListener,
+    set: PollSet,
+    patience: Nanos,
+    /// By seats.
+    connections: Vec<Option<Connection>>,
+    /// Those that have to write their last words, and until when.
+    leaving: Vec<(Connection, Nanos)>,
+    accept_paused_until: Option<Nanos>,
+    /// When all sockets were looked at last.
+    looked: Nanos,
+}
+
+impl Host<'_, '_> {
+    fn run(&mut self) -> Result<Outcome, Ended> {
+        loop {
+            let now = self.hosting.clock.now();
+            self.send(now);
+            if self.leaving.is_empty()
+                && let Some(outcome) = self.server.outcome()
+            {
+                return outcome.clone();
+            }
+            // As long as answers are due, one is read by a call that blocks: all of them are needed anyway.
+            let awaited = self.server.awaited();
+            if let Some(seat) = awaited
+                && self.leaving.is_empty()
+                && now - self.looked < ROUND
+            {
+                self.read(seat);
+                continue;
+            }
+            let is_busy = awaited.is_some() || !self.leaving.is_empty();
+            if let Err(error) = self.look(is_busy) {
+                let reason = format!("the system cannot wait for sockets: {error}");
+                self.server.abort(Cause::System, &reason);
+            }
+        }
+    }
+
+    /// Sends all messages.
+    fn send(&mut self, now: Nanos) {
+        loop {
+            while let Some(line) = self.server.news() {
+                (self.hosting.news)(&line);
+            }
+            let Some((seat, message)) = self.server.poll() else {
+                return;
+            };
+            let Some(connection) = &mut self.connections[seat] else {
+                continue;
+            };
+            let is_last = matches!(message, ToClient::End(_));
+            if is_last {
+                connection.never_block();
+            }
+            let sent = connection.send(&message);
+            if is_last {
+                self.leave(seat, now);
+            } else if let Err(error) = sent {
+                self.lose(seat, &error.to_string());
+            }
+        }
+    }
+
+    /// Reads from a client, and passes on what is complete.
+    fn read(&mut self, seat: usize) {
+        let Some(connection) = &mut self.connections[seat] else {
+            return;
+        };
+        match connection.read() {
+            Arrived::Something => {}
+            Arrived::NothingYet => {
+                // It is not in a hurry; there is time for the others.
+                self.looked = Nanos(i64::MIN);
+                return;
+            }
+            Arrived::Gone(reason) => return self.lose(seat, &reason),
+        }
+        let now = self.hosting.clock.now();
+        loop {
+            match connection.frame() {
+                Ok(None) => return,
+                Ok(Some(frame)) => hear(&mut self.server, now, seat, frame),
+                Err(why) => return self.server.violated(seat, &why),
+            }
+        }
+    }
+
+    /// Looks after everything: all sockets, controls, time. If `is_busy`, without waiting for long.
+    fn look(&mut self, is_busy: bool) -> io::Result<()> {
+        let clock = self.hosting.clock;
+        let now = clock.now();
+        let blocked = self
+            .connections
+            .iter()
+            .flatten()
+            .any(Connection::is_blocked);
+        let deadline = if is_busy && self.leaving.is_empty() {
+            now
+        } else if blocked || !self.leaving.is_empty() {
+            now + ROUND
+        } else {
+            let accept = self.accept_paused_until.unwrap_or(Nanos::MAX);
+            self.server.deadline().min(accept)
+        };
+        self.set.wait(clock, deadline)?;
+        let now = clock.now();
+        self.looked = now;
+        for at in 0..self.set.ready().len() {
+            let Some(ready) = self.set.ready().get(at).copied() else {
+                break;
+            };
+            match ready.key {
+                LISTENER => self.accept(now)?,
+                seat => self.read(seat),
+            }
+        }
+        self.looked = now;
+        if self.accept_paused_until.is_some_and(|until| now >= until) {
+            self.accept_paused_until = None;
+            self.set.add(LISTENER, &self.listener, Interest::Read)?;
+        }
+        for seat in 0..self.connections.len() {
+            if let Some(connection) = &mut self.connections[seat]
+                && let Err(error) = connection.write()
+            {
+                self.lose(seat, &error.to_string());
+            }
+        }
+        self.leaving.retain_mut(|(connection, until)| {
+            connection.write().is_ok() && connection.is_blocked() && now < *until
+        });
+        self.hosting.controls.apply(now, &mut self.server);
+        self.server.tick(now);
+        Ok(())
+    }
+
+    fn accept(&mut self, now: Nanos) -> io::Result<()> {
+        for _ in 0..ACCEPTS {
+            let stream = match self.listener.accept() {
+                Ok((stream, _)) => stream,
+                Err(error) if is_of_the_client(&error) => return Ok(()),
+                Err(error) => {
+                    (self.hosting.news)(&format!(
+                        "a client could not be accepted ({error}); close other programs or raise the limit of open \
+                         files"
+                    ));
+                    self.set.remove(LISTENER, &self.listener);
+                    self.accept_paused_until = Some(now + PAUSE);
+                    return Ok(());
+                }
+            };
+            if self.connections.iter().flatten().count() + self.leaving.len() >= MOST {
+                continue;
+            }
+            // If it broke at once, it will come again.
+            let Ok(connection) = Connection::new(stream, self.patience) else {
+                continue;
+            };
+            let seat = self.server.connected(now);
+            self.set.add(seat, &connection.stream, Interest::Read)?;
+            if seat >= self.connections.len() {
+                self.connections.resize_with(seat + 1, || None);
+            }
+            self.connections[seat] = Some(connection);
+        }
+        Ok(())
+    }
+
+    /// The connection at `seat` is gone.
+    fn lose(&mut self, seat: usize, reason: &str) {
+        if let Some(connection) = self.connections[seat].take() {
+            self.set.remove(seat, &connection.stream);
+            self.server.lost(seat, reason);
+        }
+    }
+
+    /// The connection at `seat` has got its last message, or will have.
+    fn leave(&mut self, seat: usize, now: Nanos) {
+        if let Some(connection) = self.connections[seat].take() {
+            self.set.remove(seat, &connection.stream);
+            if connection.is_blocked() {
+                self.leaving.push((connection, now + FAREWELL));
+            }
+        }
+    }
+}
+
+/// What is longer than a turn may take would keep the server from its other clients.
+const _: () = assert!(BLOCKED.0 <= 2 * ROUND.0);

@@ -1,0 +1,336 @@
+//! The messages as bytes; docs/sdsp.md has the format for everyone.
+//!
+//! A frame is a length of four bytes, a kind of one, and what belongs to it; the length counts the kind, too. Numbers
+//! are little-endian.
+
+mod reader;
+#[cfg(test)]
+mod tests;
+
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::DataType;
+
+use crate::server::ToClient;
+use crate::{Cause, Declaration, Ended, Outcome, Step, TraceHash, Variable};
+use reader::Reader;
+
+/// The version of this format.
+pub const VERSION: u16 = 1;
+
+/// The longest frame, without the four bytes of its length.
+pub const LONGEST_FRAME: usize = 1 << 20;
+
+/// The bytes of a frame's length.
+pub const HEADER: usize = 4;
+
+/// The longest reason, in bytes; longer ones are cut.
+const LONGEST_REASON: usize = 4096;
+
+/// What a join begins with.
+const MAGIC: [u8; 4] = *b"SDSP";
+
+const JOIN: u8 = 0x01;
+const DONE: u8 = 0x02;
+const GIVE_UP: u8 = 0x03;
+const START: u8 = 0x81;
+const STEP: u8 = 0x82;
+const FINISHED: u8 = 0x83;
+const ENDED: u8 = 0x84;
+
+/// Slots as they are on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slots<'a>(&'a [[u8; 8]]);
+
+impl<'a> Slots<'a> {
+    /// The slots as numbers.
+    pub fn iter(self) -> impl ExactSizeIterator<Item = u64> + use<'a> {
+        self.0.iter().map(|bytes| u64::from_le_bytes(*bytes))
+    }
+}
+
+/// A message of a client.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FromClient<'a> {
+    /// The first one: what it writes and reads.
+    Join(Declaration),
+    /// It has run.
+    Done {
+        /// The step; 0 is the initial write.
+        sequence: u64,
+        /// What it writes, in the order of its declaration.
+        writes: Slots<'a>,
+    },
+    /// It cannot go on, or will not.
+    GiveUp(&'a str),
+}
+
+/// A message of the server, as a client reads it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FromServer<'a> {
+    /// Everyone has joined; see [`ToClient::Start`].
+    Start {
+        /// The virtual time of one step of the server.
+        step: Nanos,
+        /// The types of what the client reads.
+        reads: Vec<DataType>,
+    },
+    /// See [`ToClient::Step`].
+    Step {
+        /// The step.
+        step: Step,
+        /// What the client reads.
+        reads: Slots<'a>,
+    },
+    /// See [`ToClient::End`].
+    End(Result<Outcome, Ended>),
+}
+
+/// The length of the frame at the beginning of `bytes`, with its header, as far as that is known.
+///
+/// # Errors
+///
+/// There is no such frame.
+pub fn frame_length(bytes: &[u8]) -> Result<Option<usize>, String> {
+    let Some(header) = bytes.first_chunk::<HEADER>() else {
+        return Ok(None);
+    };
+    let length = u32::from_le_bytes(*header);
+    match usize::try_from(length) {
+        Ok(length @ 1..=LONGEST_FRAME) => Ok(Some(HEADER + length)),
+        _ => Err(format!(
+            "sent a frame of {length} bytes, expected 1 to {LONGEST_FRAME}"
+        )),
+    }
+}
+
+/// The frame at the beginning of `bytes`, without its header, if all of it is there.
+///
+/// # Errors
+///
+/// There is no such frame.
+pub fn frame(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
+    let length = frame_length(bytes)?;
+    Ok(length.and_then(|length| bytes.get(HEADER..length)))
+}
+
+/// Appends a frame to `out`.
+fn append(out: &mut Vec<u8>, kind: u8, content: impl FnOnce(&mut Vec<u8>)) {
+    let start = out.len();
+    out.extend_from_slice(&[0; HEADER]);
+    out.push(kind);
+    content(out);
+    let length = out.len() - start - HEADER;
+    debug_assert!(length <= LONGEST_FRAME, "a frame of {length} bytes");
+    let length = u32::try_from(length).expect("a frame has its limit");
+    out[start..start + HEADER].copy_from_slice(&length.to_le_bytes());
+}
+
+/// Appends the join of a client with this declaration, which was [checked](Declaration::check).
+///
+/// # Errors
+///
+/// Its names are too long to be sent.
+pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> {
+    let start = out.len();
+    let name = |out: &mut Vec<u8>, name: &str| {
+        out.push(u8::try_from(name.len()).expect("a name has its limit"));
+        out.extend_from_slice(name.as_bytes());
+    };
+    let count = |out: &mut Vec<u8>, count: usize| {
+        let count = u16::try_from(count).expect("their number has its limit");
+        out.extend_from_slice(&count.to_le_bytes());
+    };
+    // Written by hand: a long one is no broken invariant.
+    out.extend_from_slice(&[0; HEADER]);
+    out.push(JOIN);
+    out.extend_from_slice(&MAGIC);
+    out.extend_from_slice(&VERSION.to_le_bytes());
+    out.extend_from_slice(&declaration.multiple.get().to_le_bytes());
+    name(out, &declaration.name);
+    count(out, declaration.writes.len());
+    for variable in &declaration.writes {
+        out.push(code(variable.data_type));
+        name(out, &variable.name);
+    }
+    count(out, declaration.reads.len());
+    for read in &declaration.reads {
+        name(out, read);
+    }
+    let length = out.len() - start - HEADER;
+    if length > LONGEST_FRAME {
+        out.truncate(start);
+        return Err(format!(
+            "the names of its variables take {length} bytes, of {LONGEST_FRAME} at most; shorten them"
+        ));
+    }
+    let length = u32::try_from(length).expect("a frame has its limit");
+    out[start..start + HEADER].copy_from_slice(&length.to_le_bytes());
+    Ok(())
+}
+
+/// Appends what a client writes after its run of the step `sequence`.
+pub fn done(out: &mut Vec<u8>, sequence: u64, writes: &[u64]) {
+    append(out, DONE, |out| {
+        out.extend_from_slice(&sequence.to_le_bytes());
+        slots(out, writes);
+    });
+}
+
+/// Appends that a client gives up for this reason.
+pub fn give_up(out: &mut Vec<u8>, reason: &str) {
+    append(out, GIVE_UP, |out| {
+        out.extend_from_slice(cut(reason).as_bytes());
+    });
+}
+
+/// Appends a message of the server.
+pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
+    match message {
+        ToClient::Start { step, reads } => append(out, START, |out| {
+            out.extend_from_slice(&step.0.to_le_bytes());
+            out.extend(reads.iter().map(|data_type| code(*data_type)));
+        }),
+        ToClient::Step { step, reads } => append(out, STEP, |out| {
+            out.extend_from_slice(&step.sequence.to_le_bytes());
+            out.extend_from_slice(&step.time.0.to_le_bytes());
+            slots(out, reads);
+        }),
+        ToClient::End(Ok(outcome)) => append(out, FINISHED, |out| {
+            out.extend_from_slice(&outcome.steps.to_le_bytes());
+            out.extend_from_slice(&outcome.time.0.to_le_bytes());
+            out.extend_from_slice(&outcome.hash.0.to_le_bytes());
+        }),
+        ToClient::End(Err(ended)) => append(out, ENDED, |out| {
+            let cause = Cause::ALL.iter().position(|cause| *cause == ended.cause);
+            out.push(place_code(cause));
+            out.extend_from_slice(&ended.steps.to_le_bytes());
+            let client = ended.client.as_deref().unwrap_or("");
+            // The name of one that was refused may be longer than allowed; then it is left out.
+            let length = u8::try_from(client.len()).unwrap_or(0);
+            out.push(length);
+            out.extend_from_slice(&client.as_bytes()[..usize::from(length)]);
+            out.extend_from_slice(cut(&ended.reason).as_bytes());
+        }),
+    }
+}
+
+/// Reads a message of a client, without its header.
+///
+/// # Errors
+///
+/// How it violates the format, as the continuation of "the client …".
+pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
+    let mut reader = Reader::new(frame);
+    let message = match reader.byte()? {
+        JOIN => FromClient::Join(read_join(&mut reader)?),
+        DONE => FromClient::Done {
+            sequence: reader.word()?,
+            writes: reader.slots()?,
+        },
+        GIVE_UP => FromClient::GiveUp(reader.rest_as_text()?),
+        kind => return Err(format!("sent a message of the unknown kind 0x{kind:02X}")),
+    };
+    reader.finish()?;
+    Ok(message)
+}
+
+fn read_join(reader: &mut Reader<'_>) -> Result<Declaration, String> {
+    if reader.take::<4>()? != MAGIC {
+        return Err("sent a join without the letters SDSP".to_owned());
+    }
+    let version = u16::from_le_bytes(reader.take()?);
+    if version != VERSION {
+        return Err(format!(
+            "speaks version {version} of the format, and this server version {VERSION}"
+        ));
+    }
+    let multiple = u32::from_le_bytes(reader.take()?).try_into();
+    let multiple = multiple.map_err(|_| "runs every 0 steps; expected 1 or more".to_owned())?;
+    let name = reader.name()?.to_owned();
+    let mut writes = Vec::new();
+    for _ in 0..u16::from_le_bytes(reader.take()?) {
+        let data_type = reader.data_type()?;
+        writes.push(Variable::new(reader.name()?, data_type));
+    }
+    let mut reads = Vec::new();
+    for _ in 0..u16::from_le_bytes(reader.take()?) {
+        reads.push(reader.name()?.to_owned());
+    }
+    Ok(Declaration {
+        name,
+        multiple,
+        writes,
+        reads,
+    })
+}
+
+/// Reads a message of the server, without its header.
+///
+/// # Errors
+///
+/// How it violates the format, as the continuation of "the server …".
+pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
+    let mut reader = Reader::new(frame);
+    let nanos = |word: u64| Nanos(word.cast_signed());
+    let message = match reader.byte()? {
+        START => {
+            let step = nanos(reader.word()?);
+            let mut reads = Vec::new();
+            while !reader.is_at_end() {
+                reads.push(reader.data_type()?);
+            }
+            FromServer::Start { step, reads }
+        }
+        STEP => FromServer::Step {
+            step: Step {
+                sequence: reader.word()?,
+                time: nanos(reader.word()?),
+            },
+            reads: reader.slots()?,
+        },
+        FINISHED => FromServer::End(Ok(Outcome {
+            steps: reader.word()?,
+            time: nanos(reader.word()?),
+            hash: TraceHash(reader.word()?),
+        })),
+        ENDED => {
+            let code = reader.byte()?;
+            let cause = Cause::ALL.get(usize::from(code).wrapping_sub(1));
+            let cause = *cause.ok_or_else(|| format!("sent the unknown cause {code}"))?;
+            let steps = reader.word()?;
+            let client = reader.name()?;
+            FromServer::End(Err(Ended {
+                cause,
+                client: (!client.is_empty()).then(|| client.to_owned()),
+                reason: reader.rest_as_text()?.to_owned(),
+                steps,
+            }))
+        }
+        kind => return Err(format!("sent a message of the unknown kind 0x{kind:02X}")),
+    };
+    reader.finish()?;
+    Ok(message)
+}
+
+/// The code of a type: BOOL is 1, LREAL 15, in the order of [`DataType::ALL`].
+fn code(data_type: DataType) -> u8 {
+    place_code(DataType::ALL.iter().position(|other| *other == data_type))
+}
+
+fn place_code(place: Option<usize>) -> u8 {
+    let place = place.expect("the list is complete");
+    u8::try_from(place + 1).expect("a short list")
+}
+
+fn slots(out: &mut Vec<u8>, slots: &[u64]) {
+    for slot in slots {
+        out.extend_from_slice(&slot.to_le_bytes());
+    }
+}
+
+/// At most the first [`LONGEST_REASON`] bytes.
+fn cut(reason: &str) -> &str {
+    let end = (0..=reason.len().min(LONGEST_REASON)).rev();
+    let end = end.into_iter().find(|end| reason.is_char_boundary(*end));
+    &reason[..end.unwrap_or(0)]
+}

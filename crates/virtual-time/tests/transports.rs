@@ -1,0 +1,174 @@
+//! One run is the same in this process and over every transport, whoever comes first.
+
+mod common;
+
+use std::thread;
+
+use common::{client, mixer_settings, mixers, settings};
+use tickbus_base::time::{Monotonic, Nanos, Stop};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_virtual_time::{
+    Cause, Controls, Ended, Hosting, Logic, Outcome, Participant, Settings, in_process, tcp,
+};
+
+/// A run over TCP, with a thread for each client; the answers of the server, and of the clients in their order.
+fn over_tcp(
+    settings: Settings,
+    clients: Vec<Box<dyn Participant + Send>>,
+) -> (Result<Outcome, Ended>, Vec<Result<Outcome, Ended>>) {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = Address::local(listener.address().port());
+    thread::scope(|scope| {
+        let joined: Vec<_> = clients
+            .into_iter()
+            .map(|mut client| {
+                let address = &address;
+                scope.spawn(move || tcp::join(address, &mut *client))
+            })
+            .collect();
+        let outcome = serve(listener, settings, &Controls::default());
+        let ends = joined
+            .into_iter()
+            .map(|client| client.join().expect("no panic"));
+        (outcome, ends.collect())
+    })
+}
+
+fn serve(
+    listener: tcp::Listener,
+    settings: Settings,
+    controls: &Controls,
+) -> Result<Outcome, Ended> {
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        controls,
+        news: &mut |_| {},
+    };
+    listener.run(settings, Logic::new(), hosting)
+}
+
+fn in_this_process(steps: u64, count: u32) -> Outcome {
+    let mut mixers = mixers(count);
+    let clients = mixers.iter_mut().map(|mixer| mixer as _).collect();
+    in_process::run(mixer_settings(steps, count), clients, Logic::new()).expect("it runs")
+}
+
+#[test]
+fn a_run_over_tcp_is_the_one_in_this_process_whoever_comes_first() {
+    let expected = in_this_process(500, 4);
+    for turn in 0..4 {
+        let mut clients: Vec<Box<dyn Participant + Send>> = Vec::new();
+        for mixer in mixers(4) {
+            clients.push(Box::new(mixer));
+        }
+        clients.rotate_left(turn);
+        let (outcome, ends) = over_tcp(mixer_settings(500, 4), clients);
+        assert_eq!(outcome, Ok(expected.clone()));
+        assert!(ends.iter().all(|end| *end == outcome), "{ends:?}");
+    }
+}
+
+#[test]
+fn a_late_joiner_is_refused_with_the_reason_and_the_run_goes_on() {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = Address::local(listener.address().port());
+    let late = Address::local(listener.address().port());
+    let mut first = client("first", 1, &[], &[], move |step, _, _| {
+        if step.sequence == 3 {
+            let mut late_one = client("late", 1, &[], &[], |_, _, _| Ok(()));
+            let ended = tcp::join(&late, &mut late_one).expect_err("it is late");
+            assert_eq!(ended.cause, Cause::Refused);
+            assert_eq!(ended.client.as_deref(), Some("late"));
+            assert!(ended.reason.contains("is at step 3"), "{ended}");
+        }
+        Ok(())
+    });
+    thread::scope(|scope| {
+        let joined = scope.spawn(|| tcp::join(&address, &mut first));
+        let outcome = serve(listener, settings(5, &["first"]), &Controls::default());
+        assert_eq!(outcome.as_ref().map(|outcome| outcome.steps), Ok(5));
+        assert_eq!(joined.join().expect("no panic"), outcome);
+    });
+}
+
+#[test]
+fn a_client_that_hangs_is_named_and_everyone_learns_it() {
+    let mut settings = settings(50, &["good", "stuck"]);
+    settings.hang = Nanos::from_millis(300);
+    let mut good = client("good", 1, &[], &[], |_, _, _| Ok(()));
+    let (sender, receiver) = std::sync::mpsc::channel::<()>();
+    let mut stuck = client("stuck", 1, &[], &[], move |step, _, _| {
+        if step.sequence == 7 {
+            // Until the other end is dropped, when the run has ended.
+            let _ = receiver.recv();
+        }
+        Ok(())
+    });
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = Address::local(listener.address().port());
+    thread::scope(|scope| {
+        let joined = scope.spawn(|| tcp::join(&address, &mut good));
+        let hung = scope.spawn(|| tcp::join(&address, &mut stuck));
+        let ended = serve(listener, settings, &Controls::default()).expect_err("it hangs");
+        drop(sender);
+        assert_eq!(
+            ended.to_string(),
+            "the run ended after 6 steps: client \"stuck\" has not finished step 7 within 300ms"
+        );
+        for end in [joined, hung] {
+            assert_eq!(end.join().expect("no panic"), Err(ended.clone()));
+        }
+    });
+}
+
+#[test]
+fn a_client_that_goes_is_named_and_the_others_learn_it() {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = Address::local(listener.address().port());
+    let mut good = client("good", 1, &[], &[], |_, _, _| Ok(()));
+    let gone = client("gone", 1, &[], &[], |_, _, _| Ok(())).declaration;
+    thread::scope(|scope| {
+        let joined = scope.spawn(|| tcp::join(&address, &mut good));
+        scope.spawn(|| {
+            let gone = tickbus_virtual_time::client::Client::new(gone).expect("it is right");
+            let mut gone = tcp::connect(&address, gone, &Stop::new()).expect("it listens");
+            gone.wait().expect("it starts");
+            gone.answer(&[]);
+            gone.wait().expect("the first step");
+        });
+        let ended = serve(
+            listener,
+            settings(50, &["good", "gone"]),
+            &Controls::default(),
+        );
+        let ended = ended.expect_err("it is gone");
+        assert_eq!((ended.cause, ended.steps), (Cause::Lost, 0));
+        assert_eq!(ended.client.as_deref(), Some("gone"));
+        assert_eq!(joined.join().expect("no panic"), Err(ended));
+    });
+}
+
+#[test]
+fn a_stop_ends_the_run_between_two_steps() {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = Address::local(listener.address().port());
+    let controls = Controls::default();
+    let asked = controls.clone();
+    let mut one = client("one", 1, &[], &[], move |step, _, _| {
+        if step.sequence == 100 {
+            asked.send(tickbus_virtual_time::server::Control::Stop);
+        }
+        Ok(())
+    });
+    let mut settings = settings(0, &["one"]);
+    settings.steps = None;
+    thread::scope(|scope| {
+        let joined = scope.spawn(|| tcp::join(&address, &mut one));
+        let outcome = serve(listener, settings, &controls);
+        assert!(
+            outcome.as_ref().is_ok_and(|outcome| outcome.steps >= 100),
+            "{outcome:?}"
+        );
+        assert_eq!(joined.join().expect("no panic"), outcome);
+    });
+}

@@ -31,5 +31,10 @@ public enum DataType {
     /** A 64-bit unsigned integer. */
     ULINT,
     /** A 64-bit number: its bits as {@link Double#doubleToRawLongBits} gives them. */
-    LREAL
+    LREAL;
+
+    /** The code on the wire, from 1. */
+    byte code() {
+        return (byte) (ordinal() + 1);
+    }
 }

@@ -12,9 +12,23 @@ import java.util.List;
  * @param reads the names of the variables that it reads, at most 65535; they may be its own
  */
 public record Declaration(String name, int multiple, List<Variable> writes, List<String> reads) {
-    /** Keeps copies of the lists. */
+    private static final int MOST_VARIABLES = 65_535;
+
+    /**
+     * Keeps copies of the lists.
+     *
+     * @throws IllegalArgumentException if the multiple is below 1, or there are too many variables
+     */
     public Declaration {
         writes = List.copyOf(writes);
         reads = List.copyOf(reads);
+        if (multiple < 1) {
+            throw new IllegalArgumentException(
+                "client \"" + name + "\" runs every " + multiple + " steps; expected 1 or more");
+        }
+        if (Math.max(writes.size(), reads.size()) > MOST_VARIABLES) {
+            throw new IllegalArgumentException("client \"" + name + "\" writes " + writes.size() + " variables and reads "
+                + reads.size() + "; at most " + MOST_VARIABLES + " each are possible: split it into several clients");
+        }
     }
 }

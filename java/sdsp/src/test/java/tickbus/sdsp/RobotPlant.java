@@ -3,7 +3,7 @@ package tickbus.sdsp;
 import java.util.List;
 
 /** The plant of examples/robot. */
-final class RobotPlant implements Participant {
+class RobotPlant implements Participant {
     private static final double CATCH_UP = 0.048770575499285984;
 
     private final double[] position = new double[2];

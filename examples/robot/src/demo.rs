@@ -1,17 +1,21 @@
 //! The demo: runs all experiments, and writes the page.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{self, BufWriter};
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::thread;
 
 use tickbus_base::time::{Monotonic, Nanos};
+use tickbus_fieldbus::tcp::Address;
 use tickbus_robot::experiment::{Experiment, Kind, verdict};
 use tickbus_robot::load::Load;
+use tickbus_robot::metrics::Run;
 use tickbus_robot::page::{self, Picture};
 use tickbus_robot::participants::STEPS;
 use tickbus_robot::random::Random;
 use tickbus_robot::{free_wheeling, lock_step, wall_clock};
+use tickbus_virtual_time::Outcome;
 
 /// The intervals of the model's OPC link, in milliseconds.
 const MODEL_UPDATES: [i64; 3] = [10, 50, 100];
@@ -22,7 +26,10 @@ const SHOWN: i64 = 50;
 
 /// Runs everything, and returns the last line.
 pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
-    let mut experiments = vec![in_process(runs)?];
+    let mut experiments = vec![
+        in_lock_step("in one process", runs, in_process)?,
+        in_lock_step("three processes over TCP", runs, over_tcp)?,
+    ];
     for update in MODEL_UPDATES {
         experiments.push(told(model(update, runs)));
     }
@@ -66,22 +73,73 @@ fn told(experiment: Experiment) -> Experiment {
     experiment
 }
 
-/// In lock-step, with clients in any order and busy processors.
-fn in_process(runs: u32) -> Result<Experiment, String> {
+/// In lock-step, with clients in any order and busy processors: `one` is told whether the PLC is first.
+fn in_lock_step(
+    name: &str,
+    runs: u32,
+    one: impl Fn(bool) -> Result<(Run, Outcome), String>,
+) -> Result<Experiment, String> {
     let _load = Load::on_all_processors();
     let mut random = Random::new(1);
     let mut all = Vec::new();
     let mut hashes = Vec::new();
     for _ in 0..runs {
-        let (run, outcome) =
-            lock_step::in_process(random.unit() < 0.5).map_err(|ended| ended.to_string())?;
+        let (run, outcome) = one(random.unit() < 0.5)?;
         all.push(run);
         hashes.push(outcome.hash.to_string());
     }
+    let experiment = Experiment::new(format!("lock-step, {name}"), Kind::LockStep, all);
     Ok(told(Experiment {
         hashes,
-        ..Experiment::new("lock-step, in one process", Kind::LockStep, all)
+        ..experiment
     }))
+}
+
+fn in_process(plc_first: bool) -> Result<(Run, Outcome), String> {
+    lock_step::in_process(plc_first).map_err(|ended| ended.to_string())
+}
+
+/// Plant and PLC are processes of their own.
+fn over_tcp(plc_first: bool) -> Result<(Run, Outcome), String> {
+    let start = |name: &str, address: &Address| {
+        let mut command = Command::new(std::env::current_exe()?);
+        command.args([name, "--server", &address.to_string()]);
+        if name == "plant" {
+            command.arg("--positions");
+        }
+        command.stdout(Stdio::piped()).spawn()
+    };
+    let clients = |address: &Address| {
+        let names = if plc_first {
+            ["plc", "plant"]
+        } else {
+            ["plant", "plc"]
+        };
+        let [first, second] = names.map(|name| start(name, address));
+        let [plc, plant] = if plc_first {
+            [first, second]
+        } else {
+            [second, first]
+        };
+        let plant = plant?.wait_with_output()?;
+        plc?.wait_with_output()?;
+        Ok(plant.stdout)
+    };
+    let (printed, outcome) = lock_step::over_tcp(clients).map_err(|ended| ended.to_string())?;
+    let printed =
+        printed.map_err(|error: io::Error| format!("the clients cannot be started: {error}"))?;
+    let run = positions(&printed).ok_or("the plant printed something else than positions")?;
+    Ok((run, outcome))
+}
+
+/// The positions that the plant has printed before its last line.
+fn positions(printed: &[u8]) -> Option<Run> {
+    let text = std::str::from_utf8(printed).ok()?;
+    let position = |line: &str| {
+        let (x, z) = line.split_once(' ')?;
+        Some([x.parse().ok()?, z.parse().ok()?])
+    };
+    text.lines().take(STEPS).map(position).collect()
 }
 
 fn model(update: i64, runs: u32) -> Experiment {
@@ -106,7 +164,7 @@ fn on_wall_clock(update: i64, runs: u32) -> Experiment {
     Experiment::new(name, Kind::WallClock(update), runs)
 }
 
-fn write_page(experiments: &[Experiment], file: &Path) -> std::io::Result<()> {
+fn write_page(experiments: &[Experiment], file: &Path) -> io::Result<()> {
     let of = |kind| {
         experiments
             .iter()
@@ -133,6 +191,6 @@ fn write_page(experiments: &[Experiment], file: &Path) -> std::io::Result<()> {
     let mut out = BufWriter::new(File::create(file)?);
     page::write(&pictures, experiments, &mut out)?;
     out.into_inner()
-        .map_err(std::io::IntoInnerError::into_error)?
+        .map_err(io::IntoInnerError::into_error)?
         .sync_all()
 }

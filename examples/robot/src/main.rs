@@ -6,6 +6,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_robot::participants::{Machine, Program};
+use tickbus_virtual_time::{Participant, tcp};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -28,11 +31,48 @@ enum Command {
         #[arg(long, value_name = "COUNT", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=100))]
         runs: u32,
     },
+    /// Take part in a run in virtual time as the plant
+    Plant {
+        /// The server's address
+        #[arg(long, value_name = "HOST:PORT")]
+        server: Address,
+        /// Print the position of the tool after each step
+        #[arg(long)]
+        positions: bool,
+    },
+    /// Take part in a run in virtual time as the PLC
+    Plc {
+        /// The server's address
+        #[arg(long, value_name = "HOST:PORT")]
+        server: Address,
+    },
+}
+
+/// Takes part in a run, and returns the last line.
+fn join(server: &Address, participant: &mut dyn Participant) -> Result<String, String> {
+    let outcome = tcp::join(server, participant).map_err(|ended| ended.to_string())?;
+    Ok(format!(
+        "robot: ok steps={} hash={}",
+        outcome.steps, outcome.hash
+    ))
+}
+
+fn plant(server: &Address, prints_positions: bool) -> Result<String, String> {
+    let mut machine = Machine::default();
+    let line = join(server, &mut machine)?;
+    if prints_positions {
+        for [x, z] in machine.into_run() {
+            println!("{x} {z}");
+        }
+    }
+    Ok(line)
 }
 
 fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Demo { page, runs } => demo::run(&page, runs),
+        Command::Plant { server, positions } => plant(&server, positions),
+        Command::Plc { server } => join(&server, &mut Program::default()),
     };
     match outcome {
         Ok(line) => {

@@ -1,11 +1,13 @@
 //! The robot in lock-step: every run the same, whoever is first and however busy the computer.
 
+use std::thread;
+
 use tickbus_robot::experiment::{Experiment, Kind, verdict};
 use tickbus_robot::load::Load;
 use tickbus_robot::lock_step;
 use tickbus_robot::metrics::Run;
-use tickbus_robot::participants::STEPS;
-use tickbus_virtual_time::{Ended, Outcome};
+use tickbus_robot::participants::{Machine, Program, STEPS};
+use tickbus_virtual_time::{Ended, Outcome, tcp};
 
 /// The trace hash of the run. A client in another language must give the same, as `java/sdsp` does.
 const HASH: &str = "9e758daaecadc30e";
@@ -37,4 +39,34 @@ fn assert_all_equal(one: impl Fn(bool) -> Result<(Run, Outcome), Ended>) {
 #[test]
 fn in_one_process_all_runs_are_equal() {
     assert_all_equal(lock_step::in_process);
+}
+
+#[test]
+fn over_tcp_all_runs_are_the_same_as_in_one_process() {
+    assert_all_equal(|plc_first| {
+        let (run, outcome) = lock_step::over_tcp(|address| {
+            let mut machine = Machine::default();
+            thread::scope(|scope| {
+                let plant = || {
+                    let outcome = tcp::join(address, &mut machine);
+                    outcome.expect("the plant has its run")
+                };
+                let plc = || {
+                    let outcome = tcp::join(address, &mut Program::default());
+                    outcome.expect("the PLC has its run")
+                };
+                let [first, second] = if plc_first {
+                    let plc = scope.spawn(plc);
+                    [plc, scope.spawn(plant)]
+                } else {
+                    let plant = scope.spawn(plant);
+                    [plant, scope.spawn(plc)]
+                };
+                let outcome = first.join().expect("no panic");
+                assert_eq!(second.join().expect("no panic"), outcome);
+            });
+            machine.into_run()
+        })?;
+        Ok((run, outcome))
+    });
 }

@@ -24,7 +24,7 @@ const WALL_UPDATES: [i64; 2] = [10, 50];
 /// The one in the pictures.
 const SHOWN: i64 = 50;
 
-/// Runs everything, and returns the last line.
+/// Runs everything, and returns the figures of the last line.
 pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
     let mut experiments = vec![
         in_lock_step("in one process", runs, in_process)?,
@@ -49,7 +49,7 @@ pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
     });
     let lock_step = &experiments[0];
     Ok(format!(
-        "robot: ok lock_step_runs={} steps={STEPS} hash={} e_mm={:.7} d_mm={}{} page={}",
+        "lock_step_runs={} steps={STEPS} hash={} e_mm={:.7} d_mm={}{} page={}",
         experiments.iter().map(|of| of.hashes.len()).sum::<usize>(),
         lock_step.hashes[0],
         lock_step.metrics.error,
@@ -63,7 +63,7 @@ pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
 fn told(experiment: Experiment) -> Experiment {
     let metrics = experiment.metrics;
     println!(
-        "robot: {}: {} runs, E {:.3} mm, D {:.1} mm, G {:.1} mm",
+        "demo-robot: {}: {} runs, E {:.3} mm, D {:.1} mm, G {:.1} mm",
         experiment.name,
         experiment.runs.len(),
         metrics.error,

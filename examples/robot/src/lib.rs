@@ -26,3 +26,8 @@ pub mod path;
 pub mod plant;
 pub mod random;
 pub mod wall_clock;
+
+/// The programs in the guide are compiled with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/virtual-time.md")]
+struct Guide;

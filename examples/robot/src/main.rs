@@ -48,13 +48,10 @@ enum Command {
     },
 }
 
-/// Takes part in a run, and returns the last line.
+/// Takes part in a run, and returns the figures of the last line.
 fn join(server: &Address, participant: &mut dyn Participant) -> Result<String, String> {
     let outcome = tcp::join(server, participant).map_err(|ended| ended.to_string())?;
-    Ok(format!(
-        "robot: ok steps={} hash={}",
-        outcome.steps, outcome.hash
-    ))
+    Ok(format!("steps={} hash={}", outcome.steps, outcome.hash))
 }
 
 fn plant(server: &Address, prints_positions: bool) -> Result<String, String> {
@@ -69,18 +66,18 @@ fn plant(server: &Address, prints_positions: bool) -> Result<String, String> {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
-        Command::Demo { page, runs } => demo::run(&page, runs),
-        Command::Plant { server, positions } => plant(&server, positions),
-        Command::Plc { server } => join(&server, &mut Program::default()),
+    let (name, outcome) = match Arguments::parse().command {
+        Command::Demo { page, runs } => ("demo-robot", demo::run(&page, runs)),
+        Command::Plant { server, positions } => ("robot", plant(&server, positions)),
+        Command::Plc { server } => ("robot", join(&server, &mut Program::default())),
     };
     match outcome {
-        Ok(line) => {
-            println!("{line}");
+        Ok(figures) => {
+            println!("{name}: ok {figures}");
             ExitCode::SUCCESS
         }
         Err(reason) => {
-            println!("robot: failed reason={reason}");
+            println!("{name}: failed reason={reason}");
             ExitCode::FAILURE
         }
     }

@@ -50,9 +50,14 @@ final class FakeServer implements AutoCloseable {
 
     /** Waits for a frame, without its length. */
     ByteBuffer receive() throws IOException {
-        byte[] frame = new byte[Integer.reverseBytes(in.readInt())];
-        in.readFully(frame);
-        return ByteBuffer.wrap(frame).order(ByteOrder.LITTLE_ENDIAN);
+        return ByteBuffer.wrap(receiveRaw(Integer.reverseBytes(in.readInt()))).order(ByteOrder.LITTLE_ENDIAN);
+    }
+
+    /** Waits for this many bytes. */
+    byte[] receiveRaw(int count) throws IOException {
+        byte[] bytes = new byte[count];
+        in.readFully(bytes);
+        return bytes;
     }
 
     /** Sends bytes as they are. */

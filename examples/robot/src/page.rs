@@ -211,7 +211,11 @@ fn table(experiments: &[Experiment]) -> Markup {
                 thead {
                     tr {
                         th scope="col" { "experiment" }
-                        @for name in ["runs", "E, mean", "E, largest", "D", "G"] { th.n scope="col" { (name) } }
+                        th.n.more scope="col" { "runs" }
+                        th.n scope="col" { "E, mean" }
+                        th.n.more scope="col" { "E, largest" }
+                        th.n scope="col" { "D" }
+                        th.n scope="col" { "G" }
                     }
                 }
                 tbody {
@@ -219,10 +223,11 @@ fn table(experiments: &[Experiment]) -> Markup {
                         @let Metrics { error, largest_error, difference, deviation } = of.metrics;
                         tr {
                             th.name scope="row" { (of.name) }
-                            td.n { (of.runs.len()) }
-                            @for value in [error, largest_error, difference, deviation] {
-                                td.n { (millimetres(of.kind, value)) }
-                            }
+                            td.n.more { (of.runs.len()) }
+                            td.n { (millimetres(of.kind, error)) }
+                            td.n.more { (millimetres(of.kind, largest_error)) }
+                            td.n { (millimetres(of.kind, difference)) }
+                            td.n { (millimetres(of.kind, deviation)) }
                         }
                     }
                 }

@@ -145,7 +145,7 @@ fn positions(printed: &[u8]) -> Option<Run> {
 fn model(update: i64, runs: u32) -> Experiment {
     let runs =
         (1..=runs).map(|seed| free_wheeling::run(seed.into(), Nanos::from_millis(update), STEPS));
-    let name = format!("free-wheeling, model, OPC each {update} ms");
+    let name = format!("free-wheeling, model, OPC every {update} ms");
     Experiment::new(name, Kind::Model(update), runs.collect())
 }
 
@@ -160,7 +160,7 @@ fn on_wall_clock(update: i64, runs: u32) -> Experiment {
             .map(|run| run.join().expect("a run does not panic"));
         runs.collect()
     });
-    let name = format!("free-wheeling, wall clock, OPC each {update} ms");
+    let name = format!("free-wheeling, wall clock, OPC every {update} ms");
     Experiment::new(name, Kind::WallClock(update), runs)
 }
 
@@ -180,12 +180,12 @@ fn write_page(experiments: &[Experiment], file: &Path) -> io::Result<()> {
         Picture {
             heading: "Free-wheeling, a model",
             of: of(Kind::Model(SHOWN)),
-            caption: "Frames of about 5 ms, one in a hundred held up; OPC each 50 ms. Each run has its seed.",
+            caption: "Frames of about 5 ms, one in a hundred held up; OPC every 50 ms. Each run has its seed.",
         },
         Picture {
             heading: "Free-wheeling, on this computer",
             of: of(Kind::WallClock(SHOWN)),
-            caption: "PLC, simulation and OPC are threads that sleep; OPC each 50 ms.",
+            caption: "PLC, simulation and OPC are threads that sleep; OPC every 50 ms.",
         },
     ];
     let mut out = BufWriter::new(File::create(file)?);

@@ -1,6 +1,6 @@
 //! A model of a PLC and a simulation that nobody synchronises, the same for each seed.
 //!
-//! The PLC runs on wall time. The simulation intends a frame of 5 ms of its own time every 5 ms, but its computer also does
+//! The PLC runs on wall time. The simulation intends to compute 5 ms of its own time every 5 ms, but its computer also does
 //! other things: frames vary, and now and then one takes much longer. OPC hands over positions and commands at an interval
 //! and with a delay. So the simulation's time falls behind the PLC's, and neither side sees the other in time.
 

@@ -15,7 +15,7 @@ use tickbus_robot::page::{self, Picture};
 use tickbus_robot::participants::STEPS;
 use tickbus_robot::random::Random;
 use tickbus_robot::{free_wheeling, lock_step, wall_clock};
-use tickbus_virtual_time::Outcome;
+use tickbus_virtual_time::{Meeting, Outcome};
 
 /// The intervals of the model's OPC link, in milliseconds.
 const MODEL_UPDATES: [i64; 3] = [10, 50, 100];
@@ -26,10 +26,19 @@ const SHOWN: i64 = 50;
 
 /// Runs everything, and returns the figures of the last line.
 pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
+    let load = Load::on_all_processors();
     let mut experiments = vec![
-        in_lock_step("in one process", runs, in_process)?,
-        in_lock_step("three processes over TCP", runs, over_tcp)?,
+        in_lock_step("in one process, loaded computer", runs, in_process)?,
+        in_lock_step("over TCP, loaded computer", runs, |plc_first| {
+            in_processes(Meeting::Tcp(Address::local(0)), plc_first)
+        })?,
     ];
+    drop(load);
+    if cfg!(unix) {
+        let name = format!("robot-{}", std::process::id());
+        let run = |plc_first| in_processes(Meeting::SharedMemory(name.clone()), plc_first);
+        experiments.push(in_lock_step("through shared memory", runs, run)?);
+    }
     for update in MODEL_UPDATES {
         experiments.push(told(model(update, runs)));
     }
@@ -73,13 +82,12 @@ fn told(experiment: Experiment) -> Experiment {
     experiment
 }
 
-/// In lock-step, with clients in any order and busy processors: `one` is told whether the PLC is first.
+/// In lock-step, with clients in any order: `one` is told whether the PLC is first.
 fn in_lock_step(
     name: &str,
     runs: u32,
     one: impl Fn(bool) -> Result<(Run, Outcome), String>,
 ) -> Result<Experiment, String> {
-    let _load = Load::on_all_processors();
     let mut random = Random::new(1);
     let mut all = Vec::new();
     let mut hashes = Vec::new();
@@ -100,22 +108,24 @@ fn in_process(plc_first: bool) -> Result<(Run, Outcome), String> {
 }
 
 /// Plant and PLC are processes of their own.
-fn over_tcp(plc_first: bool) -> Result<(Run, Outcome), String> {
-    let start = |name: &str, address: &Address| {
+fn in_processes(at: Meeting, plc_first: bool) -> Result<(Run, Outcome), String> {
+    let start = |name: &str, server: &Meeting| {
         let mut command = Command::new(std::env::current_exe()?);
-        command.args([name, "--server", &address.to_string()]);
+        match server {
+            Meeting::Tcp(address) => command.args([name, "--server", &address.to_string()]),
+            Meeting::SharedMemory(memory) => command.args([name, "--shared-memory", memory]),
+        };
         if name == "plant" {
             command.arg("--positions");
         }
         command.stdout(Stdio::piped()).spawn()
     };
-    let clients = |address: &Address| {
-        let names = if plc_first {
-            ["plc", "plant"]
-        } else {
-            ["plant", "plc"]
-        };
-        let [first, second] = names.map(|name| start(name, address));
+    let clients = |server: &Meeting| {
+        let mut names = ["plant", "plc"];
+        if plc_first {
+            names.reverse();
+        }
+        let [first, second] = names.map(|name| start(name, server));
         let [plc, plant] = if plc_first {
             [first, second]
         } else {
@@ -125,7 +135,7 @@ fn over_tcp(plc_first: bool) -> Result<(Run, Outcome), String> {
         plc?.wait_with_output()?;
         Ok(plant.stdout)
     };
-    let (printed, outcome) = lock_step::over_tcp(clients).map_err(|ended| ended.to_string())?;
+    let (printed, outcome) = lock_step::served(at, clients).map_err(|ended| ended.to_string())?;
     let printed =
         printed.map_err(|error: io::Error| format!("the clients cannot be started: {error}"))?;
     let run = positions(&printed).ok_or("the plant printed something else than positions")?;

@@ -1,11 +1,14 @@
 //! Plant and PLC in lock-step.
 
+use std::io;
+
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_fieldbus::tcp::Address;
-use tickbus_virtual_time::tcp::Listener;
+#[cfg(unix)]
+use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{
-    Cause, Controls, Ended, Hosting, Logic, Outcome, Participant, Settings, StartCondition,
-    in_process,
+    Cause, Controls, Ended, Hosting, Logic, Meeting, Outcome, Participant, Settings,
+    StartCondition, in_process, tcp,
 };
 
 use crate::metrics::Run;
@@ -37,30 +40,65 @@ pub fn in_process(plc_first: bool) -> Result<(Run, Outcome), Ended> {
     Ok((machine.into_run(), outcome))
 }
 
-/// A run over TCP, with a server in this process: `clients` starts both at its address, and returns when they are done.
+/// Takes part in a run where its server is.
+///
+/// # Errors
+///
+/// There is no server, it refuses this client, or the run was broken off.
+pub fn join(server: &Meeting, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+    match server {
+        Meeting::Tcp(address) => tcp::join(address, participant),
+        #[cfg(unix)]
+        Meeting::SharedMemory(name) => shared_memory::join(name, participant),
+        #[cfg(not(unix))]
+        Meeting::SharedMemory(_) => Err(system("there is no shared memory on this system")),
+    }
+}
+
+/// A run with a server in this process, at port 0 on one that the system chooses: `clients` starts both where the server is,
+/// and returns when they are done.
 ///
 /// # Errors
 ///
 /// Why there was none.
-pub fn over_tcp<T>(clients: impl FnOnce(&Address) -> T) -> Result<(T, Outcome), Ended> {
-    let listener = Listener::bind(&Address::local(0)).map_err(|error| Ended {
-        cause: Cause::System,
-        client: None,
-        reason: format!("no port can be listened on: {error}"),
-        steps: 0,
-    })?;
-    let address = Address::local(listener.address().port());
+pub fn served<T>(at: Meeting, clients: impl FnOnce(&Meeting) -> T) -> Result<(T, Outcome), Ended> {
+    type Serve = Box<dyn FnOnce(Hosting<'_>) -> Result<Outcome, Ended> + Send>;
+    let cannot = |error: io::Error| system(&format!("no server can be started: {error}"));
+    let (at, serve): (Meeting, Serve) = match at {
+        Meeting::Tcp(address) => {
+            let listener = tcp::Listener::bind(&address).map_err(cannot)?;
+            let port = listener.address().port();
+            let serve = |hosting: Hosting<'_>| listener.run(settings(), Logic::new(), hosting);
+            (Meeting::Tcp(Address { port, ..address }), Box::new(serve))
+        }
+        #[cfg(unix)]
+        Meeting::SharedMemory(name) => {
+            let listener = shared_memory::Listener::bind(&name, &settings()).map_err(cannot)?;
+            let serve = |hosting: Hosting<'_>| listener.run(settings(), Logic::new(), hosting);
+            (Meeting::SharedMemory(name), Box::new(serve))
+        }
+        #[cfg(not(unix))]
+        Meeting::SharedMemory(_) => return Err(system("there is no shared memory on this system")),
+    };
     std::thread::scope(|scope| {
         let server = scope.spawn(|| {
-            let hosting = Hosting {
+            serve(Hosting {
                 clock: &*Monotonic::shared(),
                 controls: &Controls::default(),
                 news: &mut |_| {},
-            };
-            listener.run(settings(), Logic::new(), hosting)
+            })
         });
-        let done = clients(&address);
+        let done = clients(&at);
         let outcome = server.join().expect("the server does not panic")?;
         Ok((done, outcome))
     })
+}
+
+fn system(reason: &str) -> Ended {
+    Ended {
+        cause: Cause::System,
+        client: None,
+        reason: reason.to_owned(),
+        steps: 0,
+    }
 }

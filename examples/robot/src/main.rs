@@ -5,10 +5,11 @@ mod demo;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use tickbus_fieldbus::tcp::Address;
+use tickbus_robot::lock_step;
 use tickbus_robot::participants::{Machine, Program};
-use tickbus_virtual_time::{Participant, tcp};
+use tickbus_virtual_time::{Meeting, Participant};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -33,28 +34,44 @@ enum Command {
     },
     /// Take part in a run in virtual time as the plant
     Plant {
-        /// The server's address
-        #[arg(long, value_name = "HOST:PORT")]
-        server: Address,
+        #[command(flatten)]
+        server: Server,
         /// Print the position of the tool after each step
         #[arg(long)]
         positions: bool,
     },
     /// Take part in a run in virtual time as the PLC
     Plc {
-        /// The server's address
-        #[arg(long, value_name = "HOST:PORT")]
-        server: Address,
+        #[command(flatten)]
+        server: Server,
     },
 }
 
+/// Where the server is.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct Server {
+    /// The server's address
+    #[arg(long, value_name = "HOST:PORT")]
+    server: Option<Address>,
+    /// The name of the shared memory in which the server is
+    #[arg(long, value_name = "NAME")]
+    shared_memory: Option<String>,
+}
+
 /// Takes part in a run, and returns the figures of the last line.
-fn join(server: &Address, participant: &mut dyn Participant) -> Result<String, String> {
-    let outcome = tcp::join(server, participant).map_err(|ended| ended.to_string())?;
+fn join(server: Server, participant: &mut dyn Participant) -> Result<String, String> {
+    let name = || server.shared_memory.map(Meeting::SharedMemory);
+    let server = server
+        .server
+        .map(Meeting::Tcp)
+        .or_else(name)
+        .expect("clap demands one of them");
+    let outcome = lock_step::join(&server, participant).map_err(|ended| ended.to_string())?;
     Ok(format!("steps={} hash={}", outcome.steps, outcome.hash))
 }
 
-fn plant(server: &Address, prints_positions: bool) -> Result<String, String> {
+fn plant(server: Server, prints_positions: bool) -> Result<String, String> {
     let mut machine = Machine::default();
     let line = join(server, &mut machine)?;
     if prints_positions {
@@ -68,8 +85,8 @@ fn plant(server: &Address, prints_positions: bool) -> Result<String, String> {
 fn main() -> ExitCode {
     let (name, outcome) = match Arguments::parse().command {
         Command::Demo { page, runs } => ("demo-robot", demo::run(&page, runs)),
-        Command::Plant { server, positions } => ("robot", plant(&server, positions)),
-        Command::Plc { server } => ("robot", join(&server, &mut Program::default())),
+        Command::Plant { server, positions } => ("robot", plant(server, positions)),
+        Command::Plc { server } => ("robot", join(server, &mut Program::default())),
     };
     match outcome {
         Ok(figures) => {

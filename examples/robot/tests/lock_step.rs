@@ -1,22 +1,26 @@
 //! The robot in lock-step: every run the same, whoever is first and however busy the computer.
 
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
+use tickbus_fieldbus::tcp::Address;
 use tickbus_robot::experiment::{Experiment, Kind, verdict};
 use tickbus_robot::load::Load;
 use tickbus_robot::lock_step;
 use tickbus_robot::metrics::Run;
 use tickbus_robot::participants::{Machine, Program, STEPS};
-use tickbus_virtual_time::{Ended, Outcome, tcp};
+use tickbus_virtual_time::{Ended, Meeting, Outcome};
 
 /// The trace hash of the run. A client in another language must give the same, as `java/sdsp` does.
 const HASH: &str = "9e758daaecadc30e";
 
-/// Ten runs on busy processors, told whether the PLC is first.
+/// The load of one test is not that of the others.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+/// This many runs, told whether the PLC is first.
 #[track_caller]
-fn assert_all_equal(one: impl Fn(bool) -> Result<(Run, Outcome), Ended>) {
-    let _load = Load::on_all_processors();
-    let runs = (0..10).map(|number| one(number % 3 == 0).expect("it runs"));
+fn assert_all_equal(runs: u32, one: impl Fn(bool) -> Result<(Run, Outcome), Ended>) {
+    let runs = (0..runs).map(|number| one(number % 3 == 0).expect("it runs"));
     let (runs, outcomes): (Vec<Run>, Vec<Outcome>) = runs.unzip();
     for outcome in outcomes {
         assert_eq!(outcome.steps, STEPS as u64);
@@ -38,35 +42,50 @@ fn assert_all_equal(one: impl Fn(bool) -> Result<(Run, Outcome), Ended>) {
 
 #[test]
 fn in_one_process_all_runs_are_equal() {
-    assert_all_equal(lock_step::in_process);
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let _load = Load::on_all_processors();
+    assert_all_equal(10, lock_step::in_process);
+}
+
+/// A run with a thread for each client.
+fn with_threads(at: Meeting, plc_first: bool) -> Result<(Run, Outcome), Ended> {
+    lock_step::served(at, |server| {
+        let mut machine = Machine::default();
+        thread::scope(|scope| {
+            let plant = || lock_step::join(server, &mut machine).expect("the plant has its run");
+            let plc = || {
+                let outcome = lock_step::join(server, &mut Program::default());
+                outcome.expect("the PLC has its run")
+            };
+            let [first, second] = if plc_first {
+                let plc = scope.spawn(plc);
+                [plc, scope.spawn(plant)]
+            } else {
+                let plant = scope.spawn(plant);
+                [plant, scope.spawn(plc)]
+            };
+            let outcome = first.join().expect("no panic");
+            assert_eq!(second.join().expect("no panic"), outcome);
+        });
+        machine.into_run()
+    })
 }
 
 #[test]
 fn over_tcp_all_runs_are_the_same_as_in_one_process() {
-    assert_all_equal(|plc_first| {
-        let (run, outcome) = lock_step::over_tcp(|address| {
-            let mut machine = Machine::default();
-            thread::scope(|scope| {
-                let plant = || {
-                    let outcome = tcp::join(address, &mut machine);
-                    outcome.expect("the plant has its run")
-                };
-                let plc = || {
-                    let outcome = tcp::join(address, &mut Program::default());
-                    outcome.expect("the PLC has its run")
-                };
-                let [first, second] = if plc_first {
-                    let plc = scope.spawn(plc);
-                    [plc, scope.spawn(plant)]
-                } else {
-                    let plant = scope.spawn(plant);
-                    [plant, scope.spawn(plc)]
-                };
-                let outcome = first.join().expect("no panic");
-                assert_eq!(second.join().expect("no panic"), outcome);
-            });
-            machine.into_run()
-        })?;
-        Ok((run, outcome))
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let _load = Load::on_all_processors();
+    assert_all_equal(10, |plc_first| {
+        with_threads(Meeting::Tcp(Address::local(0)), plc_first)
+    });
+}
+
+#[cfg(unix)]
+#[test]
+fn through_shared_memory_all_runs_are_the_same_as_in_one_process() {
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let name = format!("robot-test-{}", std::process::id());
+    assert_all_equal(3, |plc_first| {
+        with_threads(Meeting::SharedMemory(name.clone()), plc_first)
     });
 }

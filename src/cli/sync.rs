@@ -1,11 +1,12 @@
 //! `tickbus sync FILE`: the server of a run in lock-step, for clients in other processes.
 
 use std::io::{self, BufRead as _, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::thread;
 
 use super::Outcome;
 use tickbus_base::time::{Monotonic, Stop};
+use tickbus_base::toml_text::Mistakes;
 use tickbus_virtual_time as virtual_time;
 use virtual_time::server::Control;
 #[cfg(unix)]
@@ -35,6 +36,13 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         }
     };
     file.settings.paused = arguments.paused;
+    let logic = match file.logic.as_deref().map(script).transpose() {
+        Ok(logic) => logic.unwrap_or_default(),
+        Err(mistakes) => {
+            eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
+            return Outcome::WrongInput;
+        }
+    };
     let stop = Stop::new();
     if let Err(error) = ctrlc::set_handler({
         let stop = stop.clone();
@@ -53,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     if let Err(error) = spawned {
         eprintln!("sync: commands on stdin cannot be read: {error}");
     }
-    report(serve(file, &controls))
+    report(serve(file, logic, &controls))
 }
 
 /// Prints a line. If the reader of stdout is gone, the run goes on.
@@ -62,7 +70,25 @@ fn say(line: &str) {
     let _ = writeln!(out, "sync: {line}").and_then(|()| out.flush());
 }
 
-fn serve(file: RunFile, controls: &Controls) -> Result<virtual_time::Outcome, Ended> {
+#[cfg(feature = "script")]
+fn script(path: &Path) -> Result<Logic<'static>, Mistakes> {
+    virtual_time::script::load(path)
+}
+
+#[cfg(not(feature = "script"))]
+fn script(path: &Path) -> Result<Logic<'static>, Mistakes> {
+    Err(Mistakes::of_file(
+        &path.display().to_string(),
+        "this tickbus was built without scripts",
+        "build it with --features script, or remove \"logic\"",
+    ))
+}
+
+fn serve(
+    file: RunFile,
+    logic: Logic<'_>,
+    controls: &Controls,
+) -> Result<virtual_time::Outcome, Ended> {
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         controls,
@@ -79,18 +105,18 @@ fn serve(file: RunFile, controls: &Controls) -> Result<virtual_time::Outcome, En
             let listener = tcp::Listener::bind(&address)
                 .map_err(|error| failed(format!("cannot listen on {address}: {error}")))?;
             say(&format!("listening on {}", listener.address()));
-            listener.run(file.settings, Logic::new(), hosting)
+            listener.run(file.settings, logic, hosting)
         }
         #[cfg(unix)]
         Meeting::SharedMemory(name) => {
             let listener = shared_memory::Listener::bind(&name, &file.settings)
                 .map_err(|error| failed(format!("cannot offer the memory \"{name}\": {error}")))?;
             say(&format!("waiting in the shared memory \"{name}\""));
-            listener.run(file.settings, Logic::new(), hosting)
+            listener.run(file.settings, logic, hosting)
         }
         #[cfg(not(unix))]
         Meeting::SharedMemory(_) => {
-            let reason = "this system has no shared memory for clients; use \"listen\"";
+            let reason = "this system has no shared memory for clients; use listen";
             Err(failed(reason.to_owned()))
         }
     }

@@ -8,8 +8,8 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 
 use super::layout;
 use super::mailbox::Mailbox;
-use super::patience::look;
-use crate::client::{Asked, Caller, Client, Line, client_of, silent};
+use super::patience::Patience;
+use crate::client::{Client, Connection, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a wait sleeps before it looks whether the server is alive.
@@ -59,7 +59,7 @@ pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, En
     })?;
     let spins = memory.memory().word(layout::SPINS).load(Relaxed);
     let line = MemoryLine {
-        spins: u32::try_from(spins).unwrap_or(0),
+        patience: Patience::new(u32::try_from(spins).unwrap_or(0)),
         up: Mailbox::new(layout::up(seat)),
         down: Mailbox::new(layout::down(seat)),
         memory,
@@ -67,58 +67,14 @@ pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, En
         stop: stop.clone(),
         frame: Vec::new(),
     };
-    Ok(Connection(Caller::join(client, line)))
-}
-
-/// A client's seat at its server, for a simulation that calls instead of being called: [`wait`](Self::wait) for a step,
-/// run it, [`answer`](Self::answer).
-#[derive(Debug)]
-pub struct Connection(Caller<MemoryLine>);
-
-impl Connection {
-    /// The client: what it declared, and what it reads in the step that was asked for.
-    pub const fn client(&self) -> &Client {
-        &self.0.client
-    }
-
-    /// As [`tcp::Connection::wait`](crate::tcp::Connection::wait).
-    ///
-    /// # Errors
-    ///
-    /// The server is gone, violates the protocol or says nothing, or this client was stopped.
-    pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
-        self.0.wait(limit)
-    }
-
-    /// As [`tcp::Connection::answer`](crate::tcp::Connection::answer).
-    ///
-    /// # Panics
-    ///
-    /// When nothing was asked, or the number of values is another one.
-    pub fn answer(&mut self, writes: &[u64]) {
-        self.0.answer(writes);
-    }
-
-    /// As [`tcp::Connection::give_up`](crate::tcp::Connection::give_up).
-    pub fn give_up(&mut self, reason: &str) {
-        self.0.give_up(reason);
-    }
-
-    /// Lets `participant` take part, until the end of the run.
-    ///
-    /// # Errors
-    ///
-    /// The run was broken off.
-    pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
-        self.0.run(participant)
-    }
+    Ok(Connection::join(client, line))
 }
 
 #[derive(Debug)]
 struct MemoryLine {
     memory: NamedMemory,
     seat: usize,
-    spins: u32,
+    patience: Patience,
     up: Mailbox,
     down: Mailbox,
     stop: Stop,
@@ -136,9 +92,10 @@ impl MemoryLine {
     }
 
     /// Waits until a frame has come, for [`NAP`] at most.
-    fn nap(&self) {
+    fn nap(&mut self) {
         let memory = self.memory.memory();
-        if look(self.spins, || self.down.has_frame(memory)) {
+        let down = self.down;
+        if self.patience.look(|| down.has_frame(memory)) {
             return;
         }
         let sleeps = memory.word(layout::owner(self.seat) + layout::SLEEPS);
@@ -155,8 +112,9 @@ impl Line for MemoryLine {
     fn send(&mut self, frame: &[u8]) {
         // The server takes each frame as soon as it looks; one that does not is found out by receiving.
         let memory = self.memory.memory();
-        while !self.up.has_room(memory) && self.memory.is_served() {
-            look(0, || self.up.has_room(memory));
+        let up = self.up;
+        while !self.patience.look(|| up.has_room(memory)) && self.memory.is_served() {
+            self.ring();
         }
         self.up.post(memory, &frame[wire::HEADER..]);
         self.ring();

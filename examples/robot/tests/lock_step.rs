@@ -82,7 +82,7 @@ fn over_tcp_all_runs_are_the_same_as_in_one_process() {
 
 #[cfg(unix)]
 #[test]
-fn through_shared_memory_all_runs_are_the_same_as_in_one_process() {
+fn through_shared_memory_a_run_is_the_same_as_in_one_process() {
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let name = format!("robot-test-{}", std::process::id());
     assert_all_equal(3, |plc_first| {

@@ -1,6 +1,6 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-peeler demo-profibus test bench soak lint dist build setup clean
+.PHONY: help demo demo-peeler demo-profibus demo-robot test bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -14,6 +14,9 @@ demo-peeler: ## build, then watch two PLCs peel blocks of wood to veneer over th
 
 demo-profibus: ## build, then watch the PLC program run the rig over PROFIBUS, by a master that others wrote
 	@exec tools/demo-profibus
+
+demo-robot: ## build, then run a servo robot and its PLC in lock-step and free-wheeling, and draw the paths
+	@exec tools/demo-robot
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test

@@ -13,7 +13,8 @@ use tickbus_base::time::Nanos;
 
 const TEMPLATE: &str = include_str!("template.html");
 const CHART: &str = include_str!("chart.html");
-const STYLE: &str = include_str!("style.css");
+/// The style of the page, for other pages that are to look like it.
+pub const STYLE: &str = include_str!("style.css");
 const SCRIPT: [&str; 4] = [
     include_str!("data.js"),
     include_str!("draw.js"),

@@ -1,0 +1,233 @@
+package tickbus.sdsp;
+
+import java.io.IOException;
+import java.net.SocketAddress;
+import java.nio.ByteBuffer;
+import java.nio.channels.ClosedByInterruptException;
+import java.nio.charset.StandardCharsets;
+import tickbus.sdsp.EndedException.Cause;
+
+/** Lets a {@link Participant} take part in a run over TCP. */
+public final class Client {
+    private static final byte[] MAGIC = {'S', 'D', 'S', 'P'};
+    private static final short VERSION = 1;
+
+    private static final byte JOIN = 0x01;
+    private static final byte DONE = 0x02;
+    private static final byte GIVE_UP = 0x03;
+    private static final byte START = (byte) 0x81;
+    private static final byte STEP = (byte) 0x82;
+    private static final byte FINISHED = (byte) 0x83;
+    private static final byte ENDED = (byte) 0x84;
+
+    private static final int LONGEST_NAME = 255;
+    private static final int LONGEST_REASON = 4096;
+    private static final Cause[] CAUSES = Cause.values();
+
+    private final Frames frames;
+    private final Participant participant;
+    private final long[] reads;
+    private final long[] writes;
+    /** The step that it ran last; 0 is the initial write, and -1 before that. */
+    private long ran = -1;
+    /** Why the participant cannot go on. */
+    private Exception failure;
+
+    private Client(Frames frames, Participant participant, Declaration declaration) {
+        this.frames = frames;
+        this.participant = participant;
+        reads = new long[declaration.reads().size()];
+        writes = new long[declaration.writes().size()];
+    }
+
+    /**
+     * Takes part in the run of the server at an address, until its end. Blocks the thread; an interrupt of it leaves the run.
+     *
+     * @param address the server's address
+     * @param participant what runs in each step
+     * @return how the run ended
+     * @throws EndedException if there is no server, it refuses this client, or the run was broken off
+     * @throws IllegalArgumentException if a name of the declaration is empty or longer than 255 bytes, or all of them together
+     *     take more than a mebibyte
+     */
+    public static Outcome join(SocketAddress address, Participant participant) throws EndedException {
+        Declaration declaration = participant.declare();
+        int size = size(declaration);
+        Client client = null;
+        try (Frames frames = new Frames(address)) {
+            client = new Client(frames, participant, declaration);
+            client.join(declaration, size);
+            return client.run();
+        } catch (ClosedByInterruptException e) {
+            throw ended(client, Cause.STOPPED, "this client was interrupted", e);
+        } catch (Frames.Violation e) {
+            throw ended(client, Cause.PROTOCOL, "the server violates the protocol: it " + e.getMessage(), e);
+        } catch (IOException e) {
+            throw ended(client, Cause.LOST, client == null
+                ? "no server can be reached at " + address + " (" + e.getMessage() + "); start it first, or correct the address"
+                : "the server was lost: " + e.getMessage(), e);
+        }
+    }
+
+    private static EndedException ended(Client client, Cause cause, String reason, IOException e) {
+        EndedException ended = new EndedException(cause, null, reason, client == null ? 0 : Math.max(client.ran - 1, 0));
+        ended.initCause(e);
+        return ended;
+    }
+
+    /** The size of a join without its kind. */
+    private static int size(Declaration declaration) {
+        long size = MAGIC.length + Short.BYTES + Integer.BYTES + 2 * Short.BYTES + name(declaration.name()).length + 1;
+        for (Variable variable : declaration.writes()) {
+            size += 2 + name(variable.name()).length;
+        }
+        for (String read : declaration.reads()) {
+            size += 1 + name(read).length;
+        }
+        return (int) size;
+    }
+
+    private static byte[] name(String name) {
+        byte[] bytes = name.getBytes(StandardCharsets.UTF_8);
+        if (bytes.length == 0 || bytes.length > LONGEST_NAME) {
+            throw new IllegalArgumentException(
+                "the name \"" + name + "\" has " + bytes.length + " bytes; a name has 1 to " + LONGEST_NAME);
+        }
+        return bytes;
+    }
+
+    private static void putName(ByteBuffer out, String name) {
+        byte[] bytes = name(name);
+        out.put((byte) bytes.length).put(bytes);
+    }
+
+    private void join(Declaration declaration, int size) throws IOException {
+        ByteBuffer out = frames.begin(1 + size, JOIN);
+        out.put(MAGIC).putShort(VERSION).putInt(declaration.multiple());
+        putName(out, declaration.name());
+        out.putShort((short) declaration.writes().size());
+        for (Variable variable : declaration.writes()) {
+            out.put(variable.type().code());
+            putName(out, variable.name());
+        }
+        out.putShort((short) declaration.reads().size());
+        for (String read : declaration.reads()) {
+            putName(out, read);
+        }
+        frames.send();
+    }
+
+    private Outcome run() throws IOException, EndedException {
+        try {
+            while (true) {
+                ByteBuffer in = frames.receive();
+                byte kind = in.get();
+                switch (kind) {
+                    case START -> start(in);
+                    case STEP -> step(in);
+                    case FINISHED -> {
+                        frames.expect(3 * Long.BYTES);
+                        return new Outcome(in.getLong(), in.getLong(), in.getLong());
+                    }
+                    case ENDED -> throw ended(in);
+                    default -> throw new Frames.Violation(String.format("sent a message of the unknown kind 0x%02X", kind));
+                }
+            }
+        } catch (Frames.Violation e) {
+            giveUp("the server violates the protocol: it " + e.getMessage());
+            throw e;
+        }
+    }
+
+    private void start(ByteBuffer in) throws IOException {
+        frames.expect(Long.BYTES);
+        in.getLong();
+        if (ran >= 0) {
+            throw new Frames.Violation("started twice");
+        }
+        // The types of what is read, which the participant knows.
+        expectValues(frames.left());
+        in.position(in.position() + frames.left());
+        participant.initial(writes);
+        done(0);
+    }
+
+    private void step(ByteBuffer in) throws IOException {
+        frames.expect(2 * Long.BYTES);
+        long sequence = in.getLong();
+        long nanos = in.getLong();
+        if (ran < 0 || sequence <= ran || failure != null) {
+            throw new Frames.Violation("asked for step " + sequence + " out of order");
+        }
+        expectValues(frames.left() / Long.BYTES);
+        for (int at = 0; at < reads.length; at++) {
+            reads[at] = in.getLong();
+        }
+        if (frames.left() > 0) {
+            throw new Frames.Violation("sent a message that ends within a value");
+        }
+        try {
+            participant.run(sequence, nanos, reads, writes);
+        } catch (Exception e) {
+            failure = e;
+            // The server answers with the end.
+            giveUp(e.getMessage() == null ? e.toString() : e.getMessage());
+            return;
+        }
+        done(sequence);
+    }
+
+    private void expectValues(int count) throws Frames.Violation {
+        if (count != reads.length) {
+            throw new Frames.Violation("sent " + count + " values, expected " + reads.length);
+        }
+    }
+
+    private void done(long sequence) throws IOException {
+        ran = sequence;
+        ByteBuffer out = frames.begin(1 + Long.BYTES * (1 + writes.length), DONE);
+        out.putLong(sequence);
+        for (long slot : writes) {
+            out.putLong(slot);
+        }
+        sendIfPossible();
+    }
+
+    /** If this fails, the server may have said why before: what is received next is that, or tells that it is lost. */
+    private void sendIfPossible() throws IOException {
+        try {
+            frames.send();
+        } catch (ClosedByInterruptException e) {
+            throw e;
+        } catch (IOException e) {
+            // See above.
+        }
+    }
+
+    private void giveUp(String reason) throws IOException {
+        byte[] text = reason.getBytes(StandardCharsets.UTF_8);
+        int length = Math.min(text.length, LONGEST_REASON);
+        while (length < text.length && (text[length] & 0xC0) == 0x80) {
+            // Not within a character.
+            length--;
+        }
+        frames.begin(1 + length, GIVE_UP).put(text, 0, length);
+        sendIfPossible();
+    }
+
+    private EndedException ended(ByteBuffer in) throws Frames.Violation {
+        frames.expect(1 + Long.BYTES + 1);
+        int code = in.get();
+        if (code < 1 || code > CAUSES.length) {
+            throw new Frames.Violation("sent the unknown cause " + code);
+        }
+        long steps = in.getLong();
+        String client = frames.text(Byte.toUnsignedInt(in.get()));
+        String reason = frames.text(frames.left());
+        EndedException ended = new EndedException(CAUSES[code - 1], client.isEmpty() ? null : client, reason, steps);
+        if (failure != null) {
+            ended.initCause(failure);
+        }
+        return ended;
+    }
+}

@@ -1,0 +1,126 @@
+package tickbus.sdsp;
+
+import java.io.Closeable;
+import java.io.EOFException;
+import java.io.IOException;
+import java.net.SocketAddress;
+import java.net.StandardSocketOptions;
+import java.net.UnknownHostException;
+import java.nio.ByteBuffer;
+import java.nio.ByteOrder;
+import java.nio.channels.SocketChannel;
+import java.nio.channels.UnresolvedAddressException;
+import java.nio.charset.StandardCharsets;
+
+/** Frames over a blocking socket. An interrupt of the thread that waits for one closes it. */
+final class Frames implements Closeable {
+    /** The longest frame, without the four bytes of its length. */
+    private static final int LONGEST = 1 << 20;
+    private static final int HEADER = 4;
+
+    private final SocketChannel channel;
+    private ByteBuffer in = buffer(8192).limit(0);
+    private ByteBuffer out = buffer(8192);
+    /** Where in the buffer the frame ends that was received last. */
+    private int end;
+
+    Frames(SocketAddress address) throws IOException {
+        try {
+            channel = SocketChannel.open(address);
+        } catch (UnresolvedAddressException e) {
+            throw new UnknownHostException("unknown host");
+        }
+        try {
+            channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
+            channel.setOption(StandardSocketOptions.SO_KEEPALIVE, true);
+        } catch (IOException e) {
+            channel.close();
+            throw e;
+        }
+    }
+
+    private static ByteBuffer buffer(int size) {
+        // Outside of the heap, where the system reads and writes without a copy.
+        return ByteBuffer.allocateDirect(size).order(ByteOrder.LITTLE_ENDIAN);
+    }
+
+    /** Begins a frame of this length, which counts its kind; what follows is put into the buffer. */
+    ByteBuffer begin(int length, byte kind) {
+        if (length > LONGEST) {
+            throw new IllegalArgumentException("a message of " + length + " bytes is too long, the most is " + LONGEST
+                + "; shorten the names of the variables, or make several clients of it");
+        }
+        if (out.capacity() < HEADER + length) {
+            out = buffer(HEADER + length);
+        }
+        return out.clear().putInt(length).put(kind);
+    }
+
+    /** Sends the frame that was begun. */
+    void send() throws IOException {
+        out.flip();
+        while (out.hasRemaining()) {
+            channel.write(out);
+        }
+    }
+
+    /** Waits for a frame; it is in the buffer up to {@link #left}, without its length. */
+    ByteBuffer receive() throws IOException {
+        await(HEADER);
+        int length = in.getInt();
+        if (length < 1 || length > LONGEST) {
+            throw new Violation("sent a frame of " + Integer.toUnsignedString(length) + " bytes, expected 1 to " + LONGEST);
+        }
+        await(length);
+        end = in.position() + length;
+        return in;
+    }
+
+    /** How many bytes of the frame are left. */
+    int left() {
+        return end - in.position();
+    }
+
+    private void await(int count) throws IOException {
+        while (in.remaining() < count) {
+            in.compact();
+            if (in.capacity() < count) {
+                in = buffer(HEADER + count).put(in.flip());
+            }
+            int read = channel.read(in);
+            in.flip();
+            if (read < 0) {
+                throw new EOFException("it closed the connection");
+            }
+        }
+    }
+
+    /** Checks that this many bytes of the frame are left. */
+    void expect(int count) throws Violation {
+        if (left() < count) {
+            throw new Violation("sent a message that is too short");
+        }
+    }
+
+    /** Reads a text of this many bytes. */
+    String text(int bytes) throws Violation {
+        expect(bytes);
+        byte[] text = new byte[bytes];
+        in.get(text);
+        return new String(text, StandardCharsets.UTF_8);
+    }
+
+    @Override
+    public void close() throws IOException {
+        channel.close();
+    }
+
+    /** How the server violates the protocol, as the continuation of "it …". */
+    static final class Violation extends IOException {
+        private static final long serialVersionUID = 1L;
+
+        Violation(String what) {
+            super(what);
+        }
+    }
+}

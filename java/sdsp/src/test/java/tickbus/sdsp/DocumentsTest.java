@@ -1,0 +1,83 @@
+package tickbus.sdsp;
+
+import static org.junit.jupiter.api.Assertions.assertArrayEquals;
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+
+import java.io.IOException;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.HexFormat;
+import java.util.List;
+import java.util.regex.Matcher;
+import java.util.regex.Pattern;
+import javax.tools.ToolProvider;
+import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.Timeout;
+import org.junit.jupiter.api.io.TempDir;
+
+/** What the documents show is so. */
+@Timeout(60)
+class DocumentsTest {
+    private static String document(String name) throws IOException {
+        return Files.readString(Path.of(System.getProperty("tickbus.root"), "docs", name));
+    }
+
+    /** The first fenced block in the document that begins like this. */
+    private static String block(String name, String begin) throws IOException {
+        Matcher block = Pattern.compile("^```\\w*\n(" + Pattern.quote(begin) + ".*?)^```", Pattern.DOTALL | Pattern.MULTILINE)
+            .matcher(document(name));
+        assertTrue(block.find(), "a block that begins with: " + begin);
+        return block.group(1);
+    }
+
+    @Test
+    void theProgramInTheGuideCompiles(@TempDir Path folder) throws IOException {
+        Path source = folder.resolve("Tank.java");
+        Files.writeString(source, block("virtual-time.md", "import java"));
+        String classPath = System.getProperty("surefire.test.class.path", System.getProperty("java.class.path"));
+        int code = ToolProvider.getSystemJavaCompiler().run(null, null, null, "-Xlint:all", "-Werror", "--release", "17",
+            "-cp", classPath, "-d", folder.toString(), source.toString());
+        assertEquals(0, code);
+    }
+
+    /** Writes fixed values, one after another. */
+    private record Player(Declaration declare, List<Long> values) implements Participant {
+        @Override
+        public void initial(long[] writes) {
+            writes[0] = values.get(0);
+        }
+
+        @Override
+        public void run(long sequence, long nanos, long[] reads, long[] writes) {
+            writes[0] = values.get((int) sequence);
+        }
+    }
+
+    @Test
+    void theBytesInTheFormatAreThoseOfThisClient() throws Exception {
+        play(new Player(new Declaration("tank", 1, List.of(new Variable("level", DataType.REAL)), List.of("speed")),
+            List.of((long) Float.floatToRawIntBits(2.5f), (long) Float.floatToRawIntBits(2.25f))));
+        play(new Player(new Declaration("plc", 2, List.of(new Variable("speed", DataType.INT)), List.of("level")),
+            List.of(0L, -300L)));
+    }
+
+    private static void play(Player client) throws Exception {
+        String[] lines = block("sdsp.md", "tank > ").split("\n");
+        try (FakeServer server = new FakeServer(s -> {
+            for (String line : lines) {
+                Matcher part = Pattern.compile(client.declare.name() + " +([<>])((?: [0-9a-f]{2})+).*").matcher(line);
+                if (part.matches()) {
+                    byte[] bytes = HexFormat.ofDelimiter(" ").parseHex(part.group(2).strip());
+                    if (part.group(1).equals(">")) {
+                        assertArrayEquals(bytes, s.receiveRaw(bytes.length), line);
+                    } else {
+                        s.sendRaw(bytes);
+                    }
+                }
+            }
+        })) {
+            assertEquals(new Outcome(1, 0, 0xe7880c6272ef59bfL), Client.join(server.address(), client));
+        }
+    }
+}

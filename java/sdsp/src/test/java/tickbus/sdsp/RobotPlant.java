@@ -1,0 +1,37 @@
+package tickbus.sdsp;
+
+import java.util.List;
+
+/** The plant of examples/robot. */
+class RobotPlant implements Participant {
+    private static final double CATCH_UP = 0.048770575499285984;
+
+    private final double[] position = new double[2];
+    private final double[] speed = new double[2];
+
+    @Override
+    public Declaration declare() {
+        return new Declaration("plant", 1,
+            List.of(new Variable("position_x", DataType.LREAL), new Variable("position_z", DataType.LREAL)),
+            List.of("speed_x", "speed_z"));
+    }
+
+    @Override
+    public void initial(long[] writes) {
+        write(writes);
+    }
+
+    @Override
+    public void run(long sequence, long nanos, long[] reads, long[] writes) {
+        for (int axis = 0; axis < 2; axis++) {
+            speed[axis] += (Double.longBitsToDouble(reads[axis]) - speed[axis]) * CATCH_UP;
+            position[axis] += speed[axis] * 1e-3;
+        }
+        write(writes);
+    }
+
+    private void write(long[] writes) {
+        writes[0] = Double.doubleToRawLongBits(position[0]);
+        writes[1] = Double.doubleToRawLongBits(position[1]);
+    }
+}

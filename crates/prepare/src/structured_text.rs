@@ -231,7 +231,7 @@ impl Preparation<'_, '_> {
         } else {
             edits.insert(code.start(first), format!("{task}{indent}"), MARKS);
         }
-        let program = format!("PROGRAM tickbus_scheduler WITH {TASK} : {SCHEDULE};{indent}");
+        let program = format!("PROGRAM tickbus_first WITH {TASK} : {SCHEDULE};{indent}");
         edits.insert(code.start(first), program, MARKS);
         for instance in &configuration.instances {
             match instance.task {

@@ -89,7 +89,7 @@ fn a_prepared_program_is_the_original_with_marked_changes() {
          tickbus_execute_fast : BOOL;\n    tickbus_execute_slow : BOOL;\n  END_VAR(*tickbus}*)\n",
         "(*{tickbus TASK fast%28INTERVAL := T#10ms, PRIORITY := 0%29;*)TASK tickbus_cycle(INTERVAL := T#10ms, PRIORITY := 1);(*tickbus}*)\n",
         "(*{tickbus TASK slow%28INTERVAL := T#30ms, PRIORITY := 1%29;*)(*tickbus}*)\n",
-        "(*{tickbus*)PROGRAM tickbus_scheduler WITH tickbus_cycle : TICKBUS_SCHEDULE;\n(*tickbus}*)PROGRAM a WITH \
+        "(*{tickbus*)PROGRAM tickbus_first WITH tickbus_cycle : TICKBUS_SCHEDULE;\n(*tickbus}*)PROGRAM a WITH \
          (*{tickbus fast*)tickbus_cycle(*tickbus}*) : one;\n",
     ] {
         assert!(rest.contains(piece), "{piece}\n{rest}");

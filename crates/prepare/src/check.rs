@@ -63,41 +63,41 @@ pub(crate) fn all_declarations(outline: &Outline) -> impl Iterator<Item = Range<
 
 /// Reports what cannot be prepared in a source.
 pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &Collector<'_>) {
-    names(code, wrong);
+    check_words(code, wrong);
     for inner in all_declarations(outline) {
         for at in declared(code, inner).types {
-            check_type(code, at, world, wrong);
+            check_type(code.word(at), code.start(at), world, wrong);
         }
     }
     for unit in &outline.units {
         for at in unit.returns.clone().filter(|at| code.is_word(*at)) {
-            check_type(code, at, world, wrong);
+            check_type(code.word(at), code.start(at), world, wrong);
         }
         check_unit(code, unit, world, wrong);
     }
 }
 
 /// Comments within comments, names that are taken, and code that a pragma hands to a compiler.
-fn names(code: &Code<'_>, wrong: &Collector<'_>) {
+pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
     for token in &code.all {
         let text = &code.text[token.range()];
         match token.kind {
             Kind::Comment if text.len() > 2 && text.starts_with("(*") => {
                 if let Some(at) = text[2..].find("(*") {
                     wrong.report(
-                        token.start + 2 + at,
+                        code.base + token.start + 2 + at,
                         "a comment begins within a comment",
                         "some compilers end the outer one at the first *), others do not; take out the (*",
                     );
                 }
             }
             Kind::Pragma if text.contains("__CURRENT_TIME") => wrong.report(
-                token.start,
+                code.base + token.start,
                 "this pragma reads the time of the PLC",
                 "use a TON, TOF, TP or RTC",
             ),
             Kind::Word if text.to_uppercase().starts_with(words::PREFIX) => wrong.report(
-                token.start,
+                code.base + token.start,
                 format!("the name {} is one of those that are put in", shown(text)),
                 "a program that was synchronised by hand needs no preparing; otherwise choose another name",
             ),
@@ -106,22 +106,22 @@ fn names(code: &Code<'_>, wrong: &Collector<'_>) {
     }
 }
 
-fn check_type(code: &Code<'_>, at: usize, world: &World, wrong: &Collector<'_>) {
-    let name = code.capitals(at);
-    if world.types.contains(&name) || world.is_timer(&name) || words::is_standard_type(&name) {
+/// Reports a type, named at a byte of the file, that runs on a clock, or of which that is not known.
+pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector<'_>) {
+    let is_own = world.types.contains(&name.to_uppercase());
+    if is_own || world.is_timer(name) || words::is_standard_type(name) {
         return;
     }
-    let what = code.word(at);
-    if words::is_clock(&name) {
+    if words::is_clock(name) {
         wrong.report(
-            code.start(at),
-            format!("{what} runs on a clock of its own"),
+            at,
+            format!("{} runs on a clock of its own", shown(name)),
             "use TON, TOF, TP or RTC, or a block of your own that is built from them",
         );
     } else {
         wrong.report(
-            code.start(at),
-            format!("the type {} is in none of these sources", shown(what)),
+            at,
+            format!("the type {} is in none of these sources", shown(name)),
             "hand in its source too; if it comes from a library and uses no clock, name it with --no-clock",
         );
     }
@@ -152,7 +152,8 @@ fn check_unit(code: &Code<'_>, unit: &Unit, world: &World, wrong: &Collector<'_>
     }
 }
 
-fn check_statements(
+/// Reports clocks that are read in statements, and calls of which that is not known.
+pub(crate) fn check_statements(
     code: &Code<'_>,
     body: &Range<usize>,
     known: &HashSet<String>,

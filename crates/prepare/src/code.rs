@@ -8,16 +8,28 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(crate) struct Code<'t> {
     pub(crate) text: &'t str,
+    /// Where the text stands in its file.
+    pub(crate) base: usize,
     pub(crate) all: Vec<Token>,
     pub(crate) tokens: Vec<Token>,
 }
 
 impl<'t> Code<'t> {
     pub(crate) fn new(text: &'t str) -> Self {
+        Self::part(text, 0)
+    }
+
+    /// A part of a file, at this byte.
+    pub(crate) fn part(text: &'t str, base: usize) -> Self {
         let all = tokens(text);
         let has_meaning = |token: &&Token| !token.kind.is_trivia() && token.kind != Kind::Pragma;
         let tokens = all.iter().filter(has_meaning).copied().collect();
-        Self { text, all, tokens }
+        Self {
+            text,
+            base,
+            all,
+            tokens,
+        }
     }
 
     /// What the token reads; nothing behind the last one.
@@ -47,33 +59,30 @@ impl<'t> Code<'t> {
         self.tokens.get(at).map(|token| token.kind)
     }
 
-    /// The byte offset of a token; behind the last one the end of the source.
+    /// The byte offset of a token in the file; behind the last one the end of the part.
     pub(crate) fn start(&self, at: usize) -> usize {
-        self.tokens
-            .get(at)
-            .map_or(self.text.len(), |token| token.start)
+        let token = self.tokens.get(at);
+        self.base + token.map_or(self.text.len(), |token| token.start)
     }
 
     pub(crate) fn end(&self, at: usize) -> usize {
-        self.tokens
-            .get(at)
-            .map_or(self.text.len(), |token| token.end)
+        let token = self.tokens.get(at);
+        self.base + token.map_or(self.text.len(), |token| token.end)
     }
 
-    /// The bytes from the first to the last of these tokens, with the pragmas before and behind them; `None` if there is
-    /// neither a token nor a pragma.
+    /// The bytes in the file from the first to the last of these tokens, with the pragmas before and behind them; `None` if
+    /// there is neither a token nor a pragma.
     pub(crate) fn bytes(&self, range: &Range<usize>) -> Option<Range<usize>> {
-        let start = range.start.checked_sub(1).map_or(0, |last| self.end(last));
-        let end = self.start(range.end);
-        let inner = self.all.iter().filter(|token| {
+        let before = range.start.checked_sub(1);
+        let start = before.map_or(self.base, |last| self.end(last)) - self.base;
+        let end = self.start(range.end) - self.base;
+        let is_inner = |token: &&Token| {
             !token.kind.is_trivia() && token.start >= start && token.end <= end.max(start)
-        });
-        let (mut first, mut last) = (None, 0);
-        for token in inner {
-            first.get_or_insert(token.start);
-            last = token.end;
-        }
-        first.map(|first| first..last)
+        };
+        let mut inner = self.all.iter().filter(is_inner);
+        let first = inner.next()?;
+        let last = inner.next_back().unwrap_or(first);
+        Some(self.base + first.start..self.base + last.end)
     }
 
     /// The index of the token that closes the bracket at `at`, or that of `end`.

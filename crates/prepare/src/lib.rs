@@ -21,10 +21,13 @@ mod edit;
 mod lexer;
 mod library;
 mod outline;
+mod plan;
+mod plcopen;
 mod structured_text;
 #[cfg(test)]
 mod tests;
 mod words;
+mod xml;
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -110,8 +113,19 @@ fn prepared(
             wrong.report(at, "this is no text in UTF-8", "save it as UTF-8");
         }
     }
-    if !wrong.iter().all(is_clean) {
+    let projects = texts
+        .iter()
+        .zip(wrong)
+        .filter(|((text, _), _)| xml::is_xml(text));
+    for (_, wrong) in projects.clone().filter(|_| texts.len() > 1) {
+        wrong.collect(0, xml::not_alone());
+    }
+    if !wrong.iter().all(Collector::is_empty) {
         return None;
+    }
+    if let Some(((text, _), wrong)) = projects.last() {
+        let (made, notes) = xml::prepare(text, settings, wrong)?;
+        return Some((vec![made], notes));
     }
     let codes: Vec<Code<'_>> = texts.iter().map(|(text, _)| Code::new(text)).collect();
     let mut outlines: Vec<Outline> = Vec::new();
@@ -124,7 +138,7 @@ fn prepared(
             }
         }
     }
-    if !wrong.iter().all(is_clean) {
+    if !wrong.iter().all(Collector::is_empty) {
         return None;
     }
     let mut world = World::default();
@@ -160,7 +174,7 @@ fn prepared(
             wrong[home].report(at, what, "hand in its source too");
         }
     }
-    if !wrong.iter().all(is_clean) {
+    if !wrong.iter().all(Collector::is_empty) {
         return None;
     }
     let parts: Vec<Preparation<'_, '_>> = (codes.iter().zip(&outlines))
@@ -177,10 +191,6 @@ fn prepared(
     let files = parts.iter().enumerate();
     let files = files.map(|(index, part)| part.text((index == home).then_some(blocks.as_str())));
     Some((files.collect(), note.into_iter().collect()))
-}
-
-fn is_clean(wrong: &Collector<'_>) -> bool {
-    wrong.is_empty()
 }
 
 /// Takes out what [`prepare`] has put in; what was changed elsewhere since then stays.
@@ -205,6 +215,11 @@ pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
 fn nothing_to_undo() -> Mistake {
     let right = "name a file that was prepared; an editor may have dropped its comments";
     Mistake::new("there is nothing to take out of this file", right)
+}
+
+/// The blocks of a source of ours, one of [`SOURCES`], as a file in `PLCopen` XML.
+pub fn plcopen_xml(name: &str, source: &str) -> String {
+    plcopen::document(name, source)
 }
 
 /// How the bytes of a source stand for characters.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::code::Code;
-use super::lexer::Kind;
+use super::lexer::{Kind, Token};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 
@@ -90,7 +90,7 @@ pub(crate) struct Declared {
 /// The byte offset of the first thing that cannot be read, and what is wrong with it.
 pub(crate) fn outline(code: &Code<'_>) -> Result<Outline, (usize, Mistake)> {
     let mut reader = Reader { code, at: 0 };
-    if let Some(token) = code.all.iter().find(|token| token.kind == Kind::Endless) {
+    if let Some(token) = endless(code) {
         let right = "end it; a text in quotes ends in its line";
         return Err((
             token.start,
@@ -119,6 +119,11 @@ pub(crate) fn outline(code: &Code<'_>) -> Result<Outline, (usize, Mistake)> {
         }
     }
     Ok(found)
+}
+
+/// The comment, pragma or text that has no end.
+pub(crate) fn endless<'c>(code: &'c Code<'_>) -> Option<&'c Token> {
+    code.all.iter().find(|token| token.kind == Kind::Endless)
 }
 
 struct Reader<'c, 't> {

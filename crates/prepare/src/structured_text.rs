@@ -1,28 +1,18 @@
 //! Prepares sources in Structured Text.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::chart::{chart, is_chart};
 use super::check::{World, all_declarations};
 use super::code::{Code, line_end};
-use super::duration;
 use super::edit::{Edits, Marks};
-use super::library::{self, Addresses, SCHEDULE, Signal, TASK};
+use super::library::{self, Addresses, SCHEDULE, TASK};
 use super::outline::{Configuration, Outline, Section, UnitKind, declared};
-use tickbus_base::toml_text::{Collector, shown};
+use super::plan::{self, Named, Plan};
+use tickbus_base::toml_text::Collector;
 
 const MARKS: Marks = Marks::StructuredText;
-
-/// What the configuration says about when programs run.
-#[derive(Debug, Default)]
-pub(crate) struct Plan {
-    pub(crate) signals: Vec<Signal>,
-    /// The signal of each program, by its name in capitals.
-    pub(crate) programs: BTreeMap<String, String>,
-    /// The interval of the one task, in milliseconds.
-    pub(crate) cycle: u32,
-}
 
 /// When the programs of a configuration run; what cannot be done is reported, and a remark returned.
 pub(crate) fn plan(
@@ -30,100 +20,26 @@ pub(crate) fn plan(
     configuration: &Configuration,
     wrong: &Collector<'_>,
 ) -> (Plan, Option<String>) {
-    let mut plan = Plan::default();
     if let Some(second) = configuration.resources.get(1) {
-        let right = "put all tasks and programs into one resource";
-        wrong.report(code.start(*second), "this is a second resource", right);
+        wrong.collect(code.start(*second), plan::second_resource());
     }
-    let mut tasks: BTreeMap<String, Signal> = BTreeMap::new();
-    let mut shortest: Option<u32> = None;
-    for task in &configuration.tasks {
-        let report =
-            |at: usize, what: String, right: &str| wrong.report(code.start(at), what, right);
-        if let Some(at) = task.single {
-            report(
-                at,
-                "this task starts at an event".to_owned(),
-                "call its programs from a cyclic task",
-            );
-        }
-        let Some(at) = task.interval else {
-            report(
-                task.name,
-                "this task has no INTERVAL".to_owned(),
-                "write INTERVAL := T#10ms",
-            );
-            continue;
-        };
-        match duration::milliseconds(code.word(at)) {
-            Ok(interval) => {
-                shortest = Some(shortest.map_or(interval, |shortest| shortest.min(interval)));
-                let signal = Signal::new(Some(code.word(task.name)), Some(interval));
-                tasks.insert(code.capitals(task.name), signal);
-            }
-            Err(why) => report(
-                at,
-                format!("the interval {} {why}", shown(code.word(at))),
-                "write whole milliseconds, such as T#10ms: TIME has no more on many PLCs",
-            ),
-        }
-    }
-    plan.cycle = shortest.unwrap_or(10);
-    if configuration.instances.is_empty() {
-        let right = "write PROGRAM name WITH task : program;";
-        wrong.report(
-            code.start(configuration.name),
-            "no program runs here",
-            right,
-        );
-    }
-    for instance in &configuration.instances {
-        let signal = match instance.task.map(|at| (at, tasks.get(&code.capitals(at)))) {
-            None => Signal::new(None, None),
-            Some((_, Some(signal))) => signal.clone(),
-            Some((at, None)) => {
-                let is_there = (configuration.tasks.iter())
-                    .any(|task| code.capitals(task.name) == code.capitals(at));
-                if !is_there {
-                    let what = format!("there is no task {}", shown(code.word(at)));
-                    wrong.report(code.start(at), what, "write a TASK of that name before");
-                }
-                continue;
-            }
-        };
-        if !plan.signals.contains(&signal) {
-            plan.signals.push(signal.clone());
-        }
-        let before = (plan.programs).insert(code.capitals(instance.program), signal.name.clone());
-        if before.is_some_and(|before| before != signal.name) {
-            wrong.report(
-                code.start(instance.program),
-                format!("{} runs in two tasks", shown(code.word(instance.program))),
-                "give each task a program of its own: its execution controller waits for one signal",
-            );
-        }
-    }
-    let note = order_note(code, configuration);
-    (plan, note)
-}
-
-/// In one task programs run as listed: a remark where priorities said otherwise.
-fn order_note(code: &Code<'_>, configuration: &Configuration) -> Option<String> {
-    let priority = |task: Option<usize>| {
-        let task = task.map(|at| code.capitals(at))?;
-        let mut tasks = configuration.tasks.iter();
-        let found = tasks.find(|one| code.capitals(one.name) == task)?;
-        code.word(found.priority?).parse::<u32>().ok()
+    let named = |at: usize| Named {
+        text: code.word(at).to_owned(),
+        at: code.start(at),
     };
-    let priorities: Vec<u32> = (configuration.instances.iter())
-        .filter_map(|one| priority(one.task))
-        .collect();
-    let is_mixed = !priorities.is_sorted();
-    is_mixed.then(|| {
-        "programs of one step run in the order in which the configuration lists them; here a program of higher priority \
-         stands behind one of lower priority: list it first if it must run first"
-            .to_owned()
-    })
+    let tasks = configuration.tasks.iter().map(|task| plan::Task {
+        name: named(task.name),
+        interval: task.interval.map(named),
+        single: task.single.map(|at| code.start(at)),
+        priority: task.priority.and_then(|at| code.word(at).parse().ok()),
+    });
+    let instances = (configuration.instances.iter()).map(|instance| plan::Instance {
+        task: instance.task.map(named),
+        program: named(instance.program),
+    });
+    let (tasks, instances): (Vec<_>, Vec<_>) = (tasks.collect(), instances.collect());
+    let start = code.start(configuration.name);
+    plan::plan(start, &tasks, &instances, wrong)
 }
 
 /// The changes of one source.

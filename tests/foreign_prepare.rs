@@ -2,11 +2,16 @@
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
 mod foreign;
+#[path = "export/plcopen.rs"]
+#[allow(dead_code, reason = "each test uses a part of it")]
+mod plcopen;
+#[path = "prepare/project.rs"]
+mod project;
 #[path = "prepare/stepped.rs"]
 mod stepped;
 
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
 use foreign::Absent;
 use foreign::iec2c::Compiler;
@@ -46,8 +51,21 @@ fn main() -> ExitCode {
             a_prepared_program_does_what_the_original_does,
         ),
         (
+            "a_prepared_project_in_xml_does_what_the_original_does",
+            a_prepared_project_in_xml_does_what_the_original_does,
+        ),
+        ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
+        (
             "the_rig_prepared_does_what_the_original_does",
             the_rig_prepared_does_what_the_original_does,
+        ),
+        (
+            "the_command_writes_beside_its_sources_and_never_over_them",
+            the_command_writes_beside_its_sources_and_never_over_them,
+        ),
+        (
+            "the_command_tells_what_is_wrong_and_writes_nothing",
+            the_command_tells_what_is_wrong_and_writes_nothing,
         ),
         (
             "without_a_simulation_a_prepared_program_runs_on_the_plcs_time",
@@ -360,10 +378,11 @@ fn a_prepared_program_is_the_one_synchronised_by_hand() -> Result<(), Absent> {
 /// In each step the same outputs as the original's in the scan at that time, hosted on that time.
 fn equal(
     original: &str,
+    prepared: &str,
     mut play: impl FnMut(&mut Random, &mut Stepped),
 ) -> Result<Vec<u8>, Absent> {
     let compiler = Compiler::find()?;
-    let mut ours = Stepped::load(&compiler, &prepared(original));
+    let mut ours = Stepped::load(&compiler, prepared);
     let mut right = Stepped::load(&compiler, original);
     let mut random = Random(3);
     for step in 0..3000_u32 {
@@ -378,7 +397,8 @@ fn equal(
 }
 
 fn a_prepared_program_does_what_the_original_does() -> Result<(), Absent> {
-    let outputs = equal(&text("tests/prepare/line.st"), play)?;
+    let original = text("tests/prepare/line.st");
+    let outputs = equal(&original, &prepared(&original), play)?;
     let word = |at: usize| u16::from_be_bytes([outputs[at], outputs[at + 1]]);
     assert_eq!(
         (word(8), word(16)),
@@ -389,6 +409,36 @@ fn a_prepared_program_does_what_the_original_does() -> Result<(), Absent> {
         word(10) > 100 && word(12) > 10 && word(14) > 0,
         "{outputs:?}"
     );
+    Ok(())
+}
+
+fn a_prepared_project_in_xml_does_what_the_original_does() -> Result<(), Absent> {
+    let original = text("tests/prepare/line.xml");
+    let made = prepared(&original);
+    let outputs = equal(
+        &project::structured_text(&original),
+        &project::structured_text(&made),
+        play,
+    )?;
+    let word = |at: usize| u16::from_be_bytes([outputs[at], outputs[at + 1]]);
+    assert_eq!((word(8), word(16)), (3000, 1000));
+    assert!(word(14) > 10, "{outputs:?}");
+    Ok(())
+}
+
+/// As an editor reads them.
+fn the_blocks_in_xml_compile() -> Result<(), Absent> {
+    let compiler = Compiler::find()?;
+    let configuration = "<configuration name=\"c\"><resource name=\"r\"/></configuration>";
+    let bench = text("tests/prepare/bench.st");
+    let mut whole = String::new();
+    for (name, _) in tickbus_prepare::SOURCES {
+        let xml = text(&format!("plc/iec61131/{name}.xml"));
+        let xml = xml.replace("<configurations/>", configuration);
+        let blocks = project::structured_text(&xml);
+        whole += blocks.split("CONFIGURATION").next().unwrap_or_default();
+    }
+    Stepped::load(&compiler, &(whole + &bench)).step(10);
     Ok(())
 }
 
@@ -407,7 +457,7 @@ fn the_rig_prepared_does_what_the_original_does() -> Result<(), Absent> {
         }
         moved = text;
     }
-    let outputs = equal(&moved, |random, plc| {
+    let outputs = equal(&moved, &prepared(&moved), |random, plc| {
         for byte in 8..12 {
             if random.below(8) == 0 {
                 plc.inputs[byte] ^= 1 << random.below(8);
@@ -440,5 +490,91 @@ fn without_a_simulation_a_prepared_program_runs_on_the_plcs_time() -> Result<(),
         right.scan(now);
         assert_eq!(ours.outputs[4..], right.outputs[4..], "scan {scan}");
     }
+    Ok(())
+}
+
+/// Runs `tickbus sync prepare`: its exit code, stdout and stderr.
+fn command(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args(["sync", "prepare"])
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("tickbus runs");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+    (output.status.code(), stdout, stderr)
+}
+
+fn the_command_writes_beside_its_sources_and_never_over_them() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let original = text("tests/prepare/line.st");
+    std::fs::write(folder.join("line.st"), &original).expect("written");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
+    let addresses = ["--go", "%id0", "--ms", "%ID4", "--done", "%QD0"];
+    let prepare = |more: &[&str]| command(folder, &[&["line.st"], &addresses[..], more].concat());
+
+    let (code, stdout, stderr) = prepare(&[]);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
+    assert_eq!(stdout, "prepared/line.st\nprepare: ok files=1\n");
+    assert_eq!(read("line.st"), original);
+    assert_eq!(read("prepared/line.st"), prepared(&original));
+
+    let (code, _, stderr) = prepare(&[]);
+    let told = "prepared/line.st: this file is there already; name another --out, or add --force\nprepare: failed mistakes=1\n";
+    assert_eq!((code, stderr.as_str()), (Some(1), told));
+    let (code, _, stderr) = prepare(&["--out", ".", "--force"]);
+    assert_eq!(code, Some(1));
+    assert!(
+        stderr.starts_with("./line.st: this is one of the sources; "),
+        "{stderr}"
+    );
+    assert_eq!(prepare(&["--force"]).0, Some(0));
+
+    let (code, stdout, _) = command(folder, &["prepared/line.st", "--undo"]);
+    assert_eq!(
+        (code, stdout.as_str()),
+        (Some(0), "prepared/original/line.st\nprepare: ok files=1\n")
+    );
+    assert_eq!(read("prepared/original/line.st"), original);
+    assert_eq!(prepare(&["--in-place"]).0, Some(0));
+    assert_eq!(read("line.st"), prepared(&original));
+    assert_eq!(
+        command(folder, &["line.st", "--undo", "--in-place"]).0,
+        Some(0)
+    );
+    assert_eq!(read("line.st"), original);
+    Ok(())
+}
+
+fn the_command_tells_what_is_wrong_and_writes_nothing() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let broken = text("tests/prepare/line.st").replace("run_on : TOF", "run_on : TONR");
+    std::fs::write(folder.join("line.st"), broken).expect("written");
+    let (code, stdout, stderr) = command(folder, &["line.st"]);
+    assert_eq!((code, stdout.as_str()), (Some(1), ""));
+    let told = "line.st:54:14: TONR runs on a clock of its own; ";
+    assert!(
+        stderr.starts_with(told) && stderr.ends_with("prepare: failed mistakes=1\n"),
+        "{stderr}"
+    );
+    assert!(!folder.join("prepared").exists());
+    let (code, _, stderr) = command(folder, &["none.st", "nor.st"]);
+    assert_eq!(code, Some(1));
+    assert!(stderr.ends_with("prepare: failed mistakes=2\n"), "{stderr}");
+    let (code, _, stderr) = command(folder, &["line.st", "--go", "100"]);
+    assert_eq!(code, Some(2));
+    assert!(
+        stderr.contains("write the address of a double word, such as %ID100"),
+        "{stderr}"
+    );
+    let (code, _, stderr) = command(folder, &["line.st", "--undo"]);
+    assert_eq!(code, Some(1));
+    assert!(
+        stderr.contains("there is nothing to take out of this file"),
+        "{stderr}"
+    );
     Ok(())
 }

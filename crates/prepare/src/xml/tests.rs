@@ -129,11 +129,13 @@ fn other_forms_of_a_project_survive() {
     prepared_text(&plain.replace('\n', "\r\n"));
     prepared_text(&format!("\u{FEFF}{plain}"));
     // CODESYS writes durations of XML, and no type of an instance.
-    let codesys = plain.replace("T#10ms", "PT0.01S")
-        .replace("T#30ms", "PT0.03S").replace(
-        "name=\"feeder\" typeName=\"feed\"",
-        "name=\"feed\" typeName=\"\"",
-    );
+    let codesys = plain
+        .replace("T#10ms", "PT0.01S")
+        .replace("T#30ms", "PT0.03S")
+        .replace(
+            "name=\"feeder\" typeName=\"feed\"",
+            "name=\"feed\" typeName=\"\"",
+        );
     assert!(prepared_text(&codesys).contains("interval=\"PT0.010S\""));
     let start = plain.find("          <task").expect("tasks");
     let end = plain.rfind("</task>").expect("tasks") + "</task>\n".len();

@@ -12,6 +12,7 @@ mod mirror;
 mod plc;
 #[cfg(unix)]
 mod plugin_helper;
+mod prepare;
 #[cfg(unix)]
 mod profibus;
 mod report;
@@ -43,11 +44,19 @@ enum Command {
     #[cfg(unix)]
     Profibus(profibus::Arguments),
     Report(report::Arguments),
+    #[command(subcommand)]
+    Sync(Sync),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
     #[cfg(unix)]
     #[command(hide = true)]
     PluginHelper,
+}
+
+/// Virtual time.
+#[derive(Debug, Subcommand)]
+enum Sync {
+    Prepare(prepare::Arguments),
 }
 
 /// How a command ended, for its exit code.
@@ -93,6 +102,7 @@ pub fn main() -> ExitCode {
         #[cfg(unix)]
         Command::Profibus(arguments) => profibus::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Sync(Sync::Prepare(arguments)) => prepare::run(&arguments),
         Command::Test(arguments) => test::run(&arguments),
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),

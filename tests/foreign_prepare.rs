@@ -17,8 +17,8 @@ use foreign::Absent;
 use foreign::iec2c::Compiler;
 use stepped::{Random, Stepped};
 use tickbus::plc::blocks::{ActionControl, Qualifiers, Rtc, Tof, Ton, Tp};
+use tickbus::prepare::{Addresses, Settings, Source, prepare, undo};
 use tickbus::time::Nanos;
-use tickbus_prepare::{Addresses, Settings, Source, prepare, undo};
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -81,7 +81,7 @@ fn text(path: &str) -> String {
 
 /// The blocks, before a program that uses them.
 fn with_blocks(program: &str) -> String {
-    let blocks = tickbus_prepare::SOURCES.map(|(_, text)| text);
+    let blocks = tickbus::prepare::SOURCES.map(|(_, text)| text);
     blocks.join("\n") + "\n" + program
 }
 
@@ -432,7 +432,7 @@ fn the_blocks_in_xml_compile() -> Result<(), Absent> {
     let configuration = "<configuration name=\"c\"><resource name=\"r\"/></configuration>";
     let bench = text("tests/prepare/bench.st");
     let mut whole = String::new();
-    for (name, _) in tickbus_prepare::SOURCES {
+    for (name, _) in tickbus::prepare::SOURCES {
         let xml = text(&format!("plc/iec61131/{name}.xml"));
         let xml = xml.replace("<configurations/>", configuration);
         let blocks = project::structured_text(&xml);

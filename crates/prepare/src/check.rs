@@ -54,8 +54,8 @@ pub(crate) fn all_globals(outline: &Outline) -> impl Iterator<Item = Range<usize
 /// Everything that declares variables or types.
 pub(crate) fn all_declarations(outline: &Outline) -> impl Iterator<Item = Range<usize>> {
     let units = outline.units.iter().flat_map(|unit| {
-        let sections = unit.sections.iter().map(|section| section.inner.clone());
-        sections
+        let sections = unit.sections.iter();
+        sections.map(|section| section.inner.clone())
     });
     let types = outline.types.iter().cloned();
     all_globals(outline).chain(units).chain(types)

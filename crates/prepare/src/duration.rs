@@ -41,7 +41,7 @@ pub(crate) fn milliseconds(text: &str) -> Result<u32, &'static str> {
         let mut scale = scale;
         for digit in fraction.bytes() {
             let digit = char::from(digit).to_digit(10).ok_or(UNREAD)?;
-            if scale % 10 != 0 && digit != 0 {
+            if !scale.is_multiple_of(10) && digit != 0 {
                 return Err(UNREAD);
             }
             scale /= 10;
@@ -53,7 +53,7 @@ pub(crate) fn milliseconds(text: &str) -> Result<u32, &'static str> {
     if nanos == 0 {
         return Err("is 0");
     }
-    if nanos % 1_000_000 != 0 {
+    if !nanos.is_multiple_of(1_000_000) {
         return Err("is not a whole number of milliseconds");
     }
     u32::try_from(nanos / 1_000_000).map_err(|_| "is longer than 49 days")

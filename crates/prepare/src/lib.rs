@@ -231,13 +231,11 @@ enum Encoding {
 }
 
 fn decode(bytes: &[u8]) -> (Cow<'_, str>, Encoding) {
-    match std::str::from_utf8(bytes) {
-        Ok(text) => (Cow::Borrowed(text), Encoding::Utf8),
-        Err(_) => {
-            let text = bytes.iter().map(|byte| char::from(*byte)).collect();
-            (Cow::Owned(text), Encoding::Latin1)
-        }
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        return (Cow::Borrowed(text), Encoding::Utf8);
     }
+    let text = bytes.iter().map(|byte| char::from(*byte)).collect();
+    (Cow::Owned(text), Encoding::Latin1)
 }
 
 fn encode(text: String, encoding: Encoding) -> Vec<u8> {

@@ -128,7 +128,7 @@ impl Preparation<'_, '_> {
             } else {
                 format!(" := {value}")
             };
-            globals += &format!("    {name} : {kind}{value};{end}");
+            globals.extend(["    ", &name, " : ", kind, &value, ";", end]);
         }
         globals += "  END_VAR";
         edits.insert(code.end(configuration.name), globals, MARKS);

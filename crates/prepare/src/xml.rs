@@ -187,9 +187,7 @@ impl<'a, 'i> Project<'a, 'i> {
             .filter_map(|node| node.parent())
             .map(|node| node.range().start)
             .collect();
-        let Some(start) = holders.first() else {
-            return None;
-        };
+        let start = holders.first()?;
         let mut all = statements.descendants();
         let holder = all.find(|node| node.is_element() && node.range().start == *start)?;
         if holders.len() > 1 || !holder.children().all(|node| node.is_text()) {
@@ -356,7 +354,7 @@ impl<'a, 'i> Project<'a, 'i> {
         );
         let inner = tasks.iter().flat_map(|task| named(*task, "pouInstance"));
         for instance in inner.chain(alone.iter().copied()) {
-            task += &format!("  {}\n", &self.text[instance.range()]);
+            task.extend(["  ", &self.text[instance.range()], "\n"]);
         }
         task += "</task>";
         let globals = library::globals(&plan.signals);

@@ -229,7 +229,7 @@ fn check_chart(code: &Code<'_>, unit: &Unit, chart: &Chart, wrong: &Collector<'_
             wrong.report(
                 code.start(at),
                 format!("the PLC times this {} itself", code.capitals(at)),
-                "use the qualifier N and a TON in the action, or TICKBUS_ACTION_CONTROL as docs/virtual-time-plc.md shows",
+                "use the qualifier N, and a TON that the action calls",
             );
         }
         // Charts of programs are gated; those of blocks stand still as a whole when they are not called.

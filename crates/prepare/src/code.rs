@@ -76,10 +76,12 @@ impl<'t> Code<'t> {
         let before = range.start.checked_sub(1);
         let start = before.map_or(self.base, |last| self.end(last)) - self.base;
         let end = self.start(range.end) - self.base;
-        let is_inner = |token: &&Token| {
-            !token.kind.is_trivia() && token.start >= start && token.end <= end.max(start)
-        };
-        let mut inner = self.all.iter().filter(is_inner);
+        let first = self.all.partition_point(|token| token.start < start);
+        let behind = self
+            .all
+            .partition_point(|token| token.end <= end.max(start));
+        let inner = self.all.get(first..behind)?;
+        let mut inner = inner.iter().filter(|token| !token.kind.is_trivia());
         let first = inner.next()?;
         let last = inner.next_back().unwrap_or(first);
         Some(self.base + first.start..self.base + last.end)

@@ -84,11 +84,18 @@ impl Edits {
 
 /// The offset of the first mark in `text`, if it has any.
 pub(crate) fn marked(text: &str) -> Option<usize> {
+    // Each mark has this word: one search finds all of them, however many there are.
+    const WORD: &str = "tickbus";
     let marks = Marks::ALL.map(Marks::texts);
-    let found = marks
-        .iter()
-        .flat_map(|[begin, _, second]| [text.find(begin), text.find(second)]);
-    found.flatten().min()
+    let marks = marks.map(|[begin, _, second]| [begin, second]);
+    let mut words = text.match_indices(WORD);
+    words.find_map(|(at, _)| {
+        marks.as_flattened().iter().find_map(|mark| {
+            let start = at.checked_sub(mark.find(WORD)?)?;
+            let rest = text.get(start..)?;
+            rest.starts_with(mark).then_some(start)
+        })
+    })
 }
 
 /// The text as it was before its marked changes.
@@ -121,9 +128,8 @@ pub(crate) fn undo(text: &str) -> Result<String, (usize, Mistake)> {
             None if held.is_empty() => {}
             _ => return wrong("what this mark holds is damaged"),
         }
-        let length = changed.find(second);
         let next = marked(changed);
-        let Some(length) = length.filter(|length| next == Some(*length)) else {
+        let Some(length) = next.filter(|at| changed[*at..].starts_with(second)) else {
             return wrong("the change that begins here has no end");
         };
         at = text.len() - changed.len() + length + second.len();

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::{Addresses, Prepared, SOURCES, Settings, Source, plcopen_xml, prepare, undo};
+use proptest::prelude::*;
 use roxmltree::Document;
 use tickbus_base::toml_text::Mistakes;
 
@@ -231,6 +232,30 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             .to_string()
             .starts_with("plc.xml:1:1: this is XML beside other sources; ")
     );
+}
+
+proptest! {
+    /// Pieces are taken out of the project and put in elsewhere.
+    #[test]
+    fn no_damage_to_a_project_makes_it_panic(
+        damage in proptest::collection::vec((0_usize..3000, 0_usize..80, 0_usize..3000), 1..4),
+    ) {
+        let mut text = project();
+        for (from, length, to) in damage {
+            let boundary = |text: &str, at: usize| {
+                (at % (text.len() + 1)..).find(|at| text.is_char_boundary(*at)).expect("its end")
+            };
+            let start = boundary(&text, from);
+            let end = boundary(&text, (start + length).min(text.len()));
+            let piece: String = text.drain(start..end).collect();
+            let at = boundary(&text, to);
+            text.insert_str(at, &piece);
+        }
+        if let Ok(made) = prepared(&text) {
+            let bytes = made.files[0].clone();
+            prop_assert_eq!(undo(&Source { name: String::new(), bytes }), Ok(text.into_bytes()));
+        }
+    }
 }
 
 /// `TICKBUS_UPDATE=1` writes them anew.

@@ -61,12 +61,15 @@ fn main() -> ExitCode {
         ),
         (
             "the_command_writes_beside_its_sources_and_never_over_them",
-            the_command_writes_beside_its_sources_and_never_over_them,
+            || {
+                the_command_writes_beside_its_sources_and_never_over_them();
+                Ok(())
+            },
         ),
-        (
-            "the_command_tells_what_is_wrong_and_writes_nothing",
-            the_command_tells_what_is_wrong_and_writes_nothing,
-        ),
+        ("the_command_tells_what_is_wrong_and_writes_nothing", || {
+            the_command_tells_what_is_wrong_and_writes_nothing();
+            Ok(())
+        }),
         (
             "without_a_simulation_a_prepared_program_runs_on_the_plcs_time",
             without_a_simulation_a_prepared_program_runs_on_the_plcs_time,
@@ -453,7 +456,7 @@ fn the_rig_prepared_does_what_the_original_does() -> Result<(), Absent> {
                 .find(|c: char| !c.is_ascii_digit())
                 .unwrap_or(piece.len());
             let number: u32 = piece[..end].parse().expect("a number");
-            text += &format!("{area}{}{}", number + 8, &piece[end..]);
+            text.extend([area, &(number + 8).to_string(), &piece[end..]]);
         }
         moved = text;
     }
@@ -506,7 +509,7 @@ fn command(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     (output.status.code(), stdout, stderr)
 }
 
-fn the_command_writes_beside_its_sources_and_never_over_them() -> Result<(), Absent> {
+fn the_command_writes_beside_its_sources_and_never_over_them() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let original = text("tests/prepare/line.st");
@@ -545,10 +548,9 @@ fn the_command_writes_beside_its_sources_and_never_over_them() -> Result<(), Abs
         Some(0)
     );
     assert_eq!(read("line.st"), original);
-    Ok(())
 }
 
-fn the_command_tells_what_is_wrong_and_writes_nothing() -> Result<(), Absent> {
+fn the_command_tells_what_is_wrong_and_writes_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let broken = text("tests/prepare/line.st").replace("run_on : TOF", "run_on : TONR");
@@ -576,5 +578,4 @@ fn the_command_tells_what_is_wrong_and_writes_nothing() -> Result<(), Absent> {
         stderr.contains("there is nothing to take out of this file"),
         "{stderr}"
     );
-    Ok(())
 }

@@ -56,6 +56,10 @@ fn main() -> ExitCode {
         ),
         ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
         (
+            "prepared_programs_of_the_exporter_compile",
+            prepared_programs_of_the_exporter_compile,
+        ),
+        (
             "the_rig_prepared_does_what_the_original_does",
             the_rig_prepared_does_what_the_original_does,
         ),
@@ -409,7 +413,7 @@ fn a_prepared_program_does_what_the_original_does() -> Result<(), Absent> {
         "scans, and reports in every third step"
     );
     assert!(
-        word(10) > 100 && word(12) > 10 && word(14) > 0,
+        word(10) > 100 && word(12) > 10 && word(14) > 0 && word(18) > 10,
         "{outputs:?}"
     );
     Ok(())
@@ -470,6 +474,16 @@ fn the_rig_prepared_does_what_the_original_does() -> Result<(), Absent> {
         plc.inputs[11] = u8::from(random.below(500) != 0);
     })?;
     assert_ne!(outputs[8..], [0; 8][..], "it did nothing");
+    Ok(())
+}
+
+fn prepared_programs_of_the_exporter_compile() -> Result<(), Absent> {
+    let compiler = Compiler::find()?;
+    for file in ["modbus-client-openplc/Drive.st", "rig-openplc/Test_rig.st"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let made = prepared(&text(&format!("tests/export/right/{file}")));
+        compiler.build(&made, folder.path());
+    }
     Ok(())
 }
 

@@ -96,7 +96,7 @@ pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
                 "this pragma reads the time of the PLC",
                 "use a TON, TOF, TP or RTC",
             ),
-            Kind::Word if text.to_uppercase().starts_with(words::PREFIX) => wrong.report(
+            Kind::Word if words::is_put_in(text) => wrong.report(
                 code.base + token.start,
                 format!("the name {} is one of those that are put in", shown(text)),
                 "a program that was synchronised by hand needs no preparing; otherwise choose another name",

@@ -284,39 +284,30 @@ fn every_program_of_this_project_is_prepared_and_taken_back() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut paths = Vec::new();
     tree(&root, &mut paths);
-    let mut prepared = Vec::new();
+    let mut refused = Vec::new();
     for path in paths {
         let bytes = std::fs::read(&path).expect("readable");
-        let name = path
-            .file_name()
-            .expect("a file")
-            .to_string_lossy()
-            .into_owned();
-        let made = prepare(
-            &[Source {
-                name: name.clone(),
-                bytes: bytes.clone(),
-            }],
-            &Settings::default(),
-        );
-        let Ok(made) = made else { continue };
-        let bytes_made = made.files[0].clone();
-        assert_eq!(
-            undo(&Source {
-                name: String::new(),
-                bytes: bytes_made
-            }),
-            Ok(bytes),
-            "{name}"
-        );
-        prepared.push(name);
+        let name = path.file_name().expect("a file").to_string_lossy();
+        let name = name.into_owned();
+        let source = |bytes| Source {
+            name: name.clone(),
+            bytes,
+        };
+        match prepare(&[source(bytes.clone())], &Settings::default()) {
+            Ok(made) => assert_eq!(undo(&source(made.files[0].clone())), Ok(bytes), "{name}"),
+            Err(_) => refused.push(name),
+        }
     }
-    for name in ["rig.st", "Test_rig.st"] {
-        assert!(
-            prepared.iter().any(|one| one == name),
-            "{name} is not among {prepared:?}"
-        );
-    }
+    refused.sort();
+    // The blocks themselves, and programs that use them already.
+    let right = [
+        "action_control.st",
+        "bench.st",
+        "line_by_hand.st",
+        "scheduler.st",
+        "timers.st",
+    ];
+    assert_eq!(refused, right);
 }
 
 /// Pieces of which soups and programs are made.

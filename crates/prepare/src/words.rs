@@ -3,8 +3,18 @@
 /// The timers that have a replacement on virtual time.
 pub(crate) const TIMERS: [&str; 4] = ["TON", "TOF", "TP", "RTC"];
 
-/// Prefix of what is put in; no name of a program may begin with it.
+/// Prefix of the replacements.
 pub(crate) const PREFIX: &str = "TICKBUS_";
+
+/// Whether a name is one of those that are put in. Others begin with the same prefix: `tickbus export` makes them.
+pub(crate) fn is_put_in(name: &str) -> bool {
+    let name = name.to_ascii_uppercase();
+    let Some(rest) = name.strip_prefix(PREFIX) else {
+        return false;
+    };
+    let own = "ACTION_CONTROL SCHEDULER SCHEDULE CYCLE FIRST NOW SIMULATED EXECUTE";
+    is_in(own, rest) || rest.starts_with("EXECUTE_") || TIMERS.contains(&rest)
+}
 
 const TYPES: &str = "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME LTIME DATE LDATE TOD \
     TIME_OF_DAY LTOD DT DATE_AND_TIME LDT STRING WSTRING CHAR WCHAR ANY";

@@ -112,7 +112,7 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         for node in self.named("variable") {
             let name = node.attribute("name").unwrap_or_default();
-            if name.to_uppercase().starts_with(words::PREFIX) {
+            if words::is_put_in(name) {
                 let what = format!("the name {} is one of those that are put in", shown(name));
                 let right = "a program that was synchronised by hand needs no preparing; otherwise choose another name";
                 self.wrong.report(node.range().start, what, right);

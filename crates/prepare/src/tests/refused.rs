@@ -60,8 +60,8 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             "line.st:3:6: what begins here has no end",
         ),
         (
-            with("tickbus_go : UDINT;"),
-            "line.st:2:5: the name tickbus_go is one of those that are put in",
+            with("Tickbus_Now : TIME;"),
+            "line.st:2:5: the name Tickbus_Now is one of those that are put in",
         ),
         (
             saying("n := 1; (*tickbus}*)"),

@@ -186,8 +186,8 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             "plc.xml:24:15: these statements are in LD",
         ),
         (
-            plain.replace("\"start\"", "\"tickbus_go\""),
-            "the name tickbus_go is one of those",
+            plain.replace("\"start\"", "\"tickbus_execute_x\""),
+            "the name tickbus_execute_x is one of those",
         ),
         (
             plain.replace("%IX8.0", "%id4"),

@@ -56,6 +56,10 @@ fn main() -> ExitCode {
         ),
         ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
         (
+            "the_example_counts_virtual_time",
+            the_example_counts_virtual_time,
+        ),
+        (
             "prepared_programs_of_the_exporter_compile",
             prepared_programs_of_the_exporter_compile,
         ),
@@ -332,6 +336,27 @@ fn time_stands_still_between_steps() -> Result<(), Absent> {
     // 49 days, and back to 0.
     let far = ask(&mut bench, 4_294_967_290, false, false, 30, 0);
     assert_eq!(far.date, 4_294_967_290);
+    Ok(())
+}
+
+fn the_example_counts_virtual_time() -> Result<(), Absent> {
+    let compiler = Compiler::find()?;
+    let mut cell = Stepped::load(&compiler, &with_blocks(&text("plc/iec61131/example.st")));
+    let (mut running, mut clamp) = (String::new(), String::new());
+    for step in 0..14 {
+        cell.inputs[8] = u8::from(step >= 2);
+        cell.step(10 * step);
+        let mark = |bit| if cell.outputs[4] & bit == 0 { '.' } else { '1' };
+        running.push(mark(1));
+        clamp.push(mark(2));
+    }
+    assert_eq!(running, "..1111111.....");
+    assert_eq!(clamp, "..111.........");
+    assert_eq!(
+        cell.outputs[6..10],
+        [0, 1, 0, 7],
+        "one part, and every second step"
+    );
     Ok(())
 }
 

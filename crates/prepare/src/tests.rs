@@ -303,6 +303,7 @@ fn every_program_of_this_project_is_prepared_and_taken_back() {
     let right = [
         "action_control.st",
         "bench.st",
+        "example.st",
         "line_by_hand.st",
         "scheduler.st",
         "timers.st",

@@ -392,6 +392,12 @@ proptest! {
     }
 
     #[test]
+    fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
+        let source = Source { name: String::new(), bytes };
+        let _ = (undo(&source), prepare(&[source], &Settings::default()));
+    }
+
+    #[test]
     fn every_generated_program_comes_back(
         declared in proptest::collection::vec(
             proptest::sample::select(vec![

@@ -20,6 +20,7 @@
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
 //! | [`programs`] | the PLC programs of demos and measurements |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
+//! | [`prepare`] | PLC programs put on virtual time, and taken off it byte for byte |
 //! | [`driver_cfg`] | what a driver.cfg says, with the list of bus kinds |
 //! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
@@ -46,6 +47,7 @@ pub use tickbus_image as image;
 pub use tickbus_image::signal;
 pub use tickbus_import as import;
 pub use tickbus_plc as plc;
+pub use tickbus_prepare as prepare;
 pub use tickbus_programs as programs;
 pub use tickbus_record as record;
 pub use tickbus_report as report;

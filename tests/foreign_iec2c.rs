@@ -5,10 +5,11 @@ mod foreign;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use foreign::Absent;
+use foreign::iec2c::Compiler;
 use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 
@@ -82,103 +83,69 @@ fn program(config: &Config) -> String {
     made.files.into_iter().next().expect("a program").text
 }
 
-/// The compiler and its library.
-struct Compiler {
-    program: PathBuf,
-    library: PathBuf,
+/// Every word in its library: blocks and functions, their variables, types and keywords.
+fn words(compiler: &Compiler) -> Vec<String> {
+    let files = std::fs::read_dir(&compiler.library).expect("its folder");
+    let mut words = BTreeSet::new();
+    for file in files {
+        let path = file.expect("an entry").path();
+        if path.extension().is_some_and(|extension| extension == "txt") {
+            let text = std::fs::read_to_string(&path).expect("a text");
+            let own = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+            let own = own.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic()));
+            words.extend(own.map(str::to_ascii_uppercase));
+        }
+    }
+    assert!(words.len() > 1000, "{} words", words.len());
+    words.into_iter().collect()
 }
 
-impl Compiler {
-    /// The compiler named by `IEC2C`, on the `PATH`, or in `shared/peers` beside the checkout; with the
-    /// library named by `IEC2C_LIB`, or beside the compiler.
-    fn find() -> Result<Self, Absent> {
-        let absent = |why: &str| Absent(why.to_owned());
-        let stated = std::env::var_os("IEC2C").map(PathBuf::from);
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let on_path = std::env::split_paths(&path).map(|folder| folder.join("iec2c"));
-        let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/peers/iec2c/iec2c");
-        let mut candidates = stated.into_iter().chain(on_path).chain([beside]);
-        let program = candidates.find(|path| path.is_file());
-        let why = "there is no iec2c (it comes with OpenPLC Editor and Beremiz; IEC2C names it)";
-        let program = program.ok_or_else(|| absent(why))?;
-        let program = program.canonicalize().expect("it is there");
-        let folder = program.parent().expect("a file is in a folder").to_owned();
-        let stated = std::env::var_os("IEC2C_LIB").map(PathBuf::from);
-        let beside = ["lib", "../lib", "../lib/matiec", "../share/matiec/lib"];
-        let beside = beside.iter().map(|name| folder.join(name));
-        let mut candidates = stated.into_iter().chain(beside);
-        let library = candidates
-            .find(|path| path.join("ieclib.txt").is_file())
-            .ok_or_else(|| {
-                absent("there is no ieclib.txt beside iec2c; IEC2C_LIB names its folder")
-            })?;
-        Ok(Self { program, library })
+/// Compiles a program as the runtime of `OpenPLC` v3 does, and the resulting C.
+///
+/// # Errors
+///
+/// The compilers' messages, or the file required by `OpenPLC` that is missing.
+fn compile(compiler: &Compiler, text: &str) -> Result<(), String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = folder.path().join("program.st");
+    std::fs::write(&source, text).expect("the file is written");
+    let output = Command::new(&compiler.program)
+        .args(["-f", "-l", "-p", "-r", "-R", "-a", "-I"])
+        .arg(&compiler.library)
+        .arg("-T")
+        .arg(folder.path())
+        .arg(&source)
+        .output()
+        .expect("iec2c runs");
+    if !output.status.success() {
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(format!("iec2c: {}\n{told}", output.status));
     }
-
-    /// Every word in its library: blocks and functions, their variables, types and keywords.
-    fn words(&self) -> Vec<String> {
-        let files = std::fs::read_dir(&self.library).expect("its folder");
-        let mut words = BTreeSet::new();
-        for file in files {
-            let path = file.expect("an entry").path();
-            if path.extension().is_some_and(|extension| extension == "txt") {
-                let text = std::fs::read_to_string(&path).expect("a text");
-                let own = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
-                let own = own.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic()));
-                words.extend(own.map(str::to_ascii_uppercase));
-            }
+    // Files that OpenPLC's build moves and compiles by name.
+    for name in [
+        "POUS.c",
+        "POUS.h",
+        "LOCATED_VARIABLES.h",
+        "VARIABLES.csv",
+        "Config0.c",
+        "Config0.h",
+        "Res0.c",
+    ] {
+        if !folder.path().join(name).is_file() {
+            return Err(format!("iec2c did not write {name}"));
         }
-        assert!(words.len() > 1000, "{} words", words.len());
-        words.into_iter().collect()
     }
-
-    /// Compiles a program as the runtime of `OpenPLC` v3 does, and the resulting C.
-    ///
-    /// # Errors
-    ///
-    /// The compilers' messages, or the file required by `OpenPLC` that is missing.
-    fn compile(&self, text: &str) -> Result<(), String> {
-        let folder = tempfile::tempdir().expect("a folder");
-        let source = folder.path().join("program.st");
-        std::fs::write(&source, text).expect("the file is written");
-        let output = Command::new(&self.program)
-            .args(["-f", "-l", "-p", "-r", "-R", "-a", "-I"])
-            .arg(&self.library)
-            .arg("-T")
-            .arg(folder.path())
-            .arg(&source)
-            .output()
-            .expect("iec2c runs");
-        if !output.status.success() {
-            let told = String::from_utf8_lossy(&output.stderr).into_owned();
-            return Err(format!("iec2c: {}\n{told}", output.status));
-        }
-        // Files that OpenPLC's build moves and compiles by name.
-        for name in [
-            "POUS.c",
-            "POUS.h",
-            "LOCATED_VARIABLES.h",
-            "VARIABLES.csv",
-            "Config0.c",
-            "Config0.h",
-            "Res0.c",
-        ] {
-            if !folder.path().join(name).is_file() {
-                return Err(format!("iec2c did not write {name}"));
-            }
-        }
-        let output = Command::new("cc")
-            .args(["-fsyntax-only", "-w", "-I"])
-            .arg(self.library.join("C"))
-            .args(["Config0.c", "Res0.c"])
-            .current_dir(folder.path())
-            .output()
-            .expect("cc runs");
-        if output.status.success() {
-            Ok(())
-        } else {
-            Err(String::from_utf8_lossy(&output.stderr).into_owned())
-        }
+    let output = Command::new("cc")
+        .args(["-fsyntax-only", "-w", "-I"])
+        .arg(compiler.library.join("C"))
+        .args(["Config0.c", "Res0.c"])
+        .current_dir(folder.path())
+        .output()
+        .expect("cc runs");
+    if output.status.success() {
+        Ok(())
+    } else {
+        Err(String::from_utf8_lossy(&output.stderr).into_owned())
     }
 }
 
@@ -210,7 +177,7 @@ fn every_program_for_openplc_compiles() -> Result<(), Absent> {
 
 fn signals_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Absent> {
     let compiler = Compiler::find()?;
-    let words = compiler.words();
+    let words = words(&compiler);
     let names: BTreeSet<&str> = NAMES
         .split(' ')
         .chain(words.iter().map(String::as_str))
@@ -229,13 +196,13 @@ fn signals_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Abs
 
 fn compiles(compiler: &Compiler, config: &Config) {
     let text = program(config);
-    let made = compiler.compile(&text);
+    let made = compile(compiler, &text);
     made.unwrap_or_else(|why| panic!("{} {}: {why}\n{text}", config.name, config.bus.kind()));
 }
 
 fn drivers_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Absent> {
     let compiler = Compiler::find()?;
-    let words = compiler.words();
+    let words = words(&compiler);
     // The program is called PREFIX_program, its instance PREFIX_instance: no word may equal these.
     let alike = |word: &&String| word.ends_with("_PROGRAM") || word.ends_with("_INSTANCE");
     assert_eq!(words.iter().find(alike), None);
@@ -270,9 +237,7 @@ fn a_program_without_a_statement_is_refused() -> Result<(), Absent> {
     let text = program(&config("Test rig", BUSES[0], &["Run"]));
     let broken = text.replace("  RETURN;\n", "  ;\n");
     assert_ne!(text, broken);
-    let why = compiler
-        .compile(&broken)
-        .expect_err("a lone semicolon is no statement");
+    let why = compile(&compiler, &broken).expect_err("a lone semicolon is no statement");
     assert!(why.contains("error"), "{why}");
     Ok(())
 }

@@ -146,6 +146,12 @@ fn plcopen_xml_is_valid_under_its_schema() -> Result<(), Absent> {
             files.push(path);
         }
     }
+    for (name, text) in tickbus::prepare::SOURCES {
+        let xml = tickbus::prepare::plcopen_xml(name, text).replace("tc6_0200", "tc6_0201");
+        let path = folder.path().join(format!("{name}.xml"));
+        std::fs::write(&path, xml).expect("the file is written");
+        files.push(path);
+    }
     let output = python
         .args(["-c", "import sys, xmlschema\nschema = xmlschema.XMLSchema(sys.argv[1])\nfor file in sys.argv[2:]: schema.validate(file)"])
         .arg(schema)

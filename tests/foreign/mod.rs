@@ -5,6 +5,7 @@
 //! `make test` installs the programs (`tools/peers`).
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
+pub mod iec2c;
 pub mod machine;
 #[path = "../peers/pcap.rs"]
 pub mod pcap;

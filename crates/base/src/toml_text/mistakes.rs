@@ -162,6 +162,11 @@ impl<'t> Collector<'t> {
         broken.is_none_or(|broken| (first..*broken).any(header))
     }
 
+    /// Whether nothing was reported.
+    pub fn is_empty(&self) -> bool {
+        self.found.borrow().is_empty()
+    }
+
     /// All mistakes in line order, without duplicates; `None` when there are no mistakes.
     pub fn finish(self) -> Option<Mistakes> {
         let mut found = self.found.take();

@@ -1,0 +1,269 @@
+//! What cannot be put on virtual time.
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use super::chart::{Chart, chart, is_chart};
+use super::code::Code;
+use super::lexer::Kind;
+use super::outline::{Declared, Outline, Unit, UnitKind, declared};
+use super::words;
+use tickbus_base::toml_text::{Collector, shown};
+
+/// The names that the sources themselves declare, in capitals, and those that the user vouches for.
+#[derive(Debug, Default)]
+pub(crate) struct World {
+    /// Types, function blocks, functions and programs.
+    pub(crate) types: HashSet<String>,
+    /// Global variables.
+    pub(crate) globals: HashSet<String>,
+}
+
+impl World {
+    /// Adds what a source declares.
+    pub(crate) fn add(&mut self, code: &Code<'_>, outline: &Outline) {
+        for unit in &outline.units {
+            self.types.insert(code.capitals(unit.name));
+        }
+        for inner in &outline.types {
+            let found = declared(code, inner.clone());
+            self.types
+                .extend(found.names.iter().map(|at| code.capitals(*at)));
+        }
+        for section in all_globals(outline) {
+            let found = declared(code, section);
+            self.globals
+                .extend(found.names.iter().map(|at| code.capitals(*at)));
+        }
+    }
+
+    /// Whether a type is one of the timers that are replaced, and not one that the sources declare themselves.
+    pub(crate) fn is_timer(&self, name: &str) -> bool {
+        let name = name.to_uppercase();
+        words::TIMERS.contains(&name.as_str()) && !self.types.contains(&name)
+    }
+}
+
+/// What stands between `VAR_GLOBAL` and `END_VAR`, wherever it is.
+pub(crate) fn all_globals(outline: &Outline) -> impl Iterator<Item = Range<usize>> {
+    let inner = outline.configurations.iter().flat_map(|one| &one.globals);
+    let sections = outline.globals.iter().chain(inner);
+    sections.map(|section| section.inner.clone())
+}
+
+/// Everything that declares variables or types.
+pub(crate) fn all_declarations(outline: &Outline) -> impl Iterator<Item = Range<usize>> {
+    let units = outline.units.iter().flat_map(|unit| {
+        let sections = unit.sections.iter();
+        sections.map(|section| section.inner.clone())
+    });
+    let types = outline.types.iter().cloned();
+    all_globals(outline).chain(units).chain(types)
+}
+
+/// Reports what cannot be prepared in a source.
+pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &Collector<'_>) {
+    check_words(code, wrong);
+    for inner in all_declarations(outline) {
+        for at in declared(code, inner).types {
+            check_type(code.word(at), code.start(at), world, wrong);
+        }
+    }
+    for unit in &outline.units {
+        for at in unit.returns.clone().filter(|at| code.is_word(*at)) {
+            check_type(code.word(at), code.start(at), world, wrong);
+        }
+        check_unit(code, unit, world, wrong);
+    }
+}
+
+/// Comments within comments, names that are taken, and code that a pragma hands to a compiler.
+pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
+    for token in &code.all {
+        let text = &code.text[token.range()];
+        match token.kind {
+            Kind::Comment if text.len() > 2 && text.starts_with("(*") => {
+                if let Some(at) = text[2..].find("(*") {
+                    wrong.report(
+                        code.base + token.start + 2 + at,
+                        "a comment begins within a comment",
+                        "some compilers end the outer one at the first *), others do not; take out the (*",
+                    );
+                }
+            }
+            Kind::Pragma if text.contains("__CURRENT_TIME") => wrong.report(
+                code.base + token.start,
+                "this pragma reads the time of the PLC",
+                "use a TON, TOF, TP or RTC",
+            ),
+            Kind::Word if words::is_put_in(text) => wrong.report(
+                code.base + token.start,
+                format!("the name {} is one of those that are put in", shown(text)),
+                "a program that was synchronised by hand needs no preparing; otherwise choose another name",
+            ),
+            _ => {}
+        }
+    }
+}
+
+/// Reports a type, named at a byte of the file, that runs on a clock, or of which that is not known.
+pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector<'_>) {
+    let is_own = world.types.contains(&name.to_uppercase());
+    if is_own || world.is_timer(name) || words::is_standard_type(name) {
+        return;
+    }
+    if words::is_clock(name) {
+        wrong.report(
+            at,
+            format!("{} runs on a clock of its own", shown(name)),
+            "use TON, TOF, TP or RTC, or a block of your own that is built from them",
+        );
+    } else {
+        wrong.report(
+            at,
+            format!("the type {} is in none of these sources", shown(name)),
+            "hand in its source too; if it comes from a library and uses no clock, name it with --no-clock",
+        );
+    }
+}
+
+fn check_unit(code: &Code<'_>, unit: &Unit, world: &World, wrong: &Collector<'_>) {
+    let mut declares = Declared::default();
+    for section in &unit.sections {
+        declares
+            .names
+            .extend(declared(code, section.inner.clone()).names);
+    }
+    let mut known: HashSet<String> = declares.names.iter().map(|at| code.capitals(*at)).collect();
+    if is_chart(code, &unit.body) {
+        let chart = chart(code, &unit.body);
+        check_chart(code, unit, &chart, wrong);
+        known.extend(chart.actions.iter().map(|(name, _)| code.capitals(*name)));
+        let conditions = chart
+            .transitions
+            .iter()
+            .filter_map(|one| one.condition.clone());
+        let bodies = chart.actions.iter().map(|(_, body)| body.clone());
+        for body in conditions.chain(bodies) {
+            check_statements(code, &body, &known, world, wrong);
+        }
+    } else {
+        check_statements(code, &unit.body, &known, world, wrong);
+    }
+}
+
+/// Reports clocks that are read in statements, and calls of which that is not known.
+pub(crate) fn check_statements(
+    code: &Code<'_>,
+    body: &Range<usize>,
+    known: &HashSet<String>,
+    world: &World,
+    wrong: &Collector<'_>,
+) {
+    if !body.is_empty() && is_instructions(code, body.start) {
+        wrong.report(
+            code.start(body.start),
+            "these statements are in IL",
+            "write them in Structured Text",
+        );
+        return;
+    }
+    for at in body.clone() {
+        if !code.is_word(at) || code.word(at + 1) != "(" {
+            continue;
+        }
+        let name = code.capitals(at);
+        if at > body.start && code.word(at - 1) == "." {
+            // timer.TON(...) of TIA Portal; other members are blocks whose types were checked.
+            if words::TIMERS.contains(&name.as_str()) {
+                wrong.report(
+                    code.start(at),
+                    format!("this calls the {name} of a timer of TIA Portal"),
+                    "declare an instance of TON, TOF or TP, and call that",
+                );
+            }
+            continue;
+        }
+        let is_own = known.contains(&name) || world.types.contains(&name);
+        if is_own
+            || world.globals.contains(&name)
+            || words::is_keyword(&name)
+            || words::is_standard_function(&name)
+        {
+            continue;
+        }
+        if words::is_clock(&name) {
+            wrong.report(
+                code.start(at),
+                format!("{name}() reads the clock of the PLC"),
+                "measure with a TON, whose ET is virtual time",
+            );
+        } else {
+            wrong.report(
+                code.start(at),
+                format!("{} is in none of these sources", shown(code.word(at))),
+                "hand in its source too; if it comes from a library and reads no clock, name it with --no-clock",
+            );
+        }
+    }
+}
+
+/// Whether the token begins an instruction in IL, or a label of one.
+fn is_instructions(code: &Code<'_>, at: usize) -> bool {
+    let operand = matches!(
+        code.kind(at + 1),
+        Some(Kind::Word | Kind::Literal | Kind::Address | Kind::Text)
+    );
+    let is_label = code.is_word(at) && code.word(at + 1) == ":";
+    is_label || (code.is_any(at, words::INSTRUCTIONS) && operand)
+}
+
+fn check_chart(code: &Code<'_>, unit: &Unit, chart: &Chart, wrong: &Collector<'_>) {
+    let steps: HashSet<String> = chart.steps.iter().map(|at| code.capitals(*at)).collect();
+    let actions: HashSet<String> = (chart.actions.iter())
+        .map(|(name, _)| code.capitals(*name))
+        .collect();
+    for (action, qualifier) in &chart.associations {
+        let Some(at) = *qualifier else { continue };
+        if code.is_any(at, &["L", "D", "SD", "DS", "SL"]) {
+            wrong.report(
+                code.start(at),
+                format!("the PLC times this {} itself", code.capitals(at)),
+                "use the qualifier N, and a TON that the action calls",
+            );
+        }
+        // Charts of programs are gated; those of blocks stand still as a whole when they are not called.
+        if code.is_any(at, &["P", "P0", "P1"])
+            && unit.kind == UnitKind::Program
+            && !actions.contains(&code.capitals(*action))
+        {
+            wrong.report(
+                code.start(at),
+                format!(
+                    "{} would be on for a cycle of the PLC, not for one of its task",
+                    shown(code.word(*action))
+                ),
+                "give it an ACTION with statements",
+            );
+        }
+    }
+    for transition in &chart.transitions {
+        if transition.condition.is_none() {
+            wrong.report(
+                code.start(transition.start),
+                "the condition of this transition is not in Structured Text",
+                "write FROM step TO step := condition;",
+            );
+        }
+    }
+    for at in unit.body.clone() {
+        let is_time = code.word(at + 1) == "." && code.is(at + 2, "T");
+        if is_time && steps.contains(&code.capitals(at)) {
+            wrong.report(
+                code.start(at),
+                format!("the PLC measures {}.T itself", code.word(at)),
+                "measure with a TON that the step's action calls",
+            );
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! PLC programs put on virtual time, and taken off it again, byte for byte.
+//!
+//! [`prepare`] takes sources in Structured Text, or a project as `PLCopen` XML, and makes the changes by which a real PLC
+//! keeps in step with a server of virtual time: timers are replaced, an execution controller stands around each program's
+//! statements, all tasks become one, and a scheduler runs first in it. [`undo`] takes exactly these changes back.
+//! docs/virtual-time-plc.md has them from the engineer's side.
+//!
+//! Sources are never formatted anew: what is put in stands between marks, and what it replaced is held in them.
+//! Bytes that are not UTF-8 are read as Latin-1 and written as they were.
+//!
+//! The parsers for Structured Text on crates.io (`iecst`, `iec61131`, `ironplc-parser`, all MIT) build syntax trees, from which
+//! comments, pragmas and blanks cannot be written again, and none reads every dialect whose programs are to
+//! survive here. Only declarations, charts and the configuration have to be understood, so there is a lexer that keeps every
+//! byte, and an outline read from its tokens. XML is read with `roxmltree`, which knows where each element stands.
+
+mod chart;
+mod check;
+mod code;
+mod duration;
+mod edit;
+mod lexer;
+mod library;
+mod outline;
+mod plan;
+mod plcopen;
+mod structured_text;
+#[cfg(test)]
+mod tests;
+mod words;
+mod xml;
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+
+use check::World;
+use code::Code;
+use outline::Outline;
+use structured_text::{Preparation, check_addresses, plan};
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
+
+pub use library::{Addresses, SOURCES};
+
+/// A file with a part of a program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// The name that messages have for it.
+    pub name: String,
+    /// Its contents.
+    pub bytes: Vec<u8>,
+}
+
+/// How a program is prepared.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// Where the variables for the server lie.
+    pub addresses: Addresses,
+    /// Names of types and functions of libraries that use no clock.
+    pub no_clock: Vec<String>,
+}
+
+/// A prepared program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Prepared {
+    /// The contents of each source, in their order.
+    pub files: Vec<Vec<u8>>,
+    /// Remarks for the user.
+    pub notes: Vec<String>,
+}
+
+/// Puts a program on virtual time.
+///
+/// # Errors
+///
+/// What cannot be prepared, for each source in which there is something, and its place.
+pub fn prepare(sources: &[Source], settings: &Settings) -> Result<Prepared, Vec<Mistakes>> {
+    let texts: Vec<(Cow<'_, str>, Encoding)> =
+        sources.iter().map(|source| decode(&source.bytes)).collect();
+    let wrong: Vec<Collector<'_>> = (sources.iter().zip(&texts))
+        .map(|(source, (text, _))| Collector::new(&source.name, text))
+        .collect();
+    let made = prepared(&texts, settings, &wrong);
+    let mistakes: Vec<Mistakes> = wrong.into_iter().filter_map(Collector::finish).collect();
+    match made {
+        Some((made, notes)) if mistakes.is_empty() => {
+            let files = made.into_iter().zip(&texts);
+            let files = files.map(|(text, (_, encoding))| encode(text, *encoding));
+            Ok(Prepared {
+                files: files.collect(),
+                notes,
+            })
+        }
+        _ if mistakes.is_empty() => Err(vec![Mistakes::of_file(
+            sources.first().map_or("", |source| &source.name),
+            "there is no CONFIGURATION",
+            "hand in the source that has the tasks and their programs, too: intervals are taken from there",
+        )]),
+        _ => Err(mistakes),
+    }
+}
+
+/// The changed sources, or nothing if something was reported or no source has a configuration.
+fn prepared(
+    texts: &[(Cow<'_, str>, Encoding)],
+    settings: &Settings,
+    wrong: &[Collector<'_>],
+) -> Option<(Vec<String>, Vec<String>)> {
+    for ((text, _), wrong) in texts.iter().zip(wrong) {
+        if let Some(at) = edit::marked(text) {
+            let right = "take that out first, with --undo";
+            wrong.report(at, "this program was prepared before", right);
+        } else if let Some(at) = text.find('\0') {
+            wrong.report(at, "this is no text in UTF-8", "save it as UTF-8");
+        }
+    }
+    let projects = texts
+        .iter()
+        .zip(wrong)
+        .filter(|((text, _), _)| xml::is_xml(text));
+    for (_, wrong) in projects.clone().filter(|_| texts.len() > 1) {
+        wrong.collect(0, xml::not_alone());
+    }
+    if !wrong.iter().all(Collector::is_empty) {
+        return None;
+    }
+    if let Some(((text, _), wrong)) = projects.last() {
+        let (made, notes) = xml::prepare(text, settings, wrong)?;
+        return Some((vec![made], notes));
+    }
+    let codes: Vec<Code<'_>> = texts.iter().map(|(text, _)| Code::new(text)).collect();
+    let mut outlines: Vec<Outline> = Vec::new();
+    for (code, wrong) in codes.iter().zip(wrong) {
+        match outline::outline(code) {
+            Ok(found) => outlines.push(found),
+            Err((at, mistake)) => {
+                wrong.collect(at, mistake);
+                outlines.push(Outline::default());
+            }
+        }
+    }
+    if !wrong.iter().all(Collector::is_empty) {
+        return None;
+    }
+    let mut world = World::default();
+    for (code, outline) in codes.iter().zip(&outlines) {
+        world.add(code, outline);
+    }
+    let vouched = settings.no_clock.iter().map(|name| name.to_uppercase());
+    world.types.extend(vouched);
+    let mut found = None;
+    for (index, outline) in outlines.iter().enumerate() {
+        check::check(&codes[index], outline, &world, &wrong[index]);
+        for configuration in &outline.configurations {
+            if found.replace((index, configuration)).is_some() {
+                let at = codes[index].start(configuration.start);
+                let right = "prepare the program of one PLC at a time";
+                wrong[index].report(at, "this is a second CONFIGURATION", right);
+            }
+        }
+        let sections: Vec<_> = (outline.units.iter())
+            .flat_map(|unit| &unit.sections)
+            .chain(outline.configurations.iter().flat_map(|one| &one.globals))
+            .chain(&outline.globals)
+            .collect();
+        check_addresses(&codes[index], &sections, &settings.addresses, &wrong[index]);
+    }
+    let (home, configuration) = found?;
+    let (plan, note) = plan(&codes[home], configuration, &wrong[home]);
+    for instance in &configuration.instances {
+        let name = codes[home].capitals(instance.program);
+        if !world.types.contains(&name) {
+            let what = format!("the program {name} is in none of these sources");
+            let at = codes[home].start(instance.program);
+            wrong[home].report(at, what, "hand in its source too");
+        }
+    }
+    if !wrong.iter().all(Collector::is_empty) {
+        return None;
+    }
+    let parts: Vec<Preparation<'_, '_>> = (codes.iter().zip(&outlines))
+        .map(|(code, outline)| Preparation {
+            code,
+            outline,
+            world: &world,
+            plan: &plan,
+        })
+        .collect();
+    let timers: BTreeSet<String> = parts.iter().flat_map(Preparation::timers).collect();
+    let timers: Vec<&str> = timers.iter().map(String::as_str).collect();
+    let blocks = library::text(&timers, &plan.signals, &settings.addresses);
+    let files = parts.iter().enumerate();
+    let files = files.map(|(index, part)| part.text((index == home).then_some(blocks.as_str())));
+    Some((files.collect(), note.into_iter().collect()))
+}
+
+/// Takes out what [`prepare`] has put in; what was changed elsewhere since then stays.
+///
+/// # Errors
+///
+/// The file holds no marks, or some were damaged.
+pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
+    let (text, encoding) = decode(&source.bytes);
+    let wrong = |at, mistake| {
+        let collector = Collector::new(&source.name, &text);
+        let place = Some(collector.place(at));
+        Mistakes::of_list(&source.name, vec![PlacedMistake { place, mistake }])
+    };
+    if edit::marked(&text).is_none() {
+        return Err(Mistakes::of(&source.name, nothing_to_undo()));
+    }
+    let original = edit::undo(&text).map_err(|(at, mistake)| wrong(at, mistake))?;
+    Ok(encode(original, encoding))
+}
+
+fn nothing_to_undo() -> Mistake {
+    let right = "name a file that was prepared; an editor may have dropped its comments";
+    Mistake::new("there is nothing to take out of this file", right)
+}
+
+/// The blocks of a source of ours, one of [`SOURCES`], as a file in `PLCopen` XML.
+pub fn plcopen_xml(name: &str, source: &str) -> String {
+    plcopen::document(name, source)
+}
+
+/// How the bytes of a source stand for characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Encoding {
+    Utf8,
+    /// Each byte is a character: what is no UTF-8 comes back as it was.
+    Latin1,
+}
+
+fn decode(bytes: &[u8]) -> (Cow<'_, str>, Encoding) {
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        return (Cow::Borrowed(text), Encoding::Utf8);
+    }
+    let text = bytes.iter().map(|byte| char::from(*byte)).collect();
+    (Cow::Owned(text), Encoding::Latin1)
+}
+
+fn encode(text: String, encoding: Encoding) -> Vec<u8> {
+    match encoding {
+        Encoding::Utf8 => text.into_bytes(),
+        Encoding::Latin1 => {
+            let bytes = text.chars().map(|c| u8::try_from(u32::from(c)));
+            bytes
+                .collect::<Result<_, _>>()
+                .expect("it was made of bytes and ASCII")
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Programs that are refused.
+
+use super::{line, refused};
+
+#[test]
+fn what_cannot_be_prepared_is_told_with_its_place() {
+    let with = |declared: &str| line(&format!("VAR {declared} END_VAR"), "RETURN;");
+    let saying = |statements: &str| line("VAR x : TIME; n : INT; END_VAR", statements);
+    for (text, says) in [
+        (
+            with("t : TONR;"),
+            "line.st:2:9: TONR runs on a clock of its own; use TON, ",
+        ),
+        (
+            with("t : ARRAY [1..2] OF TON_TIME;"),
+            "line.st:2:25: TON_TIME runs on a clock",
+        ),
+        (
+            with("m : MC_MoveAbsolute;"),
+            "line.st:2:9: the type MC_MoveAbsolute is in none of these sources; hand in its source",
+        ),
+        (
+            with("t : Standard.TON;"),
+            "line.st:2:9: the type Standard is in none",
+        ),
+        (
+            saying("x := TIME();"),
+            "line.st:3:6: TIME() reads the clock of the PLC; measure with a TON",
+        ),
+        (
+            saying("n := SysTimeRtcGet(1);"),
+            "SYSTIMERTCGET() reads the clock",
+        ),
+        (
+            saying("n := Stamp(1);"),
+            "line.st:3:6: Stamp is in none of these sources; hand in",
+        ),
+        (
+            saying("\"DB1\".TON(IN := TRUE);"),
+            "line.st:3:7: this calls the TON of a timer of TIA Portal",
+        ),
+        (
+            saying("{x = __CURRENT_TIME;}\nn := 1;"),
+            "line.st:3:1: this pragma reads the time",
+        ),
+        (
+            saying("LD n\nADD 1\nST n"),
+            "line.st:3:1: these statements are in IL; write them in Structured Text",
+        ),
+        (
+            saying("go: LD n"),
+            "line.st:3:1: these statements are in IL",
+        ),
+        (
+            saying("n := 1; (* a (* b *) c *)"),
+            "line.st:3:14: a comment begins within a comment",
+        ),
+        (
+            saying("n := 'open"),
+            "line.st:3:6: what begins here has no end",
+        ),
+        (
+            with("Tickbus_Now : TIME;"),
+            "line.st:2:5: the name Tickbus_Now is one of those that are put in",
+        ),
+        (
+            saying("n := 1; (*tickbus}*)"),
+            "line.st:3:9: this program was prepared before; take that out first, with --undo",
+        ),
+    ] {
+        refused(&text, says);
+    }
+}
+
+#[test]
+fn what_cannot_be_prepared_of_a_chart_is_told() {
+    let saying = |statements: &str| line("VAR x : TIME; n : INT; END_VAR", statements);
+    for (associations, says) in [
+        (
+            "move(L, T#3s);",
+            "line.st:3:24: the PLC times this L itself",
+        ),
+        (
+            "x(P);",
+            "line.st:3:21: x would be on for a cycle of the PLC",
+        ),
+    ] {
+        let chart = format!(
+            "INITIAL_STEP one: {associations} END_STEP\nTRANSITION FROM one TO one := TRUE; END_TRANSITION\nACTION move: n := 1; END_ACTION"
+        );
+        refused(&saying(&chart), says);
+    }
+    let timed =
+        "INITIAL_STEP one: END_STEP\nTRANSITION FROM one TO one := one.T > T#1s; END_TRANSITION";
+    refused(
+        &saying(timed),
+        "line.st:4:31: the PLC measures one.T itself",
+    );
+    let graphical = "INITIAL_STEP one: END_STEP\nTRANSITION FROM one TO one: LD n END_TRANSITION";
+    refused(
+        &saying(graphical),
+        "line.st:4:1: the condition of this transition is not in Structured Text",
+    );
+}
+
+#[test]
+fn what_cannot_be_prepared_of_a_configuration_is_told() {
+    let saying = |statements: &str| line("VAR x : TIME; n : INT; END_VAR", statements);
+    for (text, says) in [
+        (
+            saying("n := 1;").replace("T#30ms", "T#500us"),
+            "the interval T#500us is not a whole number of milliseconds",
+        ),
+        (
+            saying("n := 1;").replace("INTERVAL := T#30ms", "SINGLE := x"),
+            "this task starts at an event",
+        ),
+        (
+            saying("n := 1;").replace("WITH slow", "WITH slaw"),
+            "there is no task slaw",
+        ),
+        (
+            saying("n := 1;").replace(": two;", ": one;"),
+            "one runs in two tasks; give each task a program of its own",
+        ),
+        (
+            saying("n := 1;").replace(": two;", ": six;"),
+            "the program SIX is in none of these sources",
+        ),
+        (
+            saying("n := 1;").replace("END_RESOURCE", "END_RESOURCE\nRESOURCE x ON y"),
+            "this is a second resource",
+        ),
+        (
+            saying("n := 1;").replace("CONFIGURATION", "NAMESPACE"),
+            "\"NAMESPACE\" begins nothing that is known here",
+        ),
+        (
+            saying("n := 1;").replace("END_CONFIGURATION", ""),
+            "plant has no END_CONFIGURATION",
+        ),
+        (
+            saying("n := 1;").replacen("END_PROGRAM", "", 2),
+            "one has no END_PROGRAM",
+        ),
+        (
+            "PROGRAM x\nRETURN;\nEND_PROGRAM".to_owned(),
+            "line.st: there is no CONFIGURATION; hand in",
+        ),
+        (saying("n := 1;\0"), "line.st:3:8: this is no text in UTF-8"),
+    ] {
+        refused(&text, says);
+    }
+}

@@ -1,0 +1,500 @@
+//! Prepares projects as `PLCopen` XML whose statements are in Structured Text.
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeSet, HashSet};
+use std::ops::Range;
+
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::check::{World, check_statements, check_type, check_words};
+use super::code::{Code, line_end};
+use super::edit::{Edits, Marks};
+use super::library::{self, SCHEDULE, TASK};
+use super::outline;
+use super::plan::{self, Named, Plan};
+use super::structured_text::header_and_footer;
+use super::words;
+use super::{Settings, plcopen};
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::{Collector, shown};
+
+/// Files with more nodes than this are refused: no project is this large.
+const NODES: u32 = 10_000_000;
+
+/// Whether a source is XML.
+pub(crate) fn is_xml(text: &str) -> bool {
+    text.trim_start_matches('\u{FEFF}')
+        .trim_start()
+        .starts_with('<')
+}
+
+/// The prepared project and remarks, or nothing if something was reported.
+pub(crate) fn prepare(
+    text: &str,
+    settings: &Settings,
+    wrong: &Collector<'_>,
+) -> Option<(String, Vec<String>)> {
+    let options = ParsingOptions {
+        nodes_limit: NODES,
+        ..ParsingOptions::default()
+    };
+    let document = match Document::parse_with_options(text, options) {
+        Ok(document) => document,
+        Err(error) => {
+            let what = format!("this XML cannot be read: {error}");
+            wrong.report(0, what, "export it anew from the PLC's editor");
+            return None;
+        }
+    };
+    let root = document.root_element();
+    if !text[root.range()].starts_with("<project") {
+        let what = "this XML is no project of PLCopen";
+        wrong.report(
+            root.range().start,
+            what,
+            "export the project as PLCopen XML",
+        );
+        return None;
+    }
+    let project = Project { text, root, wrong };
+    let mut world = project.world();
+    world
+        .types
+        .extend(settings.no_clock.iter().map(|name| name.to_uppercase()));
+    project.check_types(&world);
+    let bodies = project.bodies(&world);
+    project.check_addresses(settings);
+    let (plan, note) = project.plan(&world)?;
+    if !wrong.is_empty() {
+        return None;
+    }
+    let made = project.edited(&world, &plan, settings, &bodies)?;
+    Some((made, note.into_iter().collect()))
+}
+
+struct Project<'a, 'i> {
+    text: &'i str,
+    root: Node<'a, 'i>,
+    wrong: &'a Collector<'i>,
+}
+
+/// The statements of a program, at these bytes of the file.
+struct Body<'a, 'i> {
+    unit: Node<'a, 'i>,
+    bytes: Range<usize>,
+}
+
+impl<'a, 'i> Project<'a, 'i> {
+    fn named(&self, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
+        named(self.root, name)
+    }
+
+    fn world(&self) -> World {
+        let mut world = World::default();
+        for element in ["pou", "dataType"] {
+            let names = self
+                .named(element)
+                .filter_map(|node| node.attribute("name"));
+            world.types.extend(names.map(str::to_uppercase));
+        }
+        for list in self.named("globalVars") {
+            world.globals.extend(variable_names(list));
+        }
+        world
+    }
+
+    fn check_types(&self, world: &World) {
+        for node in self.named("derived") {
+            let name = node.attribute("name").unwrap_or_default();
+            check_type(name, node.range().start, world, self.wrong);
+        }
+        for node in self.named("variable") {
+            let name = node.attribute("name").unwrap_or_default();
+            if words::is_put_in(name) {
+                let what = format!("the name {} is one of those that are put in", shown(name));
+                let right = "a program that was synchronised by hand needs no preparing; otherwise choose another name";
+                self.wrong.report(node.range().start, what, right);
+            }
+        }
+        for (element, what, right) in [
+            (
+                "InterfaceAsPlainText",
+                "this declaration is kept as plain text, too",
+                "export without the option for declarations as plain text: else the editor takes these",
+            ),
+            (
+                "Method",
+                "this is a method",
+                "methods are not prepared: make it a function block",
+            ),
+        ] {
+            for node in self.named(element) {
+                self.wrong.report(node.range().start, what, right);
+            }
+        }
+    }
+
+    /// The bodies of programs, checked like all others.
+    fn bodies(&self, world: &World) -> Vec<Body<'a, 'i>> {
+        let mut found = Vec::new();
+        for unit in self.named("pou") {
+            let mut known: HashSet<String> = HashSet::new();
+            known.extend(
+                child(unit, "interface")
+                    .into_iter()
+                    .flat_map(variable_names),
+            );
+            let actions = named(unit, "action").filter_map(|node| node.attribute("name"));
+            known.extend(actions.map(str::to_uppercase));
+            for body in named(unit, "body") {
+                for language in ["IL", "LD", "FBD", "SFC"] {
+                    if let Some(node) = child(body, language) {
+                        let what = format!("these statements are in {language}");
+                        let right = "write them in Structured Text, or export the project as text";
+                        self.wrong.report(node.range().start, what, right);
+                    }
+                }
+                let Some(statements) = child(body, "ST") else {
+                    continue;
+                };
+                let Some((masked, start)) = self.masked(statements) else {
+                    continue;
+                };
+                let code = Code::part(&masked, start);
+                if outline::endless(&code).is_some() {
+                    let what = "a comment or text in these statements has no end";
+                    self.wrong.report(start, what, "end it");
+                    continue;
+                }
+                check_words(&code, self.wrong);
+                let all = 0..code.tokens.len();
+                check_statements(&code, &all, &known, world, self.wrong);
+                if let (true, Some(bytes)) = (body.parent() == Some(unit), code.bytes(&all)) {
+                    found.push(Body { unit, bytes });
+                }
+            }
+        }
+        found
+    }
+
+    /// The text of statements with blanks in the place of markup, so that each byte stays where it is; and where it begins.
+    fn masked(&self, statements: Node<'a, 'i>) -> Option<(String, usize)> {
+        let texts = || statements.descendants().filter(Node::is_text);
+        let holders: BTreeSet<_> = texts()
+            .filter(|node| !node.text().unwrap_or_default().trim().is_empty())
+            .filter_map(|node| node.parent())
+            .map(|node| node.range().start)
+            .collect();
+        let start = holders.first()?;
+        let mut all = statements.descendants();
+        let holder = all.find(|node| node.is_element() && node.range().start == *start)?;
+        if holders.len() > 1 || !holder.children().all(|node| node.is_text()) {
+            let what = "these statements hold other elements";
+            self.wrong
+                .report(*start, what, "export them as plain Structured Text");
+            return None;
+        }
+        let inner = inner(self.text, holder)?;
+        Some((mask(&self.text[inner.clone()]), inner.start))
+    }
+
+    fn check_addresses(&self, settings: &Settings) {
+        let addresses = &settings.addresses;
+        for node in self.named("variable") {
+            let own = node.attribute("address").unwrap_or_default();
+            let mut taken = [&addresses.go, &addresses.ms, &addresses.done]
+                .into_iter()
+                .flatten();
+            if taken.any(|one| one.eq_ignore_ascii_case(own)) {
+                let what = format!("the program has a variable at {own} already");
+                let right = "name a free address for the server's variable";
+                self.wrong.report(node.range().start, what, right);
+            }
+        }
+    }
+
+    fn plan(&self, world: &World) -> Option<(Plan, Option<String>)> {
+        let mut resources = self.named("resource");
+        let Some(resource) = resources.next() else {
+            let right =
+                "add it in the editor and export the project anew: intervals are taken from there";
+            let at = self.root.range().start;
+            self.wrong
+                .report(at, "there is no resource with tasks", right);
+            return None;
+        };
+        if let Some(second) = resources.next() {
+            (self.wrong).collect(second.range().start, plan::second_resource());
+        }
+        let mut tasks = Vec::new();
+        let mut instances = Vec::new();
+        for node in resource.children().filter(Node::is_element) {
+            match node.tag_name().name() {
+                "task" => {
+                    let name = named_attribute(node, "name");
+                    instances.extend(named(node, "pouInstance").map(|node| plan::Instance {
+                        task: name.clone(),
+                        program: program(node),
+                    }));
+                    tasks.push(plan::Task {
+                        name: name.unwrap_or_else(|| Named {
+                            text: String::new(),
+                            at: node.range().start,
+                        }),
+                        interval: named_attribute(node, "interval"),
+                        single: named_attribute(node, "single").map(|single| single.at),
+                        priority: node
+                            .attribute("priority")
+                            .and_then(|text| text.parse().ok()),
+                    });
+                }
+                "pouInstance" => instances.push(plan::Instance {
+                    task: None,
+                    program: program(node),
+                }),
+                _ => {}
+            }
+        }
+        for instance in &instances {
+            let program = &instance.program;
+            if !world.types.contains(&program.text.to_uppercase()) {
+                let what = format!(
+                    "the program {} is not in this project",
+                    shown(&program.text)
+                );
+                self.wrong
+                    .report(program.at, what, "export the whole project");
+            }
+        }
+        Some(plan::plan(
+            resource.range().start,
+            &tasks,
+            &instances,
+            self.wrong,
+        ))
+    }
+
+    fn edited(
+        &self,
+        world: &World,
+        plan: &Plan,
+        settings: &Settings,
+        bodies: &[Body<'a, 'i>],
+    ) -> Option<String> {
+        let mut edits = Edits::default();
+        let mut timers = BTreeSet::new();
+        for node in self.named("derived") {
+            let name = node.attribute("name").unwrap_or_default();
+            if world.is_timer(name) {
+                timers.insert(name.to_uppercase());
+                let value = node.attribute_node("name")?.range_value();
+                let whole = node.range();
+                let prefix = words::PREFIX;
+                let new = format!(
+                    "{}{prefix}{}{}",
+                    &self.text[whole.start..value.start],
+                    name.to_uppercase(),
+                    &self.text[value.end..whole.end]
+                );
+                edits.replace(whole, new, Marks::Xml);
+            }
+        }
+        for body in bodies {
+            self.control(body, plan, &mut edits)?;
+        }
+        let timers: Vec<&str> = timers.iter().map(String::as_str).collect();
+        let blocks = library::text(&timers, &plan.signals, &settings.addresses);
+        let units = self.named("pous").next()?;
+        self.insert_first(units, &plcopen::pous(&blocks), &mut edits)?;
+        self.configure(plan, &mut edits)?;
+        Some(edits.apply(self.text))
+    }
+
+    /// Puts an execution controller around the statements of a program that a task runs.
+    fn control(&self, body: &Body<'a, 'i>, plan: &Plan, edits: &mut Edits) -> Option<()> {
+        let unit = body.unit;
+        let name = unit.attribute("name").unwrap_or_default();
+        let is_program = unit.attribute("pouType") == Some("program");
+        let Some(signal) = plan
+            .programs
+            .get(&name.to_uppercase())
+            .filter(|_| is_program)
+        else {
+            return Some(());
+        };
+        let (header, footer) = header_and_footer(self.text, &body.bytes, signal);
+        edits.insert(body.bytes.start, header, Marks::StructuredText);
+        edits.insert(body.bytes.end, footer, Marks::StructuredText);
+        let external = [
+            ("tickbus_simulated", None, "BOOL", None),
+            (signal.as_str(), None, "BOOL", None),
+        ];
+        let external = plcopen::variables("externalVars", &external);
+        self.insert_first(child(unit, "interface")?, &external, edits)
+    }
+
+    fn configure(&self, plan: &Plan, edits: &mut Edits) -> Option<()> {
+        let resource = self.named("resource").next()?;
+        let is = |name: &'static str| {
+            let children = resource.children().filter(Node::is_element);
+            children.filter(move |node| node.tag_name().name() == name)
+        };
+        let (tasks, alone): (Vec<_>, Vec<_>) = (is("task").collect(), is("pouInstance").collect());
+        // Durations are written as the project has them.
+        let first = tasks.first().and_then(|task| task.attribute("interval"));
+        let interval = if first.is_some_and(|interval| interval.starts_with('P')) {
+            format!("PT{}.{:03}S", plan.cycle / 1000, plan.cycle % 1000)
+        } else {
+            format!("T#{}ms", plan.cycle)
+        };
+        let mut task = format!(
+            "<task name=\"{TASK}\" interval=\"{interval}\" priority=\"1\">\n  <pouInstance name=\"tickbus_first\" typeName=\"{SCHEDULE}\"/>\n"
+        );
+        let inner = tasks.iter().flat_map(|task| named(*task, "pouInstance"));
+        for instance in inner.chain(alone.iter().copied()) {
+            task.extend(["  ", &self.text[instance.range()], "\n"]);
+        }
+        task += "</task>";
+        let globals = library::globals(&plan.signals);
+        let globals: Vec<plcopen::Variable<'_>> = (globals.iter())
+            .map(|(name, kind, value)| {
+                let value = (!value.is_empty()).then_some(*value);
+                (name.as_str(), None, *kind, value)
+            })
+            .collect();
+        let globals = plcopen::variables("globalVars", &globals);
+        let task = self.lines(&task);
+        let globals = self.lines(&globals);
+        if let (Some(first), Some(last)) = (tasks.first(), tasks.last()) {
+            edits.replace(first.range(), task, Marks::Xml);
+            for other in &tasks[1..] {
+                edits.replace(other.range(), "", Marks::Xml);
+            }
+            edits.insert(last.range().end, globals, Marks::Xml);
+        } else {
+            self.insert_first(resource, &(task + &globals), edits)?;
+        }
+        for instance in alone {
+            edits.replace(instance.range(), "", Marks::Xml);
+        }
+        Some(())
+    }
+
+    fn lines(&self, text: &str) -> String {
+        text.replace('\n', line_end(self.text))
+    }
+
+    /// Puts XML in as the first content of an element.
+    fn insert_first(&self, node: Node<'a, 'i>, new: &str, edits: &mut Edits) -> Option<()> {
+        let end = line_end(self.text);
+        let new = format!("{end}{}{end}", self.lines(new));
+        if let Some(inner) = inner(self.text, node) {
+            edits.insert(inner.start, new, Marks::Xml);
+        } else {
+            let whole = node.range();
+            let start = self.text[whole.clone()].trim_end_matches("/>").to_owned();
+            let name = start[1..].split_whitespace().next()?;
+            edits.replace(whole, format!("{start}>{new}</{name}>"), Marks::Xml);
+        }
+        Some(())
+    }
+}
+
+/// Elements called `name` within, in any namespace: versions of `PLCopen` XML differ only in that.
+fn named<'a, 'i>(
+    node: Node<'a, 'i>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
+    node.descendants()
+        .filter(move |node| node.is_element() && node.tag_name().name() == name)
+}
+
+fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    let mut children = node.children().filter(Node::is_element);
+    children.find(|child| child.tag_name().name() == name)
+}
+
+fn variable_names<'a, 'i>(list: Node<'a, 'i>) -> impl Iterator<Item = String> + use<'a, 'i> {
+    let names = named(list, "variable").filter_map(|node| node.attribute("name"));
+    names.map(str::to_uppercase)
+}
+
+fn named_attribute(node: Node<'_, '_>, name: &str) -> Option<Named> {
+    let attribute = node.attribute_node(name)?;
+    let text = attribute.value().to_owned();
+    let at = attribute.range_value().start;
+    (!text.is_empty()).then_some(Named { text, at })
+}
+
+/// The program of an instance. CODESYS leaves its type empty: there a program is its own instance.
+fn program(instance: Node<'_, '_>) -> Named {
+    let named = named_attribute(instance, "typeName").or_else(|| named_attribute(instance, "name"));
+    named.unwrap_or_else(|| Named {
+        text: String::new(),
+        at: instance.range().start,
+    })
+}
+
+/// The bytes between the tags of an element; `None` if it has only one tag.
+fn inner(text: &str, node: Node<'_, '_>) -> Option<Range<usize>> {
+    let whole = node.range();
+    let mut quote = None;
+    let tag = text[whole.clone()].bytes().position(|byte| {
+        match (quote, byte) {
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (Some(open), byte) if open == byte => quote = None,
+            (None, b'>') => return true,
+            _ => {}
+        }
+        false
+    })?;
+    let start = whole.start + tag + 1;
+    let end = whole.start + text[whole.clone()].rfind("</")?;
+    (start <= end && text.as_bytes()[start - 2] != b'/').then_some(start..end)
+}
+
+/// Text of XML with references and markup as characters and blanks, byte for byte in their places.
+fn mask(raw: &str) -> String {
+    const MARKUP: [(&str, &str); 7] = [
+        ("<![CDATA[", ""),
+        ("]]>", ""),
+        ("&lt;", "<"),
+        ("&gt;", ">"),
+        ("&amp;", "&"),
+        ("&quot;", "\""),
+        ("&apos;", "'"),
+    ];
+    let mut masked = String::with_capacity(raw.len());
+    let mut rest = raw;
+    let mut is_data = false;
+    while let Some(c) = rest.chars().next() {
+        let mut markup = MARKUP.iter().filter(|(from, _)| rest.starts_with(from));
+        // In CDATA nothing but its end is markup.
+        let found = markup.find(|(from, _)| !is_data || *from == "]]>");
+        let (length, character) = if let Some((from, to)) = found {
+            is_data = *from == "<![CDATA[" || (is_data && *from != "]]>");
+            (from.len(), (*to).to_owned())
+        } else if !is_data && rest.starts_with("&#") {
+            // Line ends and blanks, mostly.
+            (
+                rest.find(';').map_or(rest.len(), |at| at + 1),
+                "\n".to_owned(),
+            )
+        } else {
+            (c.len_utf8(), c.to_string())
+        };
+        let blanks = length - character.len();
+        masked += &character;
+        masked.extend(std::iter::repeat_n(' ', blanks));
+        rest = &rest[length..];
+    }
+    masked
+}
+
+/// A file that holds XML beside others.
+pub(crate) fn not_alone() -> Mistake {
+    let right = "prepare a project in XML by itself";
+    Mistake::new("this is XML beside other sources", right)
+}

@@ -1,0 +1,208 @@
+//! `tickbus sync prepare FILE...`: puts a PLC program on virtual time, and takes it off again.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::Outcome;
+use tickbus_base::toml_text::Mistakes;
+use tickbus_prepare::{Addresses, Settings, Source, prepare, undo};
+
+/// Put a PLC program on virtual time, so that it runs in lock-step with a simulation; --undo takes it off again, byte for byte.
+///
+/// Takes the sources in Structured Text of one PLC together, or a project as PLCopen XML. docs/virtual-time-plc.md has the steps for an engineer.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The sources of the program.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+
+    /// Take out what was put in.
+    #[arg(long, conflicts_with_all = ["go", "ms", "done", "no_clock"])]
+    undo: bool,
+
+    /// Folder for the files, which keep their names [default: beside the first FILE, "prepared", or "original" with --undo].
+    #[arg(long, value_name = "DIR", conflicts_with = "in_place")]
+    out: Option<PathBuf>,
+
+    /// Write over the sources themselves.
+    #[arg(long)]
+    in_place: bool,
+
+    /// Overwrite files that are there.
+    #[arg(long, conflicts_with = "in_place")]
+    force: bool,
+
+    /// Where the server writes the number of a step, such as %ID100 [default: a variable without an address].
+    #[arg(long, value_name = "ADDRESS", value_parser = address)]
+    go: Option<String>,
+
+    /// Where the server writes the virtual time in milliseconds, such as %ID104.
+    #[arg(long, value_name = "ADDRESS", value_parser = address)]
+    ms: Option<String>,
+
+    /// Where the server reads the number of the last step that was made, such as %QD100.
+    #[arg(long, value_name = "ADDRESS", value_parser = address)]
+    done: Option<String>,
+
+    /// A type or function of a library that uses no clock; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    no_clock: Vec<String>,
+}
+
+/// Reads an address of 32 bits, as it is to stand in the program.
+fn address(text: &str) -> Result<String, String> {
+    let capitals = text.to_ascii_uppercase();
+    let rest = ["%ID", "%QD", "%MD"]
+        .iter()
+        .find_map(|area| capitals.strip_prefix(area));
+    let is_number = |rest: &str| {
+        rest.split('.')
+            .all(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    match rest {
+        Some(rest) if is_number(rest) => Ok(capitals),
+        _ => Err("write the address of a double word, such as %ID100".to_owned()),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let mut stderr = std::io::stderr().lock();
+    match changed(arguments).and_then(|made| write(arguments, made)) {
+        Ok((paths, notes)) => {
+            for note in notes {
+                let _ = writeln!(stderr, "note: {note}");
+            }
+            for path in &paths {
+                println!("{}", path.display());
+            }
+            println!("prepare: ok files={}", paths.len());
+            Outcome::Done
+        }
+        Err(mistakes) => {
+            let count: usize = mistakes.iter().map(Mistakes::len).sum();
+            for mistakes in &mistakes {
+                let _ = writeln!(stderr, "{mistakes}");
+            }
+            let _ = writeln!(stderr, "prepare: failed mistakes={count}");
+            Outcome::WrongInput
+        }
+    }
+}
+
+/// The files as they are to be, and remarks.
+struct Made {
+    files: Vec<Vec<u8>>,
+    notes: Vec<String>,
+}
+
+fn changed(arguments: &Arguments) -> Result<Made, Vec<Mistakes>> {
+    let (sources, wrong) = split(arguments.files.iter().map(|path| read(path)));
+    if !wrong.is_empty() {
+        return Err(wrong);
+    }
+    if arguments.undo {
+        let (files, wrong) = split(sources.iter().map(undo));
+        let notes = Vec::new();
+        return if wrong.is_empty() {
+            Ok(Made { files, notes })
+        } else {
+            Err(wrong)
+        };
+    }
+    let settings = Settings {
+        addresses: Addresses {
+            go: arguments.go.clone(),
+            ms: arguments.ms.clone(),
+            done: arguments.done.clone(),
+        },
+        no_clock: arguments.no_clock.clone(),
+    };
+    let made = prepare(&sources, &settings)?;
+    Ok(Made {
+        files: made.files,
+        notes: made.notes,
+    })
+}
+
+fn split<T>(results: impl Iterator<Item = Result<T, Mistakes>>) -> (Vec<T>, Vec<Mistakes>) {
+    let (mut found, mut wrong) = (Vec::new(), Vec::new());
+    for result in results {
+        match result {
+            Ok(one) => found.push(one),
+            Err(mistakes) => wrong.push(mistakes),
+        }
+    }
+    (found, wrong)
+}
+
+fn read(path: &Path) -> Result<Source, Mistakes> {
+    let name = path.display().to_string();
+    match fs::read(path) {
+        Ok(bytes) => Ok(Source { name, bytes }),
+        Err(error) => Err(Mistakes::of_file(
+            &name,
+            format!("this file cannot be read: {error}"),
+            "check the path and the name",
+        )),
+    }
+}
+
+/// Writes all files, or none if any of them would overwrite another one.
+fn write(arguments: &Arguments, made: Made) -> Result<(Vec<PathBuf>, Vec<String>), Vec<Mistakes>> {
+    let wrong = |path: &Path, what: &str, right: &str| {
+        Mistakes::of_file(&path.display().to_string(), what, right)
+    };
+    let paths = if arguments.in_place {
+        arguments.files.clone()
+    } else {
+        let default = if arguments.undo {
+            "original"
+        } else {
+            "prepared"
+        };
+        let folder = arguments.out.clone();
+        let folder = folder.unwrap_or_else(|| arguments.files[0].with_file_name(default));
+        let name = |path: &PathBuf| folder.join(path.file_name().unwrap_or_default());
+        let paths: Vec<PathBuf> = arguments.files.iter().map(name).collect();
+        let sources = arguments.files.iter().map(fs::canonicalize);
+        let sources: BTreeSet<PathBuf> = sources.filter_map(Result::ok).collect();
+        let mut names = BTreeSet::new();
+        let refused = paths.iter().filter_map(|path| {
+            let target = fs::canonicalize(path);
+            if !names.insert(path) {
+                let what = "two sources have this name";
+                Some(wrong(
+                    path,
+                    what,
+                    "give one another name, or add --in-place",
+                ))
+            } else if target.is_ok_and(|target| sources.contains(&target)) {
+                let what = "this is one of the sources";
+                Some(wrong(path, what, "name another --out, or add --in-place"))
+            } else if !arguments.force && path.symlink_metadata().is_ok() {
+                let what = "this file is there already";
+                Some(wrong(path, what, "name another --out, or add --force"))
+            } else {
+                None
+            }
+        });
+        let refused: Vec<Mistakes> = refused.collect();
+        if !refused.is_empty() {
+            return Err(refused);
+        }
+        fs::create_dir_all(&folder).map_err(|error| {
+            let what = format!("this folder cannot be made: {error}");
+            vec![wrong(&folder, &what, "name another --out")]
+        })?;
+        paths
+    };
+    for (path, bytes) in paths.iter().zip(&made.files) {
+        fs::write(path, bytes).map_err(|error| {
+            let what = format!("this file cannot be written: {error}");
+            vec![wrong(path, &what, "check the folder")]
+        })?;
+    }
+    Ok((paths, made.notes))
+}

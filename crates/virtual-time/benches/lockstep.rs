@@ -1,0 +1,234 @@
+//! Steps per second of an empty run, compared with a bare TCP coordinator: a loop that sends one message to each client
+//! and waits for their answers. In alternating rounds of one run, with each client a process of its own.
+//!
+//! Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
+#![allow(missing_docs, reason = "a bench")]
+
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use tickbus_base::time::{Monotonic, Nanos};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_image::signal::DataType;
+use tickbus_virtual_time::{
+    Controls, Declaration, Hosting, Logic, Participant, Settings, StartCondition, Step, Variable,
+    in_process, tcp,
+};
+
+/// The bytes of a step and of its answer without any variable, as we send them.
+const ASKED: usize = 21;
+const ANSWERED: usize = 13;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(at) = arguments.iter().position(|argument| argument == "--client") {
+        return client(&arguments[at + 1..]);
+    }
+    // `cargo bench` passes this; `cargo test` only checks that the bench runs.
+    let measured = arguments.iter().any(|argument| argument == "--bench");
+    let (rounds, span) = if measured {
+        (15, Duration::from_millis(300))
+    } else {
+        (1, Duration::from_millis(1))
+    };
+    for count in [2, 8] {
+        let (mut bares, mut ours, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..rounds {
+            let bare = bare(count, span);
+            let tcp = over_tcp(count, 0, span);
+            bares.push(bare);
+            ours.push(tcp);
+            ratios.push(tcp / bare);
+        }
+        println!("rust sdsp.bare.{count} {:.0}", median(&mut bares));
+        println!("rust sdsp.tcp.{count} {:.0}", median(&mut ours));
+        println!("rust sdsp.tcp.{count}.ratio {:.3}", median(&mut ratios));
+    }
+    let (mut alone, mut ratios) = (Vec::new(), Vec::new());
+    for _ in 0..rounds {
+        let rate = in_this_process(2, 0, span);
+        alone.push(rate);
+        ratios.push(rate / bare(2, span));
+    }
+    println!("rust sdsp.in_process.2 {:.0}", median(&mut alone));
+    println!("rust sdsp.in_process.2.ratio {:.1}", median(&mut ratios));
+    for variables in [0, 10, 100] {
+        let rate = over_tcp(if measured { 100 } else { 3 }, variables, span);
+        println!("rust sdsp.tcp.100.{variables} {rate:.1}");
+        let rate = in_this_process(100, variables, span);
+        println!("rust sdsp.in_process.100.{variables} {rate:.1}");
+    }
+}
+
+fn median(figures: &mut [f64]) -> f64 {
+    figures.sort_by(f64::total_cmp);
+    figures[figures.len() / 2]
+}
+
+/// A client that does nothing, with this many variables, which it also reads.
+struct Idle(String, usize);
+
+impl Participant for Idle {
+    fn declare(&self) -> Declaration {
+        let mut declaration = Declaration::new(&self.0);
+        let name = |at| format!("{} {at}", self.0);
+        declaration.reads = (0..self.1).map(name).collect();
+        let variable = |name: &String| Variable::new(name, DataType::Lreal);
+        declaration.writes = declaration.reads.iter().map(variable).collect();
+        declaration
+    }
+
+    fn initial(&mut self, _: &mut [u64]) {}
+
+    fn run(&mut self, _: Step, _: &[u64], _: &mut [u64]) -> Result<(), String> {
+        Ok(())
+    }
+}
+
+fn client(arguments: &[String]) {
+    let [kind, address, name, variables] = arguments else {
+        panic!("unexpected arguments {arguments:?}");
+    };
+    match &**kind {
+        "bare" => {
+            let mut stream = TcpStream::connect(address).expect("it listens");
+            stream.set_nodelay(true).expect("it is open");
+            let mut asked = [0; ASKED];
+            while stream.read_exact(&mut asked).is_ok() {
+                stream.write_all(&[0; ANSWERED]).expect("it reads");
+            }
+        }
+        "tcp" => {
+            let mut idle = Idle(name.clone(), variables.parse().expect("a number"));
+            let address: Address = address.parse().expect("an address");
+            tcp::join(&address, &mut idle).expect("it runs");
+        }
+        other => panic!("unknown kind {other}"),
+    }
+}
+
+fn clients(kind: &str, address: &str, count: usize, variables: usize) -> Vec<Child> {
+    let own = std::env::current_exe().expect("a path");
+    let client = |at: usize| {
+        let mut command = Command::new(&own);
+        command.args(["--client", kind, address]);
+        command.args([format!("c{at:03}"), variables.to_string()]);
+        command.spawn().expect("it starts")
+    };
+    (0..count).map(client).collect()
+}
+
+fn wait(children: Vec<Child>) {
+    for mut child in children {
+        assert!(child.wait().expect("it was started").success());
+    }
+}
+
+/// Steps per second of the bare coordinator.
+fn bare(count: usize, span: Duration) -> f64 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = listener.local_addr().expect("it is bound").to_string();
+    let children = clients("bare", &address, count, 0);
+    let mut streams: Vec<TcpStream> = (0..count)
+        .map(|_| listener.accept().expect("it comes").0)
+        .collect();
+    for stream in &streams {
+        stream.set_nodelay(true).expect("it is open");
+    }
+    let mut step = || {
+        for stream in &mut streams {
+            stream.write_all(&[0; ASKED]).expect("it reads");
+        }
+        for stream in &mut streams {
+            stream.read_exact(&mut [0; ANSWERED]).expect("it answers");
+        }
+    };
+    for _ in 0..100 {
+        step();
+    }
+    let (begun, mut steps) = (Instant::now(), 0_u32);
+    while begun.elapsed() < span {
+        step();
+        steps += 1;
+    }
+    let rate = f64::from(steps) / begun.elapsed().as_secs_f64();
+    drop(streams);
+    wait(children);
+    rate
+}
+
+/// Settings for this many clients; the logic notes when a step begins, and so the steps per second.
+fn settings(count: usize) -> Settings {
+    Settings::new(Nanos::from_millis(1), StartCondition::Count(count))
+}
+
+/// Counts steps for `span` after the first 100, and then stops the run.
+#[derive(Default)]
+struct Meter {
+    begun: Option<Instant>,
+    steps: u64,
+    rate: f64,
+}
+
+impl Meter {
+    /// Whether it is time to stop.
+    fn step(&mut self, sequence: u64, span: Duration) -> bool {
+        if sequence == 100 {
+            self.begun = Some(Instant::now());
+            self.steps = sequence;
+        }
+        let Some(begun) = self.begun else {
+            return false;
+        };
+        // The clock is looked at by the bare coordinator, too.
+        let elapsed = begun.elapsed();
+        if self.rate == 0.0 && elapsed >= span {
+            #[expect(clippy::cast_precision_loss, reason = "exact for years")]
+            let steps = (sequence - self.steps) as f64;
+            self.rate = steps / elapsed.as_secs_f64();
+            return true;
+        }
+        false
+    }
+}
+
+fn over_tcp(count: usize, variables: usize, span: Duration) -> f64 {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let children = clients("tcp", &listener.address().to_string(), count, variables);
+    let controls = Controls::default();
+    let mut meter = Meter::default();
+    let logic = Logic::new().on_time(|access| {
+        if meter.step(access.step().sequence, span) {
+            controls.send(tickbus_virtual_time::server::Control::Stop);
+        }
+        Ok(())
+    });
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        controls: &controls,
+        news: &mut |_| {},
+    };
+    listener
+        .run(settings(count), logic, hosting)
+        .expect("it runs");
+    wait(children);
+    meter.rate
+}
+
+fn in_this_process(count: usize, variables: usize, span: Duration) -> f64 {
+    let mut idle: Vec<Idle> = (0..count)
+        .map(|at| Idle(format!("c{at:03}"), variables))
+        .collect();
+    let participants = idle.iter_mut().map(|client| client as _).collect();
+    let mut meter = Meter::default();
+    let logic = Logic::new().on_time(|access| {
+        if meter.step(access.step().sequence, span) {
+            return Err("enough".to_owned());
+        }
+        Ok(())
+    });
+    in_process::run(settings(count), participants, logic).expect_err("enough");
+    meter.rate
+}

@@ -160,8 +160,8 @@ pub(crate) trait Line {
     /// Sends a frame. If that fails, receiving says so.
     fn send(&mut self, frame: &[u8]);
 
-    /// Waits for the next frame, and gives it without its header.
-    fn receive(&mut self) -> Result<&[u8], Ended>;
+    /// Waits for the next frame, for `limit` at most, and gives it without its header.
+    fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended>;
 }
 
 /// A client with its line to the server; it blocks while it waits.
@@ -179,8 +179,8 @@ impl<L: Line> Caller<L> {
     }
 
     /// Waits for what the server asks.
-    pub(crate) fn wait(&mut self) -> Result<Asked, Ended> {
-        let frame = self.line.receive()?;
+    pub(crate) fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
+        let frame = self.line.receive(limit)?;
         let asked = self.client.receive(frame);
         if let Err(ended) = &asked {
             self.give_up(&ended.reason.clone());
@@ -204,7 +204,7 @@ impl<L: Line> Caller<L> {
     pub(crate) fn run(&mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
         let mut writes = vec![0; self.client.declaration.writes.len()];
         loop {
-            match self.wait()? {
+            match self.wait(Nanos::MAX)? {
                 Asked::Initial => participant.initial(&mut writes),
                 Asked::Step(step) => {
                     let ran = participant.run(step, self.client.reads(), &mut writes);
@@ -219,6 +219,12 @@ impl<L: Line> Caller<L> {
             self.answer(&writes);
         }
     }
+}
+
+/// The server has said nothing for `limit`.
+pub(crate) fn silent(limit: Nanos) -> Ended {
+    let reason = format!("the server has not said anything for {limit}");
+    Ended::before(Cause::Hung, reason)
 }
 
 /// The client of a participant.

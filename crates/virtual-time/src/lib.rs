@@ -12,6 +12,7 @@ mod declaration;
 mod hosting;
 mod outcome;
 mod participant;
+mod run_file;
 mod settings;
 mod shared_data;
 
@@ -31,4 +32,5 @@ pub use hosting::{Controls, Hosting, hear};
 pub use logic::Logic;
 pub use outcome::{Cause, Ended, Outcome};
 pub use participant::{Participant, Step};
+pub use run_file::{Meeting, RunFile};
 pub use settings::{Pacing, Settings, StartCondition};

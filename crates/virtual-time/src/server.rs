@@ -1,60 +1,26 @@
 //! The server, without I/O: state, time and messages in; messages and the next deadline out.
 
 mod joining;
-#[cfg(test)]
-mod tests;
+mod message;
 
 use std::collections::VecDeque;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_base::toml_text::shown;
-use tickbus_image::signal::DataType;
 
 use crate::barrier::{Barrier, State};
 use crate::logic::Logic;
 use crate::{Cause, Declaration, Ended, Outcome, Settings, Step};
 use joining::Joining;
+pub(crate) use joining::MOST_CLIENTS;
+pub use message::{Control, ToClient};
 
 /// How many states are passed in a row, where no client is due, before anything else is done.
 const EMPTY_STATES: usize = 1000;
 
 /// How long the clients may take to finish a step after the run was stopped.
 const STOP_PATIENCE: Nanos = Nanos::from_secs(1);
-
-/// What a server may be asked to do while it runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Control {
-    /// Begins no more steps.
-    Pause,
-    /// Runs this many steps, and then pauses.
-    Step(u64),
-    /// Runs on.
-    Run,
-    /// Ends the run after the step that is under way; a client that does not finish it within a second is not waited for.
-    Stop,
-}
-
-/// A message of the server to one client.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ToClient<'a> {
-    /// Everyone has joined. The client answers with its initial values, as those of step 0.
-    Start {
-        /// The virtual time of one step of the server.
-        step: Nanos,
-        /// The types of the variables that it reads, in the order of its declaration.
-        reads: &'a [DataType],
-    },
-    /// The client runs, and answers with what it writes.
-    Step {
-        /// The step.
-        step: Step,
-        /// What it reads, in the order of its declaration.
-        reads: &'a [u64],
-    },
-    /// The run has ended, or the client does not take part in it. Nothing follows.
-    End(&'a Result<Outcome, Ended>),
-}
 
 /// A server for one run.
 ///
@@ -212,6 +178,10 @@ impl<'l> Server<'l> {
             self.seats.len() - 1
         });
         self.seats[seat] = Seat::Silent(now);
+        if self.outcome().is_some() {
+            self.seats[seat] = Seat::Leaving;
+            self.outbox.push_back(Out::End(seat));
+        }
         seat
     }
 

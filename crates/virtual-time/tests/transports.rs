@@ -63,7 +63,7 @@ fn a_run_over_tcp_is_the_one_in_this_process_whoever_comes_first() {
         }
         clients.rotate_left(turn);
         let (outcome, ends) = over_tcp(mixer_settings(500, 4), clients);
-        assert_eq!(outcome, Ok(expected.clone()));
+        assert_eq!(outcome, Ok(expected));
         assert!(ends.iter().all(|end| *end == outcome), "{ends:?}");
     }
 }
@@ -132,9 +132,9 @@ fn a_client_that_goes_is_named_and_the_others_learn_it() {
         scope.spawn(|| {
             let gone = tickbus_virtual_time::client::Client::new(gone).expect("it is right");
             let mut gone = tcp::connect(&address, gone, &Stop::new()).expect("it listens");
-            gone.wait().expect("it starts");
+            gone.wait(Nanos::MAX).expect("it starts");
             gone.answer(&[]);
-            gone.wait().expect("the first step");
+            gone.wait(Nanos::MAX).expect("the first step");
         });
         let ended = serve(
             listener,
@@ -171,4 +171,25 @@ fn a_stop_ends_the_run_between_two_steps() {
         );
         assert_eq!(joined.join().expect("no panic"), outcome);
     });
+}
+
+#[test]
+fn a_client_waits_for_a_silent_server_no_longer_than_its_limit() {
+    // Nobody accepts; the system lets the client connect all the same.
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = Address::local(listener.local_addr().expect("it is bound").port());
+    let client = client("one", 1, &[], &[], |_, _, _| Ok(())).declaration;
+    let client = tickbus_virtual_time::client::Client::new(client).expect("it is right");
+    let mut client = tcp::connect(&address, client, &Stop::new()).expect("it listens");
+    let ended = client
+        .wait(Nanos::from_millis(120))
+        .expect_err("nobody answers");
+    assert_eq!(ended.cause, Cause::Hung);
+    let stop = Stop::new();
+    stop.stop();
+    let declaration = client.client().declaration().clone();
+    let again = tickbus_virtual_time::client::Client::new(declaration).expect("it is right");
+    let mut again = tcp::connect(&address, again, &stop).expect("it listens");
+    let ended = again.wait(Nanos::MAX).expect_err("it was stopped");
+    assert_eq!(ended.cause, Cause::Stopped);
 }

@@ -1,16 +1,19 @@
 //! The client: it blocks while it waits for the server.
 
 use std::io::{self, Read as _, Write as _};
-use std::net::TcpStream;
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
 
-use tickbus_base::time::{Nanos, Stop};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::tcp::{Address, is_for_later, prepare};
 
-use crate::client::{Asked, Caller, Client, Line, client_of};
+use crate::client::{Asked, Caller, Client, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a read blocks before it is asked whether to stop.
 const LOOK: Nanos = Nanos::from_millis(50);
+
+/// How long an address may take to answer at first.
+const CONNECTING: Nanos = Nanos::from_secs(5);
 
 /// How long the server's machine may be silent, on the level of TCP.
 const PATIENCE: Nanos = Nanos::from_secs(10);
@@ -48,7 +51,13 @@ pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connect
 }
 
 fn open(address: &Address) -> io::Result<TcpStream> {
-    let stream = TcpStream::connect(address.to_string())?;
+    let mut failed = io::Error::other("the host has no address");
+    let mut reach = |address: SocketAddr| {
+        let reached = TcpStream::connect_timeout(&address, CONNECTING.to_duration());
+        reached.map_err(|error| failed = error).ok()
+    };
+    let reached = address.to_string().to_socket_addrs()?.find_map(&mut reach);
+    let stream = reached.ok_or(failed)?;
     prepare(&stream, PATIENCE)?;
     stream.set_nonblocking(false)?;
     stream.set_read_timeout(Some(LOOK.to_duration()))?;
@@ -66,13 +75,14 @@ impl Connection {
         &self.0.client
     }
 
-    /// Waits for what the server asks next, for any time: the server may be paused.
+    /// Waits for what the server asks next, for `limit` of wall-clock time at most, to some 50 ms. The server may be
+    /// paused, so without a reason of its own the limit is [`Nanos::MAX`].
     ///
     /// # Errors
     ///
-    /// The connection is lost, the server violates the protocol, or this client was stopped.
-    pub fn wait(&mut self) -> Result<Asked, Ended> {
-        self.0.wait()
+    /// The connection is lost, the server violates the protocol or says nothing, or this client was stopped.
+    pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
+        self.0.wait(limit)
     }
 
     /// Answers what was asked, with one value per variable of the declaration's writes. If the connection is lost, the
@@ -119,7 +129,9 @@ impl Line for TcpLine {
         let _ = self.stream.write_all(frame);
     }
 
-    fn receive(&mut self) -> Result<&[u8], Ended> {
+    fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended> {
+        // The clock is looked at only when there is time for that.
+        let mut until = None;
         loop {
             let arrived = wire::frame_length(&self.buffer[self.start..self.end]);
             let violated = |what| {
@@ -144,6 +156,10 @@ impl Line for TcpLine {
                 Err(error) if is_for_later(&error) => {
                     if self.stop.is_stopped() {
                         return Err(Ended::before(Cause::Stopped, "this client was stopped"));
+                    }
+                    let now = Monotonic::shared().now();
+                    if now >= *until.get_or_insert(now + limit - LOOK) {
+                        return Err(silent(limit));
                     }
                 }
                 Err(error) => return Err(lost(error)),

@@ -30,6 +30,8 @@ impl From<Ended> for End {
 #[derive(Debug)]
 pub(super) struct Run {
     connection: tcp::Connection,
+    /// How long the server may be silent.
+    timeout: Nanos,
     /// The virtual time of one step of this client.
     pub(super) interval: Nanos,
     /// How many of the steps that it is asked for make one of its own.
@@ -53,6 +55,7 @@ impl Run {
         let multiple = declaration.multiple;
         let mut run = Self {
             connection: connect(address, timeout, &declaration, stop)?,
+            timeout,
             interval: Nanos::ZERO,
             each: 1,
             next: 1,
@@ -124,12 +127,11 @@ impl Run {
     }
 
     fn wait(&mut self) -> Result<Asked, End> {
-        let asked = self.connection.wait();
-        self.is_over = match &asked {
-            Ok(asked) => matches!(asked, Asked::End(_)),
-            // The server learns of it when this is dropped.
-            Err(ended) => ended.cause != Cause::Stopped,
-        };
+        let asked = self.connection.wait(self.timeout);
+        self.is_over = !matches!(asked, Ok(Asked::Initial | Asked::Step(_)));
+        if let Err(ended) = &asked {
+            self.connection.give_up(&ended.reason);
+        }
         match asked? {
             Asked::End(Ok(outcome)) => Err(End::Finished(outcome)),
             Asked::End(Err(ended)) => Err(End::Broken(ended)),

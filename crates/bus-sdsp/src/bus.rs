@@ -183,6 +183,17 @@ impl Stepped for Sdsp {
     }
 }
 
+impl Drop for Sdsp {
+    fn drop(&mut self) {
+        if let State::Joined { run, .. } = &mut self.state
+            && self.values.receipt.is_some()
+        {
+            // The simulation has answered this step, and there is no further cycle to send it.
+            run.finish(&self.values.slots);
+        }
+    }
+}
+
 /// The values of this client, and the image that they come from and go to.
 #[derive(Debug)]
 struct Values {

@@ -11,6 +11,9 @@ use super::Every;
 /// How long to wait until a server that was not there is tried again.
 const PAUSE: Nanos = Nanos::from_millis(100);
 
+/// How long closing waits for the others to finish the step, too.
+const FAREWELL: Nanos = Nanos::from_secs(2);
+
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum End {
@@ -108,6 +111,14 @@ impl Run {
                 _ => self.connection.answer(writes),
             }
         }
+    }
+
+    /// Finishes the step that this client is in, as its last one. If it was the last one of the run, that ends as planned.
+    pub(super) fn finish(&mut self, writes: &[u64]) {
+        self.connection.answer(writes);
+        self.timeout = self.timeout.min(FAREWELL);
+        // Whatever is asked next is not answered.
+        let _ = self.wait();
     }
 
     /// What this client reads in its step.

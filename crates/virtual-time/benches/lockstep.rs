@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::DataType;
+#[cfg(unix)]
+use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{
     Controls, Declaration, Hosting, Logic, Participant, Settings, StartCondition, Step, Variable,
     in_process, tcp,
@@ -45,6 +47,17 @@ fn main() {
         println!("rust sdsp.bare.{count} {:.0}", median(&mut bares));
         println!("rust sdsp.tcp.{count} {:.0}", median(&mut ours));
         println!("rust sdsp.tcp.{count}.ratio {:.3}", median(&mut ratios));
+    }
+    #[cfg(unix)]
+    {
+        let (mut shared, mut ratios) = (Vec::new(), Vec::new());
+        for _ in 0..rounds {
+            let rate = through_memory(2, 0, span);
+            shared.push(rate);
+            ratios.push(rate / bare(2, span));
+        }
+        println!("rust sdsp.shared_memory.2 {:.0}", median(&mut shared));
+        println!("rust sdsp.shared_memory.2.ratio {:.1}", median(&mut ratios));
     }
     let (mut alone, mut ratios) = (Vec::new(), Vec::new());
     for _ in 0..rounds {
@@ -104,6 +117,11 @@ fn client(arguments: &[String]) {
             let mut idle = Idle(name.clone(), variables.parse().expect("a number"));
             let address: Address = address.parse().expect("an address");
             tcp::join(&address, &mut idle).expect("it runs");
+        }
+        #[cfg(unix)]
+        "shared_memory" => {
+            let mut idle = Idle(name.clone(), variables.parse().expect("a number"));
+            shared_memory::join(address, &mut idle).expect("it runs");
         }
         other => panic!("unknown kind {other}"),
     }
@@ -213,6 +231,30 @@ fn over_tcp(count: usize, variables: usize, span: Duration) -> f64 {
     listener
         .run(settings(count), logic, hosting)
         .expect("it runs");
+    wait(children);
+    meter.rate
+}
+
+#[cfg(unix)]
+fn through_memory(count: usize, variables: usize, span: Duration) -> f64 {
+    let name = format!("bench-{}", std::process::id());
+    let settings = settings(count);
+    let listener = shared_memory::Listener::bind(&name, &settings).expect("a free name");
+    let children = clients("shared_memory", &name, count, variables);
+    let controls = Controls::default();
+    let mut meter = Meter::default();
+    let logic = Logic::new().on_time(|access| {
+        if meter.step(access.step().sequence, span) {
+            controls.send(tickbus_virtual_time::server::Control::Stop);
+        }
+        Ok(())
+    });
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        controls: &controls,
+        news: &mut |_| {},
+    };
+    listener.run(settings, logic, hosting).expect("it runs");
     wait(children);
     meter.rate
 }

@@ -22,6 +22,8 @@ pub mod hash;
 pub mod in_process;
 pub mod logic;
 pub mod server;
+#[cfg(unix)]
+pub mod shared_memory;
 pub mod tcp;
 pub mod wire;
 

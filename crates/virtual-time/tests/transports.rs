@@ -7,6 +7,8 @@ use std::thread;
 use common::{client, mixer_settings, mixers, settings};
 use tickbus_base::time::{Monotonic, Nanos, Stop};
 use tickbus_fieldbus::tcp::Address;
+#[cfg(unix)]
+use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{
     Cause, Controls, Ended, Hosting, Logic, Outcome, Participant, Settings, in_process, tcp,
 };
@@ -47,6 +49,50 @@ fn serve(
     listener.run(settings, Logic::new(), hosting)
 }
 
+/// As [`over_tcp`], through shared memory.
+#[cfg(unix)]
+fn through_memory(
+    settings: Settings,
+    clients: Vec<Box<dyn Participant + Send>>,
+) -> (Result<Outcome, Ended>, Vec<Result<Outcome, Ended>>) {
+    let name = fresh_name();
+    let listener = shared_memory::Listener::bind(&name, &settings).expect("a free name");
+    thread::scope(|scope| {
+        let joined: Vec<_> = clients
+            .into_iter()
+            .map(|mut client| {
+                let name = &name;
+                scope.spawn(move || shared_memory::join(name, &mut *client))
+            })
+            .collect();
+        let outcome = serve_memory(listener, settings);
+        let ends = joined
+            .into_iter()
+            .map(|client| client.join().expect("no panic"));
+        (outcome, ends.collect())
+    })
+}
+
+#[cfg(unix)]
+fn serve_memory(listener: shared_memory::Listener, settings: Settings) -> Result<Outcome, Ended> {
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        controls: &Controls::default(),
+        news: &mut |_| {},
+    };
+    listener.run(settings, Logic::new(), hosting)
+}
+
+/// A name for shared memory that no other test has.
+#[cfg(unix)]
+fn fresh_name() -> String {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    format!("test-{}-{number}", std::process::id())
+}
+
 fn in_this_process(steps: u64, count: u32) -> Outcome {
     let mut mixers = mixers(count);
     let clients = mixers.iter_mut().map(|mixer| mixer as _).collect();
@@ -66,6 +112,94 @@ fn a_run_over_tcp_is_the_one_in_this_process_whoever_comes_first() {
         assert_eq!(outcome, Ok(expected));
         assert!(ends.iter().all(|end| *end == outcome), "{ends:?}");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_through_shared_memory_is_the_one_in_this_process_whoever_comes_first() {
+    let expected = in_this_process(2000, 3);
+    for turn in 0..3 {
+        let mut clients: Vec<Box<dyn Participant + Send>> = Vec::new();
+        for mixer in mixers(3) {
+            clients.push(Box::new(mixer));
+        }
+        clients.rotate_left(turn);
+        let (outcome, ends) = through_memory(mixer_settings(2000, 3), clients);
+        assert_eq!(outcome, Ok(expected));
+        assert!(ends.iter().all(|end| *end == outcome), "{ends:?}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn who_comes_late_or_second_to_shared_memory_is_refused() {
+    let settings = settings(20, &["first"]);
+    let name = fresh_name();
+    let listener = shared_memory::Listener::bind(&name, &settings).expect("a free name");
+    let second = shared_memory::Listener::bind(&name, &settings).expect_err("it is taken");
+    assert_eq!(second.kind(), std::io::ErrorKind::AddrInUse);
+    let late = name.clone();
+    let mut first = client("first", 1, &[], &[], move |step, _, _| {
+        if step.sequence == 3 {
+            let mut late_one = client("late", 1, &[], &[], |_, _, _| Ok(()));
+            let ended = shared_memory::join(&late, &mut late_one).expect_err("it is late");
+            assert_eq!(ended.cause, Cause::Refused);
+            assert!(ended.reason.contains("is at step 3"), "{ended}");
+        }
+        Ok(())
+    });
+    thread::scope(|scope| {
+        let joined = scope.spawn(|| shared_memory::join(&name, &mut first));
+        let outcome = serve_memory(listener, settings);
+        assert_eq!(outcome.as_ref().map(|outcome| outcome.steps), Ok(20));
+        assert_eq!(joined.join().expect("no panic"), outcome);
+    });
+    let gone = client("first", 1, &[], &[], |_, _, _| Ok(()));
+    let ended = shared_memory::join(&name, &mut { gone }).expect_err("the server is gone");
+    assert_eq!(ended.cause, Cause::Lost);
+}
+
+/// Not a test by itself: the client that the next one kills.
+#[cfg(unix)]
+#[test]
+fn a_child_that_kills_itself_in_step_5() {
+    let Ok(name) = std::env::var("TICKBUS_TEST_MEMORY") else {
+        return;
+    };
+    let mut victim = client("victim", 1, &[], &[], |step, _, _| {
+        if step.sequence == 5 {
+            std::process::abort();
+        }
+        Ok(())
+    });
+    let _ = shared_memory::join(&name, &mut victim);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_process_that_crashes_at_shared_memory_is_named() {
+    let settings = settings(20, &["good", "victim"]);
+    let name = fresh_name();
+    let listener = shared_memory::Listener::bind(&name, &settings).expect("a free name");
+    let mut good = client("good", 1, &[], &[], |_, _, _| Ok(()));
+    thread::scope(|scope| {
+        let joined = scope.spawn(|| shared_memory::join(&name, &mut good));
+        let own = std::env::current_exe().expect("a path");
+        let mut child = std::process::Command::new(own)
+            .args(["--exact", "a_child_that_kills_itself_in_step_5"])
+            .env("TICKBUS_TEST_MEMORY", &name)
+            .stdout(std::process::Stdio::null())
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let ended = serve_memory(listener, settings).expect_err("it crashes");
+        assert_eq!(
+            ended.to_string(),
+            "the run ended after 4 steps: client \"victim\" was lost: its process has ended"
+        );
+        assert_eq!(joined.join().expect("no panic"), Err(ended));
+        assert!(!child.wait().expect("it was started").success());
+    });
 }
 
 #[test]

@@ -3,9 +3,13 @@
 mod library;
 mod log;
 #[cfg(unix)]
+mod named_memory;
+#[cfg(unix)]
 mod own_file;
 mod poll;
 mod poll_set;
+#[cfg(unix)]
+mod process_watch;
 #[cfg(unix)]
 mod pseudo_terminal;
 mod serial;
@@ -16,9 +20,13 @@ mod timer_slack;
 pub use library::{Library, one_line};
 pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
 #[cfg(unix)]
+pub use named_memory::NamedMemory;
+#[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::Interest;
 pub use poll_set::{PollSet, Ready};
+#[cfg(unix)]
+pub use process_watch::ProcessWatch;
 #[cfg(unix)]
 pub use pseudo_terminal::PseudoTerminal;
 #[cfg(unix)]

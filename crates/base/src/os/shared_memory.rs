@@ -4,10 +4,16 @@
 
 use std::io;
 use std::ptr::NonNull;
+#[cfg(target_os = "linux")]
+use std::sync::atomic::AtomicU32;
 use std::sync::atomic::{AtomicU64, Ordering, fence};
+use std::time::Duration;
 
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
+
+#[cfg(target_os = "linux")]
+use super::poll::timespec;
 
 /// Bytes of one word.
 const WORD: usize = size_of::<AtomicU64>();
@@ -52,7 +58,8 @@ impl SharedMemory {
         }
         // SAFETY: a new mapping, at an address that the system chooses, so no memory that is in use
         // changes. The file is long enough, as checked; where the system can, it is sealed against being
-        // shortened, and elsewhere only this process and its helper have it, neither of which does that.
+        // shortened, and elsewhere only processes of this user have it, none of which does that. If one did,
+        // the system would end this process at its next access, rather than let it see anything else.
         let start = unsafe {
             mmap(
                 std::ptr::null_mut(),
@@ -107,6 +114,73 @@ impl SharedMemory {
             let value = word.load(Ordering::Relaxed).to_ne_bytes();
             chunk.copy_from_slice(&value[..chunk.len()]);
         }
+    }
+
+    /// One of its words.
+    ///
+    /// # Panics
+    ///
+    /// When the memory ends before.
+    pub fn word(&self, at: usize) -> &AtomicU64 {
+        &self.words()[at]
+    }
+
+    /// Waits until another process [wakes](Self::wake) those who wait for the word `at`, for `limit` at most. It returns at
+    /// once if that word is no longer `seen`, in its lower 32 bits; and it may return early for no reason.
+    ///
+    /// # Panics
+    ///
+    /// When the memory ends before.
+    pub fn wait(&self, at: usize, seen: u64, limit: Duration) {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::thread::futex;
+
+            #[expect(clippy::cast_possible_truncation, reason = "the lower half is meant")]
+            let seen = seen as u32;
+            let limit = timespec(limit);
+            // It has changed, time is up, or a signal came: the caller looks again in any case.
+            let _ = futex::wait(
+                self.lower_half(at),
+                futex::Flags::empty(),
+                seen,
+                Some(&limit),
+            );
+        }
+        #[cfg(not(target_os = "linux"))]
+        {
+            // Without such a wait: look again soon.
+            let _ = (self.word(at), seen);
+            let _ = super::poll::poll_once(&mut [], Some(limit.min(Duration::from_millis(1))));
+        }
+    }
+
+    /// Wakes every process that [waits](Self::wait) for the word `at`, which was changed before.
+    ///
+    /// # Panics
+    ///
+    /// When the memory ends before.
+    pub fn wake(&self, at: usize) {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::thread::futex;
+
+            // It fails only for addresses that are none.
+            let everyone = i32::MAX.unsigned_abs();
+            let _ = futex::wake(self.lower_half(at), futex::Flags::empty(), everyone);
+        }
+        #[cfg(not(target_os = "linux"))]
+        let _ = self.word(at);
+    }
+
+    /// The lower half of a word, as the system's waits need it: they look at 32 bits.
+    #[cfg(target_os = "linux")]
+    fn lower_half(&self, at: usize) -> &AtomicU32 {
+        let halves = std::ptr::from_ref(self.word(at)).cast::<AtomicU32>();
+        let lower = usize::from(cfg!(target_endian = "big"));
+        // SAFETY: within the word, aligned for its half, and alive as long as `self`. No code accesses the half: it is
+        // only passed to the system, which reads it by itself, like another process.
+        unsafe { &*halves.add(lower) }
     }
 
     /// How many words hold `bytes` bytes.
@@ -192,6 +266,21 @@ mod tests {
         let (_memory, file) = SharedMemory::create(8).expect("memory");
         let error = SharedMemory::open(&file, 4096).expect_err("too small");
         assert!(error.to_string().contains("8 bytes, expected 4096"));
+    }
+
+    #[test]
+    fn a_wait_for_a_word_ends_when_it_changes() {
+        let (one, file) = SharedMemory::create(64).expect("memory");
+        let two = SharedMemory::open(&file, 64).expect("the same memory");
+        one.wait(3, 1, Duration::from_secs(3600));
+        let waiting = std::thread::spawn(move || {
+            while two.word(3).load(Ordering::Acquire) == 0 {
+                two.wait(3, 0, Duration::from_secs(3600));
+            }
+        });
+        one.word(3).store(1, Ordering::Release);
+        one.wake(3);
+        waiting.join().expect("no panic");
     }
 
     #[cfg(target_os = "linux")]

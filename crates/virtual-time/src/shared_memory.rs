@@ -1,0 +1,14 @@
+//! Clients in other processes of the same computer, through shared memory: the same messages as over TCP, but without
+//! a call of the system for each.
+//!
+//! The memory has a seat for each client, with a mailbox each way that holds one frame. Who waits spins for a moment,
+//! then lets others run, and then sleeps until it is woken.
+
+mod client;
+mod layout;
+mod mailbox;
+mod patience;
+mod server;
+
+pub use client::{Connection, connect, join};
+pub use server::Listener;

@@ -1,0 +1,199 @@
+//! The client.
+
+use std::io::ErrorKind;
+use std::sync::atomic::Ordering::{Relaxed, SeqCst};
+
+use tickbus_base::os::NamedMemory;
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
+
+use super::layout;
+use super::mailbox::Mailbox;
+use super::patience::look;
+use crate::client::{Asked, Caller, Client, Line, client_of, silent};
+use crate::{Cause, Ended, Outcome, Participant, wire};
+
+/// How long a wait sleeps before it looks whether the server is alive.
+const NAP: Nanos = Nanos::from_millis(50);
+
+/// Lets `participant` take part in the run that a server on this computer offers under `name`, until its end.
+///
+/// # Errors
+///
+/// There is no server, it refuses this client, or the run was broken off.
+pub fn join(name: &str, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+    let client = client_of(participant)?;
+    connect(name, client, &Stop::new())?.run(participant)
+}
+
+/// Takes a seat at the server of this name, and joins. When `stop` is stopped, the client leaves the run.
+///
+/// # Errors
+///
+/// There is no server, or it has no seat free.
+pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, Ended> {
+    let lost = |reason: String| Ended::before(Cause::Lost, reason);
+    let path = layout::path(name);
+    let no_server = || {
+        lost(format!(
+            "no server offers the shared memory \"{name}\"; start it first, or correct the name"
+        ))
+    };
+    let memory = NamedMemory::open(&path).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => no_server(),
+        _ => lost(format!(
+            "the shared memory {} cannot be opened ({error})",
+            path.display()
+        )),
+    })?;
+    let seats = layout::seats(memory.memory()).ok_or_else(no_server)?;
+    let process = u64::from(std::process::id());
+    let is_mine = |seat: &usize| {
+        let owner = memory.memory().word(layout::owner(*seat));
+        let taken = owner.compare_exchange(layout::FREE, process, SeqCst, Relaxed);
+        taken.is_ok()
+    };
+    let seat = (0..seats).find(is_mine).ok_or_else(|| {
+        lost(format!(
+            "all {seats} seats at the shared memory \"{name}\" are taken"
+        ))
+    })?;
+    let spins = memory.memory().word(layout::SPINS).load(Relaxed);
+    let line = MemoryLine {
+        spins: u32::try_from(spins).unwrap_or(0),
+        up: Mailbox::new(layout::up(seat)),
+        down: Mailbox::new(layout::down(seat)),
+        memory,
+        seat,
+        stop: stop.clone(),
+        frame: Vec::new(),
+    };
+    Ok(Connection(Caller::join(client, line)))
+}
+
+/// A client's seat at its server, for a simulation that calls instead of being called: [`wait`](Self::wait) for a step,
+/// run it, [`answer`](Self::answer).
+#[derive(Debug)]
+pub struct Connection(Caller<MemoryLine>);
+
+impl Connection {
+    /// The client: what it declared, and what it reads in the step that was asked for.
+    pub const fn client(&self) -> &Client {
+        &self.0.client
+    }
+
+    /// As [`tcp::Connection::wait`](crate::tcp::Connection::wait).
+    ///
+    /// # Errors
+    ///
+    /// The server is gone, violates the protocol or says nothing, or this client was stopped.
+    pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
+        self.0.wait(limit)
+    }
+
+    /// As [`tcp::Connection::answer`](crate::tcp::Connection::answer).
+    ///
+    /// # Panics
+    ///
+    /// When nothing was asked, or the number of values is another one.
+    pub fn answer(&mut self, writes: &[u64]) {
+        self.0.answer(writes);
+    }
+
+    /// As [`tcp::Connection::give_up`](crate::tcp::Connection::give_up).
+    pub fn give_up(&mut self, reason: &str) {
+        self.0.give_up(reason);
+    }
+
+    /// Lets `participant` take part, until the end of the run.
+    ///
+    /// # Errors
+    ///
+    /// The run was broken off.
+    pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+        self.0.run(participant)
+    }
+}
+
+#[derive(Debug)]
+struct MemoryLine {
+    memory: NamedMemory,
+    seat: usize,
+    spins: u32,
+    up: Mailbox,
+    down: Mailbox,
+    stop: Stop,
+    frame: Vec<u8>,
+}
+
+impl MemoryLine {
+    /// Wakes the server, if it sleeps.
+    fn ring(&self) {
+        let memory = self.memory.memory();
+        if memory.word(layout::SERVER_SLEEPS).load(SeqCst) != 0 {
+            memory.word(layout::BELL).fetch_add(1, SeqCst);
+            memory.wake(layout::BELL);
+        }
+    }
+
+    /// Waits until a frame has come, for [`NAP`] at most.
+    fn nap(&self) {
+        let memory = self.memory.memory();
+        if look(self.spins, || self.down.has_frame(memory)) {
+            return;
+        }
+        let sleeps = memory.word(layout::owner(self.seat) + layout::SLEEPS);
+        sleeps.store(1, SeqCst);
+        if !self.down.has_frame(memory) {
+            let (at, seen) = self.down.bell();
+            memory.wait(at, seen, NAP.to_duration());
+        }
+        sleeps.store(0, SeqCst);
+    }
+}
+
+impl Line for MemoryLine {
+    fn send(&mut self, frame: &[u8]) {
+        // The server takes each frame as soon as it looks; one that does not is found out by receiving.
+        let memory = self.memory.memory();
+        while !self.up.has_room(memory) && self.memory.is_served() {
+            look(0, || self.up.has_room(memory));
+        }
+        self.up.post(memory, &frame[wire::HEADER..]);
+        self.ring();
+    }
+
+    fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended> {
+        let mut until = None;
+        while !self.down.has_frame(self.memory.memory()) {
+            self.nap();
+            if self.down.has_frame(self.memory.memory()) {
+                break;
+            }
+            let lost = |what| Err(Ended::before(Cause::Lost, what));
+            if !self.memory.is_served() && !self.down.has_frame(self.memory.memory()) {
+                return lost("the server was lost: its process has ended");
+            }
+            if self.stop.is_stopped() {
+                return Err(Ended::before(Cause::Stopped, "this client was stopped"));
+            }
+            let now = Monotonic::shared().now();
+            if now >= *until.get_or_insert(now + limit - NAP) {
+                return Err(silent(limit));
+            }
+        }
+        let taken = self.down.take(self.memory.memory(), &mut self.frame);
+        taken.map_err(|what| {
+            let reason = format!("the server violates the protocol: it {what}");
+            Ended::before(Cause::Protocol, reason)
+        })?;
+        Ok(&self.frame)
+    }
+}
+
+impl Drop for MemoryLine {
+    fn drop(&mut self) {
+        let owner = self.memory.memory().word(layout::owner(self.seat));
+        owner.store(layout::LEFT, SeqCst);
+        self.ring();
+    }
+}

@@ -1,0 +1,80 @@
+//! What lies where in the memory. All places are numbers of words, of 8 bytes.
+
+use std::path::PathBuf;
+
+use tickbus_base::os::{NamedMemory, SharedMemory};
+
+use crate::wire::LONGEST_FRAME;
+
+/// What the memory begins with, once it is ready: the format and its version.
+pub(super) const READY: u64 = u64::from_le_bytes(*b"SDSPshm1");
+
+/// The place of [`READY`].
+pub(super) const MAGIC: usize = 0;
+
+/// The number of seats.
+pub(super) const SEATS: usize = 1;
+
+/// How often a waiting client spins.
+pub(super) const SPINS: usize = 2;
+
+/// Counts what clients have posted while the server sleeps; the server waits for it.
+pub(super) const BELL: usize = 8;
+
+/// Whether the server sleeps.
+pub(super) const SERVER_SLEEPS: usize = 9;
+
+/// Where the seats begin.
+const FIRST: usize = 16;
+
+/// The words of one mailbox: its head, and the longest frame.
+const MAILBOX: usize = 16 + LONGEST_FRAME / 8;
+
+/// The words of one seat. Only those that are used take memory.
+const SEAT: usize = 16 + 2 * MAILBOX;
+
+/// A seat that nobody has.
+pub(super) const FREE: u64 = 0;
+
+/// Its client has left; the server makes the seat free again.
+pub(super) const LEFT: u64 = u64::MAX;
+
+/// The place of a seat's owner: the number of its process, or one of the above.
+pub(super) const fn owner(seat: usize) -> usize {
+    FIRST + seat * SEAT
+}
+
+/// Whether the client at a seat sleeps, seen from its owner.
+pub(super) const SLEEPS: usize = 8;
+
+/// The mailbox to the server.
+pub(super) const fn up(seat: usize) -> usize {
+    owner(seat) + 16
+}
+
+/// The mailbox to the client.
+pub(super) const fn down(seat: usize) -> usize {
+    up(seat) + MAILBOX
+}
+
+/// The bytes of the memory for this many seats.
+pub(super) const fn bytes(seats: usize) -> usize {
+    owner(seats) * 8
+}
+
+/// The number of seats in this memory, if it is such memory, and ready.
+pub(super) fn seats(memory: &SharedMemory) -> Option<usize> {
+    use std::sync::atomic::Ordering::Acquire;
+
+    if memory.len() <= FIRST || memory.word(MAGIC).load(Acquire) != READY {
+        return None;
+    }
+    let seats = usize::try_from(memory.word(SEATS).load(Acquire)).ok()?;
+    // The file's length is what counts.
+    (seats <= memory.len() / SEAT && memory.len() >= owner(seats)).then_some(seats)
+}
+
+/// The file of the run with this name.
+pub(super) fn path(name: &str) -> PathBuf {
+    NamedMemory::path(&format!("tickbus-sdsp-{name}"))
+}

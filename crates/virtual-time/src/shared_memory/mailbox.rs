@@ -1,0 +1,83 @@
+//! One frame at a time, from one process to another.
+
+use std::sync::atomic::Ordering::{Acquire, Relaxed, Release, SeqCst};
+
+use tickbus_base::os::SharedMemory;
+
+use crate::wire::LONGEST_FRAME;
+
+/// Counts the frames that were put in; the reader waits for it.
+const POSTED: usize = 0;
+/// Counts the frames that were taken out; on a cache line of its own, since the other process writes it.
+const TAKEN: usize = 8;
+/// The bytes of the frame, and the frame itself.
+const LENGTH: usize = 1;
+const FRAME: usize = 16;
+
+/// One end of a mailbox.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mailbox {
+    at: usize,
+    /// The frames that this end has posted or taken.
+    count: u64,
+}
+
+impl Mailbox {
+    /// The end of an empty mailbox at this place.
+    pub(super) const fn new(at: usize) -> Self {
+        Self { at, count: 0 }
+    }
+
+    /// Makes the mailbox as good as new.
+    pub(super) fn clear(&mut self, memory: &SharedMemory) {
+        memory.word(self.at + POSTED).store(0, SeqCst);
+        memory.word(self.at + TAKEN).store(0, SeqCst);
+        self.count = 0;
+    }
+
+    /// Where the reader waits, and for what to change there.
+    pub(super) const fn bell(&self) -> (usize, u64) {
+        (self.at + POSTED, self.count)
+    }
+
+    /// Whether there is room for a frame: the other end has taken the one before.
+    pub(super) fn has_room(&self, memory: &SharedMemory) -> bool {
+        memory.word(self.at + TAKEN).load(Acquire) == self.count
+    }
+
+    /// Puts in a frame, for which there is [room](Self::has_room).
+    pub(super) fn post(&mut self, memory: &SharedMemory, frame: &[u8]) {
+        memory
+            .word(self.at + LENGTH)
+            .store(frame.len() as u64, Relaxed);
+        memory.write(self.at + FRAME, frame);
+        self.count += 1;
+        // Before the look at whether the other end sleeps: it first says so, and then looks here.
+        memory.word(self.at + POSTED).store(self.count, SeqCst);
+    }
+
+    /// Whether a frame has come.
+    pub(super) fn has_frame(&self, memory: &SharedMemory) -> bool {
+        // After this end has said that it sleeps; see `post`.
+        memory.word(self.at + POSTED).load(SeqCst) != self.count
+    }
+
+    /// Takes out the frame that has come.
+    pub(super) fn take(
+        &mut self,
+        memory: &SharedMemory,
+        frame: &mut Vec<u8>,
+    ) -> Result<(), String> {
+        let posted = memory.word(self.at + POSTED).load(Acquire);
+        let length = memory.word(self.at + LENGTH).load(Relaxed);
+        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        if posted != self.count + 1 || length == 0 || length > LONGEST_FRAME {
+            return Err("wrote into the mailbox what is no frame".to_owned());
+        }
+        frame.resize(length, 0);
+        memory.read(self.at + FRAME, frame);
+        self.count = posted;
+        memory.word(self.at + TAKEN).store(posted, Release);
+        Ok(())
+    }
+}

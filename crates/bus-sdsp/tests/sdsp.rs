@@ -1,9 +1,12 @@
 //! The bus `sdsp`: machine and PLC in lock-step over TCP, with the server in this process.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
+mod server;
+
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 
+use server::Server;
 use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance::rig::{End, SIGNALS};
 use tickbus_driver::{Code, Exchange, Host};
@@ -14,60 +17,17 @@ use tickbus_image::signal::DataType;
 use tickbus_plc::{Program, Scan};
 use tickbus_virtual_time::server::Control;
 use tickbus_virtual_time::{
-    Controls, Declaration, Ended, Hosting, Logic, Outcome, Participant, Settings, StartCondition,
-    Step, TraceHash, Variable, tcp,
+    Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, TraceHash, Variable,
+    tcp,
 };
 
 const STEP: Nanos = Nanos::from_millis(1);
 
-/// A server on a thread of its own.
-struct Server {
-    port: u16,
-    controls: Controls,
-    news: mpsc::Receiver<String>,
-    thread: JoinHandle<Result<Outcome, Ended>>,
-}
-
-impl Server {
-    fn start(settings: Settings) -> Self {
-        let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
-        let port = listener.address().port();
-        let (controls, (tell, news)) = (Controls::default(), mpsc::channel());
-        let thread = thread::spawn({
-            let controls = controls.clone();
-            move || {
-                let hosting = Hosting {
-                    clock: &*Monotonic::shared(),
-                    controls: &controls,
-                    // Most tests do not listen.
-                    news: &mut |line| drop(tell.send(line.to_owned())),
-                };
-                listener.run(settings, Logic::new(), hosting)
-            }
-        });
-        Self {
-            port,
-            controls,
-            news,
-            thread,
-        }
-    }
-
-    /// A run of two clients with so many steps of 1 ms.
-    fn of_two(steps: u64) -> Self {
-        let mut settings = Settings::new(STEP, StartCondition::Count(2));
-        settings.steps = Some(steps);
-        Self::start(settings)
-    }
-
-    /// Waits until the server says this.
-    fn says(&self, part: &str) {
-        while !self.news.recv().expect(part).contains(part) {}
-    }
-
-    fn end(self) -> Result<Outcome, Ended> {
-        self.thread.join().expect("no panic")
-    }
+/// A run of two clients with so many steps of 1 ms.
+fn of_two(steps: u64) -> Server {
+    let mut settings = Settings::new(STEP, StartCondition::Count(2));
+    settings.steps = Some(steps);
+    Server::start(settings)
 }
 
 fn config(port: u16, role: &str, extra: &str) -> String {
@@ -101,7 +61,7 @@ fn controller(
 
 #[test]
 fn a_step_later_each_end_has_what_the_other_wrote_and_the_time_is_granted() {
-    let server = Server::of_two(5);
+    let server = of_two(5);
     let plc = controller(server.port, "", |end, _| {
         end.set("speed", 2.0 * end.get("position"));
         end.set("echo", end.get("echo") + 1.0);
@@ -149,7 +109,7 @@ fn a_step_later_each_end_has_what_the_other_wrote_and_the_time_is_granted() {
 
 #[test]
 fn a_tick_between_two_steps_waits_for_nobody_and_one_over_several_takes_all_of_them() {
-    let server = Server::of_two(20);
+    let server = of_two(20);
     let plc = controller(server.port, "", |end, _| {
         end.set("echo", end.get("echo") + 1.0)
     });
@@ -176,7 +136,7 @@ fn a_tick_between_two_steps_waits_for_nobody_and_one_over_several_takes_all_of_t
 
 #[test]
 fn a_simulation_of_halves_answers_within_its_step() {
-    let server = Server::of_two(10);
+    let server = of_two(10);
     let plc = controller(server.port, "", |end, _| {
         end.set("echo", end.get("position"))
     });
@@ -199,7 +159,7 @@ fn a_simulation_of_halves_answers_within_its_step() {
 /// A pulse of one tick between two steps is carried in a step, and its edge counted.
 #[test]
 fn no_pulse_between_two_steps_is_lost() {
-    let server = Server::of_two(80);
+    let server = of_two(80);
     let (to, pulses) = mpsc::channel();
     let plc = controller(server.port, "step = \"4ms\"", move |end, _| {
         end.set("speed", end.get("speed") + 1.0);
@@ -270,7 +230,7 @@ fn broken(machine: &mut End, code: Code) -> (Cause, String) {
 
 #[test]
 fn a_client_that_gives_up_ends_the_run_and_its_reason_is_told() {
-    let server = Server::of_two(100);
+    let server = of_two(100);
     let plc = foreign(server.port, DataType::Int, |step, reads, writes| {
         writes[1] = reads[0];
         match step.sequence {
@@ -301,7 +261,7 @@ fn a_client_that_gives_up_ends_the_run_and_its_reason_is_told() {
 
 #[test]
 fn a_machine_that_is_closed_says_so_to_everyone() {
-    let server = Server::of_two(100);
+    let server = of_two(100);
     let plc = foreign(server.port, DataType::Int, |_, _, _| Ok(()));
     let mut machine = open(server.port, "device", "client = \"the machine\"");
     machine.tick();
@@ -355,7 +315,7 @@ fn what_does_not_fit_the_run_is_refused_by_name() {
             "\"velocity\"",
         ),
     ] {
-        let server = Server::of_two(100);
+        let server = of_two(100);
         let plc = foreign(server.port, speed, |_, _, _| Ok(()));
         if extra.starts_with("client") {
             // So that it is the second one of that name.
@@ -373,7 +333,7 @@ fn what_does_not_fit_the_run_is_refused_by_name() {
 
 #[test]
 fn a_client_that_comes_late_is_refused_with_the_reason() {
-    let server = Server::of_two(2);
+    let server = of_two(2);
     let plc = foreign(server.port, DataType::Int, |_, _, _| Ok(()));
     let mut machine = open(server.port, "device", "");
     machine.tick();
@@ -393,9 +353,7 @@ fn a_client_that_comes_late_is_refused_with_the_reason() {
 
 #[test]
 fn no_wait_lasts_longer_than_its_time_out() {
-    let mut settings = Settings::new(STEP, StartCondition::Count(2));
-    settings.steps = Some(10);
-    let server = Server::start(settings);
+    let server = of_two(10);
     let mut machine = open(server.port, "device", "timeout = \"100ms\"");
     let (cause, reason) = broken(&mut machine, Code::BusFailed);
     assert_eq!(cause, Cause::Link);
@@ -416,7 +374,7 @@ fn no_wait_lasts_longer_than_its_time_out() {
 
 #[test]
 fn variables_are_named_by_station_or_as_one_likes() {
-    let server = Server::of_two(3);
+    let server = of_two(3);
     let text = format!(
         "[driver]\nid = 1\nname = \"two\"\n[fieldbus]\nkind = \"sdsp\"\naddress = \"127.0.0.1:{}\"\n\
          [fieldbus.at]\nout = \"a long name.of its own\"\n\
@@ -491,7 +449,7 @@ fn host(port: u16, extra: &str) -> Host {
 fn a_program_scans_in_steps_of_its_interval_until_the_run_ends() {
     let mut hashes = Vec::new();
     for _ in 0..2 {
-        let server = Server::of_two(101);
+        let server = of_two(101);
         let plc = host(server.port, "");
         let mut machine = open(server.port, "device", "");
         let mut steps = 0;
@@ -516,7 +474,7 @@ fn a_program_scans_in_steps_of_its_interval_until_the_run_ends() {
 
 #[test]
 fn a_program_that_is_stopped_leaves_the_run_and_one_whose_run_breaks_says_why() {
-    let server = Server::of_two(1_000_000_000);
+    let server = of_two(1_000_000_000);
     let plc = host(server.port, "");
     let machine = foreign_machine(server.port, |_, _, _| Ok(()));
     server.says("starts");
@@ -525,7 +483,7 @@ fn a_program_that_is_stopped_leaves_the_run_and_one_whose_run_breaks_says_why() 
     assert!(told.contains("client \"cell PLC\" gave up: "), "{told}");
     assert!(machine.join().expect("no panic").is_err());
 
-    let server = Server::of_two(100);
+    let server = of_two(100);
     let plc = host(server.port, "");
     let machine = foreign_machine(server.port, |_, _, _| Err("it burns".to_owned()));
     assert!(machine.join().expect("no panic").is_err());

@@ -25,6 +25,7 @@
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
+//! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | [`cli`] | the `tickbus` command |
 //!
@@ -49,3 +50,4 @@ pub use tickbus_programs as programs;
 pub use tickbus_record as record;
 pub use tickbus_report as report;
 pub use tickbus_testing as testing;
+pub use tickbus_virtual_time as virtual_time;

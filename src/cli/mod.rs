@@ -15,6 +15,7 @@ mod plugin_helper;
 #[cfg(unix)]
 mod profibus;
 mod report;
+mod sync;
 mod test;
 
 use std::process::ExitCode;
@@ -43,6 +44,7 @@ enum Command {
     #[cfg(unix)]
     Profibus(profibus::Arguments),
     Report(report::Arguments),
+    Sync(sync::Arguments),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
     #[cfg(unix)]
@@ -93,6 +95,7 @@ pub fn main() -> ExitCode {
         #[cfg(unix)]
         Command::Profibus(arguments) => profibus::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Sync(arguments) => sync::run(&arguments),
         Command::Test(arguments) => test::run(&arguments),
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),

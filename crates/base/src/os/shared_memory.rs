@@ -116,6 +116,12 @@ impl SharedMemory {
         }
     }
 
+    /// The number of its words.
+    #[expect(clippy::len_without_is_empty, reason = "never empty")]
+    pub const fn len(&self) -> usize {
+        self.count
+    }
+
     /// One of its words.
     ///
     /// # Panics

@@ -1,0 +1,147 @@
+//! `tickbus sync FILE`: the server of a run in lock-step, for clients in other processes.
+
+use std::io::{self, BufRead as _, Write as _};
+use std::path::PathBuf;
+use std::thread;
+
+use super::Outcome;
+use tickbus_base::time::{Monotonic, Stop};
+use tickbus_virtual_time as virtual_time;
+use virtual_time::server::Control;
+#[cfg(unix)]
+use virtual_time::shared_memory;
+use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RunFile, tcp};
+
+/// Hand out virtual time: the clients of a run go on in lock-step, and every run is the same.
+///
+/// While it runs, it takes commands on stdin, one a line: pause, step (or step 10), run, stop. docs/sdsp.md has the rules, and the
+/// format for clients of your own.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The file of the run, with a [sync] table.
+    file: PathBuf,
+
+    /// Begin paused, and wait for commands on stdin.
+    #[arg(long)]
+    paused: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let mut file = match RunFile::load(&arguments.file) {
+        Ok(file) => file,
+        Err(mistakes) => {
+            eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
+            return Outcome::WrongInput;
+        }
+    };
+    file.settings.paused = arguments.paused;
+    let stop = Stop::new();
+    if let Err(error) = ctrlc::set_handler({
+        let stop = stop.clone();
+        move || stop.stop()
+    }) {
+        eprintln!("sync: Ctrl-C cannot be caught: {error}");
+        return Outcome::BusFailed;
+    }
+    let controls = Controls::new(&stop);
+    let commands = thread::Builder::new().name("tickbus-commands".to_owned());
+    let spawned = commands.spawn({
+        let controls = controls.clone();
+        // It ends with the process: a read of stdin cannot be cancelled.
+        move || obey(&controls)
+    });
+    if let Err(error) = spawned {
+        eprintln!("sync: commands on stdin cannot be read: {error}");
+    }
+    report(serve(file, &controls))
+}
+
+/// Prints a line. If the reader of stdout is gone, the run goes on.
+fn say(line: &str) {
+    let mut out = io::stdout().lock();
+    let _ = writeln!(out, "sync: {line}").and_then(|()| out.flush());
+}
+
+fn serve(file: RunFile, controls: &Controls) -> Result<virtual_time::Outcome, Ended> {
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        controls,
+        news: &mut say,
+    };
+    let failed = |reason: String| Ended {
+        cause: Cause::System,
+        client: None,
+        reason,
+        steps: 0,
+    };
+    match file.meeting {
+        Meeting::Tcp(address) => {
+            let listener = tcp::Listener::bind(&address)
+                .map_err(|error| failed(format!("cannot listen on {address}: {error}")))?;
+            say(&format!("listening on {}", listener.address()));
+            listener.run(file.settings, Logic::new(), hosting)
+        }
+        #[cfg(unix)]
+        Meeting::SharedMemory(name) => {
+            let listener = shared_memory::Listener::bind(&name, &file.settings)
+                .map_err(|error| failed(format!("cannot offer the memory \"{name}\": {error}")))?;
+            say(&format!("waiting in the shared memory \"{name}\""));
+            listener.run(file.settings, Logic::new(), hosting)
+        }
+        #[cfg(not(unix))]
+        Meeting::SharedMemory(_) => {
+            let reason = "this system has no shared memory for clients; use \"listen\"";
+            Err(failed(reason.to_owned()))
+        }
+    }
+}
+
+/// The last line: what came of the run.
+fn report(outcome: Result<virtual_time::Outcome, Ended>) -> Outcome {
+    let ended = match outcome {
+        Ok(outcome) => {
+            let virtual_time::Outcome { steps, time, hash } = outcome;
+            say(&format!("ok steps={steps} time={time} hash={hash}"));
+            return Outcome::Done;
+        }
+        Err(ended) => ended,
+    };
+    let client = ended
+        .client
+        .map_or_else(String::new, |client| format!(" client=\"{client}\""));
+    let (cause, steps, reason) = (ended.cause, ended.steps, ended.reason);
+    say(&format!(
+        "failed cause={}{client} steps={steps} reason=\"{reason}\"",
+        cause.name()
+    ));
+    match cause {
+        Cause::Configuration | Cause::Logic => Outcome::WrongInput,
+        _ => Outcome::BusFailed,
+    }
+}
+
+/// Reads commands until stdin ends.
+fn obey(controls: &Controls) {
+    for line in io::stdin().lock().lines() {
+        let Ok(line) = line else {
+            return;
+        };
+        let mut words = line.split_whitespace();
+        let control = match (words.next(), words.next(), words.next()) {
+            (None, ..) => continue,
+            (Some("pause"), None, _) => Some(Control::Pause),
+            (Some("run"), None, _) => Some(Control::Run),
+            (Some("stop"), None, _) => Some(Control::Stop),
+            (Some("step"), None, _) => Some(Control::Step(1)),
+            (Some("step"), Some(count), None) => count.parse().ok().map(Control::Step),
+            _ => None,
+        };
+        match control {
+            Some(control) => controls.send(control),
+            None => say(&format!(
+                "\"{}\" is no command; commands are pause, step, step NUMBER, run and stop",
+                tickbus_base::toml_text::shown(&line)
+            )),
+        }
+    }
+}

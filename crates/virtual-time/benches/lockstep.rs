@@ -35,7 +35,15 @@ fn main() {
     } else {
         (1, Duration::from_millis(1))
     };
+    // A word on the command line selects what is measured.
+    let wanted = |name: &str| {
+        let mut words = arguments[1..].iter().filter(|word| !word.starts_with("--"));
+        words.next().is_none_or(|word| name.contains(&**word))
+    };
     for count in [2, 8] {
+        if !wanted(&format!("tcp.{count}")) {
+            continue;
+        }
         let (mut bares, mut ours, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..rounds {
             let bare = bare(count, span);
@@ -48,25 +56,34 @@ fn main() {
         println!("rust sdsp.tcp.{count} {:.0}", median(&mut ours));
         println!("rust sdsp.tcp.{count}.ratio {:.3}", median(&mut ratios));
     }
+    // The server as a third process, and in the process of one of the clients.
     #[cfg(unix)]
-    {
+    for (name, local) in [("shared_memory.2", 0), ("shared_memory.2.embedded", 1)] {
+        if !wanted(name) {
+            continue;
+        }
         let (mut shared, mut ratios) = (Vec::new(), Vec::new());
         for _ in 0..rounds {
-            let rate = through_memory(2, 0, span);
+            let rate = through_memory(2, local, span);
             shared.push(rate);
             ratios.push(rate / bare(2, span));
         }
-        println!("rust sdsp.shared_memory.2 {:.0}", median(&mut shared));
-        println!("rust sdsp.shared_memory.2.ratio {:.1}", median(&mut ratios));
+        println!("rust sdsp.{name} {:.0}", median(&mut shared));
+        println!("rust sdsp.{name}.ratio {:.1}", median(&mut ratios));
     }
-    let (mut alone, mut ratios) = (Vec::new(), Vec::new());
-    for _ in 0..rounds {
-        let rate = in_this_process(2, 0, span);
-        alone.push(rate);
-        ratios.push(rate / bare(2, span));
+    if wanted("in_process.2") {
+        let (mut alone, mut ratios) = (Vec::new(), Vec::new());
+        for _ in 0..rounds {
+            let rate = in_this_process(2, 0, span);
+            alone.push(rate);
+            ratios.push(rate / bare(2, span));
+        }
+        println!("rust sdsp.in_process.2 {:.0}", median(&mut alone));
+        println!("rust sdsp.in_process.2.ratio {:.1}", median(&mut ratios));
     }
-    println!("rust sdsp.in_process.2 {:.0}", median(&mut alone));
-    println!("rust sdsp.in_process.2.ratio {:.1}", median(&mut ratios));
+    if !wanted("100") {
+        return;
+    }
     for variables in [0, 10, 100] {
         let rate = over_tcp(if measured { 100 } else { 3 }, variables, span);
         println!("rust sdsp.tcp.100.{variables} {rate:.1}");
@@ -236,11 +253,13 @@ fn over_tcp(count: usize, variables: usize, span: Duration) -> f64 {
 }
 
 #[cfg(unix)]
-fn through_memory(count: usize, variables: usize, span: Duration) -> f64 {
+fn through_memory(count: usize, local: usize, span: Duration) -> f64 {
     let name = format!("bench-{}", std::process::id());
     let settings = settings(count);
     let listener = shared_memory::Listener::bind(&name, &settings).expect("a free name");
-    let children = clients("shared_memory", &name, count, variables);
+    let children = clients("shared_memory", &name, count - local, 0);
+    let mut idle: Vec<Idle> = (0..local).map(|at| Idle(format!("l{at}"), 0)).collect();
+    let locals = idle.iter_mut().map(|client| client as _).collect();
     let controls = Controls::default();
     let mut meter = Meter::default();
     let logic = Logic::new().on_time(|access| {
@@ -254,7 +273,9 @@ fn through_memory(count: usize, variables: usize, span: Duration) -> f64 {
         controls: &controls,
         news: &mut |_| {},
     };
-    listener.run(settings, logic, hosting).expect("it runs");
+    listener
+        .run_with(settings, logic, hosting, locals)
+        .expect("it runs");
     wait(children);
     meter.rate
 }

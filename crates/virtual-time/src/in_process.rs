@@ -1,15 +1,16 @@
-//! Clients in this process: the same server, without a connection.
+//! All clients in this process: the same server, without a connection.
 
-use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
+use tickbus_base::time::{Clock as _, Monotonic, Stop};
 
+use crate::local::Locals;
 use crate::logic::Logic;
-use crate::server::{Server, ToClient};
-use crate::{Cause, Ended, Outcome, Participant, Settings};
+use crate::server::Server;
+use crate::{Cause, Ended, Outcome, Pacing, Participant, Settings};
 
 /// Runs these participants, one after another in each step, until the run ends.
 ///
-/// The start condition of `settings` must fit them. A run that begins paused, or has no number of steps, does not end
-/// by itself: use a [`Server`] for that.
+/// The start condition of `settings` must fit them. A run without a number of steps ends when a participant, or the
+/// logic, fails; to control it from outside, use a [`Server`].
 ///
 /// # Errors
 ///
@@ -19,66 +20,35 @@ pub fn run(
     participants: Vec<&mut dyn Participant>,
     logic: Logic<'_>,
 ) -> Result<Outcome, Ended> {
-    let clock = Monotonic::shared();
     if settings.paused {
         let reason = "a run in one process cannot begin paused: nobody could resume it";
         return Err(Ended::before(Cause::Configuration, reason));
     }
-    let mut server = Server::new(settings, logic, clock.now())
+    let clock = Monotonic::shared();
+    // Who hangs, hangs this thread, so without a pace nobody asks for the time.
+    let is_paced = settings.pacing != Pacing::Fast;
+    let mut now = clock.now();
+    let mut server = Server::new(settings, logic, now)
         .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
-    let mut seats: Vec<Seat<'_>> = Vec::new();
-    for participant in participants {
-        let declaration = participant.declare();
-        let writes = vec![0; declaration.writes.len()];
-        let seat = server.connected(Nanos::ZERO);
-        debug_assert_eq!(seat, seats.len(), "seats are given in order");
-        seats.push(Seat {
-            participant,
-            writes,
-        });
-        server.join(Nanos::ZERO, seat, declaration);
-    }
-    let mut refused = None;
+    let mut locals = Locals::join(&mut server, now, participants);
     loop {
-        while let Some((at, message)) = server.poll() {
-            let Seat {
-                participant,
-                writes,
-            } = &mut seats[at];
-            let (sequence, ran) = match message {
-                ToClient::Start { .. } => {
-                    participant.initial(writes);
-                    (0, Ok(()))
-                }
-                ToClient::Step { step, reads } => {
-                    (step.sequence, participant.run(step, reads, writes))
-                }
-                ToClient::End(outcome) => {
-                    if let Err(ended) = outcome {
-                        refused.get_or_insert_with(|| ended.clone());
-                    }
-                    continue;
-                }
-            };
-            // No one can hang without hanging this thread, so the time matters to the pacing alone.
-            match ran {
-                Ok(()) => server.done(Nanos::ZERO, at, sequence, writes.iter().copied()),
-                Err(reason) => server.gave_up(at, &reason),
-            }
+        while let Some((seat, message)) = server.poll() {
+            locals.take(seat, &message);
         }
         if let Some(outcome) = server.outcome() {
             return outcome.clone();
         }
         if let Some(missing) = server.missing() {
             let reason = format!("the start condition still waits for {missing}");
-            return Err(refused.unwrap_or(Ended::before(Cause::Configuration, reason)));
+            let waits = Ended::before(Cause::Configuration, reason);
+            return Err(locals.refusal().cloned().unwrap_or(waits));
         }
-        clock.wait_until(server.deadline(), &Stop::new());
-        server.tick(clock.now());
+        if is_paced {
+            now = clock.now();
+        }
+        if !locals.run(&mut server, now) {
+            clock.wait_until(server.deadline(), &Stop::new());
+            server.tick(clock.now());
+        }
     }
-}
-
-struct Seat<'p> {
-    participant: &'p mut dyn Participant,
-    writes: Vec<u64>,
 }

@@ -10,6 +10,7 @@
 mod barrier;
 mod declaration;
 mod hosting;
+mod local;
 mod outcome;
 mod participant;
 mod run_file;

@@ -132,6 +132,40 @@ fn a_run_through_shared_memory_is_the_one_in_this_process_whoever_comes_first() 
 
 #[cfg(unix)]
 #[test]
+fn clients_on_the_server_s_thread_change_nothing() {
+    let expected = in_this_process(2000, 3);
+    for is_tcp in [true, false] {
+        let mut clients = mixers(3);
+        let mut remote = clients.pop().expect("the third");
+        let settings = mixer_settings(2000, 3);
+        let locals = clients.iter_mut().map(|mixer| mixer as _).collect();
+        let hosting = Hosting {
+            clock: &*Monotonic::shared(),
+            controls: &Controls::default(),
+            news: &mut |_| {},
+        };
+        let (outcome, end) = thread::scope(|scope| {
+            if is_tcp {
+                let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+                let address = Address::local(listener.address().port());
+                let joined = scope.spawn(move || tcp::join(&address, &mut remote));
+                let outcome = listener.run_with(settings, Logic::new(), hosting, locals);
+                (outcome, joined.join().expect("no panic"))
+            } else {
+                let name = fresh_name();
+                let listener = shared_memory::Listener::bind(&name, &settings).expect("free");
+                let joined = scope.spawn(move || shared_memory::join(&name, &mut remote));
+                let outcome = listener.run_with(settings, Logic::new(), hosting, locals);
+                (outcome, joined.join().expect("no panic"))
+            }
+        });
+        assert_eq!(outcome, Ok(expected), "over TCP: {is_tcp}");
+        assert_eq!(end, outcome);
+    }
+}
+
+#[cfg(unix)]
+#[test]
 fn who_comes_late_or_second_to_shared_memory_is_refused() {
     let settings = settings(20, &["first"]);
     let name = fresh_name();

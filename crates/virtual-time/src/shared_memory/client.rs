@@ -8,7 +8,7 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 
 use super::layout;
 use super::mailbox::Mailbox;
-use super::patience::look;
+use super::patience::Patience;
 use crate::client::{Asked, Caller, Client, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
@@ -59,7 +59,7 @@ pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, En
     })?;
     let spins = memory.memory().word(layout::SPINS).load(Relaxed);
     let line = MemoryLine {
-        spins: u32::try_from(spins).unwrap_or(0),
+        patience: Patience::new(u32::try_from(spins).unwrap_or(0)),
         up: Mailbox::new(layout::up(seat)),
         down: Mailbox::new(layout::down(seat)),
         memory,
@@ -118,7 +118,7 @@ impl Connection {
 struct MemoryLine {
     memory: NamedMemory,
     seat: usize,
-    spins: u32,
+    patience: Patience,
     up: Mailbox,
     down: Mailbox,
     stop: Stop,
@@ -136,9 +136,10 @@ impl MemoryLine {
     }
 
     /// Waits until a frame has come, for [`NAP`] at most.
-    fn nap(&self) {
+    fn nap(&mut self) {
         let memory = self.memory.memory();
-        if look(self.spins, || self.down.has_frame(memory)) {
+        let down = self.down;
+        if self.patience.look(|| down.has_frame(memory)) {
             return;
         }
         let sleeps = memory.word(layout::owner(self.seat) + layout::SLEEPS);
@@ -155,8 +156,9 @@ impl Line for MemoryLine {
     fn send(&mut self, frame: &[u8]) {
         // The server takes each frame as soon as it looks; one that does not is found out by receiving.
         let memory = self.memory.memory();
-        while !self.up.has_room(memory) && self.memory.is_served() {
-            look(0, || self.up.has_room(memory));
+        let up = self.up;
+        while !self.patience.look(|| up.has_room(memory)) && self.memory.is_served() {
+            self.ring();
         }
         self.up.post(memory, &frame[wire::HEADER..]);
         self.ring();

@@ -8,10 +8,11 @@ use tickbus_base::time::Nanos;
 
 use super::layout;
 use super::mailbox::Mailbox;
-use super::patience::{look, spins};
+use super::patience::Patience;
 use crate::hosting::{Hosting, hear};
+use crate::local::Locals;
 use crate::server::ToClient;
-use crate::{Cause, Ended, Logic, Outcome, Settings, StartCondition, server, wire};
+use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, StartCondition, server, wire};
 
 /// How often everything else is looked after while steps follow each other.
 const ROUND: Nanos = Nanos::from_millis(10);
@@ -46,7 +47,7 @@ impl Listener {
         };
         let seats = clients + SPARE;
         let memory = NamedMemory::serve(&layout::path(name), layout::bytes(seats))?;
-        let spins = spins(clients + 1);
+        let spins = Patience::spins(clients + 1);
         let word = |at: usize, value: u64| memory.memory().word(at).store(value, SeqCst);
         word(layout::SEATS, seats as u64);
         word(layout::SPINS, spins.into());
@@ -69,14 +70,32 @@ impl Listener {
         logic: Logic<'_>,
         hosting: Hosting<'_>,
     ) -> Result<Outcome, Ended> {
+        self.run_with(settings, logic, hosting, Vec::new())
+    }
+
+    /// As [`run`](Self::run), with `locals` as clients on the server's own thread: they run while the others do, and
+    /// no message goes to them and back.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](Self::run).
+    pub fn run_with(
+        self,
+        settings: Settings,
+        logic: Logic<'_>,
+        hosting: Hosting<'_>,
+        locals: Vec<&mut dyn Participant>,
+    ) -> Result<Outcome, Ended> {
         let now = hosting.clock.now();
-        let server = server::Server::new(settings, logic, now)
+        let mut server = server::Server::new(settings, logic, now)
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
+        let locals = Locals::join(&mut server, now, locals);
         let mut host = Host {
             server,
             hosting,
+            locals,
             memory: self.memory,
-            spins: self.spins,
+            patience: Patience::new(self.spins),
             seats: (0..self.seats).map(Seat::new).collect(),
             by_seat: Vec::new(),
             frame: Vec::new(),
@@ -87,11 +106,12 @@ impl Listener {
     }
 }
 
-struct Host<'l, 'h> {
+struct Host<'l, 'h, 'p> {
     server: server::Server<'l>,
     hosting: Hosting<'h>,
+    locals: Locals<'p>,
     memory: NamedMemory,
-    spins: u32,
+    patience: Patience,
     /// Those of the memory.
     seats: Vec<Seat>,
     /// The places in the memory of the seats that the server has given.
@@ -139,7 +159,7 @@ impl Seat {
     }
 }
 
-impl Host<'_, '_> {
+impl Host<'_, '_, '_> {
     fn run(&mut self) -> Result<Outcome, Ended> {
         loop {
             let now = self.hosting.clock.now();
@@ -154,10 +174,13 @@ impl Host<'_, '_> {
                 self.look_after_all(now);
                 continue;
             }
+            if self.locals.run(&mut self.server, now) {
+                continue;
+            }
             if let Some(seat) = self.server.awaited() {
                 let at = self.by_seat[seat];
                 let (up, memory) = (self.seats[at].up, self.memory.memory());
-                if look(self.spins, || up.has_frame(memory)) {
+                if self.patience.look(|| up.has_frame(memory)) {
                     self.hear(at);
                     continue;
                 }
@@ -179,6 +202,9 @@ impl Host<'_, '_> {
             let Some((client, message)) = self.server.poll() else {
                 return;
             };
+            if self.locals.take(client, &message) {
+                continue;
+            }
             let seat = &mut self.seats[self.by_seat[client]];
             self.frame.clear();
             wire::to_client(&mut self.frame, &message);
@@ -311,7 +337,7 @@ impl Host<'_, '_> {
             if self.seats.iter().all(has_read) || now >= until {
                 return;
             }
-            look(0, || self.seats.iter().all(has_read));
+            self.patience.look(|| self.seats.iter().all(has_read));
         }
     }
 }

@@ -9,8 +9,9 @@ use tickbus_fieldbus::tcp::{Address, is_of_the_client};
 
 use super::connection::{Arrived, BLOCKED, Connection};
 use crate::hosting::{Hosting, hear};
+use crate::local::Locals;
 use crate::server::ToClient;
-use crate::{Cause, Ended, Logic, Outcome, Settings, server};
+use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, server};
 
 /// The key of the listener in the poll set; a client's key is its seat.
 const LISTENER: usize = usize::MAX - 1;
@@ -66,20 +67,38 @@ impl Listener {
         logic: Logic<'_>,
         hosting: Hosting<'_>,
     ) -> Result<Outcome, Ended> {
+        self.run_with(settings, logic, hosting, Vec::new())
+    }
+
+    /// As [`run`](Self::run), with `locals` as clients on the server's own thread: they run while the others do, and
+    /// no message goes to them and back.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](Self::run).
+    pub fn run_with(
+        self,
+        settings: Settings,
+        logic: Logic<'_>,
+        hosting: Hosting<'_>,
+        locals: Vec<&mut dyn Participant>,
+    ) -> Result<Outcome, Ended> {
         let cannot = |error: io::Error| {
             let reason = format!("the system cannot wait for sockets: {error}");
             Ended::before(Cause::System, reason)
         };
         let now = hosting.clock.now();
         let patience = settings.hang;
-        let server = server::Server::new(settings, logic, now)
+        let mut server = server::Server::new(settings, logic, now)
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
+        let locals = Locals::join(&mut server, now, locals);
         let mut set = PollSet::new(hosting.controls.stop()).map_err(cannot)?;
         set.add(LISTENER, &self.listener, Interest::Read)
             .map_err(cannot)?;
         let mut host = Host {
             server,
             hosting,
+            locals,
             listener: self.listener,
             set,
             patience,
@@ -96,9 +115,10 @@ impl Listener {
     }
 }
 
-struct Host<'l, 'h> {
+struct Host<'l, 'h, 'p> {
     server: server::Server<'l>,
     hosting: Hosting<'h>,
+    locals: Locals<'p>,
     listener: TcpListener,
     set: PollSet,
     patience: Nanos,
@@ -111,7 +131,7 @@ struct Host<'l, 'h> {
     looked: Nanos,
 }
 
-impl Host<'_, '_> {
+impl Host<'_, '_, '_> {
     fn run(&mut self) -> Result<Outcome, Ended> {
         loop {
             let now = self.hosting.clock.now();
@@ -121,14 +141,16 @@ impl Host<'_, '_> {
             {
                 return outcome.clone();
             }
-            // As long as answers are due, one is read by a call that blocks: all of them are needed anyway.
             let awaited = self.server.awaited();
-            if let Some(seat) = awaited
-                && self.leaving.is_empty()
-                && now - self.looked < ROUND
-            {
-                self.read(seat);
-                continue;
+            if self.leaving.is_empty() && now - self.looked < ROUND {
+                if self.locals.run(&mut self.server, now) {
+                    continue;
+                }
+                // As long as answers are due, one is read by a call that blocks: all of them are needed anyway.
+                if let Some(seat) = awaited {
+                    self.read(seat);
+                    continue;
+                }
             }
             let is_busy = awaited.is_some() || !self.leaving.is_empty();
             if let Err(error) = self.look(is_busy) {
@@ -147,6 +169,9 @@ impl Host<'_, '_> {
             let Some((seat, message)) = self.server.poll() else {
                 return;
             };
+            if self.locals.take(seat, &message) {
+                continue;
+            }
             let Some(connection) = &mut self.connections[seat] else {
                 continue;
             };

@@ -1,0 +1,106 @@
+//! Clients that run on the server's own thread.
+
+use tickbus_base::time::Nanos;
+
+use crate::client::Asked;
+use crate::server::{Server, ToClient};
+use crate::{Declaration, Ended, Outcome, Participant};
+
+/// The participants on the server's thread, with their seats.
+#[derive(Default)]
+pub(crate) struct Locals<'p>(Vec<Local<'p>>);
+
+struct Local<'p> {
+    participant: &'p mut dyn Participant,
+    seat: usize,
+    asked: Option<Asked>,
+    reads: Vec<u64>,
+    writes: Vec<u64>,
+    end: Option<Result<Outcome, Ended>>,
+}
+
+impl<'p> Locals<'p> {
+    /// Lets these participants join.
+    pub(crate) fn join(
+        server: &mut Server<'_>,
+        now: Nanos,
+        participants: impl IntoIterator<Item = &'p mut dyn Participant>,
+    ) -> Self {
+        let declared = |participant: &'p mut dyn Participant| {
+            let declaration = participant.declare();
+            (participant, declaration)
+        };
+        let mut declared: Vec<_> = participants.into_iter().map(declared).collect();
+        // They run one after another in the order of all clients.
+        declared.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
+        let local = |(participant, declaration): (&'p mut dyn Participant, Declaration)| {
+            let seat = server.connected(now);
+            let local = Local {
+                participant,
+                seat,
+                asked: None,
+                reads: vec![0; declaration.reads.len()],
+                writes: vec![0; declaration.writes.len()],
+                end: None,
+            };
+            server.join(now, seat, declaration);
+            local
+        };
+        Self(declared.into_iter().map(local).collect())
+    }
+
+    /// Takes a message, if it is for one of them, to be dealt with when all messages were sent: so those who run
+    /// elsewhere run at the same time.
+    pub(crate) fn take(&mut self, seat: usize, message: &ToClient<'_>) -> bool {
+        let mut locals = self.0.iter_mut();
+        let Some(local) = locals.find(|local| local.seat == seat && local.end.is_none()) else {
+            return false;
+        };
+        match message {
+            ToClient::Start { .. } => local.asked = Some(Asked::Initial),
+            ToClient::Step { step, reads } => {
+                local.reads.copy_from_slice(reads);
+                local.asked = Some(Asked::Step(*step));
+            }
+            ToClient::End(end) => {
+                local.asked = None;
+                local.end = Some((*end).clone());
+            }
+        }
+        true
+    }
+
+    /// Runs those who were asked; false if none was.
+    pub(crate) fn run(&mut self, server: &mut Server<'_>, now: Nanos) -> bool {
+        let mut has_run = false;
+        for local in &mut self.0 {
+            let Local {
+                participant,
+                seat,
+                reads,
+                writes,
+                ..
+            } = local;
+            let (sequence, ran) = match local.asked.take() {
+                Some(Asked::Initial) => {
+                    participant.initial(writes);
+                    (0, Ok(()))
+                }
+                Some(Asked::Step(step)) => (step.sequence, participant.run(step, reads, writes)),
+                Some(Asked::End(_)) | None => continue,
+            };
+            has_run = true;
+            match ran {
+                Ok(()) => server.done(now, *seat, sequence, writes.iter().copied()),
+                Err(reason) => server.gave_up(*seat, &reason),
+            }
+        }
+        has_run
+    }
+
+    /// The first of them that was refused before the run.
+    pub(crate) fn refusal(&self) -> Option<&Ended> {
+        let mut ends = self.0.iter().filter_map(|local| local.end.as_ref());
+        ends.find_map(|end| end.as_ref().err())
+    }
+}

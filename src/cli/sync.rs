@@ -1,5 +1,7 @@
 //! `tickbus sync FILE`: the server of a run in lock-step, for clients in other processes.
 
+mod gateway;
+
 use std::io::{self, BufRead as _, Write as _};
 use std::path::PathBuf;
 use std::thread;
@@ -17,24 +19,27 @@ use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RunFile, tcp
 /// While it runs, it takes commands on stdin, one a line: pause, step (or step 10), run, stop. docs/sdsp.md has the rules, and the
 /// format for clients of your own.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct Arguments {
+    #[command(subcommand)]
+    other: Option<Other>,
+
     /// The file of the run, with a [sync] table.
-    file: PathBuf,
+    #[arg(required = true)]
+    file: Option<PathBuf>,
 
     /// Begin paused, and wait for commands on stdin.
     #[arg(long)]
     paused: bool,
 }
 
+/// What else belongs to a run in lock-step.
+#[derive(Debug, clap::Subcommand)]
+enum Other {
+    Gateway(gateway::Arguments),
+}
+
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let mut file = match RunFile::load(&arguments.file) {
-        Ok(file) => file,
-        Err(mistakes) => {
-            eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
-            return Outcome::WrongInput;
-        }
-    };
-    file.settings.paused = arguments.paused;
     let stop = Stop::new();
     if let Err(error) = ctrlc::set_handler({
         let stop = stop.clone();
@@ -43,6 +48,18 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         eprintln!("sync: Ctrl-C cannot be caught: {error}");
         return Outcome::BusFailed;
     }
+    let file = match (&arguments.other, &arguments.file) {
+        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, &stop),
+        (None, file) => file.as_ref().expect("it is required"),
+    };
+    let mut file = match RunFile::load(file) {
+        Ok(file) => file,
+        Err(mistakes) => {
+            eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
+            return Outcome::WrongInput;
+        }
+    };
+    file.settings.paused = arguments.paused;
     let controls = Controls::new(&stop);
     let commands = thread::Builder::new().name("tickbus-commands".to_owned());
     let spawned = commands.spawn({

@@ -12,4 +12,5 @@ mod variables;
 
 pub use bus::Sdsp;
 pub use options::{Every, Options};
+pub use run::connect;
 pub use variables::Variables;

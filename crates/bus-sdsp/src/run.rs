@@ -159,13 +159,17 @@ impl Drop for Run {
     }
 }
 
-/// Connects as soon as the server is there.
-fn connect(
+/// Connects with the server at `address` as soon as that is there, and joins.
+///
+/// # Errors
+///
+/// It does not appear within `timeout`, or the declaration breaks a rule.
+pub fn connect(
     address: &Address,
     timeout: Nanos,
     declaration: &Declaration,
     stop: &Stop,
-) -> Result<tcp::Connection, End> {
+) -> Result<tcp::Connection, Ended> {
     let clock = Monotonic::shared();
     let end = clock.now() + timeout;
     loop {
@@ -176,7 +180,7 @@ fn connect(
             Err(_) if now < end && !stop.is_stopped() => {
                 clock.wait_until((now + PAUSE).min(end), stop);
             }
-            connected => return Ok(connected?),
+            connected => return connected,
         }
     }
 }
@@ -192,11 +196,11 @@ fn steps_of(interval: Nanos, step: Nanos) -> Result<u64, String> {
     }
 }
 
-fn ended(cause: Cause, reason: impl Into<String>) -> End {
-    End::Broken(Ended {
+fn ended(cause: Cause, reason: impl Into<String>) -> Ended {
+    Ended {
         cause,
         client: None,
         reason: reason.into(),
         steps: 0,
-    })
+    }
 }

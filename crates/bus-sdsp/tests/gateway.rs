@@ -138,7 +138,7 @@ fn run(gateway: &mut Gateway, steps: u64) -> Result<Outcome, Ended> {
     let server = Server::start(settings);
     let port = server.port;
     let machine = thread::spawn(move || tcp::join(&Address::local(port), &mut Machine(0)));
-    let own = tcp::join(&Address::local(port), gateway);
+    let own = gateway.take_part(&Address::local(port));
     let outcome = server.end();
     assert_eq!(own, outcome);
     assert_eq!(machine.join().expect("no panic"), outcome);

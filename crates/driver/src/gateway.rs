@@ -9,12 +9,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_bus_sdsp::Variables;
+use tickbus_bus_sdsp::{Variables, connect};
 use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Link, LinkState};
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 use tickbus_plc::{Program, Scan};
-use tickbus_virtual_time::{Declaration, Participant, Step};
+use tickbus_virtual_time::{Declaration, Ended, Outcome, Participant, Step};
 
 use super::{DriverError, Host};
 
@@ -214,6 +215,16 @@ impl Gateway {
         *self.inputs.slot(GO) = done;
         self.publish();
         Ok(())
+    }
+
+    /// Takes part in the run of the server at `address`, as soon as that is there, until the run ends.
+    ///
+    /// # Errors
+    ///
+    /// The run was broken off, or the server did not appear within the time-out.
+    pub fn take_part(&mut self, address: &Address) -> Result<Outcome, Ended> {
+        let connection = connect(address, self.timeout, &self.declaration, &self.stop)?;
+        connection.run(self)
     }
 
     /// The state of the PLC's line.

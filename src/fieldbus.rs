@@ -7,5 +7,6 @@ pub use tickbus_bus_opcua as opcua;
 pub use tickbus_bus_plugin as plugin;
 pub use tickbus_bus_profibus as profibus;
 pub use tickbus_bus_s7 as s7;
+pub use tickbus_bus_sdsp as sdsp;
 pub use tickbus_bus_socket as socket;
 pub use tickbus_fieldbus::*;

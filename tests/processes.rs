@@ -372,3 +372,43 @@ fn a_mirror_serves_several_stations() {
         (slots[1].real(), slots[3].real()) == (5.0, 7.0)
     });
 }
+
+/// Server, machine and PLC are three processes that know of each other by one address.
+#[test]
+fn a_run_in_lock_step_of_three_processes_has_one_trace_hash() {
+    let mut hashes = Vec::new();
+    for _ in 0..2 {
+        let file =
+            save("[sync]\nstep = \"2ms\"\nclients = 2\nlisten = \"127.0.0.1:0\"\nuntil = \"2s\"\n");
+        let mut server = Process::start(&["sync", file.path().to_str().expect("UTF-8")]);
+        let line = server.until("listening on ");
+        let (_, address) = line.rsplit_once(' ').expect("an address");
+        let file = save(&format!(
+            "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"sdsp\"\n{SIGNALS}"
+        ));
+        let cfg = file.path().to_str().expect("UTF-8");
+        let machine = Process::start(&["mirror", cfg, "--address", address, "--tick", "2ms"]);
+        let plc = [
+            "plc",
+            "mirror",
+            "--config",
+            cfg,
+            "--address",
+            address,
+            "--scan",
+            "10ms",
+        ];
+        let plc = Process::start(&plc);
+        let last = |process: Process, begin: &str| {
+            let (lines, status) = process.end();
+            let last = lines.last().expect("a result").clone();
+            assert!(status.success() && last.starts_with(begin), "{lines:#?}");
+            last.rsplit_once("hash=").expect("a hash").1.to_owned()
+        };
+        let hash = last(server, "sync: ok steps=1000 time=1998ms hash=");
+        assert_eq!(last(machine, "mirror: ok scans=1000 stale=0 hash="), hash);
+        assert_eq!(last(plc, "plc: ok scans=200 stale=0 hash="), hash);
+        hashes.push(hash);
+    }
+    assert_eq!(hashes[0], hashes[1]);
+}

@@ -135,6 +135,9 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let told = watch(title, &host, arguments, &*clock, &stop, &is_done);
     let statistics = host.statistics();
     let (scans, stale) = host.scans();
+    // Of a run on virtual time.
+    let hash = host.fact("sdsp.hash").map(|hash| format!(" hash={hash}"));
+    let hash = hash.unwrap_or_default();
     let fault = host.fault();
     // A scan that never ends is detected here if the command was too short to detect it before.
     let unended = host.close();
@@ -149,7 +152,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
             let _ = write!(out, "{}", report.summary());
         }
         let _ = match &failure {
-            None => writeln!(out, "{title}: ok scans={scans} stale={stale}"),
+            None => writeln!(out, "{title}: ok scans={scans} stale={stale}{hash}"),
             Some(failure) => writeln!(out, "{title}: failed reason={failure}"),
         };
     }
@@ -189,9 +192,8 @@ fn watch(
     let mut result = Ok(());
     while !stop.is_stopped() && !is_done() && host.fault().is_none() {
         let now = clock.now();
-        if now >= end {
-            break;
-        }
+        // Asked first: what it has said last is still to be reported.
+        let is_over = now >= end || host.is_over();
         let link = host.link();
         let mut text = String::new();
         if is_news(told.as_ref(), &link) {
@@ -207,6 +209,9 @@ fn watch(
         if result.is_ok() && !text.is_empty() {
             let mut out = io::stdout().lock();
             result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        }
+        if is_over {
+            break;
         }
         clock.wait_until((now + LOOK).min(end).min(next_stats), stop);
     }

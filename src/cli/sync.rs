@@ -1,5 +1,8 @@
 //! `tickbus sync FILE`: the server of a run in lock-step, for clients in other processes.
 
+mod gateway;
+mod prepare;
+
 use std::io::{self, BufRead as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -18,17 +21,44 @@ use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RunFile, tcp
 /// While it runs, it takes commands on stdin, one a line: pause, step (or step 10), run, stop. docs/sdsp.md has the rules, and the
 /// format for clients of your own.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct Arguments {
+    #[command(subcommand)]
+    other: Option<Other>,
+
     /// The file of the run, with a [sync] table.
-    file: PathBuf,
+    #[arg(required = true)]
+    file: Option<PathBuf>,
 
     /// Begin paused, and wait for commands on stdin.
     #[arg(long)]
     paused: bool,
 }
 
+/// What else belongs to a run in lock-step.
+#[derive(Debug, clap::Subcommand)]
+enum Other {
+    Gateway(gateway::Arguments),
+    Prepare(prepare::Arguments),
+}
+
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let mut file = match RunFile::load(&arguments.file) {
+    if let Some(Other::Prepare(arguments)) = &arguments.other {
+        return prepare::run(arguments);
+    }
+    let stop = Stop::new();
+    if let Err(error) = ctrlc::set_handler({
+        let stop = stop.clone();
+        move || stop.stop()
+    }) {
+        eprintln!("sync: Ctrl-C cannot be caught: {error}");
+        return Outcome::BusFailed;
+    }
+    let file = match (&arguments.other, &arguments.file) {
+        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, &stop),
+        (_, file) => file.as_ref().expect("it is required"),
+    };
+    let mut file = match RunFile::load(file) {
         Ok(file) => file,
         Err(mistakes) => {
             eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
@@ -43,14 +73,6 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             return Outcome::WrongInput;
         }
     };
-    let stop = Stop::new();
-    if let Err(error) = ctrlc::set_handler({
-        let stop = stop.clone();
-        move || stop.stop()
-    }) {
-        eprintln!("sync: Ctrl-C cannot be caught: {error}");
-        return Outcome::BusFailed;
-    }
     let controls = Controls::new(&stop);
     let commands = thread::Builder::new().name("tickbus-commands".to_owned());
     let spawned = commands.spawn({

@@ -57,8 +57,13 @@ pub struct End {
 
 impl End {
     pub fn open<C: Clock + 'static>(text: &str, clock: &Arc<C>) -> Self {
-        let logged = logged::Watch::new();
         let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        Self::of(config, clock)
+    }
+
+    /// The same of a driver.cfg that was read already.
+    pub fn of<C: Clock + 'static>(config: Config, clock: &Arc<C>) -> Self {
+        let logged = logged::Watch::new();
         let driver = Driver::open(config, Arc::clone(clock) as _).expect("opens");
         let slots = driver.initial_slots();
         Self {

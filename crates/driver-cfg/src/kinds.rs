@@ -12,6 +12,7 @@ use tickbus_bus_opcua as opcua;
 use tickbus_bus_plugin as plugin;
 use tickbus_bus_profibus as profibus;
 use tickbus_bus_s7 as s7;
+use tickbus_bus_sdsp as sdsp;
 use tickbus_bus_socket as socket;
 use tickbus_fieldbus::{At, BusKind, BusOptions, Events, Role};
 use tickbus_image::signal::SignalTable;
@@ -125,6 +126,8 @@ kinds! {
     HilscherCifx(hilscher::cifx::Options),
     /// `kind = "interbus-ddi"`: an INTERBUS controller board.
     InterbusDdi(interbus::Options),
+    /// `kind = "sdsp"`: a client of a run on virtual time.
+    Sdsp(sdsp::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
     /// `kind = "mailbox"`: the example of `examples/bus-mailbox`.
@@ -133,7 +136,7 @@ kinds! {
 }
 
 /// Bus kinds that a later version will have.
-const PLANNED: [&str; 2] = ["sdsp", "dispatcher"];
+const PLANNED: [&str; 1] = ["dispatcher"];
 
 impl Options {
     /// The recording that replaces the peer, as named in the driver.cfg.

@@ -7,7 +7,7 @@ use tickbus_base::time::{Clock, Nanos};
 use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::loopback::{Mode, Peer};
 use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
-use tickbus_fieldbus::{Bus, BusSetup, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusSetup, Hosted, OpenError, Role};
 use tickbus_image::signal::Area;
 use tickbus_plc as plc;
 
@@ -17,10 +17,12 @@ use super::host::{HostThread, Program, ScanSetup, SteppedHost, check_fit, progra
 use super::replay::Replay;
 use tickbus_driver_cfg::Config;
 
-/// Creates the bus that `config` names, and starts the hosted program at its other end, if any.
+/// Creates the bus that `config` names, and starts the hosted program at its other end, if any. `hosted` is a program at
+/// this end.
 pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
+    hosted: Option<Hosted<'_>>,
 ) -> Result<(Bus, Option<Program>), DriverError> {
     if let Options::Loopback(options) = &config.bus {
         match &options.peer {
@@ -49,6 +51,7 @@ pub(super) fn open(
         cycle: config.timing.cycle,
         max_age: config.timing.max_age,
         events: config.events,
+        hosted,
     };
     let bus = config.bus.open(&setup).map_err(|error| {
         let file = config.path.display().to_string();

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use tickbus_base::Mistake;
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::statistics::Statistics;
-use tickbus_base::time::{Clock, Nanos};
+use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::faults::FaultStatus;
-use tickbus_fieldbus::{Bus, Link};
+use tickbus_fieldbus::{Bus, Hosted, Lead, Link};
 use tickbus_plc::Program;
 
 use super::host::{HostThread, ScanSetup, check_fit};
@@ -47,20 +47,35 @@ impl Host {
                 "use one driver.cfg per station for that",
             ));
         }
-        let (Bus::Free(bus), None) = bus::open(config, &clock)? else {
-            return Err(unfit(
-                "this bus runs on the ticks of a simulation, so that no PLC program can run on it by itself",
-                "choose mode = \"free\" and a \"link\", or another kind of bus",
-            ));
+        let stop = Stop::new();
+        let hosted = Hosted {
+            interval,
+            stop: &stop,
+        };
+        let bus = match bus::open(config, &clock, Some(hosted))? {
+            (Bus::Stepped(bus), None) if bus.lead() == Lead::Simulation => {
+                return Err(unfit(
+                    "this bus runs on the ticks of a simulation, so that no PLC program can run on it by itself",
+                    "choose mode = \"free\" and a \"link\", or another kind of bus",
+                ));
+            }
+            (bus, _) => bus,
         };
         let title = format!("plc {}", program.name());
         let role = config.role;
+        let is_stepped = matches!(bus, Bus::Stepped(_));
         let hosted = ScanSetup {
             program,
             interval,
-            tape: ScanRecorder::start(config, role)?,
+            tape: ScanRecorder::start(config, role, is_stepped)?,
         };
-        HostThread::start(hosted, title, config, role, bus, clock).map(Self)
+        let thread = match bus {
+            Bus::Free(bus) => HostThread::start(hosted, title, config, role, bus, clock),
+            Bus::Stepped(bus) => {
+                HostThread::start_in_steps(hosted, title, (config, role), (bus, stop), clock)
+            }
+        };
+        thread.map(Self)
     }
 
     /// The state of the line.
@@ -95,6 +110,17 @@ impl Host {
     /// Why the program is no longer scanned, if so: it panicked, or a scan does not end.
     pub fn fault(&self) -> Option<String> {
         self.0.counters.fault()
+    }
+
+    /// Whether the program is scanned no more: the run of its bus has come to its end, or there is a
+    /// [`fault`](Self::fault).
+    pub fn is_over(&self) -> bool {
+        self.0.is_over()
+    }
+
+    /// What the bus has told about itself under this key of the statistics.
+    pub fn fact(&self, key: &'static str) -> Option<String> {
+        self.0.status.fact(key)
     }
 
     /// Stops scanning and closes the bus. Returns why the program did not end, if so.

@@ -34,7 +34,7 @@ impl Driver {
         let names = config.table.stations.iter();
         let names = names.map(|station| station.name.clone()).collect();
         let status = LinkStatus::of_stations(&config.name, config.timing.max_age, names);
-        let (bus, program) = bus::open(&config, &clock)?;
+        let (bus, program) = bus::open(&config, &clock, None)?;
         let slots = SlotMap::new(&config.table, config.role);
         // On a stepped bus the tick may wait for the recorder, so that none of its ticks is dropped.
         let recorder = recorder(&config, &slots, matches!(bus, Bus::Stepped(_)))?;

@@ -43,11 +43,15 @@ pub(super) struct ScanRecorder {
 }
 
 impl ScanRecorder {
-    /// Starts the recording that `config` asks for.
-    pub(super) fn start(config: &Config, role: Role) -> Result<Option<Self>, DriverError> {
+    /// Starts the recording that `config` asks for; one that is `lossless` makes scans wait rather than drops them.
+    pub(super) fn start(
+        config: &Config,
+        role: Role,
+        lossless: bool,
+    ) -> Result<Option<Self>, DriverError> {
         let map = SlotMap::new(&config.table, role);
         let (writes, reads) = role.areas();
-        let recorder = recorder(config, &map, false)?;
+        let recorder = recorder(config, &map, lossless)?;
         Ok(recorder.map(|recorder| Self {
             recorder,
             reads: Plan::new(&config.table, 0, reads),

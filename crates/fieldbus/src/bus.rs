@@ -59,4 +59,20 @@ pub trait Stepped: Send {
     ///
     /// Why nothing was received.
     fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError>;
+
+    /// Who hands out the time.
+    fn lead(&self) -> Lead {
+        Lead::Simulation
+    }
+}
+
+/// Who hands out the time of a [stepped bus](Stepped).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lead {
+    /// The simulation at this end: without its ticks nothing happens.
+    Simulation,
+    /// The bus: [`receive`](Stepped::receive) waits, so that a PLC program can run on it by itself.
+    Bus,
+    /// Nobody any more: the bus has come to its proper end, which the state of the line tells.
+    Ended,
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tickbus_axis::Axis;
 use tickbus_base::Mistake;
-use tickbus_base::time::Nanos;
+use tickbus_base::time::{Nanos, Stop};
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 
@@ -32,6 +32,17 @@ pub struct BusSetup<'a> {
     pub max_age: Nanos,
     /// What is reported as events.
     pub events: Events,
+    /// The program that runs at this end by itself; `None` for a simulation, which ticks.
+    pub hosted: Option<Hosted<'a>>,
+}
+
+/// A PLC program that is hosted at an end of a bus by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Hosted<'a> {
+    /// The interval of its scans.
+    pub interval: Nanos,
+    /// Ends it, also while its bus waits.
+    pub stop: &'a Stop,
 }
 
 /// Why a bus does not open.

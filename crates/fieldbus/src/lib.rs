@@ -25,14 +25,14 @@ pub mod tcp;
 
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
 pub use at::{At, both_ways};
-pub use bus::{Bus, CYCLE, Free, Stepped};
+pub use bus::{Bus, CYCLE, Free, Lead, Stepped};
 pub use card::{Card, CardBus, CardOptions, Failing, Meaning, Moved, Vendor, Verdict};
 pub use changes::ChangeEvents;
 pub use cyclic::{Cycles, Exchange, Exchanged};
 pub use dead_band::DeadBands;
 pub use error::BusError;
 pub use events::Events;
-pub use kind::{BusKind, BusOptions, BusSetup, OpenError};
+pub use kind::{BusKind, BusOptions, BusSetup, Hosted, OpenError};
 pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use port::{CallWatch, Frames, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};

@@ -447,6 +447,11 @@ impl LinkStatus {
         self.lock().facts.insert(key.into(), one_line(fact));
     }
 
+    /// The fact that was set last for this key.
+    pub fn fact(&self, key: &'static str) -> Option<String> {
+        self.lock().facts.get(&key.into()).cloned()
+    }
+
     /// Increments a counter of the statistics.
     pub fn count(&self, key: &'static str) {
         *self.lock().counts.entry(key).or_default() += 1;

@@ -3,10 +3,10 @@
 use opcua::types::{DataValue, DateTime, StatusCode};
 
 use crate::pki::meaning;
-use crate::values::{self, Values, scalar};
+use crate::values::{self, scalar};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{BusError, Port};
-use tickbus_image::signal::{Area, SignalTable};
+use tickbus_image::signal::{Area, RawValues, SignalTable};
 
 use super::Field;
 
@@ -29,7 +29,7 @@ enum Quality {
 /// nothing of the station is handed in, so that its data grow old, as they should.
 #[derive(Debug)]
 pub(super) struct Readings {
-    values: Values,
+    values: RawValues,
     quality: Vec<Quality>,
     /// The source time of each signal's value.
     made: Vec<Option<DateTime>>,
@@ -45,7 +45,7 @@ impl Readings {
     pub(super) fn new(table: &SignalTable, area: Area, port: &Port) -> Self {
         let frames = (0..port.stations()).map(|station| vec![0; port.sizes(station).1].into());
         Self {
-            values: Values::new(table, area),
+            values: RawValues::new(table, area),
             quality: vec![Quality::Missing; table.signals.len()],
             made: vec![None; table.signals.len()],
             frames: frames.collect(),

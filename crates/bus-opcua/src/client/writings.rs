@@ -3,21 +3,21 @@
 use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, WriteValue};
 
 use crate::pki::meaning;
-use crate::values::{self, Values};
+use crate::values;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{Port, Receipt};
-use tickbus_image::signal::{Area, SignalTable, Slot};
+use tickbus_image::signal::{Area, RawValues, SignalTable};
 
 use super::Field;
 
 /// The signals that are written, and the values that the server has.
 #[derive(Debug)]
 pub(super) struct Writings {
-    values: Values,
+    values: RawValues,
     /// The bits that the server has accepted; `None` for none yet.
-    known: Vec<Option<Slot>>,
+    known: Vec<Option<u64>>,
     /// The pending Write: indices of signals, and their bits, with the receipt for the frames that they are from.
-    flight: Option<(Vec<(usize, Slot)>, Receipt)>,
+    flight: Option<(Vec<(usize, u64)>, Receipt)>,
     /// The signals that the server refuses, as last logged.
     refused: Vec<Option<StatusCode>>,
 }
@@ -27,7 +27,7 @@ impl Writings {
     pub(super) fn new(table: &SignalTable, area: Area) -> Self {
         let count = table.signals.len();
         Self {
-            values: Values::new(table, area),
+            values: RawValues::new(table, area),
             known: vec![None; count],
             flight: None,
             refused: vec![None; count],
@@ -65,7 +65,7 @@ impl Writings {
             port.sent(&receipt);
             return Vec::new();
         }
-        let write = |&(signal, bits): &(usize, Slot)| WriteValue {
+        let write = |&(signal, bits): &(usize, u64)| WriteValue {
             node_id: nodes[signal].clone(),
             attribute_id: AttributeId::Value as u32,
             index_range: NumericRange::None,

@@ -7,11 +7,11 @@ use opcua::server::address_space::NodeType;
 use opcua::types::{DataValue, NodeId, StatusCode, Variant};
 
 use crate::pki::date;
-use crate::values::{self, Values};
+use crate::values;
 use tickbus_base::time::{Nanos, WallClock};
 use tickbus_fieldbus::{Frames, Port, Receipt, Role, is_stale};
 use tickbus_image::Event;
-use tickbus_image::signal::{Plan, Scale, Signal, SignalTable, Slot};
+use tickbus_image::signal::{Plan, RawValues, Scale, Signal, SignalTable, Slot};
 
 use super::manager::Nodes;
 use super::space;
@@ -21,8 +21,8 @@ use super::watched::{Variable, Watched};
 pub(super) struct Image {
     table: Arc<SignalTable>,
     role: Role,
-    sends: Values,
-    receives: Values,
+    sends: RawValues,
+    receives: RawValues,
     places: Vec<PublishedSignal>,
     frames: Vec<Box<[u8]>>,
     show: Show,
@@ -89,7 +89,7 @@ struct PublishedSignal {
     node: NodeId,
     scaled: Option<(NodeId, Scale)>,
     /// The node's value; `None` at first.
-    shown: Option<(Slot, StatusCode)>,
+    shown: Option<(u64, StatusCode)>,
     /// When it was set.
     since: Nanos,
     /// Whether a client has written the signal.
@@ -113,7 +113,7 @@ impl Image {
             since: Nanos::ZERO,
             written: false,
         };
-        let mut receives = Values::new(table, rx);
+        let mut receives = RawValues::new(table, rx);
         // Values not written by any client yet are treated as missing.
         let mut slots = vec![Slot::default(); table.signals.len()];
         let frames = (0..port.stations()).map(|station| {
@@ -128,7 +128,7 @@ impl Image {
         Self {
             table: Arc::clone(table),
             role,
-            sends: Values::new(table, tx),
+            sends: RawValues::new(table, tx),
             receives,
             places: table.signals.iter().map(place).collect(),
             frames,
@@ -151,7 +151,7 @@ impl Image {
     }
 
     /// Writes the values of one list to the image, as one commit per station.
-    pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, Slot)]) {
+    pub(super) fn received(&mut self, port: &mut Port, now: Nanos, list: &[(usize, u64)]) {
         let mut touched = vec![false; self.frames.len()];
         for &(signal, bits) in list {
             // The port itself reports a change.
@@ -245,7 +245,7 @@ impl Image {
     }
 
     /// Sets the nodes of a signal if the value is new, and reports it to subscribers.
-    fn put(&mut self, now: Nanos, index: usize, bits: Slot, status: StatusCode) {
+    fn put(&mut self, now: Nanos, index: usize, bits: u64, status: StatusCode) {
         let place = &mut self.places[index];
         if place.shown == Some((bits, status)) {
             return;
@@ -293,9 +293,9 @@ fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
 }
 
 /// The slot of a signal with these bits, converted to engineering units.
-fn slot(signal: &Signal, bits: Slot) -> Slot {
+fn slot(signal: &Signal, bits: u64) -> Slot {
     if signal.is_integer_slot() {
-        return bits;
+        return Slot::from_unsigned(bits);
     }
     let raw = values::variant(signal.data_type, bits);
     let raw = match raw {

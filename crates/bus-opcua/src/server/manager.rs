@@ -23,7 +23,7 @@ use crate::pki::date;
 use crate::reactor::Inbox;
 use crate::{application, values};
 use tickbus_base::time::{Nanos, WallClock};
-use tickbus_image::signal::{Area, SignalTable, Slot};
+use tickbus_image::signal::{Area, SignalTable};
 
 use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
@@ -71,7 +71,7 @@ impl Visitor {
 /// What clients have done.
 pub(super) enum Visit {
     /// Values written in one request. A signal written twice in it starts a new list.
-    Written(Visitor, Vec<Vec<(usize, Slot)>>),
+    Written(Visitor, Vec<Vec<(usize, u64)>>),
     /// These signals are about to be read: their nodes must be updated first.
     Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
     /// A client was refused because its certificate is another application's; the text says so.
@@ -175,7 +175,7 @@ impl Signals {
         &self,
         space: &AddressSpace,
         write: &ParsedWriteValue,
-    ) -> Result<(usize, Slot), StatusCode> {
+    ) -> Result<(usize, u64), StatusCode> {
         let Some(&variable) = self.by_node.get(&write.node_id) else {
             return Err(if space.node_exists(&write.node_id) {
                 StatusCode::BadNotWritable
@@ -326,7 +326,7 @@ impl InMemoryNodeManagerImpl for Signals {
     ) -> Result<(), StatusCode> {
         // If a service fails, every node gets its status.
         self.admits(context)?;
-        let mut lists: Vec<Vec<(usize, Slot)>> = vec![Vec::new()];
+        let mut lists: Vec<Vec<(usize, u64)>> = vec![Vec::new()];
         let mut space = address_space.write();
         let now = date((self.own.wall)());
         for node in nodes_to_write {

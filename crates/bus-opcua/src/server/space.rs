@@ -8,7 +8,7 @@ use opcua::types::{
 };
 
 use crate::values::{data_type_id, variant};
-use tickbus_image::signal::{Area, Scale, Signal, SignalTable, Slot};
+use tickbus_image::signal::{Area, Scale, Signal, SignalTable};
 
 use super::units::unit;
 
@@ -99,7 +99,7 @@ fn variable(
         .description(LocalizedText::from(&*description(signal)))
         .data_type(data_type_id(signal.data_type))
         .value_rank(-1)
-        .value(variant(signal.data_type, Slot::default()))
+        .value(variant(signal.data_type, 0))
         .minimum_sampling_interval(0.0)
         .has_type_definition(kind)
         .component_of(parent);

@@ -11,10 +11,10 @@ use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
 use tickbus_base::os::wake_on_time;
 use tickbus_base::statistics::Statistics;
-use tickbus_base::time::{Clock, Nanos, Pace, Stop};
+use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Free, LinkStatus, Port, Role};
+use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Port, Role, Stepped};
 use tickbus_plc::{Program, Report};
 use tickbus_record as record;
 
@@ -62,7 +62,10 @@ pub(crate) struct HostCounters {
     scanning: Arc<Scanning>,
     report: Option<Arc<dyn Report>>,
     record: Option<Arc<record::RecorderCounters>>,
+    /// The clock of the line.
     pub(crate) clock: Arc<dyn Clock>,
+    /// The clock by which a scan hangs.
+    wall: Arc<dyn Clock>,
 }
 
 /// A program on its own thread, and the bus thread of its end of the line; dropping it stops both.
@@ -76,7 +79,18 @@ pub(crate) struct HostThread {
     stop: Stop,
     thread: Option<JoinHandle<()>>,
     #[expect(dead_code, reason = "kept for its drop")]
-    bus: BusThread,
+    bus: Option<BusThread>,
+}
+
+/// How a program is scanned.
+enum Scanned {
+    /// At a fixed interval of the clock, with a bus on a thread of its own.
+    Freely {
+        bus: Box<dyn Free>,
+        clock: Arc<dyn Clock>,
+    },
+    /// In the steps of a bus that hands out the time.
+    InSteps { bus: Box<dyn Stepped>, stop: Stop },
 }
 
 impl HostThread {
@@ -90,6 +104,31 @@ impl HostThread {
         bus: Box<dyn Free>,
         clock: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
+        let wall = Arc::clone(&clock);
+        let scanned = Scanned::Freely { bus, clock };
+        Self::start_scanned(hosted, name, (config, role), scanned, wall)
+    }
+
+    /// The same in the steps of a bus that hands out the time, and that waits no longer once `stop` is stopped. A scan
+    /// that hangs is noticed by the clock `wall`.
+    pub(crate) fn start_in_steps(
+        hosted: ScanSetup,
+        name: String,
+        (config, role): (&Config, Role),
+        (bus, stop): (Box<dyn Stepped>, Stop),
+        wall: Arc<dyn Clock>,
+    ) -> Result<Self, DriverError> {
+        let scanned = Scanned::InSteps { bus, stop };
+        Self::start_scanned(hosted, name, (config, role), scanned, wall)
+    }
+
+    fn start_scanned(
+        hosted: ScanSetup,
+        name: String,
+        (config, role): (&Config, Role),
+        scanned: Scanned,
+        wall: Arc<dyn Clock>,
+    ) -> Result<Self, DriverError> {
         let max_age = config.timing.max_age;
         let interval = hosted.interval;
         let report = hosted.program.report();
@@ -99,7 +138,11 @@ impl HostThread {
         let status = LinkStatus::new(&name, max_age);
         // A CPU whose program has died must not keep its last outputs on the bus.
         let watchdog = (interval + interval).max(max_age);
-        let (now, limit) = (Arc::clone(&clock), Some(watchdog));
+        let virtual_time = Manual::new();
+        let (clock, limit) = match &scanned {
+            Scanned::Freely { clock, .. } => (Arc::clone(clock), Some(watchdog)),
+            Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
+        };
         let board = Arc::<FaultBoard>::default();
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
         if role == config.role {
@@ -107,44 +150,80 @@ impl HostThread {
             let inputs = &cpu.units[0].inputs.bytes;
             cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
         }
-        let port = Port::new(bus_end, now, role, limit, status.clone())
+        let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
-        let reconnect = config.timing.reconnect.clone();
-        let bus = BusThread::start(bus, port, reconnect, status.clone(), &name);
-        let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
-        let (scan_counters, stop) = (Arc::clone(&cpu.scan_counters), Stop::new());
+        let scan_counters = Arc::clone(&cpu.scan_counters);
         let fault = Arc::new(Mutex::new(None));
         let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
+        let counters = HostCounters {
+            scan_counters,
+            fault: Arc::clone(&fault),
+            scanning: Arc::clone(&scanning),
+            report,
+            record,
+            clock: Arc::clone(&clock),
+            wall: Arc::clone(&wall),
+        };
+        let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
+            match scanned {
+                Scanned::Freely { bus, .. } => {
+                    let reconnect = config.timing.reconnect.clone();
+                    let bus = BusThread::start(bus, port, reconnect, status.clone(), &name);
+                    let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
+                    let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
+                    let scans = {
+                        let stop = stop.clone();
+                        move || {
+                            let times = (interval, watchdog);
+                            wake_on_time();
+                            scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
+                            Ok(())
+                        }
+                    };
+                    (stop, Some(bus), Box::new(scans))
+                }
+                Scanned::InSteps { mut bus, stop } => {
+                    let scans = {
+                        let (stop, scanning) = (stop.clone(), Arc::clone(&scanning));
+                        let status = status.clone();
+                        move || {
+                            let line = (&mut *bus, &mut port, &*virtual_time);
+                            let watch = (&*scanning, &*wall);
+                            let ended = scan_in_steps(&mut cpu, line, watch, &stop);
+                            ended.map_err(|error| {
+                                let reason = error.to_string();
+                                let (now, cause) = (virtual_time.now(), (&error).into());
+                                status.enter(now, LinkState::Failed, cause, &reason);
+                                reason
+                            })
+                        }
+                    };
+                    (stop, None, Box::new(scans))
+                }
+            };
         let (end, ended) = mpsc::channel();
-        let spawned = std::thread::Builder::new().name(name).spawn({
-            let (stop, fault, clock) = (stop.clone(), Arc::clone(&fault), Arc::clone(&clock));
-            let scanning = Arc::clone(&scanning);
-            move || {
-                let _end: Sender<()> = end;
-                let times = (interval, watchdog);
-                wake_on_time();
-                let scans = || scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
-                let result = catch_unwind(AssertUnwindSafe(scans));
-                scanning.set(None);
-                if let Err(panic) = result {
+        let spawned = std::thread::Builder::new().name(name).spawn(move || {
+            let _end: Sender<()> = end;
+            let result = catch_unwind(AssertUnwindSafe(&mut scans));
+            scanning.set(None);
+            // What it holds may take its leave of the peer, which closing waits for.
+            drop(scans);
+            let text = match result {
+                Ok(Ok(())) => return,
+                Ok(Err(text)) => text,
+                Err(panic) => {
                     let text = format!("the PLC program panicked: {}", panic_text(&*panic));
                     log::error!("{text}");
-                    *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
+                    text
                 }
-            }
+            };
+            *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
         });
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
-            counters: HostCounters {
-                scan_counters,
-                fault,
-                scanning,
-                report,
-                record,
-                clock,
-            },
+            counters,
             ended,
             status,
             board,
@@ -171,7 +250,7 @@ impl HostCounters {
     }
 
     pub(crate) fn fault(&self) -> Option<String> {
-        if let Some(span) = self.scanning.too_long(self.clock.now()) {
+        if let Some(span) = self.scanning.too_long(self.wall.now()) {
             let span = span.rounded();
             return Some(format!("the PLC program has been in one scan for {span}"));
         }
@@ -183,6 +262,11 @@ impl HostCounters {
 }
 
 impl HostThread {
+    /// Whether the program is scanned no more, for whatever reason.
+    pub(crate) fn is_over(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
     /// Stops scanning. Returns why the program did not end, if so: its thread is then left behind.
     pub(crate) fn end(&mut self) -> Option<String> {
         let thread = self.thread.take()?;
@@ -224,4 +308,30 @@ fn scan_until_stopped(
         }
         clock.wait_until(pace.due(), stop);
     }
+}
+
+/// Scans once in each step that the bus hands out, until its proper end.
+fn scan_in_steps(
+    cpu: &mut Cpu,
+    (bus, port, time): (&mut (dyn Stepped + 'static), &mut Port, &Manual),
+    (scanning, wall): (&Scanning, &dyn Clock),
+    stop: &Stop,
+) -> Result<(), BusError> {
+    while !stop.is_stopped() {
+        let now = time.now();
+        let next = match bus.receive(now, port) {
+            // It was told to wait no longer.
+            Err(_) if stop.is_stopped() => return Ok(()),
+            received => received?,
+        };
+        if bus.lead() == Lead::Ended {
+            return Ok(());
+        }
+        scanning.set(Some(wall.now()));
+        cpu.scan(now, true);
+        scanning.set(None);
+        bus.send(now, port)?;
+        time.set(next);
+    }
+    Ok(())
 }

@@ -3,6 +3,7 @@
 mod address;
 mod order;
 mod plan;
+mod raw;
 mod scale;
 pub mod section;
 mod slot;
@@ -12,6 +13,7 @@ mod types;
 pub use address::{AREA_LIMIT, Address, Addressing, Area, Width};
 pub use order::ByteOrder;
 pub use plan::{Conversions, Plan, fail_safe_frame};
+pub use raw::RawValues;
 pub use scale::Scale;
 pub use slot::Slot;
 pub use table::{Latch, Signal, SignalTable, Station};

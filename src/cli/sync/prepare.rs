@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::Outcome;
+use crate::cli::Outcome;
 use tickbus_base::toml_text::Mistakes;
 use tickbus_prepare::{Addresses, Settings, Source, prepare, undo};
 

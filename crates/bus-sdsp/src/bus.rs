@@ -1,0 +1,258 @@
+//! The bus: a client of a run, ticked by its simulation.
+
+use tickbus_base::Mistake;
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::{BusError, BusSetup, Cause, Lead, Port, Receipt, Stepped};
+use tickbus_image::signal::DataType;
+use tickbus_virtual_time as sdsp;
+use tickbus_virtual_time::{Declaration, Ended, Step};
+
+use super::run::{End, Run};
+use super::{Every, Options, Variables};
+
+/// The most steps that one tick catches up on. A longer one is taken for a wrong time.
+const MOST_STEPS: i64 = 100_000;
+
+/// A client of a run on virtual time.
+#[derive(Debug)]
+pub struct Sdsp {
+    address: Address,
+    timeout: Nanos,
+    declaration: Declaration,
+    every: Every,
+    stop: Stop,
+    values: Values,
+    state: State,
+}
+
+#[derive(Debug)]
+enum State {
+    /// It has not joined yet.
+    Apart,
+    /// In a step; the next one is due at this time of the simulation.
+    Joined { run: Run, due: Nanos },
+    /// The run is over, or goes on without this client.
+    Over(Result<(), BusError>),
+}
+
+impl Sdsp {
+    /// A client with these options. It connects in its first cycle.
+    ///
+    /// # Errors
+    ///
+    /// The names of client or variables break a rule.
+    pub fn new(options: &Options, setup: &BusSetup<'_>) -> Result<Self, Mistake> {
+        let (writes, reads) = options.variables(setup.role, setup.table);
+        let declaration = options.declaration(setup, &writes, &reads)?;
+        let (_, area) = setup.role.areas();
+        let stations = setup.table.stations.iter();
+        Ok(Self {
+            address: options.address.clone(),
+            timeout: options.timeout,
+            every: setup
+                .hosted
+                .map_or(options.every, |hosted| Every::Time(hosted.interval)),
+            stop: setup
+                .hosted
+                .map(|hosted| hosted.stop.clone())
+                .unwrap_or_default(),
+            values: Values {
+                slots: vec![0; declaration.writes.len()],
+                types: reads.iter().map(|variable| variable.data_type).collect(),
+                frames: stations
+                    .map(|station| vec![0; station.bytes(area)].into())
+                    .collect(),
+                writes,
+                reads,
+                receipt: None,
+            },
+            declaration,
+            state: State::Apart,
+        })
+    }
+
+    /// Takes part up to `now`; returns when the next step is due.
+    fn run_to(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, End> {
+        let values = &mut self.values;
+        if let State::Apart = self.state {
+            port.opening(&format!(
+                "waiting for the server at {} to start the run",
+                self.address
+            ));
+            let mut run = Run::join(
+                (&self.address, self.timeout),
+                self.declaration.clone(),
+                (self.every, &values.types),
+                &values.slots,
+                &self.stop,
+            )?;
+            values.are_sent(port);
+            let step = run.step(&values.slots)?;
+            let due = now + run.interval;
+            values.deliver(now, run.reads(), port);
+            self.begin(step, port);
+            self.state = State::Joined { run, due };
+            return Ok(due);
+        }
+        let State::Joined { run, due } = &mut self.state else {
+            unreachable!("the caller has seen to it");
+        };
+        let late = now - *due;
+        if late > run.interval.times(MOST_STEPS) {
+            return Err(run.give_up(&format!(
+                "its simulation time jumped from {due} to {now}, over more than {MOST_STEPS} steps; hand in the \
+                 nanoseconds since the simulation began, tick by tick"
+            )));
+        }
+        if late < Nanos::ZERO {
+            values.touch(now, port);
+            return Ok(*due);
+        }
+        loop {
+            run.advance(&values.slots)?;
+            values.are_sent(port);
+            values.deliver(now, run.reads(), port);
+            *due += run.interval;
+            if now < *due {
+                return Ok(*due);
+            }
+            values.collect(now, port);
+        }
+    }
+
+    fn begin(&self, step: Step, port: &mut Port) {
+        debug_assert_eq!(step.time, Nanos::ZERO, "a run begins at 0");
+        port.running(&format!("in step with the server at {}", self.address));
+    }
+
+    /// The run is over: says so, and makes what was received invalid.
+    fn end(&mut self, end: End, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let result = match &end {
+            End::Finished(outcome) => {
+                port.tell("sdsp.hash", &outcome.hash.to_string());
+                Ok(format!(
+                    "the run has come to its end after {} steps, at {} of virtual time; its trace hash is {}",
+                    outcome.steps, outcome.time, outcome.hash
+                ))
+            }
+            End::Broken(ended) => Err(bus_error(ended)),
+        };
+        let (cause, why) = match &result {
+            Ok(why) => (Cause::Left, why.clone()),
+            Err(error) => (error.into(), error.to_string()),
+        };
+        for station in 0..port.stations() {
+            port.station_left(station, now, cause, &why);
+        }
+        result.map(|_| ())
+    }
+}
+
+impl Stepped for Sdsp {
+    fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        self.values.collect(now, port);
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
+        if let State::Over(result) = &self.state {
+            return result.clone().map(|()| now);
+        }
+        match self.run_to(now, port) {
+            Ok(due) => Ok(due),
+            // A server that cannot be reached may come later.
+            Err(End::Broken(ended))
+                if matches!(self.state, State::Apart) && ended.cause == sdsp::Cause::Lost =>
+            {
+                Err(bus_error(&ended))
+            }
+            Err(end) => {
+                let result = self.end(end, now, port);
+                self.state = State::Over(result.clone());
+                result.map(|()| now)
+            }
+        }
+    }
+
+    fn lead(&self) -> Lead {
+        match self.state {
+            State::Over(_) => Lead::Ended,
+            _ => Lead::Bus,
+        }
+    }
+}
+
+impl Drop for Sdsp {
+    fn drop(&mut self) {
+        if let State::Joined { run, .. } = &mut self.state
+            && self.values.receipt.is_some()
+        {
+            // The simulation has answered this step, and there is no further cycle to send it.
+            run.finish(&self.values.slots);
+        }
+    }
+}
+
+/// The values of this client, and the image that they come from and go to.
+#[derive(Debug)]
+struct Values {
+    writes: Variables,
+    reads: Variables,
+    types: Vec<DataType>,
+    /// What it writes, as it is sent next.
+    slots: Vec<u64>,
+    /// For what is in the slots.
+    receipt: Option<Receipt>,
+    /// Per station, what it reads.
+    frames: Vec<Box<[u8]>>,
+}
+
+impl Values {
+    /// Takes what the simulation writes. If a fault swallows it, the values of before are sent again.
+    fn collect(&mut self, now: Nanos, port: &mut Port) {
+        let Some(mut frames) = port.take_all(now) else {
+            return;
+        };
+        for station in frames.stations() {
+            self.writes.take(station, frames.frame(station));
+        }
+        self.receipt = Some(frames.receipt());
+        self.writes.get(&mut self.slots);
+    }
+
+    /// The server will have what is in the slots.
+    fn are_sent(&mut self, port: &mut Port) {
+        if let Some(receipt) = self.receipt.take() {
+            port.sent(&receipt);
+        }
+    }
+
+    /// Hands in what was read in a step.
+    fn deliver(&mut self, now: Nanos, reads: &[u64], port: &mut Port) {
+        self.reads.set(reads);
+        for (station, frame) in self.frames.iter_mut().enumerate() {
+            self.reads.give(station, frame);
+            if port.is_up(now) {
+                port.received(station, now, frame);
+            }
+        }
+    }
+
+    /// Nobody can have written anything since: between two steps only the simulation's own time passes.
+    fn touch(&self, now: Nanos, port: &mut Port) {
+        if port.is_up(now) {
+            (0..self.frames.len()).for_each(|station| port.touch(station, now));
+        }
+    }
+}
+
+fn bus_error(ended: &Ended) -> BusError {
+    let reason = ended.to_string();
+    match ended.cause {
+        sdsp::Cause::Configuration | sdsp::Cause::Refused => BusError::Refused(reason),
+        sdsp::Cause::Protocol => BusError::Protocol(reason),
+        sdsp::Cause::Failed | sdsp::Cause::Logic | sdsp::Cause::Stopped => BusError::Left(reason),
+        sdsp::Cause::Lost | sdsp::Cause::Hung | sdsp::Cause::System => BusError::Link(reason),
+    }
+}

@@ -1,0 +1,181 @@
+//! What a driver.cfg says to the bus.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroU32;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::{At, BusSetup, Role};
+use tickbus_image::signal::{Signal, SignalTable};
+use tickbus_virtual_time::Declaration;
+
+use super::Variables;
+
+/// The longest name of a client, in characters.
+const NAME_LIMIT: usize = 120;
+
+/// How long the server may be silent: it may be paused, or other clients may have to be started by hand.
+const TIMEOUT: Nanos = Nanos::from_secs(60);
+
+/// The options of the bus `sdsp`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Where the server listens.
+    pub address: Address,
+    /// The name in the run, if stated.
+    pub client: Option<String>,
+    /// How often it has a step.
+    pub every: Every,
+    /// How long the server may be silent.
+    pub timeout: Nanos,
+    /// Variables with a name of their own, by signal: `[fieldbus.at]`.
+    pub at: BTreeMap<String, String>,
+}
+
+/// How often a client has a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Every {
+    /// Each time after this many steps of the server.
+    Steps(NonZeroU32),
+    /// Each time after this virtual time: a whole multiple of the server's step, and above zero.
+    Time(Nanos),
+}
+
+impl Options {
+    /// Reads the keys of the bus. `moved` says that the address will be replaced.
+    pub fn read(moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        let address = table.take("address");
+        let client = table.take("client");
+        let multiple = table.take("multiple");
+        let step = table.take("step");
+        let timeout = table.take("timeout");
+        if address.is_none() && !moved {
+            let right = "say where the server listens, such as address = \"127.0.0.1:20060\"";
+            table.require_one_of(&["address"], right);
+        }
+        // Replaced in any case.
+        let address = match address {
+            None => Some(Address::local(0)).filter(|_| moved),
+            Some(value) => read_address(&value, moved),
+        };
+        let client = client.map_or(Some(None), |value| {
+            let right = "give this client a name that no other one of the run has";
+            value
+                .label(NAME_LIMIT, right)
+                .map(|name| Some(name.to_owned()))
+        });
+        let timeout = timeout.map_or(Some(TIMEOUT), |value| value.duration());
+        let every = match (multiple, step) {
+            (Some(multiple), Some(_)) => {
+                multiple.wrong(
+                    "both a \"multiple\" and a \"step\" say how often this client has a step",
+                    "keep one of them",
+                );
+                None
+            }
+            (Some(multiple), None) => (multiple.whole(1..=u32::MAX.into()))
+                .and_then(|multiple| u32::try_from(multiple).ok()?.try_into().ok())
+                .map(Every::Steps),
+            (None, Some(step)) => step.duration().map(Every::Time),
+            (None, None) => Some(Every::Steps(NonZeroU32::MIN)),
+        };
+        Some(Self {
+            address: address?,
+            client: client?,
+            every: every?,
+            timeout: timeout?,
+            at: BTreeMap::new(),
+        })
+    }
+
+    /// Replaces the address.
+    pub(super) fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
+        self.address = address.parse()?;
+        self.address.check_dialled()
+    }
+
+    /// Takes the lines of `[fieldbus.at]`: the names of variables.
+    pub(super) fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        for line in lines {
+            let signal = &table.signals[line.signal];
+            let mut alone = Declaration::new("x");
+            alone.reads = vec![line.text.to_owned()];
+            if let Err(mistake) = alone.check() {
+                line.refuse(mistake);
+            }
+            self.at.insert(signal.name.clone(), line.text.to_owned());
+        }
+        for line in lines {
+            let signal = &table.signals[line.signal];
+            let mut others = table.signals.iter().enumerate();
+            let same = others.find(|(index, other)| {
+                *index != line.signal
+                    && other.area == signal.area
+                    && self.variable(other, table) == line.text
+            });
+            if let Some((_, other)) = same {
+                line.wrong(
+                    format!(
+                        "the variable \"{}\" is that of the signal \"{}\", too",
+                        line.text, other.name
+                    ),
+                    "give each signal a variable of its own",
+                );
+            }
+        }
+    }
+
+    /// The name of a signal's variable.
+    pub fn variable(&self, signal: &Signal, table: &SignalTable) -> String {
+        let stations = &table.stations;
+        match self.at.get(&signal.name) {
+            Some(name) => name.clone(),
+            None if stations.len() == 1 => signal.name.clone(),
+            None => format!("{}.{}", stations[signal.station].name, signal.name),
+        }
+    }
+
+    /// The variables of an end: those that it writes, and those that it reads.
+    pub(super) fn variables(&self, role: Role, table: &SignalTable) -> (Variables, Variables) {
+        let (writes, reads) = role.areas();
+        let of = |area| Variables::new(table, area, |signal| Some(self.variable(signal, table)));
+        (of(writes), of(reads))
+    }
+
+    /// What the end declares.
+    ///
+    /// # Errors
+    ///
+    /// Its names break a rule.
+    pub(super) fn declaration(
+        &self,
+        setup: &BusSetup<'_>,
+        writes: &Variables,
+        reads: &Variables,
+    ) -> Result<Declaration, Mistake> {
+        let name = match (&self.client, setup.role) {
+            (Some(client), _) => client.clone(),
+            (None, Role::Device) => setup.name.to_owned(),
+            // One driver.cfg may serve both ends.
+            (None, Role::Controller) => format!("{} PLC", setup.name),
+        };
+        let mut declaration = Declaration::new(name);
+        if let (Every::Steps(multiple), None) = (self.every, setup.hosted) {
+            declaration.multiple = multiple;
+        }
+        declaration.writes = writes.iter().cloned().collect();
+        declaration.reads = reads.iter().map(|variable| variable.name.clone()).collect();
+        declaration.check()?;
+        Ok(declaration)
+    }
+}
+
+fn read_address(value: &Value<'_>, moved: bool) -> Option<Address> {
+    let address = Address::read(value)?;
+    if !moved && let Err(mistake) = address.check_dialled() {
+        value.refuse(mistake);
+    }
+    Some(address)
+}

@@ -1,0 +1,511 @@
+//! The bus `sdsp`: machine and PLC in lock-step over TCP, with the server in this process.
+#![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
+
+mod server;
+
+use std::sync::mpsc;
+use std::thread::{self, JoinHandle};
+
+use server::Server;
+use tickbus_base::time::{Manual, Monotonic, Nanos};
+use tickbus_conformance::rig::{End, SIGNALS};
+use tickbus_driver::{Code, Exchange, Host};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::{Cause, LinkState};
+use tickbus_image::signal::DataType;
+use tickbus_plc::{Program, Scan};
+use tickbus_virtual_time::server::Control;
+use tickbus_virtual_time::{
+    Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, TraceHash, Variable,
+    tcp,
+};
+
+const STEP: Nanos = Nanos::from_millis(1);
+
+/// A run of two clients with so many steps of 1 ms.
+fn of_two(steps: u64) -> Server {
+    let mut settings = Settings::new(STEP, StartCondition::Count(2));
+    settings.steps = Some(steps);
+    Server::start(settings)
+}
+
+fn config(port: u16, role: &str, extra: &str) -> String {
+    format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"sdsp\"\naddress = \"127.0.0.1:{port}\"\n\
+         role = \"{role}\"\n{extra}\n{SIGNALS}"
+    )
+}
+
+fn open(port: u16, role: &str, extra: &str) -> End {
+    End::open(&config(port, role, extra), &Manual::new())
+}
+
+/// The other end on a thread of its own: ticks as long as the line gives data, and lets `each` see and change them.
+fn controller(
+    port: u16,
+    extra: &'static str,
+    mut each: impl FnMut(&mut End, Exchange) + Send + 'static,
+) -> JoinHandle<String> {
+    thread::spawn(move || {
+        let mut end = open(port, "controller", extra);
+        loop {
+            let found = end.tick();
+            if !matches!(found.code, Code::Fresh | Code::Unchanged) {
+                return end.link().reason;
+            }
+            each(&mut end, found);
+        }
+    })
+}
+
+#[test]
+fn a_step_later_each_end_has_what_the_other_wrote_and_the_time_is_granted() {
+    let server = of_two(5);
+    let plc = controller(server.port, "", |end, _| {
+        end.set("speed", 2.0 * end.get("position"));
+        end.set("echo", end.get("echo") + 1.0);
+    });
+    let mut machine = open(server.port, "device", "");
+    let mut seen = Vec::new();
+    machine.set("position", 100.0);
+    for step in 0..5 {
+        let found = machine.tick();
+        assert_eq!(found.code, Code::Fresh);
+        assert_eq!((found.age, found.sequence), (Nanos::ZERO, step + 1));
+        assert_eq!(found.granted, Nanos::from_millis(step as i64 + 1));
+        seen.push((machine.get("speed"), machine.get("echo")));
+        machine.set("position", -10.0 * (step as f64 + 1.0));
+    }
+    assert_eq!(machine.link().state, LinkState::Running);
+    assert_eq!(
+        seen,
+        [
+            (-1.0, 0.0),
+            (200.0, 1.0),
+            (-20.0, 2.0),
+            (-40.0, 3.0),
+            (-60.0, 4.0)
+        ]
+    );
+    let outcome = {
+        let last = machine.tick();
+        assert_eq!(last.code, Code::Stale, "the run is over");
+        server.end().expect("it ends as planned")
+    };
+    assert_eq!(outcome.steps, 5);
+    let link = machine.link();
+    assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Left));
+    let told = format!(
+        "the run has come to its end after 5 steps, at 4ms of virtual time; its trace hash is {}",
+        outcome.hash
+    );
+    assert_eq!(link.reason, told);
+    assert_eq!(plc.join().expect("no panic"), told);
+    assert_eq!(machine.get("speed"), -1.0, "the fail-safe value");
+    assert_eq!(machine.statistic("sdsp.hash"), outcome.hash.to_string());
+    assert_eq!(machine.tick().code, Code::Stale, "and it stays so");
+}
+
+#[test]
+fn a_tick_between_two_steps_waits_for_nobody_and_one_over_several_takes_all_of_them() {
+    let server = of_two(20);
+    let plc = controller(server.port, "", |end, _| {
+        end.set("echo", end.get("echo") + 1.0)
+    });
+    let mut machine = open(server.port, "device", "step = \"4ms\"\nmax_age = \"3ms\"");
+    let mut at = |millis: i64| {
+        let found = machine
+            .driver
+            .exchange(Nanos::from_millis(millis), &mut machine.slots);
+        let echo = machine.slots[2].real();
+        (found.code, found.granted.0 / STEP.0, echo)
+    };
+    // Its own time begins at 100 ms. The PLC's first value is of step 1, which it sees in step 5.
+    assert_eq!(at(100), (Code::Fresh, 104, 0.0));
+    assert_eq!(at(101), (Code::Unchanged, 104, 0.0));
+    assert_eq!(at(103), (Code::Unchanged, 104, 0.0));
+    assert_eq!(at(104), (Code::Fresh, 108, 4.0));
+    assert_eq!(at(115), (Code::Fresh, 116, 12.0));
+    // Steps 17 to 20 are the last ones.
+    assert_eq!(at(119), (Code::Fresh, 120, 16.0));
+    assert_eq!(at(120).0, Code::Stale);
+    assert!(server.end().is_ok());
+    plc.join().expect("no panic");
+}
+
+#[test]
+fn a_simulation_of_halves_answers_within_its_step() {
+    let server = of_two(10);
+    let plc = controller(server.port, "", |end, _| {
+        end.set("echo", end.get("position"))
+    });
+    let mut machine = open(server.port, "device", "");
+    let mut seen = Vec::new();
+    for step in 1..=10 {
+        assert_eq!(machine.receive().code, Code::Fresh);
+        seen.push(machine.get("echo"));
+        machine.set("position", f64::from(step));
+        machine.send();
+    }
+    // The last step is finished when the machine closes.
+    machine.driver.close();
+    // One step to the PLC, and one back.
+    assert_eq!(seen, [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+    assert!(server.end().is_ok());
+    plc.join().expect("no panic");
+}
+
+/// A pulse of one tick between two steps is carried in a step, and its edge counted.
+#[test]
+fn no_pulse_between_two_steps_is_lost() {
+    let server = of_two(80);
+    let (to, pulses) = mpsc::channel();
+    let plc = controller(server.port, "step = \"4ms\"", move |end, _| {
+        end.set("speed", end.get("speed") + 1.0);
+        to.send(end.edges("sensor")).expect("it listens");
+    });
+    let mut machine = open(server.port, "device", "multiple = 4");
+    let mut sent = 0.0;
+    for millis in 0.. {
+        // Pulses of one tick, and of changing distances.
+        let is_high = millis % 9 == 2;
+        sent += f64::from(is_high);
+        machine.set("sensor", f64::from(is_high));
+        let found = machine
+            .driver
+            .exchange(STEP.times(millis), &mut machine.slots);
+        if found.code == Code::Stale {
+            break;
+        }
+    }
+    plc.join().expect("no panic");
+    assert_eq!(pulses.iter().sum::<f64>(), sent);
+    assert!(sent >= 8.0, "{sent}");
+    assert!(server.end().is_ok());
+}
+
+/// A client that does what a test says.
+struct Foreign<F> {
+    declaration: Declaration,
+    run: F,
+}
+
+impl<F: FnMut(Step, &[u64], &mut [u64]) -> Result<(), String>> Participant for Foreign<F> {
+    fn declare(&self) -> Declaration {
+        self.declaration.clone()
+    }
+
+    fn initial(&mut self, _writes: &mut [u64]) {}
+
+    fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
+        (self.run)(step, reads, writes)
+    }
+}
+
+/// A foreign PLC for the machine at the other end, on a thread.
+fn foreign<F>(port: u16, speed: DataType, run: F) -> JoinHandle<Result<Outcome, Ended>>
+where
+    F: FnMut(Step, &[u64], &mut [u64]) -> Result<(), String> + Send + 'static,
+{
+    let mut declaration = Declaration::new("foreign PLC");
+    declaration.writes = vec![
+        Variable::new("run", DataType::Bool),
+        Variable::new("speed", speed),
+        Variable::new("echo", DataType::Int),
+    ];
+    declaration.reads = vec!["position".to_owned()];
+    thread::spawn(move || {
+        let mut client = Foreign { declaration, run };
+        tcp::join(&Address::local(port), &mut client)
+    })
+}
+
+fn broken(machine: &mut End, code: Code) -> (Cause, String) {
+    assert_eq!(machine.tick().code, code);
+    let link = machine.link();
+    assert_eq!(link.state, LinkState::Failed);
+    (link.cause, link.reason)
+}
+
+#[test]
+fn a_client_that_gives_up_ends_the_run_and_its_reason_is_told() {
+    let server = of_two(100);
+    let plc = foreign(server.port, DataType::Int, |step, reads, writes| {
+        writes[1] = reads[0];
+        match step.sequence {
+            4 => Err("its emergency stop was pressed".to_owned()),
+            _ => Ok(()),
+        }
+    });
+    let mut machine = open(server.port, "device", "");
+    machine.set("position", -5.0);
+    for _ in 0..4 {
+        assert_eq!(machine.tick().code, Code::Fresh);
+    }
+    assert_eq!(machine.get("speed"), -5.0);
+    let right = (
+        Cause::Left,
+        "the peer left: the run ended after 3 steps: client \"foreign PLC\" gave up: its emergency stop was pressed"
+            .to_owned(),
+    );
+    assert_eq!(broken(&mut machine, Code::BusFailed), right);
+    assert_eq!(
+        broken(&mut machine, Code::BusFailed),
+        right,
+        "and it stays so"
+    );
+    assert_eq!(machine.get("speed"), -1.0, "the fail-safe value");
+    assert!(server.end().is_err() && plc.join().expect("no panic").is_err());
+}
+
+#[test]
+fn a_machine_that_is_closed_says_so_to_everyone() {
+    let server = of_two(100);
+    let plc = foreign(server.port, DataType::Int, |_, _, _| Ok(()));
+    let mut machine = open(server.port, "device", "client = \"the machine\"");
+    machine.tick();
+    machine.driver.close();
+    let told = server.end().expect_err("it ends early").to_string();
+    assert_eq!(
+        told,
+        "the run ended before its first step: client \"the machine\" gave up: it was closed"
+    );
+    assert_eq!(
+        plc.join()
+            .expect("no panic")
+            .expect_err("it too")
+            .to_string(),
+        told
+    );
+}
+
+#[test]
+fn what_does_not_fit_the_run_is_refused_by_name() {
+    let int = DataType::Int;
+    for (extra, speed, cause, parts) in [
+        (
+            "step = \"2500us\"",
+            int,
+            Cause::Left,
+            "client \"cell\" gave up: its step of 2500us is no whole multiple of the server's, 1ms; make one of them fit",
+        ),
+        (
+            "step = \"100us\"",
+            int,
+            Cause::Left,
+            "its step of 100us is no whole multiple of the server's, 1ms",
+        ),
+        (
+            "",
+            DataType::Uint,
+            Cause::Left,
+            "client \"cell\" gave up: it reads \"speed\" as INT, but that is UINT; give the signal this \"type\"",
+        ),
+        (
+            "client = \"foreign PLC\"",
+            int,
+            Cause::Refused,
+            "has joined already; give this one another name",
+        ),
+        (
+            "[fieldbus.at]\nspeed = \"velocity\"",
+            int,
+            Cause::Refused,
+            "\"velocity\"",
+        ),
+    ] {
+        let server = of_two(100);
+        let plc = foreign(server.port, speed, |_, _, _| Ok(()));
+        if extra.starts_with("client") {
+            // So that it is the second one of that name.
+            server.says("\"foreign PLC\" has joined");
+        }
+        let mut machine = open(server.port, "device", extra);
+        let (found, reason) = broken(&mut machine, Code::BusFailed);
+        assert!(reason.contains(parts), "{reason}");
+        assert_eq!(found, cause, "{reason}");
+        drop(machine);
+        server.controls.send(Control::Stop);
+        assert!(plc.join().expect("no panic").is_err());
+    }
+}
+
+#[test]
+fn a_client_that_comes_late_is_refused_with_the_reason() {
+    let server = of_two(2);
+    let plc = foreign(server.port, DataType::Int, |_, _, _| Ok(()));
+    let mut machine = open(server.port, "device", "");
+    machine.tick();
+    let mut late = open(server.port, "device", "client = \"late\"");
+    let (cause, reason) = broken(&mut late, Code::BusFailed);
+    assert_eq!(cause, Cause::Refused);
+    let begin = "refused: the server refused this client: ";
+    assert!(reason.starts_with(begin), "{reason}");
+    machine.tick();
+    assert_eq!(
+        machine.tick().code,
+        Code::Stale,
+        "the others go on to the end"
+    );
+    assert!(server.end().is_ok() && plc.join().expect("no panic").is_ok());
+}
+
+#[test]
+fn no_wait_lasts_longer_than_its_time_out() {
+    let server = of_two(10);
+    let mut machine = open(server.port, "device", "timeout = \"100ms\"");
+    let (cause, reason) = broken(&mut machine, Code::BusFailed);
+    assert_eq!(cause, Cause::Link);
+    assert!(reason.contains("100ms"), "{reason}");
+    server.controls.send(Control::Stop);
+    drop(server);
+    // Nobody listens there.
+    let address = Address::local(0);
+    let listener = tcp::Listener::bind(&address).expect("a free port");
+    let port = listener.address().port();
+    drop(listener);
+    let mut early = open(port, "device", "timeout = \"50ms\"");
+    let (cause, reason) = broken(&mut early, Code::BusFailed);
+    assert_eq!(cause, Cause::Link);
+    let right = format!("no server can be reached at 127.0.0.1:{port}");
+    assert!(reason.contains(&right), "{reason}");
+}
+
+#[test]
+fn variables_are_named_by_station_or_as_one_likes() {
+    let server = of_two(3);
+    let text = format!(
+        "[driver]\nid = 1\nname = \"two\"\n[fieldbus]\nkind = \"sdsp\"\naddress = \"127.0.0.1:{}\"\n\
+         [fieldbus.at]\nout = \"a long name.of its own\"\n\
+         [[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n\
+         [[signal]]\nname = \"in\"\nstation = \"A\"\naddress = \"%QD0\"\ntype = \"REAL\"\norder = \"CDAB\"\n\
+         [[signal]]\nname = \"out\"\nstation = \"A\"\naddress = \"%ID4\"\ntype = \"REAL\"\norder = \"DCBA\"\n\
+         [[signal]]\nname = \"back\"\nstation = \"B\"\naddress = \"%IW0\"\ntype = \"INT\"\n",
+        server.port
+    );
+    let mut declaration = Declaration::new("other");
+    declaration.writes = vec![Variable::new("A.in", DataType::Real)];
+    declaration.reads = vec!["a long name.of its own".to_owned(), "B.back".to_owned()];
+    let port = server.port;
+    let other = thread::spawn(move || {
+        let mut seen = Vec::new();
+        let run = |_: Step, reads: &[u64], writes: &mut [u64]| {
+            writes[0] = u64::from(1.5_f32.to_bits());
+            seen.push((reads[0], reads[1]));
+            Ok(())
+        };
+        let mut client = Foreign { declaration, run };
+        tcp::join(&Address::local(port), &mut client).expect("it ends as planned");
+        seen
+    });
+    let mut machine = End::open(&text, &Manual::new());
+    machine.set("out", -0.25);
+    machine.set("back", -2.0);
+    machine.tick();
+    machine.tick();
+    assert_eq!(machine.get("in"), 1.5);
+    machine.tick();
+    machine.tick();
+    let sent = (u64::from((-0.25_f32).to_bits()), u64::MAX - 1);
+    assert_eq!(other.join().expect("no panic"), [sent; 3]);
+    assert!(server.end().is_ok());
+}
+
+/// Counts its scans, and answers with what it sees.
+struct Counting;
+
+impl Program for Counting {
+    fn name(&self) -> &'static str {
+        "counting"
+    }
+
+    fn input_bytes(&self) -> usize {
+        6
+    }
+
+    fn output_bytes(&self) -> usize {
+        6
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        assert!(scan.alive, "data of its own step");
+        let count = u16::from_be_bytes([scan.outputs[4], scan.outputs[5]]) + 1;
+        scan.outputs[4..6].copy_from_slice(&count.to_be_bytes());
+        scan.outputs[2..4].copy_from_slice(&scan.inputs[2..4]);
+        let millis = 5 * (i64::from(count) - 1);
+        assert_eq!(scan.now, Nanos::from_millis(millis), "virtual time");
+    }
+}
+
+fn host(port: u16, extra: &str) -> Host {
+    let text = config(port, "controller", extra);
+    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let clock = Monotonic::shared();
+    Host::open(&config, Box::new(Counting), Nanos::from_millis(5), clock).expect("opens")
+}
+
+#[test]
+fn a_program_scans_in_steps_of_its_interval_until_the_run_ends() {
+    let mut hashes = Vec::new();
+    for _ in 0..2 {
+        let server = of_two(101);
+        let plc = host(server.port, "");
+        let mut machine = open(server.port, "device", "");
+        let mut steps = 0;
+        while machine.tick().code != Code::Stale {
+            steps += 1;
+            // Scans in steps 1, 6, 11, …; what it writes there is seen in the next one, and its first values are 0.
+            let scans = f64::from((steps + 3) / 5);
+            assert_eq!(machine.get("echo"), scans, "step {steps}");
+            machine.set("position", f64::from(steps));
+        }
+        let outcome = server.end().expect("it ends as planned");
+        tickbus_conformance::rig::await_that("it is over", || plc.is_over());
+        assert_eq!((steps, outcome.steps), (101, 101));
+        assert_eq!(plc.scans(), (21, 0));
+        assert_eq!(plc.fact("sdsp.hash"), Some(outcome.hash.to_string()));
+        assert_eq!((plc.fault(), plc.close()), (None, None));
+        hashes.push(outcome.hash);
+    }
+    assert_eq!(hashes[0], hashes[1]);
+    assert_ne!(hashes[0], TraceHash(0));
+}
+
+#[test]
+fn a_program_that_is_stopped_leaves_the_run_and_one_whose_run_breaks_says_why() {
+    let server = of_two(1_000_000_000);
+    let plc = host(server.port, "");
+    let machine = foreign_machine(server.port, |_, _, _| Ok(()));
+    server.says("starts");
+    assert_eq!(plc.close(), None);
+    let told = server.end().expect_err("without a PLC").to_string();
+    assert!(told.contains("client \"cell PLC\" gave up: "), "{told}");
+    assert!(machine.join().expect("no panic").is_err());
+
+    let server = of_two(100);
+    let plc = host(server.port, "");
+    let machine = foreign_machine(server.port, |_, _, _| Err("it burns".to_owned()));
+    assert!(machine.join().expect("no panic").is_err());
+    tickbus_conformance::rig::await_that("it is over", || plc.is_over());
+    let right = "the peer left: the run ended before its first step: client \"foreign machine\" gave up: it burns";
+    assert_eq!(plc.fault().as_deref(), Some(right));
+    assert_eq!(plc.link().reason, right);
+    assert!(server.end().is_err());
+}
+
+fn foreign_machine<F>(port: u16, run: F) -> JoinHandle<Result<Outcome, Ended>>
+where
+    F: FnMut(Step, &[u64], &mut [u64]) -> Result<(), String> + Send + 'static,
+{
+    let mut declaration = Declaration::new("foreign machine");
+    declaration.writes = vec![
+        Variable::new("sensor", DataType::Bool),
+        Variable::new("position", DataType::Int),
+        Variable::new("copy", DataType::Int),
+    ];
+    thread::spawn(move || {
+        let mut client = Foreign { declaration, run };
+        tcp::join(&Address::local(port), &mut client)
+    })
+}

@@ -1,0 +1,52 @@
+//! A server of virtual time on a thread of its own.
+#![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
+
+use std::sync::mpsc;
+use std::thread::{self, JoinHandle};
+
+use tickbus_base::time::Monotonic;
+use tickbus_fieldbus::tcp::Address;
+use tickbus_virtual_time::{Controls, Ended, Hosting, Logic, Outcome, Settings, tcp};
+
+/// A server on a thread of its own.
+pub struct Server {
+    pub port: u16,
+    pub controls: Controls,
+    news: mpsc::Receiver<String>,
+    thread: JoinHandle<Result<Outcome, Ended>>,
+}
+
+impl Server {
+    pub fn start(settings: Settings) -> Self {
+        let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+        let port = listener.address().port();
+        let (controls, (tell, news)) = (Controls::default(), mpsc::channel());
+        let thread = thread::spawn({
+            let controls = controls.clone();
+            move || {
+                let hosting = Hosting {
+                    clock: &*Monotonic::shared(),
+                    controls: &controls,
+                    // Most tests do not listen.
+                    news: &mut |line| drop(tell.send(line.to_owned())),
+                };
+                listener.run(settings, Logic::new(), hosting)
+            }
+        });
+        Self {
+            port,
+            controls,
+            news,
+            thread,
+        }
+    }
+
+    /// Waits until the server says this.
+    pub fn says(&self, part: &str) {
+        while !self.news.recv().expect(part).contains(part) {}
+    }
+
+    pub fn end(self) -> Result<Outcome, Ended> {
+        self.thread.join().expect("no panic")
+    }
+}

@@ -12,6 +12,7 @@ use std::process::{Command, ExitCode};
 use foreign::Absent;
 use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
+use tickbus::prepare::{SOURCES, Settings, Source, plcopen_xml, prepare};
 
 fn main() -> ExitCode {
     foreign::main(&[
@@ -86,6 +87,18 @@ fn blark_reads_every_source_in_structured_text() -> Result<(), Absent> {
             files.extend(write(file, *target, folder.path()));
         }
     }
+    // What is put on virtual time, and with what.
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for name in ["timers", "action_control", "scheduler", "example"] {
+        files.push(root.join(format!("plc/iec61131/{name}.st")));
+    }
+    let original = Source {
+        name: "rig.st".to_owned(),
+        bytes: std::fs::read(root.join("plc/rig/rig.st")).expect("it is there"),
+    };
+    let made = prepare(&[original], &Settings::default()).expect("it can be prepared");
+    files.push(folder.path().join("prepared-rig.st"));
+    std::fs::write(files.last().expect("one"), &made.files[0]).expect("the file is written");
     let output = reader(&files)?.output().expect("python runs");
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     let complaint = String::from_utf8_lossy(&output.stderr);
@@ -146,8 +159,8 @@ fn plcopen_xml_is_valid_under_its_schema() -> Result<(), Absent> {
             files.push(path);
         }
     }
-    for (name, text) in tickbus::prepare::SOURCES {
-        let xml = tickbus::prepare::plcopen_xml(name, text).replace("tc6_0200", "tc6_0201");
+    for (name, text) in SOURCES {
+        let xml = plcopen_xml(name, text).replace("tc6_0200", "tc6_0201");
         let path = folder.path().join(format!("{name}.xml"));
         std::fs::write(&path, xml).expect("the file is written");
         files.push(path);

@@ -246,7 +246,7 @@ fn meaning(pictures: &[Picture<'_>]) -> Markup {
         p {
             "In lock-step all runs lie on one another, and 0.35 mm beside the commanded path: that is what this program does with \
              these axes, so it can be judged, and a change of it can be tested. Free-wheeling, the same program with the same axes \
-             is up to " (format!("{times:.0}")) " times as far off, and never twice the same. What one sees there is not the \
+             is up to " (format!("{times:.0}")) " times as far off, and no two runs are alike. What one sees there is not the \
              program but the link and the load of the computer: a collision in the simulation may be none at the machine, and one \
              at the machine may not be seen. A faster link makes the error smaller, and leaves it to chance all the same."
         }

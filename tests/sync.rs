@@ -194,3 +194,50 @@ fn wrong_files_and_contradictions_have_exit_code_1() {
     );
     assert_eq!(code, Some(1));
 }
+
+#[test]
+fn a_script_is_the_logic_or_the_feature_is_named() {
+    let mut script = tempfile::NamedTempFile::new().expect("a temporary file");
+    writeln!(
+        script,
+        "variable(\"b count\", \"UDINT\");\non_time(|| set(\"b count\", step() - 1));"
+    )
+    .expect("it can be written");
+    let text = format!(
+        "[sync]\nlisten = \"127.0.0.1:0\"\nstep = \"1ms\"\nclients = 1\nuntil = \"5ms\"\nlogic = \"{}\"\n",
+        script.path().display()
+    );
+    let mut sync = Sync::start(&text, &[]);
+    if cfg!(feature = "script") {
+        let address = sync.address();
+        tcp::join(&address, &mut Late).expect("it runs");
+        assert!(sync.end().0.starts_with("sync: ok steps=5 "));
+    } else {
+        let mut told = String::new();
+        let stderr = sync.child.stderr.take().expect("it is piped");
+        std::io::Read::read_to_string(&mut BufReader::new(stderr), &mut told).expect("text");
+        assert!(
+            told.contains("built without scripts; build it with --features script"),
+            "{told}"
+        );
+        assert_eq!(sync.end().1, Some(1));
+    }
+}
+
+/// Reads what the logic has written in the step before.
+struct Late;
+
+impl Participant for Late {
+    fn declare(&self) -> Declaration {
+        let mut declaration = Declaration::new("late");
+        declaration.reads = vec!["b count".to_owned()];
+        declaration
+    }
+
+    fn initial(&mut self, _: &mut [u64]) {}
+
+    fn run(&mut self, step: Step, reads: &[u64], _: &mut [u64]) -> Result<(), String> {
+        assert_eq!(reads[0], step.sequence.saturating_sub(2));
+        Ok(())
+    }
+}

@@ -3,11 +3,12 @@
 mod gateway;
 
 use std::io::{self, BufRead as _, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::thread;
 
 use super::Outcome;
 use tickbus_base::time::{Monotonic, Stop};
+use tickbus_base::toml_text::Mistakes;
 use tickbus_virtual_time as virtual_time;
 use virtual_time::server::Control;
 #[cfg(unix)]
@@ -40,16 +41,8 @@ enum Other {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let stop = Stop::new();
-    if let Err(error) = ctrlc::set_handler({
-        let stop = stop.clone();
-        move || stop.stop()
-    }) {
-        eprintln!("sync: Ctrl-C cannot be caught: {error}");
-        return Outcome::BusFailed;
-    }
     let file = match (&arguments.other, &arguments.file) {
-        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, &stop),
+        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments),
         (None, file) => file.as_ref().expect("it is required"),
     };
     let mut file = match RunFile::load(file) {
@@ -60,6 +53,16 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         }
     };
     file.settings.paused = arguments.paused;
+    let logic = match file.logic.as_deref().map(script).transpose() {
+        Ok(logic) => logic.unwrap_or_default(),
+        Err(mistakes) => {
+            eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
+            return Outcome::WrongInput;
+        }
+    };
+    let Some(stop) = stop_on_ctrl_c() else {
+        return Outcome::BusFailed;
+    };
     let controls = Controls::new(&stop);
     let commands = thread::Builder::new().name("tickbus-commands".to_owned());
     let spawned = commands.spawn({
@@ -70,7 +73,20 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     if let Err(error) = spawned {
         eprintln!("sync: commands on stdin cannot be read: {error}");
     }
-    report(serve(file, &controls))
+    report(serve(file, logic, &controls))
+}
+
+/// Is stopped by Ctrl-C.
+fn stop_on_ctrl_c() -> Option<Stop> {
+    let stop = Stop::new();
+    let caught = ctrlc::set_handler({
+        let stop = stop.clone();
+        move || stop.stop()
+    });
+    caught
+        .inspect_err(|error| eprintln!("sync: Ctrl-C cannot be caught: {error}"))
+        .ok()?;
+    Some(stop)
 }
 
 /// Prints a line. If the reader of stdout is gone, the run goes on.
@@ -79,7 +95,25 @@ fn say(line: &str) {
     let _ = writeln!(out, "sync: {line}").and_then(|()| out.flush());
 }
 
-fn serve(file: RunFile, controls: &Controls) -> Result<virtual_time::Outcome, Ended> {
+#[cfg(feature = "script")]
+fn script(path: &Path) -> Result<Logic<'static>, Mistakes> {
+    virtual_time::script::load(path)
+}
+
+#[cfg(not(feature = "script"))]
+fn script(path: &Path) -> Result<Logic<'static>, Mistakes> {
+    Err(Mistakes::of_file(
+        &path.display().to_string(),
+        "this tickbus was built without scripts",
+        "build it with --features script, or remove \"logic\"",
+    ))
+}
+
+fn serve(
+    file: RunFile,
+    logic: Logic<'_>,
+    controls: &Controls,
+) -> Result<virtual_time::Outcome, Ended> {
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         controls,
@@ -96,18 +130,18 @@ fn serve(file: RunFile, controls: &Controls) -> Result<virtual_time::Outcome, En
             let listener = tcp::Listener::bind(&address)
                 .map_err(|error| failed(format!("cannot listen on {address}: {error}")))?;
             say(&format!("listening on {}", listener.address()));
-            listener.run(file.settings, Logic::new(), hosting)
+            listener.run(file.settings, logic, hosting)
         }
         #[cfg(unix)]
         Meeting::SharedMemory(name) => {
             let listener = shared_memory::Listener::bind(&name, &file.settings)
                 .map_err(|error| failed(format!("cannot offer the memory \"{name}\": {error}")))?;
             say(&format!("waiting in the shared memory \"{name}\""));
-            listener.run(file.settings, Logic::new(), hosting)
+            listener.run(file.settings, logic, hosting)
         }
         #[cfg(not(unix))]
         Meeting::SharedMemory(_) => {
-            let reason = "this system has no shared memory for clients; use \"listen\"";
+            let reason = "this system has no shared memory for clients; use listen";
             Err(failed(reason.to_owned()))
         }
     }

@@ -2,11 +2,10 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{BusError, BusSetup, Cause, Lead, Port, Receipt, Stepped};
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time as sdsp;
-use tickbus_virtual_time::{Declaration, Ended, Step};
+use tickbus_virtual_time::{Declaration, Ended, Meeting, Step};
 
 use super::run::{End, Run};
 use super::{Every, Options, Variables};
@@ -17,7 +16,7 @@ const MOST_STEPS: i64 = 100_000;
 /// A client of a run on virtual time.
 #[derive(Debug)]
 pub struct Sdsp {
-    address: Address,
+    meeting: Meeting,
     timeout: Nanos,
     declaration: Declaration,
     every: Every,
@@ -48,7 +47,7 @@ impl Sdsp {
         let (_, area) = setup.role.areas();
         let stations = setup.table.stations.iter();
         Ok(Self {
-            address: options.address.clone(),
+            meeting: options.meeting.clone(),
             timeout: options.timeout,
             every: setup
                 .hosted
@@ -78,10 +77,10 @@ impl Sdsp {
         if let State::Apart = self.state {
             port.opening(&format!(
                 "waiting for the server at {} to start the run",
-                self.address
+                self.meeting
             ));
             let mut run = Run::join(
-                (&self.address, self.timeout),
+                (&self.meeting, self.timeout),
                 self.declaration.clone(),
                 (self.every, &values.types),
                 &values.slots,
@@ -123,7 +122,7 @@ impl Sdsp {
 
     fn begin(&self, step: Step, port: &mut Port) {
         debug_assert_eq!(step.time, Nanos::ZERO, "a run begins at 0");
-        port.running(&format!("in step with the server at {}", self.address));
+        port.running(&format!("in step with the server at {}", self.meeting));
     }
 
     /// The run is over: says so, and makes what was received invalid.

@@ -1,10 +1,9 @@
 //! This client's part in a run: from step to step.
 
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::DataType;
-use tickbus_virtual_time::client::{Asked, Client};
-use tickbus_virtual_time::{Cause, Declaration, Ended, Outcome, Step, tcp};
+use tickbus_virtual_time::client::{Asked, Client, Connection};
+use tickbus_virtual_time::{Cause, Declaration, Ended, Meeting, Outcome, Step};
 
 use super::Every;
 
@@ -32,7 +31,7 @@ impl From<Ended> for End {
 /// A client that takes part in a run.
 #[derive(Debug)]
 pub(super) struct Run {
-    connection: tcp::Connection,
+    connection: Connection,
     /// How long the server may be silent.
     timeout: Nanos,
     /// The virtual time of one step of this client.
@@ -45,10 +44,10 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Joins the run of the server at `address`, waits until it starts, and sends the initial values. A server that is
+    /// Joins the run of the server at `meeting`, waits until it starts, and sends the initial values. A server that is
     /// not there is waited for.
     pub(super) fn join(
-        (address, timeout): (&Address, Nanos),
+        (meeting, timeout): (&Meeting, Nanos),
         declaration: Declaration,
         (every, types): (Every, &[DataType]),
         initial: &[u64],
@@ -57,7 +56,7 @@ impl Run {
         let reads = declaration.reads.clone();
         let multiple = declaration.multiple;
         let mut run = Self {
-            connection: connect(address, timeout, &declaration, stop)?,
+            connection: connect(meeting, timeout, &declaration, stop)?,
             timeout,
             interval: Nanos::ZERO,
             each: 1,
@@ -159,24 +158,24 @@ impl Drop for Run {
     }
 }
 
-/// Connects with the server at `address` as soon as that is there, and joins.
+/// Connects with the server at `meeting` as soon as that is there, and joins.
 ///
 /// # Errors
 ///
 /// It does not appear within `timeout`, or the declaration breaks a rule.
 pub fn connect(
-    address: &Address,
+    meeting: &Meeting,
     timeout: Nanos,
     declaration: &Declaration,
     stop: &Stop,
-) -> Result<tcp::Connection, Ended> {
+) -> Result<Connection, Ended> {
     let clock = Monotonic::shared();
     let end = clock.now() + timeout;
     loop {
         let now = clock.now();
         let client = Client::new(declaration.clone())
             .map_err(|mistake| ended(Cause::Configuration, mistake.to_string()))?;
-        match tcp::connect(address, client, stop) {
+        match meeting.connect(client, stop) {
             Err(_) if now < end && !stop.is_stopped() => {
                 clock.wait_until((now + PAUSE).min(end), stop);
             }

@@ -15,7 +15,8 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{
-    Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, Variable, tcp,
+    Declaration, Ended, Meeting, Outcome, Participant, Settings, StartCondition, Step, Variable,
+    tcp,
 };
 
 const SIGNALS: &str = r#"
@@ -138,7 +139,7 @@ fn run(gateway: &mut Gateway, steps: u64) -> Result<Outcome, Ended> {
     let server = Server::start(settings);
     let port = server.port;
     let machine = thread::spawn(move || tcp::join(&Address::local(port), &mut Machine(0)));
-    let own = gateway.take_part(&Address::local(port));
+    let own = gateway.take_part(&Meeting::Tcp(Address::local(port)));
     let outcome = server.end();
     assert_eq!(own, outcome);
     assert_eq!(machine.join().expect("no panic"), outcome);

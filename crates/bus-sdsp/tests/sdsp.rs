@@ -509,3 +509,39 @@ where
         tcp::join(&Address::local(port), &mut client)
     })
 }
+
+/// Where the ends meet makes no difference.
+#[cfg(unix)]
+#[test]
+fn a_run_in_shared_memory_is_that_over_tcp() {
+    let name = format!("bus-sdsp-{}", std::process::id());
+    let mut settings = Settings::new(STEP, StartCondition::Count(2));
+    settings.steps = Some(300);
+    let mut outcomes = Vec::new();
+    for is_memory in [false, true] {
+        let (server, at) = if is_memory {
+            let server = Server::in_memory(&name, settings.clone());
+            (server, format!("shared_memory = \"{name}\""))
+        } else {
+            let server = Server::start(settings.clone());
+            let at = format!("address = \"127.0.0.1:{}\"", server.port);
+            (server, at)
+        };
+        let text = |role: &str| config(0, role, "").replace("address = \"127.0.0.1:0\"", &at);
+        let plc_text = text("controller");
+        let plc = thread::spawn(move || {
+            let mut plc = End::open(&plc_text, &Manual::new());
+            while plc.tick().code == Code::Fresh {
+                plc.set("speed", plc.get("position") + 3.0);
+            }
+        });
+        let mut machine = End::open(&text("device"), &Manual::new());
+        while machine.tick().code == Code::Fresh {
+            machine.set("position", machine.get("speed") + 2.0);
+        }
+        plc.join().expect("no panic");
+        assert!(machine.get("position") > 700.0);
+        outcomes.push(server.end().expect("as planned"));
+    }
+    assert_eq!(outcomes[0], outcomes[1]);
+}

@@ -1,5 +1,7 @@
 //! The client, without I/O: frames of the server in; what it asks for, and frames for it, out.
 
+use std::fmt;
+
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
@@ -156,7 +158,7 @@ impl Client {
 }
 
 /// A way to a server, of which a client waits for one frame at a time.
-pub(crate) trait Line {
+pub(crate) trait Line: fmt::Debug + Send {
     /// Sends a frame. If that fails, receiving says so.
     fn send(&mut self, frame: &[u8]);
 
@@ -164,22 +166,34 @@ pub(crate) trait Line {
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended>;
 }
 
-/// A client with its line to the server; it blocks while it waits.
+/// A client that has joined a server, for a simulation that calls instead of being called: [`wait`](Self::wait) for a
+/// step, run it, [`answer`](Self::answer).
 #[derive(Debug)]
-pub(crate) struct Caller<L> {
-    pub(crate) client: Client,
-    pub(crate) line: L,
+pub struct Connection {
+    client: Client,
+    line: Box<dyn Line>,
 }
 
-impl<L: Line> Caller<L> {
+impl Connection {
     /// Joins.
-    pub(crate) fn join(client: Client, mut line: L) -> Self {
+    pub(crate) fn join(client: Client, mut line: impl Line + 'static) -> Self {
         line.send(client.frame());
+        let line = Box::new(line);
         Self { client, line }
     }
 
-    /// Waits for what the server asks.
-    pub(crate) fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
+    /// The client: what it declared, and what it reads in the step that was asked for.
+    pub const fn client(&self) -> &Client {
+        &self.client
+    }
+
+    /// Waits for what the server asks next, for `limit` of wall-clock time at most, to some 50 ms. The server may be
+    /// paused, so without a reason of its own the limit is [`Nanos::MAX`].
+    ///
+    /// # Errors
+    ///
+    /// The server is lost, violates the protocol or says nothing, or this client was stopped.
+    pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
         let frame = self.line.receive(limit)?;
         let asked = self.client.receive(frame);
         if let Err(ended) = &asked {
@@ -188,20 +202,29 @@ impl<L: Line> Caller<L> {
         asked
     }
 
-    /// Answers it.
-    pub(crate) fn answer(&mut self, writes: &[u64]) {
+    /// Answers what was asked, with one value per variable of the declaration's writes. If the server is lost, the next
+    /// [`wait`](Self::wait) says so.
+    ///
+    /// # Panics
+    ///
+    /// When nothing was asked, or the number of values is another one.
+    pub fn answer(&mut self, writes: &[u64]) {
         self.client.answer(writes);
         self.line.send(self.client.frame());
     }
 
-    /// Tells the server why this client leaves.
-    pub(crate) fn give_up(&mut self, reason: &str) {
+    /// Tells the server why this client does not go on. The run ends for everyone; [`wait`](Self::wait) gives the end.
+    pub fn give_up(&mut self, reason: &str) {
         self.client.give_up(reason);
         self.line.send(self.client.frame());
     }
 
     /// Lets `participant` take part until the run ends.
-    pub(crate) fn run(&mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
+    ///
+    /// # Errors
+    ///
+    /// The run was broken off.
+    pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
         let mut writes = vec![0; self.client.declaration.writes.len()];
         loop {
             match self.wait(Nanos::MAX)? {

@@ -11,6 +11,7 @@ mod barrier;
 mod declaration;
 mod hosting;
 mod local;
+mod meeting;
 mod outcome;
 mod participant;
 mod run_file;
@@ -22,6 +23,8 @@ pub mod hash;
 
 pub mod in_process;
 pub mod logic;
+#[cfg(feature = "script")]
+pub mod script;
 pub mod server;
 #[cfg(unix)]
 pub mod shared_memory;
@@ -29,11 +32,13 @@ pub mod tcp;
 pub mod wire;
 
 pub use barrier::State;
+pub use client::Connection;
 pub use declaration::{Declaration, Variable, is_raw};
 pub use hash::TraceHash;
 pub use hosting::{Controls, Hosting, hear};
 pub use logic::Logic;
+pub use meeting::Meeting;
 pub use outcome::{Cause, Ended, Outcome};
 pub use participant::{Participant, Step};
-pub use run_file::{Meeting, RunFile};
+pub use run_file::RunFile;
 pub use settings::{Pacing, Settings, StartCondition};

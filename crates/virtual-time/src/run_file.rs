@@ -8,7 +8,7 @@ use tickbus_fieldbus::tcp::Address;
 
 use crate::declaration::{LONGEST_NAME, check_name};
 use crate::server::MOST_CLIENTS;
-use crate::{Pacing, Settings, StartCondition};
+use crate::{Meeting, Pacing, Settings, StartCondition};
 
 /// What the file of a run says.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,15 +19,6 @@ pub struct RunFile {
     pub meeting: Meeting,
     /// The script with the server's logic.
     pub logic: Option<PathBuf>,
-}
-
-/// Where the clients of a run meet the server.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Meeting {
-    /// The server listens at this address.
-    Tcp(Address),
-    /// Shared memory of this name, for processes of this computer.
-    SharedMemory(String),
 }
 
 impl RunFile {
@@ -89,7 +80,9 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
 
     let meeting = match (listen, shared_memory) {
         (Some(listen), _) => Address::read(&listen).map(Meeting::Tcp),
-        (None, name) => name.and_then(|value| memory_name(&value).map(Meeting::SharedMemory)),
+        (None, name) => {
+            name.and_then(|value| Meeting::read_name(&value).map(Meeting::SharedMemory))
+        }
     };
     let step = step.and_then(|value| value.duration());
     let start = clients.and_then(|value| start_condition(&value));
@@ -114,19 +107,6 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
         meeting: meeting?,
         logic: logic?,
     })
-}
-
-/// Names that are names of files everywhere.
-fn memory_name(value: &Value<'_>) -> Option<String> {
-    let right = "write a name of letters, digits, hyphens and underscores, such as \"cell\"";
-    let name = value.label(40, right)?;
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
-    if !name.chars().all(is_plain) {
-        let what = format!("\"{name}\" is no name for shared memory");
-        value.wrong(what, right);
-        return None;
-    }
-    Some(name.to_owned())
 }
 
 fn start_condition(value: &Value<'_>) -> Option<StartCondition> {

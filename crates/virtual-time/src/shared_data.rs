@@ -102,6 +102,18 @@ impl SharedData {
         }
     }
 
+    /// All variables, in order.
+    #[cfg(feature = "script")]
+    pub(crate) fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Whether hooks see the values of a commit that is going on.
+    #[cfg(feature = "script")]
+    pub(crate) fn is_committing(&self) -> bool {
+        self.is_committing
+    }
+
     /// Copies the committed values of the variables `from` into `to`.
     pub(crate) fn read(&self, from: &[u32], to: &mut [u64]) {
         for (slot, at) in to.iter_mut().zip(from) {

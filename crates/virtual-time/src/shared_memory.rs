@@ -10,5 +10,5 @@ mod mailbox;
 mod patience;
 mod server;
 
-pub use client::{Connection, connect, join};
+pub use client::{connect, join};
 pub use server::Listener;

@@ -4,5 +4,5 @@ mod client;
 mod connection;
 mod server;
 
-pub use client::{Connection, connect, join};
+pub use client::{connect, join};
 pub use server::Listener;

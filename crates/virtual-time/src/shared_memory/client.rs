@@ -9,7 +9,7 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use super::layout;
 use super::mailbox::Mailbox;
 use super::patience::Patience;
-use crate::client::{Asked, Caller, Client, Line, client_of, silent};
+use crate::client::{Client, Connection, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a wait sleeps before it looks whether the server is alive.
@@ -67,51 +67,7 @@ pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, En
         stop: stop.clone(),
         frame: Vec::new(),
     };
-    Ok(Connection(Caller::join(client, line)))
-}
-
-/// A client's seat at its server, for a simulation that calls instead of being called: [`wait`](Self::wait) for a step,
-/// run it, [`answer`](Self::answer).
-#[derive(Debug)]
-pub struct Connection(Caller<MemoryLine>);
-
-impl Connection {
-    /// The client: what it declared, and what it reads in the step that was asked for.
-    pub const fn client(&self) -> &Client {
-        &self.0.client
-    }
-
-    /// As [`tcp::Connection::wait`](crate::tcp::Connection::wait).
-    ///
-    /// # Errors
-    ///
-    /// The server is gone, violates the protocol or says nothing, or this client was stopped.
-    pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
-        self.0.wait(limit)
-    }
-
-    /// As [`tcp::Connection::answer`](crate::tcp::Connection::answer).
-    ///
-    /// # Panics
-    ///
-    /// When nothing was asked, or the number of values is another one.
-    pub fn answer(&mut self, writes: &[u64]) {
-        self.0.answer(writes);
-    }
-
-    /// As [`tcp::Connection::give_up`](crate::tcp::Connection::give_up).
-    pub fn give_up(&mut self, reason: &str) {
-        self.0.give_up(reason);
-    }
-
-    /// Lets `participant` take part, until the end of the run.
-    ///
-    /// # Errors
-    ///
-    /// The run was broken off.
-    pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
-        self.0.run(participant)
-    }
+    Ok(Connection::join(client, line))
 }
 
 #[derive(Debug)]

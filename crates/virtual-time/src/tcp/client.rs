@@ -6,7 +6,7 @@ use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::tcp::{Address, is_for_later, prepare};
 
-use crate::client::{Asked, Caller, Client, Line, client_of, silent};
+use crate::client::{Client, Connection, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a read blocks before it is asked whether to stop.
@@ -47,7 +47,7 @@ pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connect
         start: 0,
         end: 0,
     };
-    Ok(Connection(Caller::join(client, line)))
+    Ok(Connection::join(client, line))
 }
 
 fn open(address: &Address) -> io::Result<TcpStream> {
@@ -62,52 +62,6 @@ fn open(address: &Address) -> io::Result<TcpStream> {
     stream.set_nonblocking(false)?;
     stream.set_read_timeout(Some(LOOK.to_duration()))?;
     Ok(stream)
-}
-
-/// A client's connection with its server, for a simulation that calls instead of being called: [`wait`](Self::wait) for
-/// a step, run it, [`answer`](Self::answer).
-#[derive(Debug)]
-pub struct Connection(Caller<TcpLine>);
-
-impl Connection {
-    /// The client: what it declared, and what it reads in the step that was asked for.
-    pub const fn client(&self) -> &Client {
-        &self.0.client
-    }
-
-    /// Waits for what the server asks next, for `limit` of wall-clock time at most, to some 50 ms. The server may be
-    /// paused, so without a reason of its own the limit is [`Nanos::MAX`].
-    ///
-    /// # Errors
-    ///
-    /// The connection is lost, the server violates the protocol or says nothing, or this client was stopped.
-    pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
-        self.0.wait(limit)
-    }
-
-    /// Answers what was asked, with one value per variable of the declaration's writes. If the connection is lost, the
-    /// next [`wait`](Self::wait) says so.
-    ///
-    /// # Panics
-    ///
-    /// When nothing was asked, or the number of values is another one.
-    pub fn answer(&mut self, writes: &[u64]) {
-        self.0.answer(writes);
-    }
-
-    /// Tells the server why this client does not go on. The run ends for everyone; [`wait`](Self::wait) gives the end.
-    pub fn give_up(&mut self, reason: &str) {
-        self.0.give_up(reason);
-    }
-
-    /// Lets `participant` take part, until the end of the run.
-    ///
-    /// # Errors
-    ///
-    /// The run was broken off.
-    pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
-        self.0.run(participant)
-    }
 }
 
 #[derive(Debug)]

@@ -30,7 +30,7 @@ enum State {
     /// It has not joined yet.
     Apart,
     /// In a step; the next one is due at this time of the simulation.
-    Joined { run: Run, due: Nanos },
+    Joined { run: Box<Run>, due: Nanos },
     /// The run is over, or goes on without this client.
     Over(Result<(), BusError>),
 }
@@ -81,7 +81,7 @@ impl Sdsp {
             ));
             let mut run = Run::join(
                 (&self.meeting, self.timeout),
-                self.declaration.clone(),
+                &self.declaration,
                 (self.every, &values.types),
                 &values.slots,
                 &self.stop,
@@ -91,7 +91,10 @@ impl Sdsp {
             let due = now + run.interval;
             values.deliver(now, run.reads(), port);
             self.begin(step, port);
-            self.state = State::Joined { run, due };
+            self.state = State::Joined {
+                run: Box::new(run),
+                due,
+            };
             return Ok(due);
         }
         let State::Joined { run, due } = &mut self.state else {
@@ -126,8 +129,8 @@ impl Sdsp {
     }
 
     /// The run is over: says so, and makes what was received invalid.
-    fn end(&mut self, end: End, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let result = match &end {
+    fn end(end: &End, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let result = match end {
             End::Finished(outcome) => {
                 port.tell("sdsp.hash", &outcome.hash.to_string());
                 Ok(format!(
@@ -167,7 +170,7 @@ impl Stepped for Sdsp {
                 Err(bus_error(&ended))
             }
             Err(end) => {
-                let result = self.end(end, now, port);
+                let result = Self::end(&end, now, port);
                 self.state = State::Over(result.clone());
                 result.map(|()| now)
             }

@@ -48,15 +48,13 @@ impl Run {
     /// not there is waited for.
     pub(super) fn join(
         (meeting, timeout): (&Meeting, Nanos),
-        declaration: Declaration,
+        declaration: &Declaration,
         (every, types): (Every, &[DataType]),
         initial: &[u64],
         stop: &Stop,
     ) -> Result<Self, End> {
-        let reads = declaration.reads.clone();
-        let multiple = declaration.multiple;
         let mut run = Self {
-            connection: connect(meeting, timeout, &declaration, stop)?,
+            connection: connect(meeting, timeout, declaration, stop)?,
             timeout,
             interval: Nanos::ZERO,
             each: 1,
@@ -75,7 +73,8 @@ impl Run {
         };
         let fits = fits.and_then(|each| {
             let found = client.read_types();
-            let wrong = (reads.iter().zip(types).zip(found)).find(|((_, own), is)| own != is);
+            let wrong =
+                (declaration.reads.iter().zip(types).zip(found)).find(|((_, own), is)| own != is);
             match wrong {
                 None => Ok(each),
                 Some(((name, own), is)) => Err(format!(
@@ -87,7 +86,8 @@ impl Run {
             Ok(each) => run.each = each,
             Err(reason) => return Err(run.give_up(&reason)),
         }
-        let steps = i64::try_from(u64::from(multiple.get()) * run.each).unwrap_or(i64::MAX);
+        let steps =
+            i64::try_from(u64::from(declaration.multiple.get()) * run.each).unwrap_or(i64::MAX);
         run.interval = step.times(steps);
         run.connection.answer(initial);
         Ok(run)

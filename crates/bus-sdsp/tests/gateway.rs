@@ -72,19 +72,22 @@ impl Plc {
             end.set("sync.done", f64::from(done));
             while !stopped.is_stopped() {
                 end.tick();
-                let go = end.get("sync.go") as u32;
+                let go = end.slots[0].real();
                 let is_there = end.link().state == tickbus_fieldbus::LinkState::Running;
-                if is_there && go != last_go && go != 0 && count < last {
-                    assert_eq!(go, last_go + 1, "one step after another");
+                if is_there && go != f64::from(last_go) && go != 0.0 && count < last {
+                    assert_eq!(go, f64::from(last_go + 1), "one step after another");
                     assert_eq!(end.get("sync.time"), 10.0 * f64::from(count));
                     random = random.wrapping_mul(6_364_136_223_846_793_005) + 1;
                     let micros = (random >> 33) % 400;
                     end.set("speed", -1.0);
                     end.tick();
-                    clock.wait_until(clock.now() + Nanos::from_micros(micros as i64), &stopped);
-                    (last_go, count) = (go, count + 1);
+                    clock.wait_until(
+                        clock.now() + Nanos::from_micros(micros.cast_signed()),
+                        &stopped,
+                    );
+                    (last_go, count) = (last_go + 1, count + 1);
                     end.set("speed", (end.get("position") + f64::from(count)) % 1000.0);
-                    end.set("sync.done", f64::from(go));
+                    end.set("sync.done", go);
                 }
                 clock.wait_until(clock.now() + Nanos::from_micros(200), &stopped);
             }

@@ -226,6 +226,11 @@ impl Gateway {
         connection.run(self)
     }
 
+    /// As [`Host::fact`], of the PLC's bus.
+    pub fn fact(&self, key: &'static str) -> Option<String> {
+        self.host.fact(key)
+    }
+
     /// The state of the PLC's line.
     pub fn link(&self) -> Link {
         self.host.link()

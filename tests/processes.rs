@@ -5,7 +5,7 @@
 use std::io::{BufRead as _, BufReader, Lines};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
-use std::time::{Duration};
+use std::time::Duration;
 
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;

@@ -43,20 +43,10 @@ enum Other {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    if let Some(Other::Prepare(arguments)) = &arguments.other {
-        return prepare::run(arguments);
-    }
-    let stop = Stop::new();
-    if let Err(error) = ctrlc::set_handler({
-        let stop = stop.clone();
-        move || stop.stop()
-    }) {
-        eprintln!("sync: Ctrl-C cannot be caught: {error}");
-        return Outcome::BusFailed;
-    }
     let file = match (&arguments.other, &arguments.file) {
-        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, &stop),
-        (_, file) => file.as_ref().expect("it is required"),
+        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments),
+        (Some(Other::Prepare(arguments)), _) => return prepare::run(arguments),
+        (None, file) => file.as_ref().expect("it is required"),
     };
     let mut file = match RunFile::load(file) {
         Ok(file) => file,
@@ -73,6 +63,9 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             return Outcome::WrongInput;
         }
     };
+    let Some(stop) = stop_on_ctrl_c() else {
+        return Outcome::BusFailed;
+    };
     let controls = Controls::new(&stop);
     let commands = thread::Builder::new().name("tickbus-commands".to_owned());
     let spawned = commands.spawn({
@@ -84,6 +77,19 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         eprintln!("sync: commands on stdin cannot be read: {error}");
     }
     report(serve(file, logic, &controls))
+}
+
+/// Is stopped by Ctrl-C.
+fn stop_on_ctrl_c() -> Option<Stop> {
+    let stop = Stop::new();
+    let caught = ctrlc::set_handler({
+        let stop = stop.clone();
+        move || stop.stop()
+    });
+    caught
+        .inspect_err(|error| eprintln!("sync: Ctrl-C cannot be caught: {error}"))
+        .ok()?;
+    Some(stop)
 }
 
 /// Prints a line. If the reader of stdout is gone, the run goes on.

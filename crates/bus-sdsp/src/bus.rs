@@ -2,11 +2,10 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{BusError, BusSetup, Cause, Lead, Port, Receipt, Stepped};
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time as sdsp;
-use tickbus_virtual_time::{Declaration, Ended, Step};
+use tickbus_virtual_time::{Declaration, Ended, Meeting, Step};
 
 use super::run::{End, Run};
 use super::{Every, Options, Variables};
@@ -17,7 +16,7 @@ const MOST_STEPS: i64 = 100_000;
 /// A client of a run on virtual time.
 #[derive(Debug)]
 pub struct Sdsp {
-    address: Address,
+    meeting: Meeting,
     timeout: Nanos,
     declaration: Declaration,
     every: Every,
@@ -31,7 +30,7 @@ enum State {
     /// It has not joined yet.
     Apart,
     /// In a step; the next one is due at this time of the simulation.
-    Joined { run: Run, due: Nanos },
+    Joined { run: Box<Run>, due: Nanos },
     /// The run is over, or goes on without this client.
     Over(Result<(), BusError>),
 }
@@ -48,7 +47,7 @@ impl Sdsp {
         let (_, area) = setup.role.areas();
         let stations = setup.table.stations.iter();
         Ok(Self {
-            address: options.address.clone(),
+            meeting: options.meeting.clone(),
             timeout: options.timeout,
             every: setup
                 .hosted
@@ -78,11 +77,11 @@ impl Sdsp {
         if let State::Apart = self.state {
             port.opening(&format!(
                 "waiting for the server at {} to start the run",
-                self.address
+                self.meeting
             ));
             let mut run = Run::join(
-                (&self.address, self.timeout),
-                self.declaration.clone(),
+                (&self.meeting, self.timeout),
+                &self.declaration,
                 (self.every, &values.types),
                 &values.slots,
                 &self.stop,
@@ -92,7 +91,10 @@ impl Sdsp {
             let due = now + run.interval;
             values.deliver(now, run.reads(), port);
             self.begin(step, port);
-            self.state = State::Joined { run, due };
+            self.state = State::Joined {
+                run: Box::new(run),
+                due,
+            };
             return Ok(due);
         }
         let State::Joined { run, due } = &mut self.state else {
@@ -123,12 +125,12 @@ impl Sdsp {
 
     fn begin(&self, step: Step, port: &mut Port) {
         debug_assert_eq!(step.time, Nanos::ZERO, "a run begins at 0");
-        port.running(&format!("in step with the server at {}", self.address));
+        port.running(&format!("in step with the server at {}", self.meeting));
     }
 
     /// The run is over: says so, and makes what was received invalid.
-    fn end(&mut self, end: End, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let result = match &end {
+    fn end(end: &End, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        let result = match end {
             End::Finished(outcome) => {
                 port.tell("sdsp.hash", &outcome.hash.to_string());
                 Ok(format!(
@@ -168,7 +170,7 @@ impl Stepped for Sdsp {
                 Err(bus_error(&ended))
             }
             Err(end) => {
-                let result = self.end(end, now, port);
+                let result = Self::end(&end, now, port);
                 self.state = State::Over(result.clone());
                 result.map(|()| now)
             }

@@ -17,7 +17,7 @@ impl BusKind for Options {
 
 impl BusOptions for Options {
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
-        let mut parts = vec![format!("in step with the server at {}", self.address)];
+        let mut parts = vec![format!("in step with the server at {}", self.meeting)];
         parts.extend(
             self.client
                 .as_ref()

@@ -9,7 +9,7 @@ use tickbus_base::toml_text::{Table, Value};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, BusSetup, Role};
 use tickbus_image::signal::{Signal, SignalTable};
-use tickbus_virtual_time::Declaration;
+use tickbus_virtual_time::{Declaration, Meeting};
 
 use super::Variables;
 
@@ -22,8 +22,8 @@ const TIMEOUT: Nanos = Nanos::from_secs(60);
 /// The options of the bus `sdsp`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Where the server listens.
-    pub address: Address,
+    /// Where the server is met.
+    pub meeting: Meeting,
     /// The name in the run, if stated.
     pub client: Option<String>,
     /// How often it has a step.
@@ -47,18 +47,28 @@ impl Options {
     /// Reads the keys of the bus. `moved` says that the address will be replaced.
     pub fn read(moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
+        let memory = table.take("shared_memory");
         let client = table.take("client");
         let multiple = table.take("multiple");
         let step = table.take("step");
         let timeout = table.take("timeout");
-        if address.is_none() && !moved {
-            let right = "say where the server listens, such as address = \"127.0.0.1:20060\"";
-            table.require_one_of(&["address"], right);
+        if !moved {
+            let right = "say where the server listens, such as address = \"127.0.0.1:20060\", or by which name it \
+                         offers shared memory on this computer, shared_memory = \"cell\"";
+            table.require_one_of(&["address", "shared_memory"], right);
         }
-        // Replaced in any case.
-        let address = match address {
-            None => Some(Address::local(0)).filter(|_| moved),
-            Some(value) => read_address(&value, moved),
+        let meeting = match (address, memory) {
+            (Some(_), Some(both)) => {
+                both.wrong(
+                    "\"shared_memory\" stands beside \"address\"",
+                    "keep the one by which the server is met",
+                );
+                None
+            }
+            (Some(address), None) => read_address(&address, moved).map(Meeting::Tcp),
+            (None, Some(name)) => Meeting::read_name(&name).map(Meeting::SharedMemory),
+            // To be replaced.
+            (None, None) => moved.then(|| Meeting::Tcp(Address::local(0))),
         };
         let client = client.map_or(Some(None), |value| {
             let right = "give this client a name that no other one of the run has";
@@ -82,7 +92,7 @@ impl Options {
             (None, None) => Some(Every::Steps(NonZeroU32::MIN)),
         };
         Some(Self {
-            address: address?,
+            meeting: meeting?,
             client: client?,
             every: every?,
             timeout: timeout?,
@@ -92,8 +102,10 @@ impl Options {
 
     /// Replaces the address.
     pub(super) fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
-        self.address = address.parse()?;
-        self.address.check_dialled()
+        let address: Address = address.parse()?;
+        address.check_dialled()?;
+        self.meeting = Meeting::Tcp(address);
+        Ok(())
     }
 
     /// Takes the lines of `[fieldbus.at]`: the names of variables.

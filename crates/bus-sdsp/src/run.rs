@@ -1,10 +1,9 @@
 //! This client's part in a run: from step to step.
 
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::DataType;
-use tickbus_virtual_time::client::{Asked, Client};
-use tickbus_virtual_time::{Cause, Declaration, Ended, Outcome, Step, tcp};
+use tickbus_virtual_time::client::{Asked, Client, Connection};
+use tickbus_virtual_time::{Cause, Declaration, Ended, Meeting, Outcome, Step};
 
 use super::Every;
 
@@ -32,7 +31,7 @@ impl From<Ended> for End {
 /// A client that takes part in a run.
 #[derive(Debug)]
 pub(super) struct Run {
-    connection: tcp::Connection,
+    connection: Connection,
     /// How long the server may be silent.
     timeout: Nanos,
     /// The virtual time of one step of this client.
@@ -45,19 +44,17 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Joins the run of the server at `address`, waits until it starts, and sends the initial values. A server that is
+    /// Joins the run of the server at `meeting`, waits until it starts, and sends the initial values. A server that is
     /// not there is waited for.
     pub(super) fn join(
-        (address, timeout): (&Address, Nanos),
-        declaration: Declaration,
+        (meeting, timeout): (&Meeting, Nanos),
+        declaration: &Declaration,
         (every, types): (Every, &[DataType]),
         initial: &[u64],
         stop: &Stop,
     ) -> Result<Self, End> {
-        let reads = declaration.reads.clone();
-        let multiple = declaration.multiple;
         let mut run = Self {
-            connection: connect(address, timeout, &declaration, stop)?,
+            connection: connect(meeting, timeout, declaration, stop)?,
             timeout,
             interval: Nanos::ZERO,
             each: 1,
@@ -76,7 +73,8 @@ impl Run {
         };
         let fits = fits.and_then(|each| {
             let found = client.read_types();
-            let wrong = (reads.iter().zip(types).zip(found)).find(|((_, own), is)| own != is);
+            let wrong =
+                (declaration.reads.iter().zip(types).zip(found)).find(|((_, own), is)| own != is);
             match wrong {
                 None => Ok(each),
                 Some(((name, own), is)) => Err(format!(
@@ -88,7 +86,8 @@ impl Run {
             Ok(each) => run.each = each,
             Err(reason) => return Err(run.give_up(&reason)),
         }
-        let steps = i64::try_from(u64::from(multiple.get()) * run.each).unwrap_or(i64::MAX);
+        let steps =
+            i64::try_from(u64::from(declaration.multiple.get()) * run.each).unwrap_or(i64::MAX);
         run.interval = step.times(steps);
         run.connection.answer(initial);
         Ok(run)
@@ -159,24 +158,24 @@ impl Drop for Run {
     }
 }
 
-/// Connects with the server at `address` as soon as that is there, and joins.
+/// Connects with the server at `meeting` as soon as that is there, and joins.
 ///
 /// # Errors
 ///
 /// It does not appear within `timeout`, or the declaration breaks a rule.
 pub fn connect(
-    address: &Address,
+    meeting: &Meeting,
     timeout: Nanos,
     declaration: &Declaration,
     stop: &Stop,
-) -> Result<tcp::Connection, Ended> {
+) -> Result<Connection, Ended> {
     let clock = Monotonic::shared();
     let end = clock.now() + timeout;
     loop {
         let now = clock.now();
         let client = Client::new(declaration.clone())
             .map_err(|mistake| ended(Cause::Configuration, mistake.to_string()))?;
-        match tcp::connect(address, client, stop) {
+        match meeting.connect(client, stop) {
             Err(_) if now < end && !stop.is_stopped() => {
                 clock.wait_until((now + PAUSE).min(end), stop);
             }

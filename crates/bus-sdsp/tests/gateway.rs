@@ -15,7 +15,8 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{
-    Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, Variable, tcp,
+    Declaration, Ended, Meeting, Outcome, Participant, Settings, StartCondition, Step, Variable,
+    tcp,
 };
 
 const SIGNALS: &str = r#"
@@ -71,19 +72,22 @@ impl Plc {
             end.set("sync.done", f64::from(done));
             while !stopped.is_stopped() {
                 end.tick();
-                let go = end.get("sync.go") as u32;
+                let go = end.slots[0].real();
                 let is_there = end.link().state == tickbus_fieldbus::LinkState::Running;
-                if is_there && go != last_go && go != 0 && count < last {
-                    assert_eq!(go, last_go + 1, "one step after another");
+                if is_there && go != f64::from(last_go) && go != 0.0 && count < last {
+                    assert_eq!(go, f64::from(last_go + 1), "one step after another");
                     assert_eq!(end.get("sync.time"), 10.0 * f64::from(count));
                     random = random.wrapping_mul(6_364_136_223_846_793_005) + 1;
                     let micros = (random >> 33) % 400;
                     end.set("speed", -1.0);
                     end.tick();
-                    clock.wait_until(clock.now() + Nanos::from_micros(micros as i64), &stopped);
-                    (last_go, count) = (go, count + 1);
+                    clock.wait_until(
+                        clock.now() + Nanos::from_micros(micros.cast_signed()),
+                        &stopped,
+                    );
+                    (last_go, count) = (last_go + 1, count + 1);
                     end.set("speed", (end.get("position") + f64::from(count)) % 1000.0);
-                    end.set("sync.done", f64::from(go));
+                    end.set("sync.done", go);
                 }
                 clock.wait_until(clock.now() + Nanos::from_micros(200), &stopped);
             }
@@ -138,7 +142,7 @@ fn run(gateway: &mut Gateway, steps: u64) -> Result<Outcome, Ended> {
     let server = Server::start(settings);
     let port = server.port;
     let machine = thread::spawn(move || tcp::join(&Address::local(port), &mut Machine(0)));
-    let own = gateway.take_part(&Address::local(port));
+    let own = gateway.take_part(&Meeting::Tcp(Address::local(port)));
     let outcome = server.end();
     assert_eq!(own, outcome);
     assert_eq!(machine.join().expect("no panic"), outcome);

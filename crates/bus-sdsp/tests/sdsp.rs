@@ -69,13 +69,16 @@ fn a_step_later_each_end_has_what_the_other_wrote_and_the_time_is_granted() {
     let mut machine = open(server.port, "device", "");
     let mut seen = Vec::new();
     machine.set("position", 100.0);
-    for step in 0..5 {
+    for step in 0..5_u32 {
         let found = machine.tick();
         assert_eq!(found.code, Code::Fresh);
-        assert_eq!((found.age, found.sequence), (Nanos::ZERO, step + 1));
-        assert_eq!(found.granted, Nanos::from_millis(step as i64 + 1));
+        assert_eq!(
+            (found.age, found.sequence),
+            (Nanos::ZERO, u64::from(step) + 1)
+        );
+        assert_eq!(found.granted, STEP.times(i64::from(step) + 1));
         seen.push((machine.get("speed"), machine.get("echo")));
-        machine.set("position", -10.0 * (step as f64 + 1.0));
+        machine.set("position", -10.0 * (f64::from(step) + 1.0));
     }
     assert_eq!(machine.link().state, LinkState::Running);
     assert_eq!(
@@ -111,7 +114,7 @@ fn a_step_later_each_end_has_what_the_other_wrote_and_the_time_is_granted() {
 fn a_tick_between_two_steps_waits_for_nobody_and_one_over_several_takes_all_of_them() {
     let server = of_two(20);
     let plc = controller(server.port, "", |end, _| {
-        end.set("echo", end.get("echo") + 1.0)
+        end.set("echo", end.get("echo") + 1.0);
     });
     let mut machine = open(server.port, "device", "step = \"4ms\"\nmax_age = \"3ms\"");
     let mut at = |millis: i64| {
@@ -138,7 +141,7 @@ fn a_tick_between_two_steps_waits_for_nobody_and_one_over_several_takes_all_of_t
 fn a_simulation_of_halves_answers_within_its_step() {
     let server = of_two(10);
     let plc = controller(server.port, "", |end, _| {
-        end.set("echo", end.get("position"))
+        end.set("echo", end.get("position"));
     });
     let mut machine = open(server.port, "device", "");
     let mut seen = Vec::new();
@@ -508,4 +511,40 @@ where
         let mut client = Foreign { declaration, run };
         tcp::join(&Address::local(port), &mut client)
     })
+}
+
+/// Where the ends meet makes no difference.
+#[cfg(unix)]
+#[test]
+fn a_run_in_shared_memory_is_that_over_tcp() {
+    let name = format!("bus-sdsp-{}", std::process::id());
+    let mut settings = Settings::new(STEP, StartCondition::Count(2));
+    settings.steps = Some(300);
+    let mut outcomes = Vec::new();
+    for is_memory in [false, true] {
+        let (server, at) = if is_memory {
+            let server = Server::in_memory(&name, settings.clone());
+            (server, format!("shared_memory = \"{name}\""))
+        } else {
+            let server = Server::start(settings.clone());
+            let at = format!("address = \"127.0.0.1:{}\"", server.port);
+            (server, at)
+        };
+        let text = |role: &str| config(0, role, "").replace("address = \"127.0.0.1:0\"", &at);
+        let plc_text = text("controller");
+        let plc = thread::spawn(move || {
+            let mut plc = End::open(&plc_text, &Manual::new());
+            while plc.tick().code == Code::Fresh {
+                plc.set("speed", plc.get("position") + 3.0);
+            }
+        });
+        let mut machine = End::open(&text("device"), &Manual::new());
+        while machine.tick().code == Code::Fresh {
+            machine.set("position", machine.get("speed") + 2.0);
+        }
+        plc.join().expect("no panic");
+        assert!(machine.get("position") > 700.0);
+        outcomes.push(server.end().expect("as planned"));
+    }
+    assert_eq!(outcomes[0], outcomes[1]);
 }

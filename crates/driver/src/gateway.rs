@@ -11,11 +11,10 @@ use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_bus_sdsp::{Variables, connect};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Link, LinkState};
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 use tickbus_plc::{Program, Scan};
-use tickbus_virtual_time::{Declaration, Ended, Outcome, Participant, Step};
+use tickbus_virtual_time::{Declaration, Ended, Meeting, Outcome, Participant, Step};
 
 use super::{DriverError, Host};
 
@@ -217,14 +216,19 @@ impl Gateway {
         Ok(())
     }
 
-    /// Takes part in the run of the server at `address`, as soon as that is there, until the run ends.
+    /// Takes part in the run of the server at `meeting`, as soon as that is there, until the run ends.
     ///
     /// # Errors
     ///
     /// The run was broken off, or the server did not appear within the time-out.
-    pub fn take_part(&mut self, address: &Address) -> Result<Outcome, Ended> {
-        let connection = connect(address, self.timeout, &self.declaration, &self.stop)?;
+    pub fn take_part(&mut self, meeting: &Meeting) -> Result<Outcome, Ended> {
+        let connection = connect(meeting, self.timeout, &self.declaration, &self.stop)?;
         connection.run(self)
+    }
+
+    /// As [`Host::fact`], of the PLC's bus.
+    pub fn fact(&self, key: &'static str) -> Option<String> {
+        self.host.fact(key)
     }
 
     /// The state of the PLC's line.

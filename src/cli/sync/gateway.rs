@@ -4,14 +4,15 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::{report, say};
+use super::{report, say, stop_on_ctrl_c};
 use crate::cli::Outcome;
 use crate::cli::host::span;
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_driver::{Gateway, GatewayOptions};
 use tickbus_driver_cfg::{CommandLineEnd, Config};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{LinkState, Role};
+use tickbus_virtual_time::Meeting;
 
 /// How often the state of the PLC's line is looked at until there is one.
 const LOOK: Nanos = Nanos::from_millis(10);
@@ -27,7 +28,7 @@ pub(in crate::cli) struct Arguments {
 
     /// Where the server of the run listens.
     #[arg(long, value_name = "HOST:PORT", value_parser = address)]
-    server: Address,
+    server: Meeting,
 
     /// The PLC's name in the run [default: the driver's, with " PLC" behind it].
     #[arg(long, value_name = "NAME")]
@@ -42,13 +43,13 @@ pub(in crate::cli) struct Arguments {
     timeout: Nanos,
 }
 
-fn address(text: &str) -> Result<Address, String> {
+fn address(text: &str) -> Result<Meeting, String> {
     let address: Address = text.parse().map_err(|wrong| format!("{wrong}"))?;
     address.check_dialled().map_err(|wrong| wrong.to_string())?;
-    Ok(address)
+    Ok(Meeting::Tcp(address))
 }
 
-pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
+pub(super) fn run(arguments: &Arguments) -> Outcome {
     let asked = CommandLineEnd {
         role: Role::Device,
         moved: false,
@@ -65,8 +66,11 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
         multiple: arguments.multiple,
         timeout: arguments.timeout,
     };
+    let Some(stop) = stop_on_ctrl_c() else {
+        return Outcome::BusFailed;
+    };
     let clock = Monotonic::shared();
-    let mut gateway = match Gateway::open(&config, options, Arc::clone(&clock) as _, stop) {
+    let mut gateway = match Gateway::open(&config, options, Arc::clone(&clock) as _, &stop) {
         Ok(gateway) => gateway,
         Err(error) => {
             eprintln!("sync: {error}");
@@ -78,7 +82,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
         }
     };
     while gateway.link().state == LinkState::Closed && !stop.is_stopped() {
-        clock.wait_until(clock.now() + LOOK, stop);
+        clock.wait_until(clock.now() + LOOK, &stop);
     }
     say(&format!("the line of the PLC: {}", gateway.link().reason));
     if let Err(why) = gateway.await_plc() {

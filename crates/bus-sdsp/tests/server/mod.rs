@@ -17,20 +17,39 @@ pub struct Server {
 }
 
 impl Server {
+    /// Over TCP, on a free port.
     pub fn start(settings: Settings) -> Self {
         let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
         let port = listener.address().port();
+        Self::run(port, move |hosting| {
+            listener.run(settings, Logic::new(), hosting)
+        })
+    }
+
+    /// In shared memory of this name.
+    #[cfg(unix)]
+    pub fn in_memory(name: &str, settings: Settings) -> Self {
+        let listener = tickbus_virtual_time::shared_memory::Listener::bind(name, &settings);
+        let listener = listener.expect("a name of this test alone");
+        Self::run(0, move |hosting| {
+            listener.run(settings, Logic::new(), hosting)
+        })
+    }
+
+    fn run(
+        port: u16,
+        serve: impl FnOnce(Hosting<'_>) -> Result<Outcome, Ended> + Send + 'static,
+    ) -> Self {
         let (controls, (tell, news)) = (Controls::default(), mpsc::channel());
         let thread = thread::spawn({
             let controls = controls.clone();
             move || {
-                let hosting = Hosting {
+                serve(Hosting {
                     clock: &*Monotonic::shared(),
                     controls: &controls,
                     // Most tests do not listen.
                     news: &mut |line| drop(tell.send(line.to_owned())),
-                };
-                listener.run(settings, Logic::new(), hosting)
+                })
             }
         });
         Self {

@@ -2,6 +2,7 @@
 
 mod joining;
 mod message;
+mod patience;
 
 use std::collections::VecDeque;
 
@@ -303,60 +304,6 @@ impl<'l> Server<'l> {
         self.advance(now);
     }
 
-    /// When [`tick`](Self::tick) has something to do, if nothing happens before; a time that has passed means at once.
-    pub fn deadline(&self) -> Nanos {
-        let silent = self.seats.iter().filter_map(|seat| match seat {
-            Seat::Silent(since) => Some(*since + self.settings.hang),
-            _ => None,
-        });
-        let silent = silent.min().unwrap_or(Nanos::MAX);
-        silent.min(match &self.phase {
-            Phase::Joining(..) => self.asked + self.settings.join,
-            Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
-                match (self.is_paused(), &self.pace) {
-                    (true, _) => Nanos::MAX,
-                    (false, Some(pace)) => pace.due(),
-                    // There were too many empty steps in a row.
-                    (false, None) => Nanos::ZERO,
-                }
-            }
-            Phase::Running(barrier, _) if barrier.is_synchronised() => Nanos::ZERO,
-            Phase::Running(..) => {
-                let hang = self.asked + self.settings.hang;
-                hang.min(self.stop_by.unwrap_or(Nanos::MAX))
-            }
-            Phase::Ended(_) => Nanos::MAX,
-        })
-    }
-
-    /// Does what is due at `now`: the next step, or the end of somebody's patience.
-    pub fn tick(&mut self, now: Nanos) {
-        let hang = self.settings.hang;
-        for seat in 0..self.seats.len() {
-            if matches!(self.seats[seat], Seat::Silent(since) if now >= since + hang) {
-                let reason = format!("did not join within {hang}");
-                self.refuse(seat, None, Cause::Hung, &reason);
-            }
-        }
-        match &self.phase {
-            Phase::Joining(joining, _) if now >= self.asked + self.settings.join => {
-                let (limit, missing) = (self.settings.join, joining.missing());
-                let reason = format!("still waiting for {missing}, after {limit}");
-                self.end_for(Cause::Hung, None, reason);
-            }
-            Phase::Running(barrier, _) if !barrier.is_synchronised() => {
-                if now >= self.asked + hang {
-                    self.end_of_patience(Cause::Hung, &format!("within {hang}"));
-                } else if self.stop_by.is_some_and(|by| now >= by) {
-                    let limit = format!("within {STOP_PATIENCE} after the run was stopped");
-                    self.end_of_patience(Cause::Stopped, &limit);
-                }
-            }
-            _ => {}
-        }
-        self.advance(now);
-    }
-
     /// The next message, and the seat that it is for.
     pub fn poll(&mut self) -> Option<(usize, ToClient<'_>)> {
         let out = self.outbox.pop_front()?;
@@ -452,27 +399,6 @@ impl<'l> Server<'l> {
             let due = barrier.due().map(|client| Out::Step(seats[client]));
             self.outbox.extend(due);
         }
-    }
-
-    /// Ends the run for a client that has not answered.
-    fn end_of_patience(&mut self, cause: Cause, limit: &str) {
-        let Phase::Running(barrier, _) = &self.phase else {
-            return;
-        };
-        let mut owing = barrier
-            .owing()
-            .map(|client| &*barrier.declaration(client).name);
-        let client = owing.next().map(str::to_owned);
-        let others: Vec<String> = owing.map(|name| format!("\"{name}\"")).collect();
-        let others = match &*others {
-            [] => String::new(),
-            _ => format!("; neither have {}", others.join(", ")),
-        };
-        let reason = match barrier.step().sequence {
-            0 => format!("has not sent its initial values {limit}{others}"),
-            sequence => format!("has not finished step {sequence} {limit}{others}"),
-        };
-        self.end_for(cause, client, reason);
     }
 
     fn blame(&mut self, seat: usize, cause: Cause, reason: &str) {

@@ -121,3 +121,12 @@ fn a_hook_that_fails_or_never_ends_ends_the_run() {
         assert!(ended.reason.contains(part), "{part} in {ended}");
     }
 }
+
+#[test]
+fn the_documented_example_is_a_script() {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/sdsp.md"));
+    let text = text.expect("it is there");
+    let (_, rest) = text.split_once("```rust\n").expect("the example begins");
+    let (script, _) = rest.split_once("```").expect("the example ends");
+    parse("example", script).unwrap_or_else(|why| panic!("{why}"));
+}

@@ -412,3 +412,35 @@ fn a_run_in_lock_step_of_three_processes_has_one_trace_hash() {
     }
     assert_eq!(hashes[0], hashes[1]);
 }
+
+#[test]
+fn a_gateway_says_what_its_driver_cfg_lacks_and_which_plc_does_not_come() {
+    let gateway = |signals: &str| {
+        let file = save(&config("address = \"127.0.0.1:0\"").replace(SIGNALS, signals));
+        let cfg = file.path().to_str().expect("UTF-8");
+        let server = ["--server", "127.0.0.1:1", "--timeout", "50ms"];
+        let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args([&["sync", "gateway", cfg], &server[..]].concat())
+            .output()
+            .expect("tickbus runs");
+        let told = [output.stdout, output.stderr].concat();
+        (String::from_utf8(told).expect("text"), output.status.code())
+    };
+    let (told, code) = gateway(SIGNALS);
+    assert_eq!(code, Some(1), "{told}");
+    assert!(
+        told.contains("there is no signal \"sync.go\"; add it as a UDINT in %I"),
+        "{told}"
+    );
+    let signal = |name: &str, address: &str| {
+        format!("[[signal]]\nname = \"sync.{name}\"\naddress = \"{address}\"\ntype = \"UDINT\"\n")
+    };
+    let right = [("go", "%ID0"), ("time", "%ID4"), ("done", "%QD0")];
+    let (told, code) = gateway(&right.map(|(name, address)| signal(name, address)).concat());
+    assert_eq!(code, Some(3), "{told}");
+    let part = "sync: failed reason=\"the PLC did not appear within 50ms: ";
+    assert!(
+        told.contains(part) && told.contains("the line of the PLC: "),
+        "{told}"
+    );
+}

@@ -3,6 +3,8 @@
 
 mod server;
 
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 
@@ -15,7 +17,8 @@ use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Cause, LinkState};
 use tickbus_image::signal::DataType;
 use tickbus_plc::{Program, Scan};
-use tickbus_virtual_time::server::Control;
+use tickbus_virtual_time::server::{Control, ToClient};
+use tickbus_virtual_time::wire;
 use tickbus_virtual_time::{
     Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, TraceHash, Variable,
     tcp,
@@ -547,4 +550,74 @@ fn a_run_in_shared_memory_is_that_over_tcp() {
         outcomes.push(server.end().expect("as planned"));
     }
     assert_eq!(outcomes[0], outcomes[1]);
+}
+
+#[test]
+fn a_simulation_whose_time_jumps_is_told_and_leaves() {
+    let server = of_two(1_000_000);
+    let plc = foreign(server.port, DataType::Int, |_, _, _| Ok(()));
+    let mut machine = open(server.port, "device", "");
+    let mut at = |time| {
+        let found = machine.driver.exchange(time, &mut machine.slots);
+        (found.code, machine.link().reason)
+    };
+    assert_eq!(at(Nanos::ZERO).0, Code::Fresh);
+    let (code, reason) = at(Nanos::from_secs(1000));
+    assert_eq!(code, Code::BusFailed);
+    let right = "client \"cell\" gave up: its simulation time jumped from 1ms to 1000s, over more than 100000 steps";
+    assert!(reason.contains(right), "{reason}");
+    let told = server.end().expect_err("it gave up").to_string();
+    assert!(told.contains(right), "{told}");
+    assert!(plc.join().expect("no panic").is_err());
+}
+
+#[test]
+fn a_server_that_is_lost_ends_the_run_for_good() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let port = listener.local_addr().expect("bound").port();
+    let server = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().expect("the machine");
+        let types = [DataType::Bool, DataType::Int, DataType::Int];
+        let reads = [1, 2, 3];
+        let step = Step {
+            sequence: 1,
+            time: Nanos::ZERO,
+        };
+        let mut out = Vec::new();
+        wire::to_client(
+            &mut out,
+            &ToClient::Start {
+                step: STEP,
+                reads: &types,
+            },
+        );
+        wire::to_client(
+            &mut out,
+            &ToClient::Step {
+                step,
+                reads: &reads,
+            },
+        );
+        let frame = |stream: &mut TcpStream| {
+            let mut length = [0; 4];
+            stream.read_exact(&mut length).expect("its length");
+            let length = usize::try_from(u32::from_le_bytes(length)).expect("small");
+            stream.read_exact(&mut vec![0; length]).expect("the rest");
+        };
+        frame(&mut stream);
+        let (start, step) = out.split_at(4 + 1 + 8 + types.len());
+        stream.write_all(start).expect("it is there");
+        frame(&mut stream);
+        stream.write_all(step).expect("it is there");
+        // Nothing is left unread when the connection is closed.
+        frame(&mut stream);
+    });
+    let mut machine = open(port, "device", "");
+    assert_eq!(machine.tick().code, Code::Fresh);
+    assert_eq!(machine.get("speed"), 2.0);
+    let (cause, reason) = broken(&mut machine, Code::BusFailed);
+    server.join().expect("no panic");
+    assert_eq!(cause, Cause::Link);
+    assert!(reason.contains("the server was lost"), "{reason}");
+    assert_eq!(broken(&mut machine, Code::BusFailed), (cause, reason));
 }

@@ -15,6 +15,9 @@ use crate::{Cause, Ended, Outcome, Participant, wire};
 /// How long a wait sleeps before it looks whether the server is alive.
 const NAP: Nanos = Nanos::from_millis(50);
 
+/// How long the server may leave a frame in the mailbox.
+const PATIENCE: Nanos = Nanos::from_secs(10);
+
 /// Lets `participant` take part in the run that a server on this computer offers under `name`, until its end.
 ///
 /// # Errors
@@ -109,11 +112,17 @@ impl MemoryLine {
 
 impl Line for MemoryLine {
     fn send(&mut self, frame: &[u8]) {
-        // The server takes each frame as soon as it looks; one that does not is found out by receiving.
+        // The server takes each frame as soon as it looks. If it does not, this one is lost, and receiving finds out why.
         let memory = self.memory.memory();
+        let clock = Monotonic::shared();
+        let until = clock.now() + PATIENCE;
         let up = self.up;
-        while !self.patience.look(|| up.has_room(memory)) && self.memory.is_served() {
+        while !up.has_room(memory) {
+            if clock.now() >= until || !self.memory.is_served() {
+                return;
+            }
             self.ring();
+            self.patience.look(|| up.has_room(memory));
         }
         self.up.post(memory, &frame[wire::HEADER..]);
         self.ring();

@@ -4,8 +4,9 @@ use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, is_for_later, prepare};
+use tickbus_fieldbus::tcp::{Address, prepare};
 
+use super::is_later;
 use crate::client::{Client, Connection, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
@@ -107,7 +108,7 @@ impl Line for TcpLine {
             match self.stream.read(&mut self.buffer[self.end..]) {
                 Ok(0) => return Err(lost("it closed the connection")),
                 Ok(count) => self.end += count,
-                Err(error) if is_for_later(&error) => {
+                Err(error) if is_later(&error) => {
                     if self.stop.is_stopped() {
                         return Err(Ended::before(Cause::Stopped, "this client was stopped"));
                     }

@@ -4,8 +4,9 @@ use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{close_gracefully, is_for_later, prepare};
+use tickbus_fieldbus::tcp::{close_gracefully, prepare};
 
+use super::is_later;
 use crate::server::ToClient;
 use crate::wire;
 
@@ -72,7 +73,7 @@ impl Connection {
                 self.end += count;
                 Arrived::Something
             }
-            Err(error) if is_for_later(&error) => Arrived::NothingYet,
+            Err(error) if is_later(&error) => Arrived::NothingYet,
             Err(error) => Arrived::Gone(error.to_string()),
         }
     }
@@ -99,7 +100,7 @@ impl Connection {
             match self.stream.write(&self.out[self.written..]) {
                 Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
                 Ok(count) => self.written += count,
-                Err(error) if is_for_later(&error) => return Ok(()),
+                Err(error) if is_later(&error) => return Ok(()),
                 Err(error) => return Err(error),
             }
         }

@@ -38,19 +38,32 @@ fn frames(text: &str) -> Vec<(&str, bool, Vec<u8>)> {
     frames
 }
 
-#[test]
-fn the_documented_example_is_what_the_server_does() {
+fn documented() -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/sdsp.md");
-    let text = std::fs::read_to_string(file).expect("it is there");
-    let frames = frames(&text);
-    assert_eq!(frames.len(), 12, "{frames:02x?}");
+    std::fs::read_to_string(file).expect("it is there")
+}
+
+/// The server of the example.
+fn server() -> Server<'static> {
     let names = ["plc", "tank"].map(str::to_owned).to_vec();
     let settings = Settings {
         steps: Some(1),
+        hang: HANG,
+        join: HANG,
         ..Settings::new(Nanos::from_millis(10), StartCondition::Names(names))
     };
+    Server::new(settings, Logic::new(), Nanos::ZERO).expect("right settings")
+}
+
+const HANG: Nanos = Nanos::from_secs(1);
+
+#[test]
+fn the_documented_example_is_what_the_server_does() {
+    let text = documented();
+    let frames = frames(&text);
+    assert_eq!(frames.len(), 12, "{frames:02x?}");
     let now = Nanos::ZERO;
-    let mut server = Server::new(settings, Logic::new(), now).expect("right settings");
+    let mut server = server();
     let mut seats: Vec<&str> = Vec::new();
     let mut sent: Vec<(usize, Vec<u8>)> = Vec::new();
     for (who, up, bytes) in &frames {
@@ -76,4 +89,104 @@ fn the_documented_example_is_what_the_server_does() {
     }
     assert!(sent.is_empty());
     assert!(matches!(server.outcome(), Some(Ok(_))));
+}
+
+/// Plays the example, with the client's bytes as `change` makes them, to its end: what was sent in vain, then silence.
+/// Tells how the run ended, and whether it hung on a client.
+fn play(frames: &[(&str, bool, Vec<u8>)], mut change: impl FnMut(usize, &mut Vec<u8>)) -> Ending {
+    let now = Nanos::ZERO;
+    let mut server = server();
+    let seats = ["tank", "plc"].map(|_| server.connected(now));
+    // What has arrived of each and is no whole frame yet; `None` when it has been told the end.
+    let mut streams = [Some(Vec::new()), Some(Vec::new())];
+    let sent = frames.iter().filter(|(_, up, _)| *up).enumerate();
+    for (number, (who, _, bytes)) in sent {
+        let at = usize::from(*who == "plc");
+        let mut bytes = bytes.clone();
+        change(number, &mut bytes);
+        if let Some(stream) = &mut streams[at] {
+            stream.extend(bytes);
+        }
+        let mut taken = 0;
+        while let Some(stream) = &streams[at] {
+            match wire::frame(&stream[taken..]) {
+                Ok(Some(frame)) => {
+                    taken += wire::HEADER + frame.len();
+                    hear(&mut server, now, seats[at], frame);
+                }
+                Ok(None) => break,
+                Err(why) => {
+                    server.violated(seats[at], &why);
+                    break;
+                }
+            }
+            while let Some((seat, message)) = server.poll() {
+                if matches!(message, tickbus_virtual_time::server::ToClient::End(_)) {
+                    streams[usize::from(seat != seats[0])] = None;
+                }
+            }
+        }
+        if let Some(stream) = &mut streams[at] {
+            stream.drain(..taken.min(stream.len()));
+        }
+    }
+    server.tick(HANG);
+    server.outcome().expect("no run hangs").clone()
+}
+
+type Ending = Result<tickbus_virtual_time::Outcome, tickbus_virtual_time::Ended>;
+
+#[test]
+fn any_bit_that_flips_changes_the_hash_or_ends_the_run_with_a_reason() {
+    let text = documented();
+    let frames = frames(&text);
+    let right = play(&frames, |_, _| {}).expect("it is right");
+    let sent = frames.iter().filter(|(_, up, _)| *up);
+    let lengths: Vec<usize> = sent.map(|(.., bytes)| bytes.len()).collect();
+    let mut ended = 0;
+    for (number, length) in lengths.iter().enumerate() {
+        for bit in 0..8 * length {
+            let flip = |at: usize, bytes: &mut Vec<u8>| {
+                if at == number {
+                    bytes[bit / 8] ^= 1 << (bit % 8);
+                }
+            };
+            match play(&frames, flip) {
+                Ok(outcome) => {
+                    // The multiple of a run of one step is in the hash; what a client reads is not.
+                    let is_of_reads = number < 2 && bit / 8 > length - 6;
+                    assert!(outcome.hash != right.hash || is_of_reads, "{number} {bit}");
+                }
+                Err(why) => {
+                    assert!(!why.reason.is_empty());
+                    ended += 1;
+                }
+            }
+        }
+    }
+    assert!(ended > 500, "{ended}");
+}
+
+#[test]
+fn a_client_that_breaks_off_anywhere_is_named() {
+    let text = documented();
+    let frames = frames(&text);
+    let sent: Vec<_> = frames.iter().filter(|(_, up, _)| *up).collect();
+    for (number, (who, _, bytes)) in sent.iter().enumerate() {
+        for length in 0..bytes.len() {
+            let cut = |at: usize, bytes: &mut Vec<u8>| {
+                if at == number {
+                    bytes.truncate(length);
+                } else if at > number {
+                    // Nobody is asked any more.
+                    bytes.clear();
+                }
+            };
+            let ended = play(&frames, cut).expect_err("it is cut off");
+            assert!(
+                ended.to_string().contains(who),
+                "{ended} for {who} at {number}"
+            );
+        }
+    }
 }

@@ -193,6 +193,65 @@ fn who_comes_late_or_second_to_shared_memory_is_refused() {
     assert_eq!(ended.cause, Cause::Lost);
 }
 
+/// Not a test by itself: the server that the next one starts.
+#[cfg(unix)]
+#[test]
+fn a_server_that_kills_itself_in_step_5() {
+    let Ok(name) = std::env::var("TICKBUS_TEST_SERVER") else {
+        return;
+    };
+    let settings = settings(20, &["one"]);
+    let listener = shared_memory::Listener::bind(&name, &settings).expect("a free name");
+    let logic = Logic::new().on_time(|access| {
+        if access.step().sequence == 5 {
+            std::process::abort();
+        }
+        Ok(())
+    });
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        controls: &Controls::default(),
+        news: &mut |_| {},
+    };
+    let _ = listener.run(settings, logic, hosting);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_server_that_crashes_at_shared_memory_is_noticed_and_replaced() {
+    let name = fresh_name();
+    let own = std::env::current_exe().expect("a path");
+    let mut child = std::process::Command::new(own)
+        .args(["--exact", "a_server_that_kills_itself_in_step_5"])
+        .env("TICKBUS_TEST_SERVER", &name)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let mut steps = 0;
+    let mut one = client("one", 1, &[], &[], |step, _, _| {
+        steps = step.sequence;
+        Ok(())
+    });
+    let ended = loop {
+        let ended = shared_memory::join(&name, &mut one).expect_err("it crashes");
+        if !ended.reason.contains("no server offers") {
+            break ended;
+        }
+        assert_eq!(child.try_wait().expect("it was started"), None);
+        thread::yield_now();
+    };
+    assert_eq!(
+        (ended.cause, &*ended.reason),
+        (Cause::Lost, "the server was lost: its process has ended")
+    );
+    assert_eq!(steps, 4);
+    assert!(!child.wait().expect("it was started").success());
+    // Its file is still there.
+    let settings = settings(1, &["one"]);
+    shared_memory::Listener::bind(&name, &settings).expect("it is replaced");
+}
+
 /// Not a test by itself: the client that the next one kills.
 #[cfg(unix)]
 #[test]

@@ -93,6 +93,10 @@ impl NamedMemory {
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = opened(path)?;
         let length = file.metadata()?.len();
+        if length == 0 {
+            // Its server is just making it.
+            return Err(ErrorKind::NotFound.into());
+        }
         let bytes = usize::try_from(length).map_err(|_| ErrorKind::OutOfMemory)?;
         let memory = SharedMemory::open(&file, bytes)?;
         let opened = Self {

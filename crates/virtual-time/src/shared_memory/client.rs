@@ -60,8 +60,8 @@ pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, En
     let spins = memory.memory().word(layout::SPINS).load(Relaxed);
     let line = MemoryLine {
         patience: Patience::new(u32::try_from(spins).unwrap_or(0)),
-        up: Mailbox::new(layout::up(seat)),
-        down: Mailbox::new(layout::down(seat)),
+        up: Mailbox::new(layout::up(seat), layout::down(seat)),
+        down: Mailbox::new(layout::down(seat), layout::up(seat)),
         memory,
         seat,
         stop: stop.clone(),
@@ -98,13 +98,12 @@ impl MemoryLine {
         if self.patience.look(|| down.has_frame(memory)) {
             return;
         }
-        let sleeps = memory.word(layout::owner(self.seat) + layout::SLEEPS);
-        sleeps.store(1, SeqCst);
+        self.down.set_sleeping(memory, true);
         if !self.down.has_frame(memory) {
             let (at, seen) = self.down.bell();
             memory.wait(at, seen, NAP.to_duration());
         }
-        sleeps.store(0, SeqCst);
+        self.down.set_sleeping(memory, false);
     }
 }
 

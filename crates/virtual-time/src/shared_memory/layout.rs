@@ -44,9 +44,6 @@ pub(super) const fn owner(seat: usize) -> usize {
     FIRST + seat * SEAT
 }
 
-/// Whether the client at a seat sleeps, seen from its owner.
-pub(super) const SLEEPS: usize = 8;
-
 /// The mailbox to the server.
 pub(super) const fn up(seat: usize) -> usize {
     owner(seat) + 16

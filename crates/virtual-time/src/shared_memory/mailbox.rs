@@ -8,30 +8,37 @@ use crate::wire::LONGEST_FRAME;
 
 /// Counts the frames that were put in; the reader waits for it.
 const POSTED: usize = 0;
-/// Counts the frames that were taken out; on a cache line of its own, since the other process writes it.
-const TAKEN: usize = 8;
-/// The bytes of the frame, and the frame itself.
+/// The bytes of the frame.
 const LENGTH: usize = 1;
-const FRAME: usize = 16;
+/// Counts the frames that were taken out of the mailbox the other way: so each cache line has one process that writes
+/// to it, and a short frame takes a single one.
+const TAKEN: usize = 2;
+/// Whether who posts here sleeps.
+const SLEEPS: usize = 3;
+/// The frame.
+const FRAME: usize = 4;
 
 /// One end of a mailbox.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mailbox {
     at: usize,
+    /// Where the mailbox the other way is.
+    back: usize,
     /// The frames that this end has posted or taken.
     count: u64,
 }
 
 impl Mailbox {
-    /// The end of an empty mailbox at this place.
-    pub(super) const fn new(at: usize) -> Self {
-        Self { at, count: 0 }
+    /// The end of an empty mailbox at this place; the one the other way is at `back`.
+    pub(super) const fn new(at: usize, back: usize) -> Self {
+        Self { at, back, count: 0 }
     }
 
     /// Makes the mailbox as good as new.
     pub(super) fn clear(&mut self, memory: &SharedMemory) {
         memory.word(self.at + POSTED).store(0, SeqCst);
-        memory.word(self.at + TAKEN).store(0, SeqCst);
+        memory.word(self.at + SLEEPS).store(0, SeqCst);
+        memory.word(self.back + TAKEN).store(0, SeqCst);
         self.count = 0;
     }
 
@@ -40,9 +47,21 @@ impl Mailbox {
         (self.at + POSTED, self.count)
     }
 
+    /// Says whether the reader of this mailbox sleeps.
+    pub(super) fn set_sleeping(&self, memory: &SharedMemory, sleeps: bool) {
+        memory
+            .word(self.back + SLEEPS)
+            .store(u64::from(sleeps), SeqCst);
+    }
+
+    /// Whether the reader of this mailbox sleeps.
+    pub(super) fn is_reader_sleeping(&self, memory: &SharedMemory) -> bool {
+        memory.word(self.back + SLEEPS).load(SeqCst) != 0
+    }
+
     /// Whether there is room for a frame: the other end has taken the one before.
     pub(super) fn has_room(&self, memory: &SharedMemory) -> bool {
-        memory.word(self.at + TAKEN).load(Acquire) == self.count
+        memory.word(self.back + TAKEN).load(Acquire) == self.count
     }
 
     /// Puts in a frame, for which there is [room](Self::has_room).
@@ -77,7 +96,7 @@ impl Mailbox {
         frame.resize(length, 0);
         memory.read(self.at + FRAME, frame);
         self.count = posted;
-        memory.word(self.at + TAKEN).store(posted, Release);
+        memory.word(self.back + TAKEN).store(posted, Release);
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ const YIELDS: u32 = 400;
 
 /// If others take the processor for longer than this, the computer is busy with something else: who sleeps then gets it
 /// back sooner than who lets others run.
-const LONG: Nanos = Nanos::from_micros(100);
+const LONG: Nanos = Nanos::from_millis(1);
 
 /// For how many waits that is remembered.
 const BUSY: u32 = 200;

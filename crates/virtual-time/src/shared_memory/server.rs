@@ -139,8 +139,8 @@ impl Seat {
     const fn new(at: usize) -> Self {
         Self {
             at,
-            up: Mailbox::new(layout::up(at)),
-            down: Mailbox::new(layout::down(at)),
+            up: Mailbox::new(layout::up(at), layout::down(at)),
+            down: Mailbox::new(layout::down(at), layout::up(at)),
             client: None,
             watch: None,
             waiting: None,
@@ -152,8 +152,7 @@ impl Seat {
     fn post(&mut self, memory: &NamedMemory, frame: &[u8]) {
         let memory = memory.memory();
         self.down.post(memory, frame);
-        let sleeps = memory.word(layout::owner(self.at) + layout::SLEEPS);
-        if sleeps.load(SeqCst) != 0 {
+        if self.down.is_reader_sleeping(memory) {
             memory.wake(self.down.bell().0);
         }
     }

@@ -28,6 +28,9 @@ const ROUND: Nanos = Nanos::from_millis(10);
 /// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
+/// How long the system may wait for a client's machine to acknowledge data, at least: it repeats what was lost on the way.
+const ACKNOWLEDGED: Nanos = Nanos::from_secs(10);
+
 /// How long a client may take to read that the run has ended.
 const FAREWELL: Nanos = Nanos::from_secs(1);
 
@@ -280,7 +283,7 @@ impl Host<'_, '_, '_> {
                 continue;
             }
             // If it broke at once, it will come again.
-            let Ok(connection) = Connection::new(stream, self.patience) else {
+            let Ok(connection) = Connection::new(stream, self.patience.max(ACKNOWLEDGED)) else {
                 continue;
             };
             let seat = self.server.connected(now);

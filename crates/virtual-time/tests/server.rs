@@ -1,0 +1,271 @@
+//! The server alone, on a clock that the test sets: who is refused and why, patience, pace, pause and stop.
+
+mod common;
+
+use common::{client, settings};
+use tickbus_base::time::Nanos;
+use tickbus_image::signal::DataType;
+use tickbus_virtual_time::server::{Control, Server, ToClient};
+use tickbus_virtual_time::{
+    Cause, Declaration, Ended, Logic, Outcome, Pacing, Settings, State, Variable,
+};
+
+const MS: i64 = 1_000_000;
+
+/// A server with the clients "a" and "b", which have joined; each writes a BOOL of its name.
+struct Bench {
+    server: Server<'static>,
+    now: Nanos,
+}
+
+fn declaration(name: &str) -> Declaration {
+    let mut declaration = client(name, 1, &[], &[], |_, _, _| Ok(())).declaration;
+    declaration.writes = vec![Variable::new(name, DataType::Bool)];
+    declaration
+}
+
+impl Bench {
+    fn new(settings: Settings) -> Self {
+        let now = Nanos::ZERO;
+        let server = Server::new(settings, Logic::new(), now).expect("right settings");
+        let mut bench = Self { server, now };
+        for name in ["a", "b"] {
+            let seat = bench.server.connected(now);
+            bench.server.join(now, seat, declaration(name));
+        }
+        bench
+    }
+
+    /// All have sent their initial values.
+    fn started(settings: Settings) -> Self {
+        let mut bench = Self::new(settings);
+        assert_eq!(bench.asked(), [0, 0]);
+        bench.answer(0);
+        bench
+    }
+
+    /// The steps that were asked for; 0 is the start.
+    #[track_caller]
+    fn asked(&mut self) -> Vec<u64> {
+        let mut asked = Vec::new();
+        while let Some((_, message)) = self.server.poll() {
+            asked.push(match message {
+                ToClient::Start { .. } => 0,
+                ToClient::Step { step, .. } => step.sequence,
+                ToClient::End(end) => panic!("{end:?}"),
+            });
+        }
+        asked
+    }
+
+    fn answer(&mut self, sequence: u64) {
+        for seat in 0..2 {
+            self.server.done(self.now, seat, sequence, [1].into_iter());
+        }
+    }
+
+    fn pass(&mut self, span: Nanos) {
+        self.now += span;
+        self.server.tick(self.now);
+    }
+
+    fn outcome(&self) -> Result<Outcome, Ended> {
+        self.server.outcome().expect("it has ended").clone()
+    }
+
+    #[track_caller]
+    fn ended(&self, text: &str) {
+        assert_eq!(self.outcome().expect_err(text).to_string(), text);
+    }
+}
+
+fn two() -> Settings {
+    settings(9, &["a", "b"])
+}
+
+/// The end that a seat is sent.
+fn refusal(server: &mut Server<'_>) -> (usize, Ended) {
+    match server.poll() {
+        Some((seat, ToClient::End(Err(ended)))) => (seat, ended.clone()),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn who_may_not_join_is_told_why_and_the_others_wait_on() {
+    let now = Nanos::ZERO;
+    let mut server = Server::new(two(), Logic::new(), now).expect("right settings");
+    let first = server.connected(now);
+    server.join(now, first, declaration("a"));
+    for (name, part) in [
+        ("a", "a client of the name \"a\" has joined already"),
+        (
+            "c",
+            "no client of the name \"c\" is expected; expected are \"a\", \"b\"",
+        ),
+        ("b ", "has blanks around it"),
+    ] {
+        let seat = server.connected(now);
+        server.join(now, seat, declaration(name));
+        let (told, ended) = refusal(&mut server);
+        assert_eq!((told, ended.cause), (seat, Cause::Refused));
+        assert!(ended.reason.contains(part), "{ended}");
+    }
+    let silent = server.connected(now);
+    server.tick(Nanos::from_secs(10));
+    let (told, ended) = refusal(&mut server);
+    assert_eq!((told, ended.cause), (silent, Cause::Hung));
+    server.join(now, first, declaration("a"));
+    let (told, ended) = refusal(&mut server);
+    assert_eq!(told, first);
+    assert_eq!(ended.reason, "joined twice");
+    assert_eq!(server.state(), State::Start);
+    assert_eq!(server.missing().as_deref(), Some("\"a\", \"b\""));
+}
+
+#[test]
+fn clients_that_never_come_end_the_wait() {
+    let now = Nanos::ZERO;
+    let limit = Nanos::from_secs(60);
+    let settings = Settings {
+        join: limit,
+        ..two()
+    };
+    let mut server = Server::new(settings, Logic::new(), now).expect("right settings");
+    assert_eq!(server.deadline(), limit);
+    let seat = server.connected(now);
+    server.join(now, seat, declaration("b"));
+    server.tick(limit);
+    let ended = server.outcome().expect("it has ended").clone();
+    let ended = ended.expect_err("it waits in vain").to_string();
+    let expected = "the run ended before its first step: still waiting for \"a\", after 1min";
+    assert_eq!(ended, expected);
+}
+
+#[test]
+fn every_violation_names_its_client_and_what_it_did() {
+    type Violation = fn(&mut Bench);
+    let cases: [(Violation, &str); 6] = [
+        (
+            |bench| bench.server.done(bench.now, 1, 0, [1].into_iter()),
+            "answered step 0 in step 1",
+        ),
+        (
+            |bench| {
+                for _ in 0..2 {
+                    bench.server.done(bench.now, 1, 1, [1].into_iter());
+                }
+            },
+            "answered step 1 twice",
+        ),
+        (
+            |bench| bench.server.done(bench.now, 1, 1, [1, 1].into_iter()),
+            "wrote 2 values in step 1, expected 1, one for each variable that it declared",
+        ),
+        (
+            |bench| bench.server.done(bench.now, 1, 1, [2].into_iter()),
+            "wrote a wrong value in step 1: the variable \"b\" is a BOOL, which 0x2 is no raw value of",
+        ),
+        (
+            |bench| bench.server.join(bench.now, 1, declaration("b")),
+            "joined twice",
+        ),
+        (
+            |bench| bench.server.gave_up(1, "no paper"),
+            "gave up: no paper",
+        ),
+    ];
+    for (violate, reason) in cases {
+        let mut bench = Bench::started(two());
+        assert_eq!(bench.asked(), [1, 1]);
+        violate(&mut bench);
+        bench.ended(&format!(
+            "the run ended before its first step: client \"b\" {reason}"
+        ));
+    }
+}
+
+#[test]
+fn all_who_hang_are_named_in_order() {
+    let mut bench = Bench::started(two());
+    bench.asked();
+    assert_eq!(bench.server.deadline(), Nanos::from_secs(10));
+    bench.pass(Nanos::from_secs(10) - Nanos(1));
+    assert_eq!(bench.server.outcome(), None);
+    bench.pass(Nanos(1));
+    bench.ended(
+        "the run ended before its first step: client \"a\" has not finished step 1 within 10s; neither have \"b\"",
+    );
+}
+
+#[test]
+fn the_pace_is_a_limit_and_late_steps_are_not_made_up_for() {
+    let settings = Settings {
+        pacing: Pacing::Times(0.5),
+        ..two()
+    };
+    let mut bench = Bench::started(settings);
+    // Steps of 1 ms, half as fast as the wall clock.
+    assert_eq!(bench.asked(), [1, 1]);
+    bench.answer(1);
+    assert_eq!(bench.asked(), [0; 0]);
+    assert_eq!(bench.server.deadline(), Nanos(2 * MS));
+    bench.pass(Nanos(2 * MS));
+    assert_eq!(bench.asked(), [2, 2]);
+    bench.pass(Nanos(5 * MS));
+    bench.answer(2);
+    assert_eq!(bench.asked(), [3, 3], "the step that is late comes at once");
+    bench.answer(3);
+    assert_eq!(bench.asked(), [0; 0], "and only that one");
+    assert_eq!(bench.server.deadline(), Nanos(8 * MS));
+}
+
+#[test]
+fn a_pause_holds_between_steps_and_single_steps_go_on() {
+    let settings = Settings {
+        paused: true,
+        ..two()
+    };
+    let mut bench = Bench::started(settings);
+    assert_eq!(bench.asked(), [0; 0]);
+    assert!(bench.server.is_paused());
+    assert_eq!(bench.server.deadline(), Nanos::MAX, "a pause has no limit");
+    bench.pass(Nanos::from_secs(3600));
+    bench.server.control(bench.now, Control::Step(2));
+    assert_eq!(bench.asked(), [1, 1]);
+    bench.answer(1);
+    assert_eq!(bench.asked(), [2, 2]);
+    bench.answer(2);
+    assert_eq!(bench.asked(), [0; 0]);
+    bench.server.control(bench.now, Control::Run);
+    assert_eq!(bench.asked(), [3, 3]);
+    bench.server.control(bench.now, Control::Pause);
+    bench.answer(3);
+    assert_eq!(bench.asked(), [0; 0]);
+    bench.server.control(bench.now, Control::Stop);
+    assert_eq!(bench.outcome().map(|outcome| outcome.steps), Ok(3));
+}
+
+#[test]
+fn a_stop_waits_for_the_step_but_not_for_long() {
+    let mut bench = Bench::started(two());
+    bench.asked();
+    bench.server.control(bench.now, Control::Stop);
+    assert_eq!(bench.server.outcome(), None);
+    bench.answer(1);
+    assert_eq!(bench.outcome().map(|outcome| outcome.steps), Ok(1));
+
+    let mut bench = Bench::started(two());
+    bench.asked();
+    bench.server.done(bench.now, 0, 1, [1].into_iter());
+    bench.server.control(bench.now, Control::Stop);
+    assert_eq!(bench.server.deadline(), Nanos::from_secs(1));
+    bench.pass(Nanos::from_secs(1));
+    bench.ended(
+        "the run ended before its first step: client \"b\" has not finished step 1 within 1s after the run was stopped",
+    );
+    assert_eq!(
+        bench.outcome().expect_err("it was stopped").cause,
+        Cause::Stopped
+    );
+}

@@ -6,6 +6,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
+use std::path::Path;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
@@ -55,6 +56,22 @@ fn main() {
         println!("rust sdsp.bare.{count} {:.0}", median(&mut bares));
         println!("rust sdsp.tcp.{count} {:.0}", median(&mut ours));
         println!("rust sdsp.tcp.{count}.ratio {:.3}", median(&mut ratios));
+    }
+    // A server that others wrote, where `tools/peers` could install it; it takes seconds to begin.
+    for count in [2, 8] {
+        if !measured || !wanted(&format!("helics.{count}")) {
+            continue;
+        }
+        let round = |_| Some((helics(count, span)?, bare(count, span)));
+        let Some(rounds) = (0..3).map(round).collect::<Option<Vec<_>>>() else {
+            break;
+        };
+        let (mut theirs, mut ratios): (Vec<_>, Vec<_>) = rounds
+            .iter()
+            .map(|(rate, bare)| (*rate, rate / bare))
+            .unzip();
+        println!("rust sdsp.helics.{count} {:.0}", median(&mut theirs));
+        println!("rust sdsp.helics.{count}.ratio {:.3}", median(&mut ratios));
     }
     // The server as a third process, and in the process of one of the clients.
     #[cfg(unix)]
@@ -194,7 +211,22 @@ fn bare(count: usize, span: Duration) -> f64 {
     rate
 }
 
-/// Settings for this many clients; the logic notes when a step begins, and so the steps per second.
+/// Steps per second of HELICS, if it is installed.
+fn helics(count: usize, span: Duration) -> Option<f64> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let output = Command::new(root.join("target/peers/helics/bin/python"))
+        .arg(root.join("benches/peers/helics_steps.py"))
+        .args([count.to_string(), span.as_secs_f64().to_string()])
+        .output();
+    let Ok(output) = output else {
+        eprintln!("HELICS is not installed (tools/peers)");
+        return None;
+    };
+    let rate = String::from_utf8_lossy(&output.stdout).trim().parse();
+    Some(rate.unwrap_or_else(|_| panic!("HELICS: {}", String::from_utf8_lossy(&output.stderr))))
+}
+
+/// Settings for this many clients.
 fn settings(count: usize) -> Settings {
     Settings::new(Nanos::from_millis(1), StartCondition::Count(count))
 }

@@ -1,8 +1,10 @@
-//! The gateway with a PLC that somebody else wrote behind it: pymodbus polls it as its remote I/O.
-#![allow(missing_docs, reason = "a test")]
+//! The gateway with PLCs behind it that speak by somebody else's software: pymodbus polls it as its remote I/O, rust7
+//! reads and writes it by S7 communication.
+#![allow(missing_docs, clippy::unnecessary_wraps, reason = "tests of one shape")]
 
 mod foreign;
 
+use std::net::SocketAddr;
 use std::num::NonZeroU32;
 use std::process::{ExitCode, Stdio};
 use std::thread;
@@ -12,7 +14,7 @@ use tickbus::driver::{Gateway, GatewayOptions};
 use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::tcp::Address;
 use tickbus::signal::DataType;
-use tickbus::time::{Monotonic, Nanos, Stop};
+use tickbus::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus::virtual_time::{
     Controls, Declaration, Hosting, Logic, Meeting, Outcome, Participant, Settings, StartCondition,
     Step, Variable, tcp,
@@ -28,9 +30,9 @@ id   = 1
 name = "cell"
 
 [fieldbus]
-kind    = "modbus-server"
 address = "127.0.0.1:0"
 max_age = "20s"
+{kind}
 
 [[signal]]
 name    = "sync.go"
@@ -58,10 +60,19 @@ address = "%QW4"
 type    = "INT"
 "#;
 
+const MODBUS: &str = "kind = \"modbus-server\"";
+
+const S7: &str = "kind = \"s7-server\"\n\
+    db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\" }]";
+
+/// A PLC that finds the gateway at this address, and delays its answers by this seed; what waits for its end, and tells how
+/// many steps it had.
+type Plc = fn(SocketAddr, u32) -> Result<Box<dyn FnOnce() -> u64>, Absent>;
+
 fn main() -> ExitCode {
     foreign::main(&[(
-        "a_plc_of_pymodbus_is_in_step_whatever_time_it_takes",
-        pymodbus_in_step,
+        "plcs_of_pymodbus_and_rust7_are_in_step_whatever_time_they_take",
+        plcs_in_step,
     )])
 }
 
@@ -86,9 +97,77 @@ impl Participant for Machine {
     }
 }
 
-fn run(seed: u32) -> Result<Outcome, Absent> {
+/// A PLC of pymodbus.
+fn pymodbus(address: SocketAddr, seed: u32) -> Result<Box<dyn FnOnce() -> u64>, Absent> {
     let mut python = foreign::python_with("main", &["pymodbus"])?;
-    let config = Config::parse("driver.cfg", CONFIG).unwrap_or_else(|why| panic!("{why}"));
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/modbus_sync_plc.py"
+    );
+    let numbers = [u64::from(address.port()), STEPS, seed.into()].map(|n| n.to_string());
+    python.args([script, "127.0.0.1"]).args(numbers);
+    let mut plc = python
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    Ok(Box::new(move || {
+        drop(plc.stdin.take());
+        let told = plc.wait_with_output().expect("it ends");
+        let told = String::from_utf8_lossy(&told.stdout).into_owned();
+        let (_, steps) = told.split_once("ok steps=").expect(&told);
+        steps.trim().parse().expect("a number")
+    }))
+}
+
+/// The same with rust7.
+fn rust7(address: SocketAddr, seed: u32) -> Result<Box<dyn FnOnce() -> u64>, Absent> {
+    let ended = Stop::new();
+    let thread = thread::spawn({
+        let ended = ended.clone();
+        move || s7_plc(address.port(), seed, &ended)
+    });
+    Ok(Box::new(move || {
+        ended.stop();
+        thread.join().expect("no panic")
+    }))
+}
+
+fn s7_plc(port: u16, seed: u32, ended: &Stop) -> u64 {
+    let mut client = rust7::client::S7Client::new();
+    client.set_connection_port(port).expect("not connected yet");
+    let connected = client.connect_rack_slot("127.0.0.1", 0, 1);
+    connected.expect("connects");
+    client.write_db(1, 0, &[0; 6]).expect("DB 1 is there");
+    let clock = Monotonic::shared();
+    let (mut last, mut count, mut random) = (0_u32, 0_u32, seed);
+    while !ended.is_stopped() {
+        let mut inputs = [0; 10];
+        client.read_db(2, 0, &mut inputs).expect("DB 2 is there");
+        let double = |at| u32::from_be_bytes(*inputs[at..].first_chunk().expect("four bytes"));
+        let (go, millis) = (double(0), double(4));
+        if go == last {
+            continue;
+        }
+        assert_eq!((go, millis), (last + 1, 10 * count));
+        (last, count) = (go, count + 1);
+        client.write_db(1, 4, &[0xFF; 2]).expect("DB 1 is there");
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let pause = Nanos::from_micros(i64::from(random >> 22));
+        clock.wait_until(clock.now() + pause, ended);
+        let position = u32::from(u16::from_be_bytes([inputs[8], inputs[9]]));
+        let speed = u16::try_from((position + count) % 1000).expect("small");
+        let written = client.write_db(1, 4, &speed.to_be_bytes());
+        written.expect("DB 1 is there");
+        let answered = client.write_db(1, 0, &go.to_be_bytes());
+        answered.expect("DB 1 is there");
+    }
+    count.into()
+}
+
+fn run(kind: &str, plc: Plc, seed: u32) -> Result<Outcome, Absent> {
+    let text = CONFIG.replace("{kind}", kind);
+    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
     let options = GatewayOptions {
         client: None,
         multiple: NonZeroU32::new(10).expect("not 0"),
@@ -97,28 +176,15 @@ fn run(seed: u32) -> Result<Outcome, Absent> {
     let gateway = Gateway::open(&config, options, Monotonic::shared(), &Stop::new());
     let mut gateway = gateway.expect("opens");
     let address = eventually("it listens", || gateway.fact("address"));
-    let (host, port) = address.rsplit_once(':').expect("an address");
-    let script = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/peers/modbus_sync_plc.py"
-    );
-    let (steps, seed) = (STEPS.to_string(), seed.to_string());
-    python.args([script, host, port, &steps, &seed]);
-    let plc = python.stdin(Stdio::piped()).stdout(Stdio::piped());
-    let mut plc = plc.spawn().expect("it runs");
+    let end_of_plc = plc(address.parse().expect("an address"), seed)?;
     gateway.await_plc().expect("it is there");
 
     let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
-    let meeting = Meeting::Tcp(Address::local(listener.address().port()));
+    let address = Address::local(listener.address().port());
     let mut settings = Settings::new(Nanos::from_millis(1), StartCondition::Count(2));
     settings.steps = Some(10 * STEPS);
     let outcome = thread::scope(|scope| {
-        scope.spawn(|| {
-            let Meeting::Tcp(address) = &meeting else {
-                unreachable!("it is")
-            };
-            tcp::join(address, &mut Machine(0)).expect("as planned")
-        });
+        scope.spawn(|| tcp::join(&address, &mut Machine(0)).expect("as planned"));
         let server = scope.spawn(|| {
             let hosting = Hosting {
                 clock: &*Monotonic::shared(),
@@ -127,20 +193,21 @@ fn run(seed: u32) -> Result<Outcome, Absent> {
             };
             listener.run(settings, Logic::new(), hosting)
         });
+        let meeting = Meeting::Tcp(address.clone());
         gateway.take_part(&meeting).expect("as planned");
         server.join().expect("no panic").expect("as planned")
     });
-    drop(plc.stdin.take());
-    let told = plc.wait_with_output().expect("it ends");
-    let told = String::from_utf8_lossy(&told.stdout).into_owned();
-    assert!(told.contains(&format!("ok steps={STEPS}")), "{told}");
+    assert_eq!(end_of_plc(), STEPS);
     gateway.close();
     Ok(outcome)
 }
 
-fn pymodbus_in_step() -> Result<(), Absent> {
-    let one = run(1)?;
+/// The bus makes no difference to the trace, and neither does the time that a PLC takes.
+fn plcs_in_step() -> Result<(), Absent> {
+    let one = run(S7, rust7, 1)?;
     assert_eq!(one.steps, 10 * STEPS);
-    assert_eq!(run(2)?, one, "the PLC took other times");
+    assert_eq!(run(S7, rust7, 2)?, one, "it took other times");
+    assert_eq!(run(MODBUS, pymodbus, 1)?, one, "over another bus");
+    assert_eq!(run(MODBUS, pymodbus, 2)?, one, "it took other times");
     Ok(())
 }

@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 mod fixture;
+mod lockstep;
 
 use std::fs;
 use std::path::{Path, PathBuf};

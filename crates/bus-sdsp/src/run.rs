@@ -176,7 +176,7 @@ pub fn connect(
         let client = Client::new(declaration.clone())
             .map_err(|mistake| ended(Cause::Configuration, mistake.to_string()))?;
         match meeting.connect(client, stop) {
-            Err(_) if now < end && !stop.is_stopped() => {
+            Err(ended) if ended.cause == Cause::Lost && now < end && !stop.is_stopped() => {
                 clock.wait_until((now + PAUSE).min(end), stop);
             }
             connected => return connected,

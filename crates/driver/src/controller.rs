@@ -23,7 +23,8 @@ pub struct Host(HostThread);
 
 impl Host {
     /// Opens the bus that `config` describes and starts scanning `program` every `interval`. It does not wait
-    /// for the peer: scans begin at once, and are told that the peer is not there.
+    /// for the peer: scans begin at once, and are told that the peer is not there. On a bus that hands out the time they
+    /// begin with its first step, and `interval` is one of virtual time.
     ///
     /// # Errors
     ///

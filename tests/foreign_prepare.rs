@@ -470,7 +470,7 @@ fn the_blocks_in_xml_compile() -> Result<(), Absent> {
         let blocks = project::structured_text(&xml);
         whole += blocks.split("CONFIGURATION").next().unwrap_or_default();
     }
-    Stepped::load(&compiler, &(whole + &bench)).step(10);
+    Stepped::load(&compiler, &(whole + bench.as_str())).step(10);
     Ok(())
 }
 

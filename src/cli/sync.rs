@@ -26,7 +26,7 @@ pub(super) struct Arguments {
     #[command(subcommand)]
     other: Option<Other>,
 
-    /// The file of the run, with a [sync] table.
+    /// The file of the run: what its table "sync" says is in docs/sdsp.md.
     #[arg(required = true)]
     file: Option<PathBuf>,
 

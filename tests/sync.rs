@@ -143,7 +143,7 @@ fn a_paused_run_is_stepped_and_stopped_by_commands() {
         }
         assert!(
             sync.line()
-                .contains("\"nonsense\" is no command; commands are pause")
+                .contains("\"nonsense\" is not a command; commands are pause")
         );
         let outcome = joined.join().expect("no panic").expect("it was stopped");
         assert!(outcome.steps <= 4, "{outcome:?}");
@@ -168,7 +168,7 @@ fn an_interrupt_while_it_waits_ends_it_and_says_for_whom() {
     let reason = "stopped while it waited for \"a\", \"b\"";
     assert_eq!(
         last,
-        format!("sync: failed cause=stopped steps=0 reason=\"{reason}\"")
+        format!("sync: failed cause=stopped steps=0 reason={reason:?}")
     );
     assert_eq!(code, Some(3));
 }

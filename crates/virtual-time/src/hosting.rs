@@ -41,7 +41,9 @@ impl Controls {
 
     /// Passes on what was asked.
     pub(crate) fn apply(&self, now: Nanos, server: &mut Server<'_>) {
-        for control in self.lock().drain(..) {
+        // A hook may send one, too.
+        let asked = std::mem::take(&mut *self.lock());
+        for control in asked {
             server.control(now, control);
         }
         if self.stop.is_stopped() {

@@ -149,11 +149,14 @@ fn steps(value: &Value<'_>, step: Option<Nanos>) -> Option<u64> {
         let (below, above) = (until.0 / step.0, until.0 / step.0 + 1);
         value.wrong(
             format!("\"until\" is {until}, which is no whole number of steps of {step}"),
-            format!(
-                "write \"{}\" or \"{}\"",
-                step.times(below.max(1)),
-                step.times(above)
-            ),
+            match below {
+                0 => format!("write \"{step}\" at least"),
+                _ => format!(
+                    "write \"{}\" or \"{}\"",
+                    step.times(below),
+                    step.times(above)
+                ),
+            },
         );
         return None;
     }

@@ -16,6 +16,7 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Mistakes, PlacedMistake, load_text};
 use tickbus_image::signal::DataType;
 
+use crate::declaration::check_name;
 use crate::logic::Access;
 use crate::{Logic, Variable};
 use frame::Frame;
@@ -82,6 +83,8 @@ pub fn parse(file: &str, text: &str) -> Result<Logic<'static>, Mistakes> {
         .set_max_array_size(LARGEST)
         .set_max_map_size(LARGEST)
         .disable_symbol("eval")
+        // It would stop the run, and the server with it.
+        .disable_symbol("sleep")
         .on_print(|text| log::info!("script: {text}"))
         .on_debug(|text, _, place| log::info!("script, {place}: {text}"));
     offer_registration(&mut engine, &registered);
@@ -151,6 +154,10 @@ fn offer_registration(engine: &mut Engine, registered: &Arc<Mutex<Registered>>) 
                 .parse()
                 .map_err(|error| format!("\"{data_type}\" is {error}"))?;
             let mut registered = open(&into)?;
+            check_name("variable", name).map_err(|mistake| mistake.to_string())?;
+            if registered.variables.iter().any(|known| known.name == name) {
+                return Err(format!("the variable \"{name}\" is declared twice").into());
+            }
             registered.variables.push(Variable::new(name, data_type));
             Ok(())
         },

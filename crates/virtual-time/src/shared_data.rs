@@ -171,7 +171,9 @@ impl SharedData {
 
 fn no_value(variable: &Variable, value: u64) -> String {
     let Variable { name, data_type } = variable;
-    format!("the variable \"{name}\" is a {data_type}, which 0x{value:x} is no raw value of")
+    format!(
+        "the variable \"{name}\" has the type {data_type}, and 0x{value:x} is not a value of it"
+    )
 }
 
 fn shown(owner: Option<&str>) -> String {

@@ -170,7 +170,7 @@ fn logic_runs_in_its_order_and_its_writes_join_the_commit() {
 #[test]
 fn logic_that_fails_or_oversteps_ends_the_run() {
     let plc = || {
-        client("plc", 1, &["a"], &[], |_, _, writes| {
+        client("plc", 1, &["a"], &["a"], |_, _, writes| {
             writes[0] += 1;
             Ok(())
         })
@@ -184,6 +184,13 @@ fn logic_that_fails_or_oversteps_ends_the_run() {
     );
     assert_eq!((late.cause, late.steps), (Cause::Logic, 2));
     assert!(late.reason.ends_with("three is too many"), "{late}");
+    let read = ended(
+        Logic::new().on_read("a", |access| match access.step().sequence {
+            2 => Err("nobody reads it thrice".to_owned()),
+            _ => Ok(()),
+        }),
+    );
+    assert_eq!((read.cause, read.steps), (Cause::Logic, 2), "{read}");
     for (logic, part) in [
         (Logic::new().on_time(|a| a.set("a", 1)), "is a client's"),
         (Logic::new().on_time(|a| a.set("b", 1)), "no variable \"b\""),
@@ -195,7 +202,7 @@ fn logic_that_fails_or_oversteps_ends_the_run() {
             Logic::new()
                 .variable(Variable::new("b", DataType::Bool))
                 .on_time(|access| access.set("b", 2)),
-            "no raw value",
+            "is not a value of it",
         ),
         (
             Logic::new()

@@ -114,13 +114,43 @@ fn who_may_not_join_is_told_why_and_the_others_wait_on() {
     let silent = server.connected(now);
     server.tick(Nanos::from_secs(10));
     let (told, ended) = refusal(&mut server);
-    assert_eq!((told, ended.cause), (silent, Cause::Hung));
+    assert_eq!((told, ended.cause), (silent, Cause::Refused));
     server.join(now, first, declaration("a"));
     let (told, ended) = refusal(&mut server);
     assert_eq!(told, first);
     assert_eq!(ended.reason, "joined twice");
     assert_eq!(server.state(), State::Start);
     assert_eq!(server.missing().as_deref(), Some("\"a\", \"b\""));
+}
+
+#[test]
+fn an_answer_before_the_question_was_sent_is_none() {
+    let now = Nanos::ZERO;
+    let mut server = Server::new(settings(9, &["a"]), Logic::new(), now).expect("right settings");
+    let seat = server.connected(now);
+    server.join(now, seat, declaration("a"));
+    // All of it in one piece, before the server has sent anything.
+    server.done(now, seat, 0, [1].into_iter());
+    let ended = server.outcome().expect("it has ended").clone();
+    let ended = ended.expect_err("it violates the protocol");
+    assert_eq!(ended.cause, Cause::Protocol);
+    assert_eq!(ended.reason, "answered before it was asked");
+}
+
+#[test]
+fn the_time_that_the_server_takes_is_not_the_clients() {
+    let now = Nanos::ZERO;
+    let mut server = Server::new(settings(9, &["a"]), Logic::new(), now).expect("right settings");
+    let seat = server.connected(now);
+    server.join(now, seat, declaration("a"));
+    while server.poll().is_some() {}
+    let sent = Nanos::from_secs(11);
+    server.sent(sent);
+    server.tick(sent);
+    assert_eq!(server.outcome(), None, "it was asked just now");
+    server.tick(sent + Nanos::from_secs(10));
+    let ended = server.outcome().expect("it hangs").clone();
+    assert_eq!(ended.expect_err("it hangs").cause, Cause::Hung);
 }
 
 #[test]
@@ -164,7 +194,7 @@ fn every_violation_names_its_client_and_what_it_did() {
         ),
         (
             |bench| bench.server.done(bench.now, 1, 1, [2].into_iter()),
-            "wrote a wrong value in step 1: the variable \"b\" is a BOOL, which 0x2 is no raw value of",
+            "wrote a wrong value in step 1: the variable \"b\" has the type BOOL, and 0x2 is not a value of it",
         ),
         (
             |bench| bench.server.join(bench.now, 1, declaration("b")),
@@ -194,7 +224,7 @@ fn all_who_hang_are_named_in_order() {
     assert_eq!(bench.server.outcome(), None);
     bench.pass(Nanos(1));
     bench.ended(
-        "the run ended before its first step: client \"a\" has not finished step 1 within 10s; neither have \"b\"",
+        "the run ended before its first step: client \"a\" has not finished step 1 within 10s; nor has \"b\"",
     );
 }
 

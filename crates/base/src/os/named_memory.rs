@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rustix::fs::{FlockOperation, OFlags, flock};
 
@@ -46,7 +47,8 @@ impl NamedMemory {
         for _ in 0..ATTEMPTS {
             match opened(path) {
                 Ok(left) => {
-                    if !lock(&left)? {
+                    // Someone who only looks whether it is served has it locked for a moment.
+                    if !lock_soon(&left)? {
                         return Err(in_use());
                     }
                     // Nobody serves it. Processes that still have it keep the old one.
@@ -157,6 +159,17 @@ fn lock(file: &File) -> io::Result<bool> {
         Err(error) if io::Error::from(error).kind() == ErrorKind::WouldBlock => Ok(false),
         Err(error) => Err(error.into()),
     }
+}
+
+/// The same, for some 50 ms.
+fn lock_soon(file: &File) -> io::Result<bool> {
+    for _ in 0..50 {
+        if lock(file)? {
+            return Ok(true);
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Ok(false)
 }
 
 /// Whether `path` still leads to this file.

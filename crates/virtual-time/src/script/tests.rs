@@ -97,11 +97,11 @@ fn a_hook_that_fails_or_never_ends_ends_the_run() {
         ),
         (
             "on_time(|| set(\"changes\", 40000));",
-            "is a INT, and cannot be 40000",
+            "has the type INT and cannot hold 40000",
         ),
         (
             "on_time(|| set(\"full\", 1));",
-            "is a BOOL, and cannot be 1",
+            "has the type BOOL and cannot hold 1",
         ),
         (
             "on_time(|| reader());",

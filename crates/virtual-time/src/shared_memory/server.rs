@@ -194,13 +194,15 @@ impl Host<'_, '_, '_> {
 
     /// Sends all messages.
     fn send(&mut self, now: Nanos) {
+        let mut has_sent = false;
         loop {
             while let Some(line) = self.server.news() {
                 (self.hosting.news)(&line);
             }
             let Some((client, message)) = self.server.poll() else {
-                return;
+                break;
             };
+            has_sent = true;
             if self.locals.take(client, &message) {
                 continue;
             }
@@ -217,6 +219,9 @@ impl Host<'_, '_, '_> {
                 // Only the end of the run comes before the client has taken the message before it.
                 seat.waiting = Some((frame.to_vec(), now + FAREWELL));
             }
+        }
+        if has_sent {
+            self.server.sent(self.hosting.clock.now());
         }
     }
 
@@ -299,7 +304,8 @@ impl Host<'_, '_, '_> {
                 seat.waiting = Some((frame, until));
             }
         }
-        while self.seats[at].client.is_some() && self.seats[at].up.has_frame(self.memory.memory()) {
+        // One frame in each turn: a client that posts without end, or posts what is no frame, holds nobody up.
+        if self.seats[at].client.is_some() && self.seats[at].up.has_frame(self.memory.memory()) {
             self.hear(at);
         }
         let seat = &mut self.seats[at];

@@ -165,13 +165,15 @@ impl Host<'_, '_, '_> {
 
     /// Sends all messages.
     fn send(&mut self, now: Nanos) {
+        let mut has_sent = false;
         loop {
             while let Some(line) = self.server.news() {
                 (self.hosting.news)(&line);
             }
             let Some((seat, message)) = self.server.poll() else {
-                return;
+                break;
             };
+            has_sent = true;
             if self.locals.take(seat, &message) {
                 continue;
             }
@@ -188,6 +190,9 @@ impl Host<'_, '_, '_> {
             } else if let Err(error) = sent {
                 self.lose(seat, &error.to_string());
             }
+        }
+        if has_sent {
+            self.server.sent(self.hosting.clock.now());
         }
     }
 

@@ -173,7 +173,7 @@ class ClientTest {
         });
         assertSame(Cause.REFUSED, ended.cause());
         assertEquals(Optional.empty(), ended.client());
-        assertEquals("the run ended after 7 steps: too late", ended.getMessage());
+        assertEquals("the server refused this client: too late", ended.getMessage());
     }
 
     @Test

@@ -1,12 +1,16 @@
 //! Steps per second of an empty run, compared with a bare TCP coordinator: a loop that sends one message to each client
-//! and waits for their answers. In alternating rounds of one run, with each client a process of its own.
+//! and waits for their answers; and with HELICS if it is installed. In alternating rounds of one run, with each client a
+//! process of its own.
 //!
 //! Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
 #![allow(missing_docs, reason = "a bench")]
+#![allow(unsafe_code, reason = "HELICS is a library in C")]
+
+#[path = "lockstep/helics.rs"]
+mod helics;
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
-use std::path::Path;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
@@ -41,37 +45,33 @@ fn main() {
         let mut words = arguments[1..].iter().filter(|word| !word.starts_with("--"));
         words.next().is_none_or(|word| name.contains(&**word))
     };
+    let with_helics = measured && helics::installed();
     for count in [2, 8] {
         if !wanted(&format!("tcp.{count}")) {
             continue;
         }
         let (mut bares, mut ours, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut others, mut others_ratios) = (Vec::new(), Vec::new());
         for _ in 0..rounds {
             let bare = bare(count, span);
             let tcp = over_tcp(count, 0, span);
             bares.push(bare);
             ours.push(tcp);
             ratios.push(tcp / bare);
+            if with_helics {
+                let rate = helics::steps(count, span);
+                others.extend(rate);
+                others_ratios.extend(rate.map(|rate| rate / bare));
+            }
         }
         println!("rust sdsp.bare.{count} {:.0}", median(&mut bares));
         println!("rust sdsp.tcp.{count} {:.0}", median(&mut ours));
         println!("rust sdsp.tcp.{count}.ratio {:.3}", median(&mut ratios));
-    }
-    // A server that others wrote, where `tools/peers` could install it; it takes seconds to begin.
-    for count in [2, 8] {
-        if !measured || !wanted(&format!("helics.{count}")) {
-            continue;
+        if !others.is_empty() {
+            println!("rust sdsp.helics.{count} {:.0}", median(&mut others));
+            let ratio = median(&mut others_ratios);
+            println!("rust sdsp.helics.{count}.ratio {ratio:.3}");
         }
-        let round = |_| Some((helics(count, span)?, bare(count, span)));
-        let Some(rounds) = (0..3).map(round).collect::<Option<Vec<_>>>() else {
-            break;
-        };
-        let (mut theirs, mut ratios): (Vec<_>, Vec<_>) = rounds
-            .iter()
-            .map(|(rate, bare)| (*rate, rate / bare))
-            .unzip();
-        println!("rust sdsp.helics.{count} {:.0}", median(&mut theirs));
-        println!("rust sdsp.helics.{count}.ratio {:.3}", median(&mut ratios));
     }
     // The server as a third process, and in the process of one of the clients.
     #[cfg(unix)]
@@ -135,6 +135,9 @@ impl Participant for Idle {
 }
 
 fn client(arguments: &[String]) {
+    if arguments[0] == "helics" {
+        return helics::client(&arguments[1..]);
+    }
     let [kind, address, name, variables] = arguments else {
         panic!("unexpected arguments {arguments:?}");
     };
@@ -209,21 +212,6 @@ fn bare(count: usize, span: Duration) -> f64 {
     drop(streams);
     wait(children);
     rate
-}
-
-/// Steps per second of HELICS, if it is installed.
-fn helics(count: usize, span: Duration) -> Option<f64> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let output = Command::new(root.join("target/peers/helics/bin/python"))
-        .arg(root.join("benches/peers/helics_steps.py"))
-        .args([count.to_string(), span.as_secs_f64().to_string()])
-        .output();
-    let Ok(output) = output else {
-        eprintln!("HELICS is not installed (tools/peers)");
-        return None;
-    };
-    let rate = String::from_utf8_lossy(&output.stdout).trim().parse();
-    Some(rate.unwrap_or_else(|_| panic!("HELICS: {}", String::from_utf8_lossy(&output.stderr))))
 }
 
 /// Settings for this many clients.

@@ -12,6 +12,8 @@ import sys
 
 from snakes.nets import Inhibitor, MultiArc, PetriNet, Place, StateGraph, Test, Transition, Value, dot
 
+ALWAYS = "always marked"
+
 
 class Net:
     def __init__(self, number):
@@ -22,7 +24,12 @@ class Net:
         self.arcs = []
 
     def finish(self):
-        # SNAKES takes one arc for each direction, place and transition; several kinds become one need.
+        # SNAKES never fires a transition without an input arc: here it tests a place that is always marked.
+        self.net.add_place(Place(ALWAYS, [dot]))
+        with_input = {transition for kind, _, transition, _ in self.arcs if kind != "OUTPUT"}
+        for transition in self.transitions:
+            if transition not in with_input:
+                self.net.add_input(ALWAYS, transition, Test(Value(dot)))
         for kind, place, transition, weight in self.arcs:
             tokens = [Value(dot)] * weight
             label = tokens[0] if weight == 1 else MultiArc(tokens)

@@ -28,10 +28,14 @@ class SnakesTest {
         SplitMix random = new SplitMix(1962);
         List<PetriNet> nets = new ArrayList<>();
         StringBuilder text = new StringBuilder();
-        for (int i = 0; i < NETS; i++) {
-            PetriNet net = i % 2 == 0 ? withoutCapacities(RandomNets.any(random, 4, 4)) : RandomNets.plain(random, 4, 4);
-            nets.add(net);
-            write(i, net, text);
+        for (int drawn = 0; nets.size() < NETS; drawn++) {
+            PetriNet net = drawn % 2 == 0 ? withoutCapacities(RandomNets.any(random, 4, 4)) : RandomNets.plain(random, 5, 4);
+            Reachability graph = Reachability.explore(net, LIMIT);
+            // Most are unbounded or have two markings: of those, a few.
+            if (graph.isComplete() && graph.size() > 4 || drawn % 60 == 0) {
+                write(nets.size(), net, text);
+                nets.add(net);
+            }
         }
         Path file = Files.writeString(folder.resolve("nets"), text);
         Path output = folder.resolve("output");
@@ -48,7 +52,7 @@ class SnakesTest {
             explored += ours.contains("more") ? 0 : 1;
             assertEquals(lines[i], ours, nets.get(i).arcs().toString());
         }
-        assertTrue(explored > NETS / 4, explored + " nets were small enough");
+        assertTrue(explored > NETS / 2, explored + " nets were small enough");
     }
 
     /** SNAKES has none. */

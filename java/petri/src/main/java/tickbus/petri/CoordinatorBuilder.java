@@ -20,6 +20,24 @@ public final class CoordinatorBuilder {
     long seed;
     int limit = 10_000;
 
+    /** A copy, which later calls do not change. */
+    private CoordinatorBuilder(CoordinatorBuilder of) {
+        net = of.net;
+        conditions = of.conditions.clone();
+        firing = of.firing.clone();
+        entry = of.entry.clone();
+        exit = of.exit.clone();
+        continuous = of.continuous.clone();
+        inputs.addAll(of.inputs);
+        outputs.addAll(of.outputs);
+        failSafe.addAll(of.failSafe);
+        reader = of.reader;
+        writer = of.writer;
+        listener = of.listener;
+        seed = of.seed;
+        limit = of.limit;
+    }
+
     CoordinatorBuilder(PetriNet net) {
         this.net = net;
         conditions = new Condition[net.transitions().size()];
@@ -105,8 +123,8 @@ public final class CoordinatorBuilder {
         return this;
     }
 
-    /** The coordinator, which has not scanned yet. */
+    /** A coordinator that has not scanned yet; what is bound later is not bound to it. */
     public Coordinator build() {
-        return new Coordinator(this);
+        return new Coordinator(new CoordinatorBuilder(this));
     }
 }

@@ -16,7 +16,7 @@ import java.util.Map;
  * undecidable; give the place a capacity, or use {@link Reachability}.
  */
 public final class Coverability {
-    /** So many tokens as one likes. */
+    /** No bound: for any number there is a reachable marking with more tokens than that. */
     public static final int OMEGA = Integer.MAX_VALUE;
 
     private final PetriNet net;
@@ -187,7 +187,7 @@ public final class Coverability {
         return markings.size();
     }
 
-    /** The tokens of a marking, with {@link #OMEGA} for a place that can have as many as one likes. */
+    /** The tokens of a marking, with {@link #OMEGA} for a place without a bound. */
     public int[] tokens(int number) {
         return Arrays.copyOf(markings.get(number), net.places().size());
     }

@@ -11,6 +11,9 @@ public final class FiringLog implements FiringListener {
 
     /** A log of the last {@code capacity} firings, 1 or more. */
     public FiringLog(PetriNet net, int capacity) {
+        if (capacity < 1) {
+            throw new IllegalArgumentException("a log of " + capacity + " firings; expected 1 or more");
+        }
         this.net = net;
         scans = new long[capacity];
         times = new long[capacity];

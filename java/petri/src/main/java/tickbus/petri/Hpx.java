@@ -55,6 +55,9 @@ public final class Hpx {
     }
 
     private Hpx(SourceText source, long unit) {
+        if (unit < 1) {
+            throw new IllegalArgumentException("a unit of " + unit + " ns; expected 1 or more");
+        }
         this.source = source;
         this.unit = unit;
     }

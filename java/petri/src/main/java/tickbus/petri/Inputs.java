@@ -8,7 +8,7 @@ public final class Inputs {
         this.signals = signals;
     }
 
-    /** The index of an input; an {@link IllegalArgumentException} if there is none of this name. */
+    /** The index of an input; an {@link IllegalArgumentException} if no input or output has this name. */
     public int index(String name) {
         return signals.index(name);
     }

@@ -164,6 +164,8 @@ public final class NetBuilder {
     private void checkName(String kind, String given, Map<String, ?> others) {
         if (given == null || given.isBlank()) {
             mistakes.add(kind + " number " + (others.size() + 1) + ": no name; expected one");
+        } else if (!given.equals(given.strip()) || given.chars().anyMatch(Character::isISOControl)) {
+            mistakes.add(kind + " '" + given + "': a blank at an end or a control character; expected a name without");
         } else if (others.containsKey(given)) {
             mistakes.add(kind + " " + given + ": given twice; expected a name of its own");
         }

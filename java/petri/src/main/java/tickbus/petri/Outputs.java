@@ -8,7 +8,7 @@ public final class Outputs {
         this.signals = signals;
     }
 
-    /** The index of an output; an {@link IllegalArgumentException} if there is none of this name. */
+    /** The index of an output; an {@link IllegalArgumentException} if no input or output has this name. */
     public int index(String name) {
         return signals.index(name);
     }

@@ -189,7 +189,7 @@ final class PnmlReader {
         nodes.put(node.id, node);
         children(element, inner -> {
             switch (inner) {
-                case "name" -> node.name = label(element, inner).strip();
+                case "name" -> node.name = label(element, inner).strip().replaceAll("\\s+", " ");
                 case "initialMarking" -> {
                     if (!tag.equals("place")) {
                         throw unexpected(element, inner);
@@ -375,7 +375,7 @@ final class PnmlReader {
                 return nanos;
             }
         } catch (NumberFormatException wrong) {
-            // told below
+            // The mistake below says what was expected.
         }
         throw source.mistake(node.line, element, "delay '" + SourceText.shortened(value) + "'; expected nanoseconds, 0 or more");
     }

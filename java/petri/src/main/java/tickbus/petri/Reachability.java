@@ -66,9 +66,7 @@ public final class Reachability {
                     continue;
                 }
                 System.arraycopy(tokens, 0, next, 0, tokens.length);
-                try {
-                    effects.fire(next, t);
-                } catch (ArithmeticException overflow) {
+                if (!hasFired(next, t)) {
                     return;
                 }
                 fired.set(t);
@@ -86,6 +84,16 @@ public final class Reachability {
         }
         firstEdge.add(targets.size());
         complete = true;
+    }
+
+    /** Fires, unless a place would have more tokens than an int can count. */
+    private boolean hasFired(int[] tokens, int t) {
+        try {
+            net.effects.fire(tokens, t);
+            return true;
+        } catch (ArithmeticException overflow) {
+            return false;
+        }
     }
 
     /** The net. */
@@ -304,7 +312,9 @@ public final class Reachability {
                         int fires = side == 0 ? pair.first() : pair.second();
                         int other = side == 0 ? pair.second() : pair.first();
                         System.arraycopy(tokens, 0, next, 0, tokens.length);
-                        net.effects.fire(next, fires);
+                        if (!hasFired(next, fires)) {
+                            continue;
+                        }
                         if (!net.effects.isEnabled(next, other) && seen.add((long) fires << 32 | other)) {
                             found.add(new Conflicts.Effective(fires, other, marking(number)));
                         }

@@ -255,6 +255,15 @@ class CoordinatorTest {
     }
 
     @Test
+    void whatIsBoundAfterBuildingIsNotBoundToThatCoordinator() {
+        CoordinatorBuilder builder = Coordinator.of(choice()).when("back", in -> false);
+        Coordinator coordinator = builder.build();
+        builder.when("a", in -> false).when("b", in -> false);
+        assertEquals(1, coordinator.scan(0));
+        assertEquals(0, builder.build().scan(0));
+    }
+
+    @Test
     void anUnknownNameIsRefusedAtOnce() {
         assertThrows(IllegalArgumentException.class, () -> Coordinator.of(choice()).when("c", in -> true));
         assertThrows(IllegalArgumentException.class, () -> Coordinator.of(choice()).inputs("a", "a").build());

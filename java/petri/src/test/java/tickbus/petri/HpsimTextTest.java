@@ -54,7 +54,7 @@ class HpsimTextTest {
     }
 
     @Test
-    void whatIsWrongIsToldWithLineAndElement() {
+    void whatIsWrongIsReportedWithLineAndElement() {
         assertTrue(mistake(Samples.PAPER.replace("(-1 0 1 0)", "(-1 x 1 0)"))
             .equals("n.txt:9: row 3, column 2: entry 'x'; expected a whole number"));
         assertTrue(mistake(Samples.PAPER.replace("(-1 0 1 0)", "(-1 0 1)")).contains("n.txt:9: row 3: 3 columns; expected 4"));

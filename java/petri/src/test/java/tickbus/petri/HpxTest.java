@@ -58,7 +58,7 @@ class HpxTest {
     }
 
     @Test
-    void whatIsWrongIsToldWithLineAndElement() {
+    void whatIsWrongIsReportedWithLineAndElement() {
         assertTrue(mistake(NET.replace("VERSION=0.9", "VERSION=1.0")).equals("n.hpx:3: DOCUMENT: VERSION 1.0; expected 0.9"));
         assertTrue(mistake(NET.replace("ARC_WEIGHT=4", "ARC_WEIGHT=-4")).contains("ARC_WEIGHT -4; expected 1 to"));
         assertTrue(mistake(NET.replace("ARC_WEIGHT=4", "ARC_WEIGHT=four")).contains("ARC_WEIGHT 'four'; expected a whole number"));

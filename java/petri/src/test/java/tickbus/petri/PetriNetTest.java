@@ -74,13 +74,13 @@ class PetriNetTest {
     }
 
     @Test
-    void allMistakesOfABuilderAreToldAtOnce() {
+    void allMistakesOfABuilderAreReportedAtOnce() {
         NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("w").capacity(3).place("a", -1).place("a")
             .place("b", 5).capacity(2).input("a").transition("t").input("nowhere").input("a", 0).output("b").output("b")
-            .transition(" ").build());
+            .transition(" ").place("a\u0007").build());
         for (String one : new String[] {"call place(...) before capacity", "place a: -1 tokens", "place a: given twice",
             "place b: 5 tokens; expected at most its capacity of 2", "there is no transition yet",
-            "there is no place 'nowhere'", "weight 0; expected 1 or more", "arc t -> b: given twice", "no name"}) {
+            "there is no place 'nowhere'", "weight 0; expected 1 or more", "arc t -> b: given twice", "no name", "a control character"}) {
             assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
         }
     }

@@ -70,7 +70,7 @@ class PnmlTest {
     }
 
     @Test
-    void whatIsWrongIsToldWithLineAndElement() {
+    void whatIsWrongIsReportedWithLineAndElement() {
         assertEquals("n.pnml:10: arc x2: target 'u' is not there; expected the id of a place or transition",
             mistake(PAGES.replace("id=\"x2\" source=\"a\" target=\"t\"", "id=\"x2\" source=\"a\" target=\"u\"")));
         assertTrue(mistake(PAGES.replace("ptnet", "symmetricnet")).contains("n.pnml:3: net n1: type 'http"));

@@ -101,7 +101,12 @@ class AnalysisTest {
         assertThrows(GaveUpException.class, () -> Semiflows.places(net, 3));
         assertThrows(GaveUpException.class, () -> Siphons.siphons(net, 10));
         PetriNet all = PetriNet.named("all").place("p").transition("t").output("p").build();
-        assertEquals(Verdict.UNKNOWN, Reachability.explore(all, 100_000).isBounded(), "it grows through all widths");
+        Reachability grown = Reachability.explore(all, 100_000);
+        assertEquals(Verdict.UNKNOWN, grown.isBounded());
+        for (int tokens : new int[] {0, 1, 2, 15, 16, 255, 256, 65_535, 65_536, 99_999}) {
+            assertEquals(tokens, grown.find(all.marking(tokens)), "packed anew with wider places");
+            assertEquals(tokens, grown.marking(tokens).get(0));
+        }
     }
 
     @Test
@@ -110,6 +115,7 @@ class AnalysisTest {
             .transition("make").input("idle").output("made").transition("put").input("made").output("idle").output("store", 2)
             .transition("dead").input("never").output("idle").build();
         Coverability cover = Coverability.explore(net, 1000);
+        assertEquals("net producer: 4 markings", cover.toString());
         assertEquals(Verdict.NO, cover.isBounded());
         assertEquals(Verdict.NO, cover.isSafe());
         assertEquals(1, cover.bound(0));
@@ -187,6 +193,14 @@ class AnalysisTest {
             }
         }
         assertTrue(flows > 50, flows + " semiflows");
+        for (int round = 0; round < 300; round++) {
+            PetriNet net = RandomNets.plain(random, 9, 4);
+            List<int[]> found = Semiflows.places(net, 10_000);
+            for (int[] flow : found) {
+                assertTrue(isFlow(net.incidence(), flow), net.arcs().toString());
+                assertTrue(found.stream().noneMatch(other -> other != flow && within(other, flow)), net.arcs().toString());
+            }
+        }
     }
 
     private static boolean isFlow(int[][] c, int[] weights) {

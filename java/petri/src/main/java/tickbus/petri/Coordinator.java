@@ -1,0 +1,325 @@
+package tickbus.petri;
+
+import java.util.Optional;
+import java.util.Set;
+import java.util.TreeSet;
+
+/**
+ * Runs a net as a control program, one {@link #scan} after the other.
+ *
+ * <p>A scan reads the inputs once. Then it fires until no transition is enabled, due and true: conditions are tested
+ * before one is chosen, so a false one starves nobody; the greatest priority fires first; among ready transitions of
+ * one priority that are in conflict, chance decides, by a seed; others fire in the order of the net. Then it runs the
+ * continuous actions of the marked places and writes the outputs. The same seed, times and inputs give the same
+ * firings. A scan allocates nothing in the steady state.
+ *
+ * <p>If something throws, or if the net does not come to rest, the controller stops for good with its outputs at their
+ * fail-safe values, and {@link #stop} says why. Not for several threads at once.
+ */
+public final class Coordinator {
+    /** How many of the last firings a livelock report looks at. */
+    private static final int RECENT = 256;
+
+    private enum Step { READER, CONDITION, FIRING, ENTRY, EXIT, CONTINUOUS, WRITER }
+
+    private final PetriNet net;
+    private final CoordinatorBuilder bound;
+    private final Inputs inputs;
+    private final Outputs outputs;
+    private final double[] failSafe;
+    private final SplitMix random;
+    private final int[] cluster;
+    private final int[] priority;
+    final Enabling enabling;
+    private final boolean[] timed;
+    /** Whether the delay of an enabled transition is over. */
+    private final boolean[] ripe;
+    /** Enabled, ripe, and true in this scan. */
+    private final IndexSet ready;
+    /** The scan in which the condition was last tested. */
+    private final long[] testedIn;
+    private final boolean[] holds;
+    /** A bit for each place that is marked and has a continuous action. */
+    private final long[] active;
+    private final int[] candidates;
+    private final int[] recent = new int[RECENT];
+    private long scans;
+    private long now = Long.MIN_VALUE;
+    private boolean scanning;
+    private Step step = Step.READER;
+    private int at;
+    private Stop stop;
+
+    Coordinator(CoordinatorBuilder bound) {
+        this.bound = bound;
+        net = bound.net;
+        inputs = new Inputs(new Signals("input", bound.inputs));
+        outputs = new Outputs(new Signals("output", bound.outputs));
+        failSafe = bound.failSafe.stream().mapToDouble(Double::doubleValue).toArray();
+        System.arraycopy(failSafe, 0, outputs.signals.values, 0, failSafe.length);
+        random = new SplitMix(bound.seed);
+        cluster = Conflicts.clusters(net);
+        int transitions = net.transitions().size();
+        priority = net.transitions().stream().mapToInt(Transition::priority).toArray();
+        timed = new boolean[transitions];
+        for (Transition transition : net.transitions()) {
+            timed[transition.index()] = transition.delay().kind() != Delay.Kind.NONE;
+        }
+        ripe = new boolean[transitions];
+        ready = new IndexSet(transitions);
+        testedIn = new long[transitions];
+        holds = new boolean[transitions];
+        active = new long[(net.places().size() + 63) / 64];
+        candidates = new int[transitions];
+        enabling = new Enabling(net, new Enabling.Watcher() {
+            @Override
+            public void enabled(int t) {
+                arm(t);
+            }
+
+            @Override
+            public void disabled(int t) {
+                ready.remove(t);
+                ripe[t] = false;
+                if (timed[t]) {
+                    enabling.due.remove(t);
+                }
+            }
+        });
+    }
+
+    /** Binds conditions and actions to this net. */
+    public static CoordinatorBuilder of(PetriNet net) {
+        return new CoordinatorBuilder(net);
+    }
+
+    /** Its net. */
+    public PetriNet net() {
+        return net;
+    }
+
+    /** The marking now, as a copy. */
+    public Marking marking() {
+        return new Marking(net, enabling.tokens.clone());
+    }
+
+    /** How many scans there have been, with the one that stopped it. */
+    public long scans() {
+        return scans;
+    }
+
+    /** Its outputs, for views; they are what was last written, unless called from an action. */
+    public Outputs outputs() {
+        return outputs;
+    }
+
+    /** Why it stopped; empty while it runs. */
+    public Optional<Stop> stop() {
+        return Optional.ofNullable(stop);
+    }
+
+    /** When a delay is over next; {@link Long#MAX_VALUE} if nothing waits for the time. */
+    public long nextDue() {
+        return enabling.due.next();
+    }
+
+    /**
+     * One scan at the time {@code nanos}, which must not go back. The clock may begin anywhere: tokens of the initial
+     * marking arrive with the first scan.
+     *
+     * @return how many transitions fired; 0 after the controller has stopped
+     */
+    public int scan(long nanos) {
+        if (nanos < now) {
+            throw new IllegalArgumentException("a scan at " + nanos + " ns after one at " + now
+                + "; expected a time that does not go back");
+        }
+        if (scanning) {
+            throw new IllegalStateException("a scan within a scan; an action must not call scan");
+        }
+        if (stop != null) {
+            return 0;
+        }
+        now = nanos;
+        scans++;
+        scanning = true;
+        try {
+            return run();
+        } catch (Throwable thrown) {
+            fail(thrown);
+            return 0;
+        } finally {
+            scanning = false;
+        }
+    }
+
+    private int run() {
+        step = Step.READER;
+        bound.reader.read(inputs.signals.values);
+        ready.clear();
+        if (scans == 1) {
+            enabling.start(now);
+            for (int p = 0; p < enabling.tokens.length; p++) {
+                if (enabling.tokens[p] > 0) {
+                    act(bound.entry, Step.ENTRY, p);
+                    mark(p);
+                }
+            }
+        }
+        while (enabling.due.isDue(now)) {
+            int index = enabling.due.pop();
+            if (index < timed.length) {
+                ripe[index] = true;
+            } else {
+                enabling.release(index - timed.length, now);
+            }
+        }
+        for (int i = 0; i < enabling.enabled.size(); i++) {
+            consider(enabling.enabled.get(i));
+        }
+        int fired = 0;
+        while (ready.size() > 0) {
+            if (fired == bound.limit) {
+                livelock();
+                return 0;
+            }
+            int choices = choose();
+            int t = choices == 1 ? candidates[0] : candidates[random.below(choices)];
+            recent[fired++ % RECENT] = t;
+            fire(t, choices);
+        }
+        for (int word = 0; word < active.length; word++) {
+            for (long bits = active[word]; bits != 0; bits &= bits - 1) {
+                act(bound.continuous, Step.CONTINUOUS, 64 * word + Long.numberOfTrailingZeros(bits));
+            }
+        }
+        step = Step.WRITER;
+        bound.writer.write(outputs.signals.values);
+        return fired;
+    }
+
+    private void act(Action[] actions, Step of, int index) {
+        if (actions[index] != null) {
+            step = of;
+            at = index;
+            actions[index].run(inputs, outputs);
+        }
+    }
+
+    /** An enabled transition waits for its delay, anew after each firing of its own. */
+    private void arm(int t) {
+        if (timed[t]) {
+            long delay = net.transition(t).delay().draw(random);
+            ripe[t] = delay == 0;
+            if (delay > 0) {
+                enabling.due.put(t, Enabling.after(now, delay));
+                ready.remove(t);
+            }
+        } else {
+            ripe[t] = true;
+        }
+        consider(t);
+    }
+
+    private void consider(int t) {
+        if (!ripe[t]) {
+            return;
+        }
+        if (testedIn[t] != scans) {
+            Condition condition = bound.conditions[t];
+            step = Step.CONDITION;
+            at = t;
+            holds[t] = condition == null || condition.test(inputs);
+            testedIn[t] = scans;
+        }
+        if (holds[t]) {
+            ready.add(t);
+        }
+    }
+
+    /** Fills in the candidates: of the ready ones of the greatest priority the first one, and those in conflict with it. */
+    private int choose() {
+        int first = ready.get(0);
+        for (int i = 1; i < ready.size(); i++) {
+            int t = ready.get(i);
+            if (priority[t] > priority[first] || priority[t] == priority[first] && t < first) {
+                first = t;
+            }
+        }
+        candidates[0] = first;
+        int count = 1;
+        if (cluster[first] >= 0) {
+            for (int i = 0; i < ready.size(); i++) {
+                int t = ready.get(i);
+                if (t != first && cluster[t] == cluster[first] && priority[t] == priority[first]) {
+                    candidates[count++] = t;
+                }
+            }
+        }
+        return count;
+    }
+
+    private void fire(int t, int choices) {
+        Effects effects = net.effects;
+        step = Step.FIRING;
+        at = t;
+        enabling.fire(t, now);
+        if (timed[t] && enabling.enabled.contains(t)) {
+            arm(t);
+        }
+        bound.listener.fired(scans, now, t, choices);
+        for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+            mark(effects.changePlace[i]);
+            if (effects.changeTakes[i] > 0) {
+                act(bound.exit, Step.EXIT, effects.changePlace[i]);
+            }
+        }
+        act(bound.firing, Step.FIRING, t);
+        for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+            if (effects.changePuts[i] > 0) {
+                act(bound.entry, Step.ENTRY, effects.changePlace[i]);
+            }
+        }
+    }
+
+    private void mark(int p) {
+        if (bound.continuous[p] != null) {
+            long bit = 1L << p;
+            active[p / 64] = enabling.tokens[p] > 0 ? active[p / 64] | bit : active[p / 64] & ~bit;
+        }
+    }
+
+    private void livelock() {
+        Set<String> names = new TreeSet<>();
+        for (int i = 0; i < Math.min(RECENT, bound.limit); i++) {
+            names.add(net.transition(recent[i]).name());
+        }
+        halt(Stop.Cause.LIVELOCK, "transitions " + names, bound.limit
+            + " firings in one scan, and the net does not come to rest; lately " + names + " fired. Give one of them a "
+            + "condition that becomes false or a delay, or raise the limit", null);
+    }
+
+    private void fail(Throwable thrown) {
+        String element = switch (step) {
+            case READER -> "reader of the inputs";
+            case CONDITION -> "condition of transition " + net.transition(at).name();
+            case FIRING -> "firing of transition " + net.transition(at).name();
+            case ENTRY -> "entry action of place " + net.place(at).name();
+            case EXIT -> "exit action of place " + net.place(at).name();
+            case CONTINUOUS -> "continuous action of place " + net.place(at).name();
+            case WRITER -> "writer of the outputs";
+        };
+        halt(Stop.Cause.THROWN, element, element + " threw " + thrown, thrown);
+    }
+
+    private void halt(Stop.Cause cause, String element, String message, Throwable thrown) {
+        System.arraycopy(failSafe, 0, outputs.signals.values, 0, failSafe.length);
+        stop = new Stop(cause, element, "net " + net.name() + ", scan " + scans + ": " + message, thrown, scans, marking());
+        try {
+            bound.writer.write(outputs.signals.values);
+        } catch (RuntimeException again) {
+            stop = new Stop(cause, element, stop.message() + "; the fail-safe values could not be written either: " + again,
+                thrown, scans, stop.marking());
+        }
+    }
+}

@@ -1,0 +1,130 @@
+package tickbus.petri;
+
+import java.util.ArrayList;
+import java.util.List;
+
+/** Binds conditions and actions to a net. An unknown name is an {@link IllegalArgumentException} at once. */
+public final class CoordinatorBuilder {
+    final PetriNet net;
+    final Condition[] conditions;
+    final Action[] firing;
+    final Action[] entry;
+    final Action[] exit;
+    final Action[] continuous;
+    final List<String> inputs = new ArrayList<>();
+    final List<String> outputs = new ArrayList<>();
+    final List<Double> failSafe = new ArrayList<>();
+    InputReader reader = values -> { };
+    OutputWriter writer = values -> { };
+    FiringListener listener = (scan, nanos, transition, choices) -> { };
+    long seed;
+    int limit = 10_000;
+
+    /** A copy, which later calls do not change. */
+    private CoordinatorBuilder(CoordinatorBuilder of) {
+        net = of.net;
+        conditions = of.conditions.clone();
+        firing = of.firing.clone();
+        entry = of.entry.clone();
+        exit = of.exit.clone();
+        continuous = of.continuous.clone();
+        inputs.addAll(of.inputs);
+        outputs.addAll(of.outputs);
+        failSafe.addAll(of.failSafe);
+        reader = of.reader;
+        writer = of.writer;
+        listener = of.listener;
+        seed = of.seed;
+        limit = of.limit;
+    }
+
+    CoordinatorBuilder(PetriNet net) {
+        this.net = net;
+        conditions = new Condition[net.transitions().size()];
+        firing = new Action[net.transitions().size()];
+        entry = new Action[net.places().size()];
+        exit = new Action[net.places().size()];
+        continuous = new Action[net.places().size()];
+    }
+
+    /** The seed of every choice and every random delay; 0 unless given. */
+    public CoordinatorBuilder seed(long value) {
+        seed = value;
+        return this;
+    }
+
+    /** How many firings in one scan are a livelock, 1 or more; 10,000 unless given. */
+    public CoordinatorBuilder limit(int firings) {
+        if (firings < 1) {
+            throw new IllegalArgumentException("a limit of " + firings + " firings; expected 1 or more");
+        }
+        limit = firings;
+        return this;
+    }
+
+    /** Names inputs, in the order in which the reader fills them in. */
+    public CoordinatorBuilder inputs(String... names) {
+        inputs.addAll(List.of(names));
+        return this;
+    }
+
+    /** Reads the inputs. */
+    public CoordinatorBuilder reader(InputReader of) {
+        reader = of;
+        return this;
+    }
+
+    /** Names an output. It begins with its fail-safe value, and has it again when the controller stops. */
+    public CoordinatorBuilder output(String name, double failSafeValue) {
+        outputs.add(name);
+        failSafe.add(failSafeValue);
+        return this;
+    }
+
+    /** Writes the outputs. */
+    public CoordinatorBuilder writer(OutputWriter of) {
+        writer = of;
+        return this;
+    }
+
+    /** The condition of a transition; without one it is always true. */
+    public CoordinatorBuilder when(String transition, Condition condition) {
+        conditions[net.transition(transition).index()] = condition;
+        return this;
+    }
+
+    /** Runs when a transition fires, after the exit and before the entry actions. */
+    public CoordinatorBuilder onFiring(String transition, Action action) {
+        firing[net.transition(transition).index()] = action;
+        return this;
+    }
+
+    /** Runs when a firing puts tokens into a place, and in the first scan if the place is marked initially. */
+    public CoordinatorBuilder onEntry(String place, Action action) {
+        entry[net.place(place).index()] = action;
+        return this;
+    }
+
+    /** Runs when a firing takes tokens from a place. */
+    public CoordinatorBuilder onExit(String place, Action action) {
+        exit[net.place(place).index()] = action;
+        return this;
+    }
+
+    /** Runs at the end of each scan in which the place is marked, in the order of the places. */
+    public CoordinatorBuilder during(String place, Action action) {
+        continuous[net.place(place).index()] = action;
+        return this;
+    }
+
+    /** Hears of the firings. */
+    public CoordinatorBuilder listener(FiringListener of) {
+        listener = of;
+        return this;
+    }
+
+    /** A coordinator that has not scanned yet; what is bound later is not bound to it. */
+    public Coordinator build() {
+        return new Coordinator(new CoordinatorBuilder(this));
+    }
+}

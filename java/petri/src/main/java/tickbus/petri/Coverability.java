@@ -1,0 +1,231 @@
+package tickbus.petri;
+
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.BitSet;
+import java.util.HashMap;
+import java.util.List;
+import java.util.Map;
+
+/**
+ * The coverability graph of Karp and Miller: which places can grow without bound, and which markings can be covered. It
+ * is finite for every net, but may be huge; so there is a limit. Delays, priorities and conditions are left out.
+ *
+ * <p>Places with a capacity get a complement inside, and inhibitor arcs on them become tests of it. An inhibitor arc on
+ * a place without a capacity is refused with an {@link UnsupportedOperationException}: for such nets the questions are
+ * undecidable; give the place a capacity, or use {@link Reachability}.
+ */
+public final class Coverability {
+    /** No bound: for any number there is a reachable marking with more tokens than that. */
+    public static final int OMEGA = Integer.MAX_VALUE;
+
+    private final PetriNet net;
+    private final PetriNet plain;
+    private final int limit;
+    private final List<int[]> markings = new ArrayList<>();
+    private final Ints parents = new Ints();
+    private final int[] bounds;
+    private final BitSet fired = new BitSet();
+    private boolean complete;
+
+    private Coverability(PetriNet net, int limit) {
+        this.net = net;
+        this.limit = limit;
+        plain = withComplements(net);
+        bounds = new int[net.places().size()];
+    }
+
+    /** Explores at most {@code limit} markings with or without omega, 1 or more. */
+    public static Coverability explore(PetriNet net, int limit) {
+        if (limit < 1) {
+            throw new IllegalArgumentException("a limit of " + limit + " markings; expected 1 or more");
+        }
+        Coverability graph = new Coverability(net, limit);
+        graph.run();
+        return graph;
+    }
+
+    /** The same net without capacities and inhibitor arcs, the complements after the places. */
+    private static PetriNet withComplements(PetriNet net) {
+        int places = net.places().size();
+        NetBuilder builder = new NetBuilder(net.name());
+        net.places().forEach(place -> builder.place("p" + place.index(), place.initial()));
+        for (Place place : net.places()) {
+            if (place.isLimited()) {
+                builder.place("c" + place.index(), place.capacity() - place.initial());
+            }
+        }
+        int[][] needed = new int[places][net.transitions().size()];
+        int[][] gain = net.incidence();
+        net.transitions().forEach(transition -> builder.transition("t" + transition.index()));
+        for (Arc arc : net.arcs()) {
+            Place place = net.place(arc.place());
+            if (arc.kind() == ArcKind.INHIBITOR) {
+                if (!place.isLimited()) {
+                    throw new UnsupportedOperationException("net " + net.name() + ": inhibitor arc " + place.name() + " -> "
+                        + net.transition(arc.transition()).name() + ": coverability is undecidable with inhibitor arcs on "
+                        + "places without a capacity; give " + place.name() + " one, or explore with Reachability");
+                }
+                // Fewer than w tokens are at least K - w + 1 in the complement.
+                needed[arc.place()][arc.transition()] = Math.max(0, place.capacity() - arc.weight() + 1);
+            } else {
+                builder.arc(arc.kind(), "p" + arc.place(), "t" + arc.transition(), arc.weight());
+            }
+        }
+        for (Place place : net.places()) {
+            int p = place.index();
+            for (int t = 0; place.isLimited() && t < gain[p].length; t++) {
+                if (gain[p][t] > 0) {
+                    builder.arc(ArcKind.INPUT, "c" + p, "t" + t, gain[p][t]);
+                } else if (gain[p][t] < 0) {
+                    builder.arc(ArcKind.OUTPUT, "c" + p, "t" + t, -gain[p][t]);
+                }
+                if (needed[p][t] > 0) {
+                    builder.arc(ArcKind.TEST, "c" + p, "t" + t, needed[p][t]);
+                }
+            }
+        }
+        return builder.build();
+    }
+
+    private void run() {
+        Map<Key, Integer> numbers = new HashMap<>();
+        add(plain.initialMarking().tokens, -1, numbers);
+        for (int number = 0; number < markings.size(); number++) {
+            int[] tokens = markings.get(number);
+            for (int t = 0; t < plain.transitions().size(); t++) {
+                if (!plain.effects.isEnabled(tokens, t)) {
+                    continue;
+                }
+                fired.set(t);
+                int[] next = fire(tokens, t);
+                accelerate(next, number);
+                if (!numbers.containsKey(new Key(next))) {
+                    if (markings.size() == limit) {
+                        return;
+                    }
+                    add(next, number, numbers);
+                }
+            }
+        }
+        complete = true;
+    }
+
+    private record Key(int[] tokens) {
+        @Override
+        public boolean equals(Object other) {
+            return other instanceof Key that && Arrays.equals(tokens, that.tokens);
+        }
+
+        @Override
+        public int hashCode() {
+            return Arrays.hashCode(tokens);
+        }
+    }
+
+    private void add(int[] tokens, int parent, Map<Key, Integer> numbers) {
+        numbers.put(new Key(tokens), markings.size());
+        markings.add(tokens);
+        parents.add(parent);
+        for (int p = 0; p < bounds.length; p++) {
+            bounds[p] = Math.max(bounds[p], tokens[p]);
+        }
+    }
+
+    private int[] fire(int[] tokens, int t) {
+        int[] next = tokens.clone();
+        Effects effects = plain.effects;
+        for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+            int p = effects.changePlace[i];
+            if (tokens[p] != OMEGA) {
+                long count = (long) tokens[p] - effects.changeTakes[i] + effects.changePuts[i];
+                if (count >= OMEGA) {
+                    throw new GaveUpException("net " + net.name() + ": gave up at " + markings.size()
+                        + " markings: a place would have more than " + OMEGA + " tokens");
+                }
+                next[p] = (int) count;
+            }
+        }
+        return next;
+    }
+
+    /** Where an ancestor is less everywhere, what has grown since can grow again and again. */
+    private void accelerate(int[] tokens, int parent) {
+        boolean grown = true;
+        while (grown) {
+            grown = false;
+            for (int a = parent; a >= 0; a = parents.get(a)) {
+                int[] ancestor = markings.get(a);
+                if (isCoveredBy(ancestor, tokens)) {
+                    for (int p = 0; p < tokens.length; p++) {
+                        if (ancestor[p] < tokens[p] && tokens[p] != OMEGA) {
+                            tokens[p] = OMEGA;
+                            grown = true;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    private static boolean isCoveredBy(int[] less, int[] more) {
+        for (int p = 0; p < less.length; p++) {
+            if (less[p] > more[p]) {
+                return false;
+            }
+        }
+        return true;
+    }
+
+    /** Whether it came to the end. */
+    public boolean isComplete() {
+        return complete;
+    }
+
+    /** How many markings, with or without omega, it has. */
+    public int size() {
+        return markings.size();
+    }
+
+    /** The tokens of a marking, with {@link #OMEGA} for a place without a bound. */
+    public int[] tokens(int number) {
+        return Arrays.copyOf(markings.get(number), net.places().size());
+    }
+
+    /** The most tokens that a place can have; {@link #OMEGA} if there is no bound. Of what was explored, if it gave up. */
+    public int bound(int place) {
+        return bounds[place];
+    }
+
+    /** Whether there is a bound to the tokens of every place. */
+    public Verdict isBounded() {
+        return Arrays.stream(bounds).anyMatch(bound -> bound == OMEGA) ? Verdict.NO
+            : complete ? Verdict.YES : Verdict.UNKNOWN;
+    }
+
+    /** Whether no place ever has more than one token. */
+    public Verdict isSafe() {
+        return Arrays.stream(bounds).anyMatch(bound -> bound > 1) ? Verdict.NO : complete ? Verdict.YES : Verdict.UNKNOWN;
+    }
+
+    /** Whether a reachable marking has at least these tokens everywhere. */
+    public Verdict isCoverable(Marking marking) {
+        for (int number = 0; number < markings.size(); number++) {
+            if (isCoveredBy(marking.tokens, tokens(number))) {
+                return Verdict.YES;
+            }
+        }
+        return complete ? Verdict.NO : Verdict.UNKNOWN;
+    }
+
+    /** Whether the transition fires in some reachable marking. */
+    public Verdict canFire(int transition) {
+        return fired.get(transition) ? Verdict.YES : complete ? Verdict.NO : Verdict.UNKNOWN;
+    }
+
+    /** How far it came. */
+    @Override
+    public String toString() {
+        return "net " + net.name() + ": " + (complete ? "" : "gave up at ") + size() + " markings";
+    }
+}

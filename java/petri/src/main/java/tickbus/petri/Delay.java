@@ -1,0 +1,65 @@
+package tickbus.petri;
+
+/**
+ * How long a timed transition waits, in nanoseconds. Drawn anew each time the transition becomes enabled.
+ *
+ * @param kind how {@code first} and {@code second} are read
+ * @param first the fixed delay, the mean, or the least delay
+ * @param second the greatest delay of {@link Kind#UNIFORM}; otherwise 0
+ */
+public record Delay(Kind kind, long first, long second) {
+    /** No delay: the transition is immediate. */
+    public static final Delay NONE = new Delay(Kind.NONE, 0, 0);
+
+    /** The distribution of a delay. */
+    public enum Kind {
+        /** Immediate. */
+        NONE,
+        /** Always the same. */
+        FIXED,
+        /** Exponentially distributed about a mean. */
+        EXPONENTIAL,
+        /** Equally distributed between two bounds, both included. */
+        UNIFORM
+    }
+
+    /** Checks the figures: an {@link IllegalArgumentException} names the one that is out of range. */
+    public Delay {
+        if (first < 0 || second < 0) {
+            throw new IllegalArgumentException("a delay of " + Math.min(first, second) + " ns; expected 0 or more");
+        }
+        if (kind == Kind.UNIFORM && second < first) {
+            throw new IllegalArgumentException("a delay between " + first + " and " + second
+                + " ns; expected the least first");
+        }
+        if (kind != Kind.UNIFORM && second != 0 || kind == Kind.NONE && first != 0) {
+            throw new IllegalArgumentException(kind + " with the figures " + first + " and " + second
+                + "; expected 0 for a figure that it does not have");
+        }
+    }
+
+    /** Always {@code nanos}. */
+    public static Delay fixed(long nanos) {
+        return new Delay(Kind.FIXED, nanos, 0);
+    }
+
+    /** Exponentially distributed; {@code mean} in nanoseconds. */
+    public static Delay exponential(long mean) {
+        return new Delay(Kind.EXPONENTIAL, mean, 0);
+    }
+
+    /** Equally distributed from {@code least} to {@code greatest} nanoseconds, both included. */
+    public static Delay uniform(long least, long greatest) {
+        return new Delay(Kind.UNIFORM, least, greatest);
+    }
+
+    long draw(SplitMix random) {
+        return switch (kind) {
+            case NONE -> 0;
+            case FIXED -> first;
+            // A draw is never 0, so the logarithm is finite; a cast of what is too great saturates.
+            case EXPONENTIAL -> (long) (-first * Math.log(random.unit()));
+            case UNIFORM -> Math.min(second, first + (long) (random.fraction() * (second - first + 1.0)));
+        };
+    }
+}

@@ -1,0 +1,149 @@
+package tickbus.petri;
+
+/**
+ * The marking of a running net, and which transitions it enables. A firing looks only at the arcs of the places that
+ * it changes, so its cost does not grow with the net.
+ */
+final class Enabling {
+    private final PetriNet net;
+    private final Effects effects;
+    final int[] tokens;
+    /** The tokens that input and test arcs may use; as many as there are in an untimed place. */
+    private final int[] available;
+    private final TokenAges[] ages;
+    private final int[] unmet;
+    private final IndexSet touched;
+    final IndexSet enabled;
+    private final Watcher watcher;
+    /** Timed transitions by index, then timed places. */
+    final DueHeap due;
+    /** How many needs have been looked at. */
+    long visits;
+
+    /** Hears which transitions become enabled or disabled by a change as a whole. */
+    interface Watcher {
+        void enabled(int transition);
+
+        void disabled(int transition);
+    }
+
+    Enabling(PetriNet net, Watcher watcher) {
+        this.net = net;
+        this.watcher = watcher;
+        effects = net.effects;
+        int places = net.places().size();
+        int transitions = net.transitions().size();
+        tokens = new int[places];
+        available = new int[places];
+        ages = new TokenAges[places];
+        for (Place place : net.places()) {
+            ages[place.index()] = place.delay() > 0 ? new TokenAges() : null;
+        }
+        unmet = new int[transitions];
+        touched = new IndexSet(transitions);
+        enabled = new IndexSet(transitions);
+        due = new DueHeap(transitions + places);
+    }
+
+    /** Puts the initial marking, whose tokens arrive now. */
+    void start(long now) {
+        for (int t = 0; t < unmet.length; t++) {
+            unmet[t] = 0;
+            for (int i = effects.needFirst[t]; i < effects.needFirst[t + 1]; i++) {
+                unmet[t] += isMet(i, 0, 0) ? 0 : 1;
+            }
+            touched.add(t);
+        }
+        for (Place place : net.places()) {
+            arrive(place.index(), place.initial(), now);
+        }
+        settle();
+    }
+
+    private boolean isMet(int need, int usable, int all) {
+        return effects.needKind[need] == Effects.AT_LEAST ? usable >= effects.needLevel[need] : all <= effects.needLevel[need];
+    }
+
+    void fire(int t, long now) {
+        for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+            int p = effects.changePlace[i];
+            if ((long) tokens[p] - effects.changeTakes[i] + effects.changePuts[i] > Integer.MAX_VALUE) {
+                throw new ArithmeticException("place " + net.place(p).name() + " would hold more than " + Integer.MAX_VALUE
+                    + " tokens");
+            }
+        }
+        for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+            int p = effects.changePlace[i];
+            int takes = effects.changeTakes[i];
+            int puts = effects.changePuts[i];
+            if (ages[p] == null) {
+                change(p, available[p] + puts - takes, tokens[p] + puts - takes);
+            } else {
+                change(p, available[p] - takes, tokens[p] - takes);
+                arrive(p, puts, now);
+            }
+        }
+        settle();
+    }
+
+    /** The time after a delay; {@link Long#MAX_VALUE}, which is never, if it is too late for a long. */
+    static long after(long now, long delay) {
+        return delay > Long.MAX_VALUE - Math.max(0, now) ? Long.MAX_VALUE : now + delay;
+    }
+
+    private void arrive(int p, int count, long now) {
+        if (count == 0) {
+            return;
+        }
+        if (ages[p] == null) {
+            change(p, available[p] + count, tokens[p] + count);
+        } else {
+            ages[p].add(after(now, net.place(p).delay()), count);
+            due.put(unmet.length + p, ages[p].next());
+            change(p, available[p], tokens[p] + count);
+        }
+    }
+
+    /** Makes available the tokens of a place that are old enough. */
+    void release(int place, long now) {
+        while (ages[place].isDue(now)) {
+            change(place, available[place] + ages[place].release(), tokens[place]);
+        }
+        if (ages[place].next() != Long.MAX_VALUE) {
+            due.put(unmet.length + place, ages[place].next());
+        }
+        settle();
+    }
+
+    private void change(int p, int usable, int all) {
+        int usableBefore = available[p];
+        int allBefore = tokens[p];
+        available[p] = usable;
+        tokens[p] = all;
+        for (int d = effects.dependentFirst[p]; d < effects.dependentFirst[p + 1]; d++) {
+            int need = effects.dependentNeed[d];
+            visits++;
+            boolean before = isMet(need, usableBefore, allBefore);
+            if (before != isMet(need, usable, all)) {
+                int t = effects.needTransition[need];
+                unmet[t] += before ? 1 : -1;
+                touched.add(t);
+            }
+        }
+    }
+
+    /** Only the change as a whole enables and disables. */
+    private void settle() {
+        for (int i = 0; i < touched.size(); i++) {
+            int t = touched.get(i);
+            if (unmet[t] == 0 && !enabled.contains(t)) {
+                enabled.add(t);
+                watcher.enabled(t);
+            } else if (unmet[t] != 0 && enabled.contains(t)) {
+                enabled.remove(t);
+                watcher.disabled(t);
+            }
+        }
+        touched.clear();
+    }
+}

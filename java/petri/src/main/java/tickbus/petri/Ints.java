@@ -1,0 +1,36 @@
+package tickbus.petri;
+
+import java.util.Arrays;
+
+/** A list of ints. */
+final class Ints {
+    private int[] values = new int[64];
+    private int size;
+
+    void add(int value) {
+        if (size == values.length) {
+            values = Arrays.copyOf(values, (int) Math.min(Integer.MAX_VALUE - 16, values.length * 3L / 2));
+        }
+        values[size++] = value;
+    }
+
+    int get(int at) {
+        return values[at];
+    }
+
+    void set(int at, int value) {
+        values[at] = value;
+    }
+
+    int pop() {
+        return values[--size];
+    }
+
+    int size() {
+        return size;
+    }
+
+    long bytes() {
+        return 4L * values.length;
+    }
+}

@@ -1,0 +1,204 @@
+package tickbus.petri;
+
+import java.util.ArrayList;
+import java.util.HashMap;
+import java.util.LinkedHashMap;
+import java.util.List;
+import java.util.Map;
+
+/**
+ * Builds a net step by step. {@link #capacity} and {@link #delay(long)} belong to the place named last,
+ * {@link #priority}, {@link #delay(Delay)} and the arcs to the transition named last. Arcs may name places that come
+ * later. {@link #build} reports all mistakes at once.
+ */
+public final class NetBuilder {
+    private final String name;
+    private final Map<String, Place> places = new LinkedHashMap<>();
+    private final Map<String, Transition> transitions = new LinkedHashMap<>();
+    private final List<Pending> arcs = new ArrayList<>();
+    private final List<String> mistakes = new ArrayList<>();
+    private String place;
+    private String transition;
+
+    private record Pending(ArcKind kind, String place, String transition, int weight) {
+        String text() {
+            return switch (kind) {
+                case OUTPUT -> "arc " + transition + " -> " + place;
+                case INPUT -> "arc " + place + " -> " + transition;
+                case TEST -> "test arc " + place + " -> " + transition;
+                case INHIBITOR -> "inhibitor arc " + place + " -> " + transition;
+            };
+        }
+    }
+
+    NetBuilder(String name) {
+        this.name = name;
+    }
+
+    /** A place without tokens. */
+    public NetBuilder place(String name) {
+        return place(name, 0);
+    }
+
+    /** A place with tokens in the initial marking. */
+    public NetBuilder place(String name, int initial) {
+        if (initial < 0) {
+            mistakes.add("place " + name + ": " + initial + " tokens; expected 0 or more");
+        }
+        checkName("place", name, places);
+        places.put(name, new Place(places.size(), name, initial, Place.UNLIMITED, 0));
+        place = name;
+        return this;
+    }
+
+    /** The most tokens that the last place may hold, 1 or more. */
+    public NetBuilder capacity(int most) {
+        if (place == null) {
+            mistakes.add("capacity " + most + ": there is no place yet; call place(...) before capacity(...)");
+            return this;
+        }
+        if (most < 1) {
+            mistakes.add("place " + place + ": capacity " + most + "; expected 1 or more");
+        }
+        places.computeIfPresent(place, (key, old) ->
+            new Place(old.index(), key, old.initial(), most, old.delay()));
+        return this;
+    }
+
+    /** How many nanoseconds a token that arrives in the last place is unavailable, 0 or more. */
+    public NetBuilder delay(long nanos) {
+        if (place == null) {
+            mistakes.add("delay " + nanos + ": there is no place yet; call place(...) before delay(long)");
+            return this;
+        }
+        if (nanos < 0) {
+            mistakes.add("place " + place + ": delay " + nanos + " ns; expected 0 or more");
+        }
+        places.computeIfPresent(place, (key, old) ->
+            new Place(old.index(), key, old.initial(), old.capacity(), nanos));
+        return this;
+    }
+
+    /** An immediate transition of priority 0. */
+    public NetBuilder transition(String name) {
+        checkName("transition", name, transitions);
+        transitions.put(name, new Transition(transitions.size(), name, 0, Delay.NONE));
+        transition = name;
+        return this;
+    }
+
+    /** The priority of the last transition; the greatest fires first. */
+    public NetBuilder priority(int priority) {
+        if (isTransition("priority(int)")) {
+            transitions.computeIfPresent(transition, (key, old) ->
+                new Transition(old.index(), key, priority, old.delay()));
+        }
+        return this;
+    }
+
+    /** How long the last transition must be enabled before it fires. */
+    public NetBuilder delay(Delay delay) {
+        if (isTransition("delay(Delay)")) {
+            transitions.computeIfPresent(transition, (key, old) ->
+                new Transition(old.index(), key, old.priority(), delay));
+        }
+        return this;
+    }
+
+    /** The last transition takes one token from each of these places. */
+    public NetBuilder input(String... from) {
+        for (String one : from) {
+            input(one, 1);
+        }
+        return this;
+    }
+
+    /** The last transition takes {@code weight} tokens from a place. */
+    public NetBuilder input(String from, int weight) {
+        return arc(ArcKind.INPUT, from, weight);
+    }
+
+    /** The last transition puts one token into each of these places. */
+    public NetBuilder output(String... to) {
+        for (String one : to) {
+            output(one, 1);
+        }
+        return this;
+    }
+
+    /** The last transition puts {@code weight} tokens into a place. */
+    public NetBuilder output(String to, int weight) {
+        return arc(ArcKind.OUTPUT, to, weight);
+    }
+
+    /** The last transition needs {@code weight} tokens in a place, and leaves them there. */
+    public NetBuilder test(String of, int weight) {
+        return arc(ArcKind.TEST, of, weight);
+    }
+
+    /** The last transition needs fewer than {@code weight} tokens in a place. */
+    public NetBuilder inhibitor(String of, int weight) {
+        return arc(ArcKind.INHIBITOR, of, weight);
+    }
+
+    private NetBuilder arc(ArcKind kind, String with, int weight) {
+        if (isTransition("an arc")) {
+            arc(kind, with, transition, weight);
+        }
+        return this;
+    }
+
+    /** An arc of any kind between nodes by name, for readers of files. */
+    NetBuilder arc(ArcKind kind, String with, String by, int weight) {
+        arcs.add(new Pending(kind, with, by, weight));
+        return this;
+    }
+
+    private boolean isTransition(String what) {
+        if (transition == null) {
+            mistakes.add(what + ": there is no transition yet; call transition(...) before it");
+        }
+        return transition != null;
+    }
+
+    private void checkName(String kind, String given, Map<String, ?> others) {
+        if (given == null || given.isBlank()) {
+            mistakes.add(kind + " number " + (others.size() + 1) + ": no name; expected one");
+        } else if (!given.equals(given.strip()) || given.chars().anyMatch(Character::isISOControl)) {
+            mistakes.add(kind + " '" + given + "': a blank at an end or a control character; expected a name without");
+        } else if (others.containsKey(given)) {
+            mistakes.add(kind + " " + given + ": given twice; expected a name of its own");
+        }
+    }
+
+    /** The net; a {@link NetException} with all mistakes if there are any. */
+    public PetriNet build() {
+        Map<String, String> seen = new HashMap<>();
+        List<Arc> made = new ArrayList<>();
+        for (Pending arc : arcs) {
+            Place with = places.get(arc.place);
+            Transition by = transitions.get(arc.transition);
+            if (with == null) {
+                mistakes.add(arc.text() + ": there is no place '" + arc.place + "'");
+            } else if (by == null) {
+                mistakes.add(arc.text() + ": there is no transition '" + arc.transition + "'");
+            } else if (arc.weight < 1) {
+                mistakes.add(arc.text() + ": weight " + arc.weight + "; expected 1 or more");
+            } else if (seen.put(arc.text(), "") != null) {
+                mistakes.add(arc.text() + ": given twice; expected one arc with a weight");
+            } else {
+                made.add(new Arc(arc.kind, with.index(), by.index(), arc.weight));
+            }
+        }
+        for (Place one : places.values()) {
+            if (one.initial() > one.capacity() && one.capacity() > 0) {
+                mistakes.add("place " + one.name() + ": " + one.initial() + " tokens; expected at most its capacity of "
+                    + one.capacity());
+            }
+        }
+        if (!mistakes.isEmpty()) {
+            throw new NetException("net " + name, 0, "", String.join("\n", mistakes));
+        }
+        return new PetriNet(name, List.copyOf(places.values()), List.copyOf(transitions.values()), made);
+    }
+}

@@ -1,0 +1,35 @@
+package tickbus.petri;
+
+/**
+ * A net that cannot be built or read. The message says where, what was found, what was expected and what to do;
+ * each mistake of a builder is on a line of its own.
+ */
+public final class NetException extends RuntimeException {
+    private static final long serialVersionUID = 1L;
+
+    private final String source;
+    private final int line;
+    private final String element;
+
+    NetException(String source, int line, String element, String message) {
+        super(source + (line > 0 ? ":" + line : "") + ": " + (element.isEmpty() ? "" : element + ": ") + message);
+        this.source = source;
+        this.line = line;
+        this.element = element;
+    }
+
+    /** The file, or the name of the net if it does not come from a file. */
+    public String source() {
+        return source;
+    }
+
+    /** The line in the file, from 1; 0 if there is none. */
+    public int line() {
+        return line;
+    }
+
+    /** The element of the file or net, such as {@code arc a3}; empty if the whole is meant. */
+    public String element() {
+        return element;
+    }
+}

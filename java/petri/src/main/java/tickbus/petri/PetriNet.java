@@ -1,0 +1,195 @@
+package tickbus.petri;
+
+import java.util.Arrays;
+import java.util.Comparator;
+import java.util.HashMap;
+import java.util.List;
+import java.util.Map;
+
+/**
+ * A net of places and transitions with weighted, test and inhibitor arcs. Immutable, so it may be shared by threads.
+ *
+ * <p>A transition is enabled if each input and test arc finds at least its weight of tokens, each inhibitor arc fewer,
+ * and if no place would hold more than its capacity after the firing. A place that is both input and output of a
+ * transition counts with the difference. Priorities and delays are for the {@link Coordinator}.
+ */
+public final class PetriNet {
+    private final String name;
+    private final List<Place> places;
+    private final List<Transition> transitions;
+    private final List<Arc> arcs;
+    private final Map<String, Integer> placesByName = new HashMap<>();
+    private final Map<String, Integer> transitionsByName = new HashMap<>();
+    /** What each transition needs and changes, in the order of its places. */
+    final Effects effects;
+
+    PetriNet(String name, List<Place> places, List<Transition> transitions, List<Arc> arcs) {
+        this.name = name;
+        this.places = places;
+        this.transitions = transitions;
+        this.arcs = arcs.stream()
+            .sorted(Comparator.comparingInt(Arc::transition).thenComparing(Arc::kind).thenComparingInt(Arc::place))
+            .toList();
+        places.forEach(place -> placesByName.put(place.name(), place.index()));
+        transitions.forEach(transition -> transitionsByName.put(transition.name(), transition.index()));
+        effects = new Effects(places, transitions.size(), this.arcs);
+    }
+
+    /** Starts a net with this name. */
+    public static NetBuilder named(String name) {
+        return new NetBuilder(name);
+    }
+
+    /**
+     * A net from its matrices of input and output weights; row = place ({@code P0}, {@code P1}, …), column = transition
+     * ({@code T0}, …).
+     */
+    public static PetriNet fromMatrices(String name, int[][] pre, int[][] post, int[] marking) {
+        return Matrices.net(name, pre, post, marking);
+    }
+
+    /**
+     * A net from its incidence matrix, output minus input weights; row = place, column = transition. Only a pure net
+     * has all its arcs in it: a place that is input and output of one transition does not.
+     */
+    public static PetriNet fromIncidence(String name, int[][] incidence, int[] marking) {
+        return Matrices.net(name, Matrices.positive(incidence, -1), Matrices.positive(incidence, 1), marking);
+    }
+
+    /** Its name. */
+    public String name() {
+        return name;
+    }
+
+    /** Its places, by index. */
+    public List<Place> places() {
+        return places;
+    }
+
+    /** Its transitions, by index. */
+    public List<Transition> transitions() {
+        return transitions;
+    }
+
+    /** All arcs, ordered by transition, kind and place. */
+    public List<Arc> arcs() {
+        return arcs;
+    }
+
+    /** The place with this index. */
+    public Place place(int index) {
+        return places.get(index);
+    }
+
+    /** The transition with this index. */
+    public Transition transition(int index) {
+        return transitions.get(index);
+    }
+
+    /** The place with this name; an {@link IllegalArgumentException} lists what there is if it is not there. */
+    public Place place(String named) {
+        return places.get(find("place", named, placesByName));
+    }
+
+    /** The transition with this name; an {@link IllegalArgumentException} lists what there is if it is not there. */
+    public Transition transition(String named) {
+        return transitions.get(find("transition", named, transitionsByName));
+    }
+
+    private int find(String kind, String named, Map<String, Integer> index) {
+        Integer found = index.get(named);
+        if (found == null) {
+            throw new IllegalArgumentException("net " + name + ": there is no " + kind + " '" + named + "'; there are "
+                + index.keySet().stream().sorted().limit(20).toList());
+        }
+        return found;
+    }
+
+    /** The initial marking, as a copy. */
+    public Marking initialMarking() {
+        return new Marking(this, places.stream().mapToInt(Place::initial).toArray());
+    }
+
+    /** A marking with these tokens, one figure for each place; out of range is an {@link IllegalArgumentException}. */
+    public Marking marking(int... tokens) {
+        if (tokens.length != places.size()) {
+            throw new IllegalArgumentException("net " + name + ": a marking of " + tokens.length
+                + " places; expected " + places.size());
+        }
+        for (int p = 0; p < tokens.length; p++) {
+            checkTokens(p, tokens[p]);
+        }
+        return new Marking(this, tokens.clone());
+    }
+
+    void checkTokens(int place, int count) {
+        Place one = places.get(place);
+        if (count < 0 || count > one.capacity()) {
+            throw new IllegalArgumentException("net " + name + ": place " + one.name() + ": " + count
+                + " tokens; expected 0 to " + one.capacity());
+        }
+    }
+
+    /** Whether the transition is enabled, apart from time, priority and conditions. */
+    public boolean isEnabled(Marking marking, int transition) {
+        return effects.isEnabled(marking.tokens, transition);
+    }
+
+    /** Fires a transition; an {@link IllegalStateException} if it is not enabled. */
+    public void fire(Marking marking, int transition) {
+        if (!isEnabled(marking, transition)) {
+            throw new IllegalStateException("net " + name + ": transition " + transition(transition).name()
+                + " is not enabled in " + marking);
+        }
+        try {
+            effects.fire(marking.tokens, transition);
+        } catch (ArithmeticException overflow) {
+            throw new IllegalStateException("net " + name + ": transition " + transition(transition).name()
+                + " would put more than " + Integer.MAX_VALUE + " tokens into a place", overflow);
+        }
+    }
+
+    /** The weights of the input arcs; row = place, column = transition. */
+    public int[][] pre() {
+        return matrix(ArcKind.INPUT);
+    }
+
+    /** The weights of the output arcs; row = place, column = transition. */
+    public int[][] post() {
+        return matrix(ArcKind.OUTPUT);
+    }
+
+    /** The incidence matrix, output minus input weights; row = place, column = transition. */
+    public int[][] incidence() {
+        int[][] incidence = post();
+        int[][] pre = pre();
+        for (int p = 0; p < pre.length; p++) {
+            for (int t = 0; t < pre[p].length; t++) {
+                incidence[p][t] -= pre[p][t];
+            }
+        }
+        return incidence;
+    }
+
+    private int[][] matrix(ArcKind kind) {
+        int[][] matrix = new int[places.size()][transitions.size()];
+        for (Arc arc : arcs) {
+            if (arc.kind() == kind) {
+                matrix[arc.place()][arc.transition()] = arc.weight();
+            }
+        }
+        return matrix;
+    }
+
+    /** Whether the other net has the same places, transitions and arcs; the names of the nets may differ. */
+    public boolean isSameAs(PetriNet other) {
+        return places.equals(other.places) && transitions.equals(other.transitions) && arcs.equals(other.arcs);
+    }
+
+    /** Its name and size. */
+    @Override
+    public String toString() {
+        return "net " + name + ": " + places.size() + " places, " + transitions.size() + " transitions, "
+            + arcs.size() + " arcs, " + Arrays.toString(initialMarking().tokens);
+    }
+}

@@ -1,0 +1,47 @@
+package tickbus.petri;
+
+/** Seeded nets for tests against an oracle. */
+final class RandomNets {
+    private RandomNets() {
+    }
+
+    /** A net with arcs of all kinds and some capacities; often unbounded. */
+    static PetriNet any(SplitMix random, int places, int transitions) {
+        return net(random, places, transitions, true);
+    }
+
+    /** A net with input and output arcs only. */
+    static PetriNet plain(SplitMix random, int places, int transitions) {
+        return net(random, places, transitions, false);
+    }
+
+    private static PetriNet net(SplitMix random, int places, int transitions, boolean special) {
+        NetBuilder builder = PetriNet.named("random");
+        for (int p = 0; p < places; p++) {
+            builder.place("p" + p, random.below(3));
+            if (special && random.below(3) == 0) {
+                builder.capacity(2 + random.below(2));
+            }
+        }
+        for (int t = 0; t < transitions; t++) {
+            builder.transition("t" + t);
+            for (int p = 0; p < places; p++) {
+                int kind = random.below(12);
+                int weight = 1 + random.below(4) / 3;
+                if (kind < 2) {
+                    builder.input("p" + p, weight);
+                }
+                if (kind == 1 || kind == 2 || kind == 3) {
+                    builder.output("p" + p, weight);
+                }
+                if (special && kind == 4) {
+                    builder.test("p" + p, weight);
+                }
+                if (special && kind == 5) {
+                    builder.inhibitor("p" + p, weight + 1);
+                }
+            }
+        }
+        return builder.build();
+    }
+}

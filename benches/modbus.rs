@@ -23,8 +23,8 @@ use std::time::{Duration, Instant};
 
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
-use tickbus_base::os::raise_open_files;
 use tickbus::time::{Monotonic, Nanos, TimeHistogram};
+use tickbus_base::os::raise_open_files;
 
 /// Registers written and read in one request.
 const REGISTERS: u8 = 64;

@@ -375,6 +375,7 @@ impl Board {
                 listing.next = order + 1;
                 listing.count += 1;
             }
+            self.seats[seat].outbox.is_swollen = true;
             if has_end {
                 self.seats[seat]
                     .outbox

@@ -54,6 +54,8 @@ pub(crate) struct Outbox {
     /// Inputs whose newest value waits, in the order in which they began to.
     pub(crate) waiting: Vec<usize>,
     pub(crate) listing: Option<Listing>,
+    /// There was a list in it, which is asked for rarely: its memory is not kept.
+    pub(crate) is_swollen: bool,
     /// The line received of which the last line of values was made, and where that begins.
     line: u64,
     line_start: usize,
@@ -74,8 +76,7 @@ impl Outbox {
         if self.written == self.bytes.len() {
             self.bytes.clear();
             self.written = 0;
-            // A long list is asked for rarely; its memory is not kept.
-            if self.bytes.capacity() > 2 * FULL {
+            if std::mem::take(&mut self.is_swollen) {
                 self.bytes = Vec::new();
             }
         } else if self.written > FULL {

@@ -36,8 +36,6 @@ struct Extent {
 struct Pairs {
     name: &'static str,
     pairs: Vec<(TcpStream, TcpStream)>,
-    /// How many line ends arrive per value.
-    ends: usize,
     /// Makes what sends one value through a pair.
     message: fn(usize, usize) -> String,
 }
@@ -147,7 +145,6 @@ fn ours(address: SocketAddr, count: usize) -> Pairs {
     Pairs {
         name: "",
         pairs: (0..count).map(pair).collect(),
-        ends: 1,
         message: |_, value| format!("P Q1={value}\r\n"),
     }
 }
@@ -161,7 +158,6 @@ fn bare(address: SocketAddr, count: usize) -> Pairs {
     Pairs {
         name: ".bare",
         pairs: (0..count).map(|_| (connect(), connect())).collect(),
-        ends: 1,
         message: |_, value| format!("P I1={value}\r\n"),
     }
 }
@@ -176,7 +172,6 @@ fn through_nats(server: &Nats, count: usize) -> Pairs {
     Pairs {
         name: ".nats",
         pairs: (0..count).map(pair).collect(),
-        ends: 2,
         message: |pair, value| {
             let text = format!("P Q1={value}");
             format!("PUB s{pair} {}\r\n{text}\r\n", text.len())
@@ -184,16 +179,16 @@ fn through_nats(server: &Nats, count: usize) -> Pairs {
     }
 }
 
-/// Reads this many line ends.
-fn read_lines(mut stream: &TcpStream, mut count: usize, buffer: &mut [u8]) {
+/// Reads this many values: each has one sign of equality, and NATS's own lines have none.
+fn read_values(mut stream: &TcpStream, mut count: usize, buffer: &mut [u8]) {
     while count > 0 {
         let length = stream.read(buffer).expect("lines arrive");
         assert!(length > 0, "the connection is closed");
-        let ends = buffer[..length]
+        let values = buffer[..length]
             .iter()
-            .filter(|byte| **byte == b'\n')
+            .filter(|byte| **byte == b'=')
             .count();
-        count = count.checked_sub(ends).expect("no more than was sent");
+        count = count.checked_sub(values).expect("no more than was sent");
     }
 }
 
@@ -212,7 +207,7 @@ impl Pairs {
             for write in &writes {
                 sender.write_all(write.as_bytes()).expect("it reads");
             }
-            read_lines(receiver, self.ends * BATCH, &mut buffer);
+            read_values(receiver, BATCH, &mut buffer);
             count += BATCH as f64;
         }
         count / begin.elapsed().as_secs_f64()
@@ -234,7 +229,7 @@ impl Pairs {
                     .expect("it reads");
             }
             for (_, receiver) in &self.pairs {
-                read_lines(receiver, self.ends, &mut buffer);
+                read_values(receiver, 1, &mut buffer);
             }
             turn += 1;
         }
@@ -242,7 +237,7 @@ impl Pairs {
         if turn % 2 == 1 {
             for ((sender, receiver), lines) in self.pairs.iter_mut().zip(&lines) {
                 sender.write_all(lines[1].as_bytes()).expect("it reads");
-                read_lines(receiver, self.ends, &mut buffer);
+                read_values(receiver, 1, &mut buffer);
             }
         }
         (turn * self.pairs.len()) as f64 / begin.elapsed().as_secs_f64()
@@ -288,7 +283,7 @@ fn latency(extent: &Extent, servers: &mut [Pairs]) {
             let (sender, receiver) = &mut server.pairs[0];
             let begin = Instant::now();
             sender.write_all(message.as_bytes()).expect("it reads");
-            read_lines(receiver, server.ends, &mut buffer);
+            read_values(receiver, 1, &mut buffer);
             let span = i64::try_from(begin.elapsed().as_nanos()).unwrap_or(i64::MAX);
             spans.record(Nanos(span));
             due += INTERVAL;

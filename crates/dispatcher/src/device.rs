@@ -4,7 +4,7 @@ use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 
 use crate::channel::{Counts, Kind};
-use crate::grammar::is_name;
+use crate::name::is_name;
 
 /// What a client is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

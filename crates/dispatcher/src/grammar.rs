@@ -16,20 +16,12 @@
 
 use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
 use crate::device::Role;
+use crate::name::{LONGEST_NAME, is_name};
 use crate::number::Number;
 use crate::refusal::{Code, Refusal};
 
 /// The longest line, in bytes, with its end.
 pub const LONGEST_LINE: usize = 4096;
-
-/// The longest name of a client, in characters.
-pub const LONGEST_NAME: usize = 63;
-
-/// Whether `text` can be the name of a client.
-pub fn is_name(text: &str) -> bool {
-    let letter = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte);
-    (1..=LONGEST_NAME).contains(&text.len()) && text.bytes().all(letter)
-}
 
 /// A line, read as far as its keyword says what it is.
 #[derive(Clone, Debug)]

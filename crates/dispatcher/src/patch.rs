@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use crate::channel::{Channel, Kind};
-use crate::grammar::is_name;
+use crate::name::is_name;
 
 /// One channel of one client, by its name.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -66,9 +66,18 @@ struct Session {
     /// The rest of the current line is too long, and is ignored.
     is_skipping: bool,
     is_version_2: bool,
-    /// It has to read its answers before its next line is looked at, or its patch has to be saved.
-    is_stuck: bool,
-    is_closing: bool,
+    progress: Progress,
+}
+
+/// Whether the next line of a client is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// When it comes.
+    Going,
+    /// When the client has read its answers, or its patch was saved.
+    Stuck,
+    /// Never: the connection is to be closed.
+    Closing,
 }
 
 /// An answer to be given when the patch is saved.
@@ -135,8 +144,7 @@ impl Dispatcher {
             begun: Vec::new(),
             is_skipping: false,
             is_version_2: false,
-            is_stuck: false,
-            is_closing: false,
+            progress: Progress::Going,
         });
         self.next_look = self.next_look.min(now + self.settings.idle);
         Ok(seat)
@@ -155,12 +163,13 @@ impl Dispatcher {
     /// Whether bytes of this client are wanted now. If not, it has to read its answers first.
     pub fn wants_bytes(&self, seat: usize) -> bool {
         self.session(seat)
-            .is_some_and(|session| !session.is_stuck && !session.is_closing)
+            .is_some_and(|session| session.progress == Progress::Going)
     }
 
     /// Whether the connection is to be closed when its answers are written.
     pub fn is_closing(&self, seat: usize) -> bool {
-        self.session(seat).is_some_and(|session| session.is_closing)
+        self.session(seat)
+            .is_some_and(|session| session.progress == Progress::Closing)
     }
 
     /// A seat with something to write or to be closed, each once.
@@ -182,10 +191,10 @@ impl Dispatcher {
         let may_go_on = self.may_answer(seat);
         if may_go_on
             && let Some(session) = &mut self.sessions[seat]
-            && session.is_stuck
+            && session.progress == Progress::Stuck
             && !self.promised.iter().any(|promised| promised.seat == seat)
         {
-            session.is_stuck = false;
+            session.progress = Progress::Going;
             self.resumable.push(seat);
         }
     }
@@ -210,11 +219,14 @@ impl Dispatcher {
         let idle = self.settings.idle;
         let mut first = Nanos::MAX;
         for seat in 0..self.sessions.len() {
-            let Some(session) = self.sessions[seat].as_mut().filter(|it| !it.is_closing) else {
+            let Some(session) = self.sessions[seat]
+                .as_mut()
+                .filter(|it| it.progress != Progress::Closing)
+            else {
                 continue;
             };
             if now - session.heard >= idle {
-                session.is_closing = true;
+                session.progress = Progress::Closing;
                 let refusal = Code::TimeOut.because(format_args!(
                     "nothing was heard for {idle}; send PING when there is nothing else to send"
                 ));
@@ -252,8 +264,10 @@ impl Dispatcher {
             for sink in sinks {
                 self.board.refresh(&sink);
             }
-            if let Some(session) = &mut self.sessions[seat] {
-                session.is_stuck = false;
+            if let Some(session) = &mut self.sessions[seat]
+                && session.progress == Progress::Stuck
+            {
+                session.progress = Progress::Going;
                 if !session.begun.is_empty() {
                     self.resumable.push(seat);
                 }
@@ -293,10 +307,10 @@ impl Dispatcher {
             let Some(session) = &mut self.sessions[seat] else {
                 break;
             };
-            if session.is_closing {
+            if session.progress == Progress::Closing {
                 return bytes.len();
             }
-            if session.is_stuck {
+            if session.progress == Progress::Stuck {
                 break;
             }
             let rest = &bytes[at..];
@@ -323,7 +337,7 @@ impl Dispatcher {
                 break;
             };
             if !session.is_skipping && !may_answer(&mut self.board, seat) {
-                session.is_stuck = true;
+                session.progress = Progress::Stuck;
                 break;
             }
             at += end + 1;
@@ -373,7 +387,7 @@ impl Dispatcher {
             Line::Bye => {
                 self.confirm(seat, "BYE");
                 if let Some(session) = &mut self.sessions[seat] {
-                    session.is_closing = true;
+                    session.progress = Progress::Closing;
                 }
                 self.board.touch(seat);
             }
@@ -534,7 +548,7 @@ impl Dispatcher {
     fn promise(&mut self, seat: usize, verb: &'static str, sinks: Vec<Pin>) {
         self.promised.push(Promised { seat, verb, sinks });
         if let Some(session) = &mut self.sessions[seat] {
-            session.is_stuck = true;
+            session.progress = Progress::Stuck;
         }
     }
 

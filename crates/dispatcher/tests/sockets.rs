@@ -338,12 +338,10 @@ fn whenever_it_is_killed_the_patch_is_the_old_one_or_the_new_one_and_what_was_co
 
 /// A line that connects 60 inputs, or cuts them all.
 fn change(is_connected: bool) -> String {
-    let inputs = 1..=60;
     if is_connected {
         return "DISCONNECT Q1".to_owned();
     }
-    "CONNECT".to_owned()
-        + &inputs
-            .map(|at| format!(" Q1:FROM:I{at}"))
-            .collect::<String>()
+    (1..=60).fold("CONNECT".to_owned(), |line, at| {
+        line + &format!(" Q1:FROM:I{at}")
+    })
 }

@@ -211,7 +211,7 @@ mod watch {
         ) -> io::Result<()> {
             let patience = match patience {
                 // Nobody notices that a long wait ends a little early, and one system call does.
-                Some(span) if span >= LONG => Some(span - EARLY),
+                Some(span) if span >= LONG => Some(span.saturating_sub(EARLY)),
                 // epoll counts whole milliseconds; `ppoll`, which waits for it, has a finer resolution.
                 Some(span) => {
                     if !span.is_zero() {
@@ -453,9 +453,12 @@ mod tests {
     fn a_deadline_ends_a_wait() {
         let clock = Monotonic::shared();
         let mut set = PollSet::new(&Stop::new()).expect("sockets");
-        let deadline = clock.now() + Nanos::from_millis(2);
-        while clock.now() < deadline {
-            set.wait(&*clock, deadline).expect("it waits");
+        // A short wait, and one that is long enough to end early.
+        for span in [2, 102] {
+            let deadline = clock.now() + Nanos::from_millis(span);
+            while clock.now() < deadline {
+                set.wait(&*clock, deadline).expect("it waits");
+            }
         }
     }
 }

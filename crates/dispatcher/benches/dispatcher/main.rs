@@ -7,6 +7,11 @@
 //!
 //! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
+#![allow(
+    clippy::cast_precision_loss,
+    clippy::naive_bytecount,
+    reason = "counts are small, and a call per byte more is the same for all"
+)]
 
 #[cfg(unix)]
 mod hub;

@@ -35,7 +35,7 @@ struct Extent {
 /// The clients of one server, in pairs of a sender and a receiver.
 struct Pairs {
     name: &'static str,
-    pairs: Vec<(TcpStream, TcpStream)>,
+    streams: Vec<(TcpStream, TcpStream)>,
     /// Makes what sends one value through a pair.
     message: fn(usize, usize) -> String,
 }
@@ -144,7 +144,7 @@ fn ours(address: SocketAddr, count: usize) -> Pairs {
     };
     Pairs {
         name: "",
-        pairs: (0..count).map(pair).collect(),
+        streams: (0..count).map(pair).collect(),
         message: |_, value| format!("P Q1={value}\r\n"),
     }
 }
@@ -157,7 +157,7 @@ fn bare(address: SocketAddr, count: usize) -> Pairs {
     };
     Pairs {
         name: ".bare",
-        pairs: (0..count).map(|_| (connect(), connect())).collect(),
+        streams: (0..count).map(|_| (connect(), connect())).collect(),
         message: |_, value| format!("P I1={value}\r\n"),
     }
 }
@@ -171,7 +171,7 @@ fn through_nats(server: &Nats, count: usize) -> Pairs {
     };
     Pairs {
         name: ".nats",
-        pairs: (0..count).map(pair).collect(),
+        streams: (0..count).map(pair).collect(),
         message: |pair, value| {
             let text = format!("P Q1={value}");
             format!("PUB s{pair} {}\r\n{text}\r\n", text.len())
@@ -199,7 +199,7 @@ impl Pairs {
             .map(|value| (self.message)(0, 1000 + value))
             .collect();
         let writes: Vec<String> = lines.chunks(per_write).map(<[String]>::concat).collect();
-        let (sender, receiver) = &mut self.pairs[0];
+        let (sender, receiver) = &mut self.streams[0];
         let mut buffer = vec![0; 64 * 1024];
         let begin = Instant::now();
         let mut count = 0.0;
@@ -215,7 +215,7 @@ impl Pairs {
 
     /// Sends a line through each pair, over and over; returns lines per second.
     fn turns(&mut self, span: Duration) -> f64 {
-        let pairs = 0..self.pairs.len();
+        let pairs = 0..self.streams.len();
         let lines: Vec<[String; 2]> = pairs
             .map(|pair| [(self.message)(pair, 1000), (self.message)(pair, 1001)])
             .collect();
@@ -223,24 +223,24 @@ impl Pairs {
         let begin = Instant::now();
         let mut turn = 0;
         while begin.elapsed() < span {
-            for ((sender, _), lines) in self.pairs.iter_mut().zip(&lines) {
+            for ((sender, _), lines) in self.streams.iter_mut().zip(&lines) {
                 sender
                     .write_all(lines[turn % 2].as_bytes())
                     .expect("it reads");
             }
-            for (_, receiver) in &self.pairs {
+            for (_, receiver) in &self.streams {
                 read_values(receiver, 1, &mut buffer);
             }
             turn += 1;
         }
         // The next span begins with another value than this one has ended with.
         if turn % 2 == 1 {
-            for ((sender, receiver), lines) in self.pairs.iter_mut().zip(&lines) {
+            for ((sender, receiver), lines) in self.streams.iter_mut().zip(&lines) {
                 sender.write_all(lines[1].as_bytes()).expect("it reads");
                 read_values(receiver, 1, &mut buffer);
             }
         }
-        (turn * self.pairs.len()) as f64 / begin.elapsed().as_secs_f64()
+        (turn * self.streams.len()) as f64 / begin.elapsed().as_secs_f64()
     }
 }
 
@@ -280,7 +280,7 @@ fn latency(extent: &Extent, servers: &mut [Pairs]) {
         for (server, spans) in servers.iter_mut().zip(&mut spans) {
             thread::sleep(due.saturating_duration_since(Instant::now()));
             let message = (server.message)(0, 1000 + turn as usize % 2);
-            let (sender, receiver) = &mut server.pairs[0];
+            let (sender, receiver) = &mut server.streams[0];
             let begin = Instant::now();
             sender.write_all(message.as_bytes()).expect("it reads");
             read_values(receiver, 1, &mut buffer);
@@ -324,7 +324,7 @@ fn crowd(extent: &Extent, address: SocketAddr) {
         .map(|_| pairs.turns(extent.span))
         .collect();
     println!("rust dispatcher.crowd.idle {}", extent.idle);
-    println!("rust dispatcher.crowd.active {}", 2 * pairs.pairs.len());
+    println!("rust dispatcher.crowd.active {}", 2 * pairs.streams.len());
     println!("rust dispatcher.crowd.bytes_per_client {memory:.0}");
     println!(
         "rust dispatcher.crowd.us_per_line {:.3}",

@@ -56,7 +56,7 @@ impl Lab {
     }
 
     pub(crate) fn wait(&mut self, span: Nanos) {
-        self.now = self.now + span;
+        self.now += span;
         self.settle();
     }
 

@@ -10,8 +10,6 @@
 #![allow(missing_docs, reason = "a bench")]
 #![allow(unsafe_code, reason = "libmodbus is a library in C")]
 
-#[path = "../tests/peers/descriptors.rs"]
-mod descriptors;
 #[path = "modbus/libmodbus.rs"]
 mod libmodbus;
 
@@ -26,6 +24,7 @@ use std::time::{Duration, Instant};
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::time::{Monotonic, Nanos, TimeHistogram};
+use tickbus_base::os::raise_open_files;
 
 /// Registers written and read in one request.
 const REGISTERS: u8 = 64;
@@ -247,7 +246,7 @@ fn crowd(extent: &Extent) {
     // Both ends of each connection are in this process.
     let count = extent
         .clients
-        .min(descriptors::raise().saturating_sub(100) / 2);
+        .min(raise_open_files().saturating_sub(100) / 2);
     let (driver, address) = device();
     let before = resident();
     let mut refused = 0_u32;

@@ -6,8 +6,6 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[path = "peers/descriptors.rs"]
-mod descriptors;
 #[path = "peers/modbus.rs"]
 mod modbus;
 #[path = "peers/modbus_plc.rs"]
@@ -22,6 +20,7 @@ mod rtu;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Duration;
+use tickbus_base::os::raise_open_files;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
@@ -300,7 +299,7 @@ fn a_thousand_clients_are_served_side_by_side() {
     let (mut device, mut honest) = device("");
     let address = device.address();
     // Both ends of each connection are in this process.
-    let count = 1000.min(descriptors::raise().saturating_sub(100) / 2);
+    let count = 1000.min(raise_open_files().saturating_sub(100) / 2);
     let mut crowd: Vec<TcpStream> = (0..count).map(|_| client(address)).collect();
     for stream in &mut crowd {
         let bytes = request(9, 1, &[6, 0, 2, 0, 3]);

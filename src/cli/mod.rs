@@ -4,6 +4,7 @@
 
 mod axes;
 mod check;
+mod dispatch;
 mod export;
 mod gsd;
 mod host;
@@ -36,6 +37,7 @@ struct Arguments {
 enum Command {
     Axes(axes::Arguments),
     Check(check::Arguments),
+    Dispatch(dispatch::Arguments),
     Export(export::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
@@ -87,6 +89,7 @@ pub fn main() -> ExitCode {
     let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Dispatch(arguments) => dispatch::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Gsd(arguments) => gsd::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),

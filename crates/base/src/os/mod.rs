@@ -2,6 +2,7 @@
 
 mod library;
 mod log;
+mod open_files;
 #[cfg(unix)]
 mod named_memory;
 #[cfg(unix)]
@@ -19,6 +20,7 @@ mod timer_slack;
 
 pub use library::{Library, one_line};
 pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
+pub use open_files::raise_open_files;
 #[cfg(unix)]
 pub use named_memory::NamedMemory;
 #[cfg(unix)]

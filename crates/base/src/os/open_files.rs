@@ -1,9 +1,8 @@
-//! The number of sockets that this process may have.
-#![allow(unreachable_pub, reason = "a benchmark uses it, too")]
+//! The number of files and sockets that this process may have.
 
-/// Raises the limit of open files as far as possible; returns the limit.
+/// Raises the limit of open files as far as the system allows without special rights; returns the limit.
 #[cfg(unix)]
-pub fn raise() -> usize {
+pub fn raise_open_files() -> usize {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
     let limit = getrlimit(Resource::Nofile);
@@ -22,6 +21,6 @@ pub fn raise() -> usize {
 
 /// There is no limit to raise.
 #[cfg(not(unix))]
-pub fn raise() -> usize {
+pub fn raise_open_files() -> usize {
     usize::MAX
 }

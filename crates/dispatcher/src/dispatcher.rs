@@ -1,0 +1,592 @@
+//! The dispatcher without its sockets: lines in, lines out, and time handed in.
+
+use std::net::SocketAddr;
+
+use tickbus_base::time::Nanos;
+
+use crate::board::{Board, OnLoss, Traffic};
+use crate::channel::Channel;
+use crate::device::{Device, Role};
+use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, Values};
+use crate::number::Number;
+use crate::patch::{Patch, Pin};
+use crate::refusal::{Code, Refusal};
+
+/// How a dispatcher serves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// A client that has sent no complete line for this long is disconnected.
+    pub idle: Nanos,
+    /// What an input gets when its source has gone.
+    pub on_loss: OnLoss,
+    /// The most clients at a time.
+    pub clients: usize,
+}
+
+impl Default for Settings {
+    /// The 60 s of the paper, fail-safe, 16,384 clients.
+    fn default() -> Self {
+        Self {
+            idle: Nanos::from_secs(60),
+            on_loss: OnLoss::FailSafe,
+            clients: 16_384,
+        }
+    }
+}
+
+/// The dispatcher. Each connection has a seat, a number that is used again when it is free.
+///
+/// After calls that take `now`, and after [`saved`](Self::saved) and [`gone`](Self::gone): save the patch if
+/// [`unsaved`](Self::unsaved), then write what there is [`to_write`](Self::to_write) to each seat of
+/// [`next_touched`](Self::next_touched).
+#[derive(Debug)]
+pub struct Dispatcher {
+    settings: Settings,
+    board: Board,
+    sessions: Vec<Option<Session>>,
+    free: Vec<usize>,
+    count: usize,
+    /// The values of the current line.
+    items: Vec<(usize, Number)>,
+    /// Seats that were stuck and may go on.
+    resumable: Vec<usize>,
+    /// Answers to be given when the patch is saved.
+    promised: Vec<Promised>,
+    /// When the times of all clients are looked at next.
+    next_look: Nanos,
+}
+
+#[derive(Debug)]
+struct Session {
+    peer: SocketAddr,
+    /// When its last complete line came, or the connection.
+    heard: Nanos,
+    /// What has arrived and was not worked on yet.
+    begun: Vec<u8>,
+    /// The rest of the current line is too long, and is ignored.
+    is_skipping: bool,
+    is_version_2: bool,
+    progress: Progress,
+}
+
+/// Whether the next line of a client is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    /// When it comes.
+    Going,
+    /// When the client has read its answers, or its patch was saved.
+    Stuck,
+    /// Never: the connection is to be closed.
+    Closing,
+}
+
+/// An answer to be given when the patch is saved.
+#[derive(Debug)]
+struct Promised {
+    seat: usize,
+    verb: &'static str,
+    /// Inputs that then get the value of their new source.
+    sinks: Vec<Pin>,
+}
+
+impl Dispatcher {
+    /// A dispatcher without clients.
+    pub fn new(settings: Settings, patch: Patch) -> Self {
+        Self {
+            settings,
+            board: Board::new(patch, settings.on_loss),
+            sessions: Vec::new(),
+            free: Vec::new(),
+            count: 0,
+            items: Vec::new(),
+            resumable: Vec::new(),
+            promised: Vec::new(),
+            next_look: Nanos::MAX,
+        }
+    }
+
+    /// All connections between channels.
+    pub fn patch(&self) -> &Patch {
+        self.board.patch()
+    }
+
+    /// What went through so far.
+    pub fn traffic(&self) -> Traffic {
+        self.board.traffic
+    }
+
+    /// The number of clients.
+    pub fn clients(&self) -> usize {
+        self.count
+    }
+
+    /// A client has connected; returns its seat.
+    ///
+    /// # Errors
+    ///
+    /// There are as many clients as the settings allow. Send it this, and close.
+    pub fn connected(&mut self, now: Nanos, peer: SocketAddr) -> Result<usize, Refusal> {
+        let most = self.settings.clients;
+        if self.count >= most {
+            return Err(Code::Limit.because(format_args!(
+                "{most} clients are here, and no more are served"
+            )));
+        }
+        let seat = self.free.pop().unwrap_or_else(|| {
+            self.sessions.push(None);
+            self.sessions.len() - 1
+        });
+        self.count += 1;
+        self.board.seat(seat);
+        self.sessions[seat] = Some(Session {
+            peer,
+            heard: now,
+            begun: Vec::new(),
+            is_skipping: false,
+            is_version_2: false,
+            progress: Progress::Going,
+        });
+        self.next_look = self.next_look.min(now + self.settings.idle);
+        Ok(seat)
+    }
+
+    /// The connection of a seat is gone, or was closed.
+    pub fn gone(&mut self, seat: usize) {
+        if self.sessions[seat].take().is_some() {
+            self.count -= 1;
+            self.free.push(seat);
+            self.promised.retain(|promised| promised.seat != seat);
+            self.board.unplug(seat);
+        }
+    }
+
+    /// Whether bytes of this client are wanted now. If not, it has to read its answers first.
+    pub fn wants_bytes(&self, seat: usize) -> bool {
+        self.session(seat)
+            .is_some_and(|session| session.progress == Progress::Going)
+    }
+
+    /// Whether the connection is to be closed when its answers are written.
+    pub fn is_closing(&self, seat: usize) -> bool {
+        self.session(seat)
+            .is_some_and(|session| session.progress == Progress::Closing)
+    }
+
+    /// A seat with something to write or to be closed, each once.
+    pub fn next_touched(&mut self) -> Option<usize> {
+        self.board.next_touched()
+    }
+
+    /// What is to be written to a client now.
+    pub fn to_write(&mut self, seat: usize) -> &[u8] {
+        if let Some(session) = &self.sessions[seat] {
+            self.board.refill(seat, session.is_version_2);
+        }
+        self.board.to_write(seat)
+    }
+
+    /// The system has taken this many bytes for a client.
+    pub fn wrote(&mut self, seat: usize, count: usize) {
+        self.board.outbox(seat).wrote(count);
+        let may_go_on = self.may_answer(seat);
+        if may_go_on
+            && let Some(session) = &mut self.sessions[seat]
+            && session.progress == Progress::Stuck
+            && !self.promised.iter().any(|promised| promised.seat == seat)
+        {
+            session.progress = Progress::Going;
+            self.resumable.push(seat);
+        }
+    }
+
+    /// When [`tick`](Self::tick) has something to do even if nothing arrives.
+    pub fn deadline(&self) -> Nanos {
+        if self.resumable.is_empty() {
+            self.next_look
+        } else {
+            Nanos::ZERO
+        }
+    }
+
+    /// Goes on with clients that had to wait, and disconnects those that have been silent for too long.
+    pub fn tick(&mut self, now: Nanos) {
+        for seat in std::mem::take(&mut self.resumable) {
+            self.arrived(now, seat, &[]);
+        }
+        if now < self.next_look {
+            return;
+        }
+        let idle = self.settings.idle;
+        let mut first = Nanos::MAX;
+        for seat in 0..self.sessions.len() {
+            let Some(session) = self.sessions[seat]
+                .as_mut()
+                .filter(|it| it.progress != Progress::Closing)
+            else {
+                continue;
+            };
+            if now - session.heard >= idle {
+                session.progress = Progress::Closing;
+                let refusal = Code::TimeOut.because(format_args!(
+                    "nothing was heard for {idle}; send PING when there is nothing else to send"
+                ));
+                self.refuse(seat, &refusal);
+            } else {
+                first = first.min(session.heard + idle);
+            }
+        }
+        // With many clients there is always one whose time comes next; they are looked at together.
+        let soonest = now + Nanos(idle.0 / 600);
+        self.next_look = first.max(soonest);
+        if first == Nanos::MAX {
+            self.next_look = Nanos::MAX;
+        }
+    }
+
+    /// The patch, if it was changed and not saved since.
+    pub fn unsaved(&self) -> Option<&Patch> {
+        (!self.promised.is_empty()).then(|| self.board.patch())
+    }
+
+    /// The patch was saved, or why not: who changed it is answered.
+    pub fn saved(&mut self, outcome: &Result<(), String>) {
+        for Promised { seat, verb, sinks } in std::mem::take(&mut self.promised) {
+            match outcome {
+                Ok(()) => self.confirm(seat, verb),
+                Err(why) => self.refuse(
+                    seat,
+                    &Code::Internal.because(format_args!(
+                        "the patch could not be saved ({why}); it holds until the dispatcher ends"
+                    )),
+                ),
+            }
+            self.board.begin_line();
+            for sink in sinks {
+                self.board.refresh(&sink);
+            }
+            if let Some(session) = &mut self.sessions[seat]
+                && session.progress == Progress::Stuck
+            {
+                session.progress = Progress::Going;
+                if !session.begun.is_empty() {
+                    self.resumable.push(seat);
+                }
+            }
+        }
+    }
+
+    /// Bytes have arrived from a client, in any pieces.
+    pub fn arrived(&mut self, now: Nanos, seat: usize, bytes: &[u8]) {
+        let Some(session) = &mut self.sessions[seat] else {
+            return;
+        };
+        if session.begun.is_empty() {
+            let taken = self.work(now, seat, bytes);
+            if let Some(session) = &mut self.sessions[seat] {
+                session.begun.extend_from_slice(&bytes[taken..]);
+            }
+            return;
+        }
+        session.begun.extend_from_slice(bytes);
+        let mut begun = std::mem::take(&mut session.begun);
+        let taken = self.work(now, seat, &begun);
+        if let Some(session) = &mut self.sessions[seat] {
+            begun.drain(..taken);
+            if begun.is_empty() && begun.capacity() > 2 * LONGEST_LINE {
+                begun = Vec::new();
+            }
+            session.begun = begun;
+        }
+    }
+
+    /// Works on the complete lines at the beginning of `bytes`; returns how many bytes those were.
+    fn work(&mut self, now: Nanos, seat: usize, bytes: &[u8]) -> usize {
+        let mut at = 0;
+        let mut counts = self.board.device(seat).map(|device| device.counts);
+        while at < bytes.len() {
+            let Some(session) = &mut self.sessions[seat] else {
+                break;
+            };
+            if session.progress == Progress::Closing {
+                return bytes.len();
+            }
+            if session.progress == Progress::Stuck {
+                break;
+            }
+            let rest = &bytes[at..];
+            if let Some(counts) = counts
+                && !session.is_skipping
+            {
+                self.items.clear();
+                if let Some(length) = grammar::quick_values(rest, counts, &mut self.items) {
+                    session.heard = now;
+                    self.board.traffic.lines += 1;
+                    self.set_values(seat);
+                    at += length;
+                    continue;
+                }
+            }
+            let Some(end) = rest.iter().position(|byte| *byte == b'\n') else {
+                if session.is_skipping || rest.len() >= LONGEST_LINE {
+                    let is_new = !std::mem::replace(&mut session.is_skipping, true);
+                    if is_new {
+                        self.refuse_length(seat);
+                    }
+                    return bytes.len();
+                }
+                break;
+            };
+            if !session.is_skipping && !may_answer(&mut self.board, seat) {
+                session.progress = Progress::Stuck;
+                break;
+            }
+            at += end + 1;
+            session.heard = now;
+            self.board.traffic.lines += 1;
+            if std::mem::take(&mut session.is_skipping) {
+                continue;
+            }
+            if end >= LONGEST_LINE {
+                self.refuse_length(seat);
+                continue;
+            }
+            let line = &rest[..end];
+            if let Err(refusal) = self.obey(seat, line.strip_suffix(b"\r").unwrap_or(line)) {
+                self.refuse(seat, &refusal);
+            }
+            counts = self.board.device(seat).map(|device| device.counts);
+        }
+        at
+    }
+
+    /// Carries a line out.
+    fn obey(&mut self, seat: usize, line: &[u8]) -> Result<(), Refusal> {
+        let line = grammar::parse(line)?;
+        let is_plugged = self.board.device(seat).is_some();
+        let may_come_first = matches!(
+            line,
+            Line::Nothing | Line::Identify(_) | Line::Ping | Line::Bye
+        );
+        if !is_plugged && !may_come_first {
+            return Err(Code::IdentifyFirst
+                .because("say first who you are, such as VR NAME Q08 I08 AQ02 AI03"));
+        }
+        self.board.begin_line();
+        match line {
+            Line::Nothing => {}
+            Line::Identify(identification) => self.identify(seat, identification)?,
+            Line::Values(values) => self.values(seat, values)?,
+            Line::Connect(joints) => self.connect(seat, joints)?,
+            Line::Disconnect(channels) => self.disconnect(seat, channels)?,
+            Line::List => {
+                self.confirm(seat, "LIST");
+                self.board.list(seat);
+            }
+            // Nobody sends it who does not want to hear it.
+            Line::Ping => self.board.say(seat, "OK PING"),
+            Line::Bye => {
+                self.confirm(seat, "BYE");
+                if let Some(session) = &mut self.sessions[seat] {
+                    session.progress = Progress::Closing;
+                }
+                self.board.touch(seat);
+            }
+        }
+        Ok(())
+    }
+
+    fn identify(&mut self, seat: usize, identification: Identification<'_>) -> Result<(), Refusal> {
+        let Identification {
+            role,
+            name,
+            counts,
+            is_version_2,
+        } = identification;
+        if let Some(device) = self.board.device(seat) {
+            let text = format!(
+                "you are {} already; connect once more to be another client",
+                device.name
+            );
+            return Err(Code::Conflict.because(text));
+        }
+        if self.board.is_taken(name) {
+            let text = format!("there is a client {name} already; take another name");
+            return Err(Code::Conflict.because(text));
+        }
+        let Some(session) = &mut self.sessions[seat] else {
+            return Ok(());
+        };
+        session.is_version_2 = is_version_2;
+        let device = Device {
+            role,
+            name: name.to_owned(),
+            counts,
+            peer: session.peer,
+        };
+        self.board.plug(seat, device);
+        self.confirm(seat, Role::keyword(role));
+        self.board.list(seat);
+        self.board.refresh_all(seat);
+        Ok(())
+    }
+
+    fn values(&mut self, seat: usize, values: Values<'_>) -> Result<(), Refusal> {
+        let Some(counts) = self.board.device(seat).map(|device| device.counts) else {
+            return Ok(());
+        };
+        self.items.clear();
+        for item in values {
+            let (channel, value) = item?;
+            if !channel.kind.is_output() {
+                let text = format!("{channel} is an input; a client sends values of its outputs");
+                return Err(Code::Mismatch.because(text));
+            }
+            let place = counts
+                .place(channel)
+                .ok_or_else(|| no_channel("you have", channel))?;
+            self.items.push((place, value));
+        }
+        self.set_values(seat);
+        Ok(())
+    }
+
+    /// Routes the values of the current line.
+    #[inline]
+    fn set_values(&mut self, seat: usize) {
+        self.board.begin_line();
+        for (channel, value) in &self.items {
+            self.board.set(seat, *channel, *value);
+        }
+    }
+
+    fn connect(&mut self, seat: usize, joints: Joints<'_>) -> Result<(), Refusal> {
+        let own_name = self.name(seat);
+        let mut connections: Vec<(Pin, Pin)> = Vec::new();
+        for joint in joints {
+            let joint = joint?;
+            if !self.board.has(seat, joint.own) {
+                return Err(no_channel("you have", joint.own));
+            }
+            let Some(other) = self.board.find(joint.peer) else {
+                return Err(Code::NotFound.because(format_args!(
+                    "there is no client {}; LIST shows who is here",
+                    joint.peer
+                )));
+            };
+            let peer = self.name(other);
+            if !self.board.has(other, joint.channel) {
+                return Err(no_channel(&format!("{peer} has"), joint.channel));
+            }
+            let (own, channel) = (joint.own.kind, joint.channel.kind);
+            if own.is_output() == channel.is_output() || own.is_analog() != channel.is_analog() {
+                return Err(Code::Mismatch.because(format_args!(
+                    "{} and {} cannot be connected; connect an output with an input, digital or analog both",
+                    joint.own, joint.channel
+                )));
+            }
+            let own = Pin::new(&own_name, joint.own);
+            let peer = Pin::new(&peer, joint.channel);
+            let (sink, source) = if joint.own.kind.is_output() {
+                (peer, own)
+            } else {
+                (own, peer)
+            };
+            let mut in_line = connections.iter().filter(|(other, _)| *other == sink);
+            let present = self.board.patch().source(&sink);
+            let present = present.or(in_line.next().map(|(_, source)| source));
+            if let Some(other) = present.filter(|other| **other != source) {
+                return Err(Code::Conflict.because(format_args!(
+                    "{sink} is connected to {other} already; DISCONNECT it there first"
+                )));
+            }
+            connections.push((sink, source));
+        }
+        let mut sinks = Vec::with_capacity(connections.len());
+        for (sink, source) in connections {
+            if self.board.patch().source(&sink).is_none() {
+                self.board.connect(sink.clone(), source);
+            }
+            sinks.push(sink);
+        }
+        self.promise(seat, "CONNECT", sinks);
+        Ok(())
+    }
+
+    fn disconnect(&mut self, seat: usize, channels: Channels<'_>) -> Result<(), Refusal> {
+        let own_name = self.name(seat);
+        let mut sinks = Vec::new();
+        for channel in channels {
+            let channel = channel?;
+            if !self.board.has(seat, channel) {
+                return Err(no_channel("you have", channel));
+            }
+            let own = Pin::new(&own_name, channel);
+            let before = sinks.len();
+            if channel.kind.is_output() {
+                sinks.extend(self.board.patch().sinks(&own).cloned());
+            } else if self.board.patch().source(&own).is_some() {
+                sinks.push(own);
+            }
+            if sinks.len() == before {
+                let text = format!("{channel} is not connected");
+                return Err(Code::NotFound.because(text));
+            }
+        }
+        for sink in &sinks {
+            self.board.disconnect(sink);
+        }
+        self.promise(seat, "DISCONNECT", Vec::new());
+        Ok(())
+    }
+
+    fn name(&self, seat: usize) -> String {
+        let device = self.board.device(seat);
+        device.map(|device| device.name.clone()).unwrap_or_default()
+    }
+
+    /// Answers when the patch is saved; until then no further line of the client is looked at.
+    fn promise(&mut self, seat: usize, verb: &'static str, sinks: Vec<Pin>) {
+        self.promised.push(Promised { seat, verb, sinks });
+        if let Some(session) = &mut self.sessions[seat] {
+            session.progress = Progress::Stuck;
+        }
+    }
+
+    fn session(&self, seat: usize) -> Option<&Session> {
+        self.sessions.get(seat)?.as_ref()
+    }
+
+    fn may_answer(&mut self, seat: usize) -> bool {
+        may_answer(&mut self.board, seat)
+    }
+
+    /// Answers `OK` to a client of version 2.
+    fn confirm(&mut self, seat: usize, verb: &str) {
+        if self
+            .session(seat)
+            .is_some_and(|session| session.is_version_2)
+        {
+            self.board.say(seat, &format!("OK {verb}"));
+        }
+    }
+
+    fn refuse(&mut self, seat: usize, refusal: &Refusal) {
+        self.board.traffic.refused += 1;
+        self.board.say(seat, &refusal.to_string());
+    }
+
+    fn refuse_length(&mut self, seat: usize) {
+        let text = format!("the line has more than {LONGEST_LINE} bytes and was ignored");
+        self.refuse(seat, &Code::TooLong.because(text));
+    }
+}
+
+/// Whether a client may get further answers: it has read enough of the last ones.
+fn may_answer(board: &mut Board, seat: usize) -> bool {
+    let outbox = board.outbox(seat);
+    outbox.listing.is_none() && !outbox.is_full()
+}
+
+fn no_channel(who_has: &str, channel: Channel) -> Refusal {
+    Code::NotFound.because(format_args!("{who_has} no {channel}"))
+}

@@ -1,0 +1,381 @@
+//! The lines that a client may send.
+//!
+//! ```text
+//! line       = [ident | values | connect | disconnect | "LIST" | "PING" | "BYE"] (CRLF | LF)
+//! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) ["V=2"]
+//! values     = "P" *(channel "=" number)
+//! connect    = "CONNECT" 1*(channel ":" name ":" channel)
+//! disconnect = "DISCONNECT" 1*channel
+//! channel    = ("Q" | "I" | "AQ" | "AI") 1*DIGIT
+//! number     = ["-"] 1*DIGIT ["." 1*DIGIT]
+//! name       = 1*63(ALPHA | DIGIT | "_" | "-" | ".")
+//! ```
+//!
+//! Words are separated by blanks or tabs. Keywords and channels are read in any case. Blanks beside `:` and `=` do not
+//! count, since the published examples have some.
+
+use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
+use crate::device::Role;
+use crate::name::{LONGEST_NAME, is_name};
+use crate::number::Number;
+use crate::refusal::{Code, Refusal};
+
+/// The longest line, in bytes, with its end.
+pub const LONGEST_LINE: usize = 4096;
+
+/// A line, read as far as its keyword says what it is.
+#[derive(Clone, Debug)]
+pub enum Line<'a> {
+    /// An empty line.
+    Nothing,
+    /// Who the client is.
+    Identify(Identification<'a>),
+    /// Values of its outputs.
+    Values(Values<'a>),
+    /// Connections to be made.
+    Connect(Joints<'a>),
+    /// Channels whose connections are to be cut.
+    Disconnect(Channels<'a>),
+    /// A request for the list of devices.
+    List,
+    /// A sign of life.
+    Ping,
+    /// Good-bye.
+    Bye,
+}
+
+/// What a client says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identification<'a> {
+    /// What it is.
+    pub role: Role,
+    /// Its name.
+    pub name: &'a str,
+    /// Its channels.
+    pub counts: Counts,
+    /// Whether it wants confirmations.
+    pub is_version_2: bool,
+}
+
+/// Reads a line, without its end.
+///
+/// # Errors
+///
+/// The line is not in the grammar. What the iterators of [`Line`] yield can be wrong as well.
+pub fn parse(line: &[u8]) -> Result<Line<'_>, Refusal> {
+    const VERBS: [&str; 6] = ["P", "CONNECT", "DISCONNECT", "LIST", "PING", "BYE"];
+
+    let mut words = Words(line);
+    let Some(keyword) = words.word() else {
+        return match words.sign() {
+            None => Ok(Line::Nothing),
+            Some(_) => Err(words.unexpected("a keyword such as P or CONNECT")),
+        };
+    };
+    if let Some(role) = Role::parse(keyword) {
+        return identification(role, words).map(Line::Identify);
+    }
+    let verb = VERBS
+        .iter()
+        .position(|verb| keyword.eq_ignore_ascii_case(verb.as_bytes()));
+    let simple = match verb {
+        Some(0) => return Ok(Line::Values(Values(words))),
+        Some(1) => {
+            return words
+                .not_empty("I1:NAME:Q2")
+                .map(|()| Line::Connect(Joints(words)));
+        }
+        Some(2) => {
+            return words
+                .not_empty("I1")
+                .map(|()| Line::Disconnect(Channels(words)));
+        }
+        Some(3) => Line::List,
+        Some(4) => Line::Ping,
+        Some(5) => Line::Bye,
+        _ => {
+            return Err(Code::Syntax.because(format_args!(
+                "\"{}\" is no keyword; write VR, VP, P, CONNECT, DISCONNECT, LIST, PING or BYE",
+                shown(keyword)
+            )));
+        }
+    };
+    words.end().map(|()| simple)
+}
+
+fn identification(role: Role, mut words: Words<'_>) -> Result<Identification<'_>, Refusal> {
+    let name = words.word().and_then(|word| std::str::from_utf8(word).ok());
+    let Some(name) = name.filter(|name| is_name(name)) else {
+        return Err(Code::Syntax.because(format_args!(
+            "{} needs a name of 1 to {LONGEST_NAME} letters, digits, _, - and .",
+            role.keyword()
+        )));
+    };
+    let mut counts = [None; 4];
+    let mut is_version_2 = false;
+    while let Some(word) = words.word() {
+        if word.eq_ignore_ascii_case(b"V") && words.take(b'=') {
+            if words.word() != Some(b"2") {
+                return Err(Code::Syntax.because("the version is 2, as V=2"));
+            }
+            is_version_2 = true;
+            break;
+        }
+        let Some((kind, count)) = Kind::with_number(word) else {
+            return Err(Code::Syntax.because(format_args!(
+                "\"{}\" is no number of channels; write Q08, I08, AQ02, AI03 or the like",
+                shown(word)
+            )));
+        };
+        if count > MOST_CHANNELS {
+            return Err(Code::Limit.because(format_args!(
+                "\"{}\" is too many: a client has up to {MOST_CHANNELS} channels of a kind",
+                shown(word)
+            )));
+        }
+        if counts[kind as usize].replace(count).is_some() {
+            let letters = kind.letters();
+            return Err(Code::Syntax.because(format_args!("{letters} stands here twice")));
+        }
+    }
+    words.end()?;
+    if counts == [None; 4] {
+        return Err(Code::Syntax.because("say how many channels there are, such as Q08 I08"));
+    }
+    let [q, i, aq, ai] = counts.map(Option::unwrap_or_default);
+    Ok(Identification {
+        role,
+        name,
+        counts: Counts::new(q, i, aq, ai),
+        is_version_2,
+    })
+}
+
+/// The values of a line, each checked when it is reached.
+#[derive(Clone, Debug)]
+pub struct Values<'a>(Words<'a>);
+
+impl Iterator for Values<'_> {
+    type Item = Result<(Channel, Number), Refusal>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.0.item(|words| {
+            let channel = words.channel()?;
+            if !words.take(b'=') {
+                return Err(words.unexpected("= and a number, as in Q1=20"));
+            }
+            let text = words.word().unwrap_or_default();
+            match Number::parse(text) {
+                Some(number) => Ok((channel, number)),
+                None => Err(Code::Syntax.because(format_args!(
+                    "\"{}\" is no number for {channel}; write one such as 20 or -4.5, of up to 23 characters",
+                    shown(text)
+                ))),
+            }
+        })
+    }
+}
+
+/// One connection, as a client asks for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Joint<'a> {
+    /// The channel of the client itself.
+    pub own: Channel,
+    /// The other client: its name, or `P1` for the first process.
+    pub peer: &'a str,
+    /// The channel of the other client.
+    pub channel: Channel,
+}
+
+/// The connections of a line, each checked when it is reached.
+#[derive(Clone, Debug)]
+pub struct Joints<'a>(Words<'a>);
+
+impl<'a> Iterator for Joints<'a> {
+    type Item = Result<Joint<'a>, Refusal>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        const SHAPE: &str = ": as in I1:NAME:Q2";
+
+        self.0.item(|words| {
+            let own = words.channel()?;
+            if !words.take(b':') {
+                return Err(words.unexpected(SHAPE));
+            }
+            let word = words.word().unwrap_or_default();
+            let peer = std::str::from_utf8(word).unwrap_or_default();
+            if !is_name(peer) {
+                let text = format!("\"{}\" cannot be the name of a client", shown(word));
+                return Err(Code::Syntax.because(text));
+            }
+            if !words.take(b':') {
+                return Err(words.unexpected(SHAPE));
+            }
+            let channel = words.channel()?;
+            Ok(Joint { own, peer, channel })
+        })
+    }
+}
+
+/// The channels of a line, each checked when it is reached.
+#[derive(Clone, Debug)]
+pub struct Channels<'a>(Words<'a>);
+
+impl Iterator for Channels<'_> {
+    type Item = Result<Channel, Refusal>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.0.item(Words::channel)
+    }
+}
+
+/// What is left of a line.
+#[derive(Clone, Copy, Debug)]
+struct Words<'a>(&'a [u8]);
+
+impl<'a> Words<'a> {
+    fn skip_blanks(&mut self) {
+        while let [b' ' | b'\t', rest @ ..] = self.0 {
+            self.0 = rest;
+        }
+    }
+
+    /// Takes the next word; `None` at a sign and at the end.
+    fn word(&mut self) -> Option<&'a [u8]> {
+        self.skip_blanks();
+        let is_end = |byte: &u8| matches!(byte, b' ' | b'\t' | b':' | b'=');
+        let length = self.0.iter().position(is_end).unwrap_or(self.0.len());
+        let (word, rest) = self.0.split_at(length);
+        self.0 = rest;
+        (length > 0).then_some(word)
+    }
+
+    /// The sign that comes next.
+    fn sign(&mut self) -> Option<u8> {
+        self.skip_blanks();
+        self.0.first().copied().filter(|byte| b":=".contains(byte))
+    }
+
+    /// Takes this sign, if it comes next.
+    fn take(&mut self, sign: u8) -> bool {
+        let is_next = self.sign() == Some(sign);
+        if is_next {
+            self.0 = &self.0[1..];
+        }
+        is_next
+    }
+
+    fn channel(&mut self) -> Result<Channel, Refusal> {
+        let word = self.word().unwrap_or_default();
+        Channel::parse(word).ok_or_else(|| {
+            Code::Syntax.because(format_args!(
+                "\"{}\" is no channel; write Q1, I1, AQ1, AI1 or the like",
+                shown(word)
+            ))
+        })
+    }
+
+    /// The next item of a list; after a mistake there are no more.
+    fn item<T>(
+        &mut self,
+        read: impl FnOnce(&mut Self) -> Result<T, Refusal>,
+    ) -> Option<Result<T, Refusal>> {
+        self.skip_blanks();
+        if self.0.is_empty() {
+            return None;
+        }
+        let item = read(self);
+        if item.is_err() {
+            self.0 = &[];
+        }
+        Some(item)
+    }
+
+    fn not_empty(&mut self, example: &str) -> Result<(), Refusal> {
+        self.skip_blanks();
+        if self.0.is_empty() {
+            return Err(Code::Syntax.because(format_args!("say what, such as {example}")));
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), Refusal> {
+        self.skip_blanks();
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        Err(self.unexpected("the end of the line"))
+    }
+
+    fn unexpected(&self, expected: &str) -> Refusal {
+        Code::Syntax.because(format_args!(
+            "\"{}\" stands where {expected} was expected",
+            shown(self.0)
+        ))
+    }
+}
+
+/// What a client sent, for an answer of one line.
+fn shown(bytes: &[u8]) -> String {
+    const LONGEST: usize = 40;
+
+    let text = bytes.iter().take(LONGEST).map(|byte| match byte {
+        b' '..=b'~' if *byte != b'"' => char::from(*byte),
+        _ => '?',
+    });
+    let end = if bytes.len() > LONGEST { ".." } else { "" };
+    text.chain(end.chars()).collect()
+}
+
+/// Reads a line of values in its usual form at the beginning of `bytes`, in one pass: the places of the outputs of a
+/// client with these `counts`, and the numbers. Returns the length of the line with its end, or `None` if the line has to
+/// be looked at properly.
+#[inline]
+pub(crate) fn quick_values(
+    bytes: &[u8],
+    counts: Counts,
+    items: &mut Vec<(usize, Number)>,
+) -> Option<usize> {
+    let &[b'P', b' ', ..] = bytes else {
+        return None;
+    };
+    let mut at = 2;
+    loop {
+        let kind = match *bytes.get(at)? {
+            b'Q' => Kind::DigitalOutput,
+            b'A' if *bytes.get(at + 1)? == b'Q' => {
+                at += 1;
+                Kind::AnalogOutput
+            }
+            _ => return None,
+        };
+        at += 1;
+        let first = at;
+        let mut number = 0_u16;
+        while let digit @ b'0'..=b'9' = *bytes.get(at)? {
+            if at - first == 4 {
+                return None;
+            }
+            number = number * 10 + u16::from(digit - b'0');
+            at += 1;
+        }
+        if at == first || bytes[at] != b'=' {
+            return None;
+        }
+        let place = counts.place(Channel { kind, number })?;
+        let (value, length) = Number::quick(&bytes[at + 1..])?;
+        items.push((place, value));
+        at += 1 + length;
+        at += match *bytes.get(at)? {
+            b' ' | b'\n' => 1,
+            b'\r' if *bytes.get(at + 1)? == b'\n' => 2,
+            _ => return None,
+        };
+        if at > LONGEST_LINE {
+            return None;
+        }
+        if bytes[at - 1] == b'\n' {
+            return Some(at);
+        }
+    }
+}

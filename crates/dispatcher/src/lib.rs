@@ -1,0 +1,30 @@
+//! The dispatcher of a virtual laboratory.
+//!
+//! Virtual controllers and virtual processes are clients of one server. Each says by a line of text how many inputs and
+//! outputs it has, asks for connections, and sends its values; the dispatcher passes them on along the patch.
+//! docs/dispatcher.md has the protocol, for users and for authors of clients.
+//!
+//! [`Dispatcher`] does no I/O; [`tcp`] puts it on a port.
+
+mod board;
+mod channel;
+mod device;
+mod dispatcher;
+pub mod grammar;
+mod name;
+mod number;
+mod outbox;
+mod patch;
+mod patch_file;
+mod refusal;
+pub mod tcp;
+
+pub use board::{OnLoss, Traffic};
+pub use channel::{Channel, Counts, Kind, MOST_CHANNELS};
+pub use device::{Device, Role};
+pub use dispatcher::{Dispatcher, Settings};
+pub use name::{LONGEST_NAME, is_name};
+pub use number::{LONGEST_NUMBER, Number};
+pub use patch::{Patch, Pin};
+pub use patch_file::PatchFile;
+pub use refusal::{Code, Refusal};

@@ -1,0 +1,133 @@
+//! What a client has not read yet.
+
+use crate::channel::Channel;
+use crate::number::Number;
+
+/// The bytes of an outbox above which no further answers are made.
+const FULL: usize = 64 * 1024;
+
+/// The bytes of an outbox above which values wait in their channels. It is less than for answers: a client that only sends
+/// values and never reads is served all the same.
+const JAMMED: usize = 32 * 1024;
+
+/// The bytes of an outbox below which lines are made of values that have waited.
+const ROOM: usize = 16 * 1024;
+
+/// The longest line of values that is made, in bytes, without its last value.
+const LONGEST: usize = 4000;
+
+/// An input's channel as it stands in a line of values: `I4=`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Label {
+    text: [u8; 8],
+    length: u8,
+}
+
+impl Label {
+    pub(crate) fn new(channel: Channel) -> Self {
+        let label = format!("{channel}=");
+        let mut text = [0; 8];
+        text[..label.len()].copy_from_slice(label.as_bytes());
+        #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
+        let length = label.len() as u8;
+        Self { text, length }
+    }
+}
+
+/// A part of the device list that is still to be written.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Listing {
+    /// The next device, by the order of registration.
+    pub(crate) next: u64,
+    /// The first device that came after the list was asked for.
+    pub(crate) end: u64,
+    /// Devices written.
+    pub(crate) count: usize,
+}
+
+/// The bytes for a client that the system has not taken yet, and what waits behind them: at most the newest value of
+/// each input.
+#[derive(Debug, Default)]
+pub(crate) struct Outbox {
+    bytes: Vec<u8>,
+    written: usize,
+    /// Inputs whose newest value waits, in the order in which they began to.
+    pub(crate) waiting: Vec<usize>,
+    pub(crate) listing: Option<Listing>,
+    /// There was a list in it, which is asked for rarely: its memory is not kept.
+    pub(crate) is_swollen: bool,
+    /// The line received of which the last line of values was made, and where that begins.
+    line: u64,
+    line_start: usize,
+    /// Whether it is in the list of those that have news.
+    pub(crate) is_touched: bool,
+}
+
+impl Outbox {
+    /// What is to be written.
+    pub(crate) fn to_write(&self) -> &[u8] {
+        &self.bytes[self.written..]
+    }
+
+    /// The system has taken `count` bytes.
+    pub(crate) fn wrote(&mut self, count: usize) {
+        self.written += count;
+        self.line = 0;
+        if self.written == self.bytes.len() {
+            self.bytes.clear();
+            self.written = 0;
+            if std::mem::take(&mut self.is_swollen) {
+                self.bytes = Vec::new();
+            }
+        } else if self.written > FULL {
+            self.bytes.drain(..self.written);
+            self.written = 0;
+        }
+    }
+
+    /// Whether no more answers are to be made for now.
+    pub(crate) fn is_full(&self) -> bool {
+        self.to_write().len() >= FULL
+    }
+
+    /// Whether lines of values may be made.
+    pub(crate) fn has_room(&self) -> bool {
+        self.to_write().len() < ROOM
+    }
+
+    /// Whether a value has to wait in its channel: behind others, behind a list, or because the client does not read.
+    pub(crate) fn is_jammed(&self) -> bool {
+        !self.waiting.is_empty() || self.listing.is_some() || self.to_write().len() >= JAMMED
+    }
+
+    /// Adds a line.
+    pub(crate) fn line(&mut self, text: &str) {
+        self.bytes.extend_from_slice(text.as_bytes());
+        self.bytes.extend_from_slice(b"\r\n");
+        self.line = 0;
+    }
+
+    /// Adds a value: to the last line, if that was made of the same line received. What a client sends together
+    /// arrives together.
+    #[inline]
+    pub(crate) fn value(&mut self, line: u64, label: &Label, number: &Number) {
+        let mut text = [0; 40];
+        let mut at = 2;
+        if self.line == line && self.bytes.len() - self.line_start < LONGEST {
+            self.bytes.truncate(self.bytes.len() - 2);
+            text[0] = b' ';
+            at = 1;
+        } else {
+            self.line = line;
+            self.line_start = self.bytes.len();
+            text[..2].copy_from_slice(b"P ");
+        }
+        // Copies of fixed length take fewer instructions than those of any length.
+        text[at..at + 8].copy_from_slice(&label.text);
+        at += usize::from(label.length);
+        text[at..at + 24].copy_from_slice(number.padded());
+        at += number.len();
+        text[at..at + 2].copy_from_slice(b"\r\n");
+        self.bytes.extend_from_slice(&text[..at + 2]);
+    }
+}

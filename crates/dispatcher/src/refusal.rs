@@ -1,0 +1,61 @@
+//! What the dispatcher answers to a line that it does not carry out.
+
+use std::fmt;
+
+/// Why a line was refused, as the answer `ERR <code> <text>` says it. A line that is refused has changed nothing.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("ERR {} {text}", code.number())]
+pub struct Refusal {
+    /// What kind of mistake it is.
+    pub code: Code,
+    /// What happened and what would be right, in one line.
+    pub text: String,
+}
+
+/// The codes of refusals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Code {
+    /// 400: the line is not in the grammar.
+    Syntax,
+    /// 401: the client has not identified itself.
+    IdentifyFirst,
+    /// 404: there is no such client, channel or connection.
+    NotFound,
+    /// 408: nothing was heard for too long; the connection is closed.
+    TimeOut,
+    /// 409: the name or the input is taken.
+    Conflict,
+    /// 413: the line is too long.
+    TooLong,
+    /// 422: the channels do not fit together.
+    Mismatch,
+    /// 429: more than the dispatcher serves.
+    Limit,
+    /// 500: the dispatcher could not do its part.
+    Internal,
+}
+
+impl Code {
+    /// The number on the wire.
+    pub const fn number(self) -> u16 {
+        match self {
+            Self::Syntax => 400,
+            Self::IdentifyFirst => 401,
+            Self::NotFound => 404,
+            Self::TimeOut => 408,
+            Self::Conflict => 409,
+            Self::TooLong => 413,
+            Self::Mismatch => 422,
+            Self::Limit => 429,
+            Self::Internal => 500,
+        }
+    }
+
+    /// A refusal with this code.
+    pub(crate) fn because(self, text: impl fmt::Display) -> Refusal {
+        Refusal {
+            code: self,
+            text: text.to_string(),
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! The dispatcher on a TCP port: one thread for all connections.
+
+use std::io::{self, Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+
+use tickbus_base::os::{Interest, PollSet, Ready};
+use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_fieldbus::tcp::{Address, close_gracefully, is_for_later, is_of_the_client, prepare};
+
+use crate::dispatcher::Dispatcher;
+use crate::patch_file::PatchFile;
+
+/// The key of the listener in the poll set; a client's key is its seat.
+const LISTENER: usize = usize::MAX - 1;
+
+/// At most this many clients are accepted per turn.
+const ACCEPTS: usize = 64;
+
+/// At most this many bytes are read from a client per turn, before others are served.
+const BUFFER: usize = 64 * 1024;
+
+/// How long no client is accepted after the system had no socket.
+const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// How long the system keeps bytes that a client does not read. Not the dispatcher's limit: who is silent for 60 s is
+/// disconnected, and who only sends need not read.
+const PATIENCE: Nanos = Nanos::from_secs(3600);
+
+/// A port that is listened on.
+#[derive(Debug)]
+pub struct Listener {
+    listener: TcpListener,
+    address: SocketAddr,
+}
+
+/// What a dispatcher on a port works with.
+pub struct Hosting<'h> {
+    /// The clock.
+    pub clock: &'h dyn Clock,
+    /// Ends it.
+    pub stop: &'h Stop,
+    /// Where the patch survives, if anywhere.
+    pub patch_file: Option<&'h PatchFile>,
+    /// Takes what an operator should know, a line each.
+    pub news: &'h mut dyn FnMut(&str),
+}
+
+impl Listener {
+    /// Listens on `address`; port 0 lets the system choose one.
+    ///
+    /// # Errors
+    ///
+    /// The host is unknown, or the address cannot be listened on.
+    pub fn bind(address: &Address) -> io::Result<Self> {
+        let listener = TcpListener::bind(address.to_string())?;
+        listener.set_nonblocking(true)?;
+        let address = listener.local_addr()?;
+        Ok(Self { listener, address })
+    }
+
+    /// The address that it listens on.
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Serves all clients until stopped.
+    ///
+    /// # Errors
+    ///
+    /// The system cannot wait for sockets.
+    pub fn run(self, dispatcher: &mut Dispatcher, hosting: Hosting<'_>) -> io::Result<()> {
+        let mut set = PollSet::new(hosting.stop)?;
+        set.add(LISTENER, &self.listener, Interest::Read)?;
+        let mut host = Host {
+            dispatcher,
+            hosting,
+            listener: self.listener,
+            set,
+            connections: Vec::new(),
+            buffer: vec![0; BUFFER].into(),
+            ready: Vec::new(),
+            accept_paused_until: None,
+        };
+        while !host.hosting.stop.is_stopped() {
+            host.turn()?;
+        }
+        for seat in 0..host.connections.len() {
+            host.close(seat);
+        }
+        Ok(())
+    }
+}
+
+struct Connection {
+    stream: TcpStream,
+    interest: Interest,
+}
+
+struct Host<'d, 'h> {
+    dispatcher: &'d mut Dispatcher,
+    hosting: Hosting<'h>,
+    listener: TcpListener,
+    set: PollSet,
+    /// By seats.
+    connections: Vec<Option<Connection>>,
+    /// The receive buffer, shared by all clients.
+    buffer: Box<[u8]>,
+    ready: Vec<Ready>,
+    accept_paused_until: Option<Nanos>,
+}
+
+impl Host<'_, '_> {
+    fn turn(&mut self) -> io::Result<()> {
+        let accept = self.accept_paused_until.unwrap_or(Nanos::MAX);
+        let deadline = self.dispatcher.deadline().min(accept);
+        self.set.wait(self.hosting.clock, deadline)?;
+        let now = self.hosting.clock.now();
+        self.ready.clear();
+        self.ready.extend_from_slice(self.set.ready());
+        for at in 0..self.ready.len() {
+            let ready = self.ready[at];
+            if ready.key == LISTENER {
+                self.accept(now)?;
+                continue;
+            }
+            if ready.is_readable {
+                self.read(now, ready.key);
+            }
+            if ready.is_writable {
+                self.write(ready.key)?;
+            }
+        }
+        self.dispatcher.tick(now);
+        // Everyone who changed the patch in this turn waits for one write of the file.
+        if let Some(patch) = self.dispatcher.unsaved() {
+            let saved = match self.hosting.patch_file {
+                Some(file) => file.save(patch).map_err(|error| error.to_string()),
+                None => Ok(()),
+            };
+            if let Err(why) = &saved {
+                (self.hosting.news)(&format!(
+                    "the patch could not be saved ({why}); what changes now is lost at the end"
+                ));
+            }
+            self.dispatcher.saved(&saved);
+        }
+        while let Some(seat) = self.dispatcher.next_touched() {
+            self.write(seat)?;
+        }
+        if self.accept_paused_until.is_some_and(|until| now >= until) {
+            self.accept_paused_until = None;
+            self.set.add(LISTENER, &self.listener, Interest::Read)?;
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, now: Nanos, seat: usize) {
+        let Some(connection) = self.connections.get_mut(seat).and_then(Option::as_mut) else {
+            return;
+        };
+        if !self.dispatcher.wants_bytes(seat) {
+            return;
+        }
+        match connection.stream.read(&mut self.buffer) {
+            Ok(0) => self.drop_client(seat),
+            Ok(count) => self.dispatcher.arrived(now, seat, &self.buffer[..count]),
+            Err(error) if is_for_later(&error) => {}
+            Err(_) => self.drop_client(seat),
+        }
+    }
+
+    /// Writes what the system takes, and closes if that was the last.
+    fn write(&mut self, seat: usize) -> io::Result<()> {
+        let Some(connection) = self.connections.get_mut(seat).and_then(Option::as_mut) else {
+            return Ok(());
+        };
+        let mut is_blocked = false;
+        while !is_blocked {
+            let bytes = self.dispatcher.to_write(seat);
+            if bytes.is_empty() {
+                break;
+            }
+            let length = bytes.len();
+            match connection.stream.write(bytes) {
+                Ok(count) if count > 0 => {
+                    self.dispatcher.wrote(seat, count);
+                    is_blocked = count < length;
+                }
+                Err(error) if is_for_later(&error) => is_blocked = true,
+                Ok(_) | Err(_) => {
+                    self.drop_client(seat);
+                    return Ok(());
+                }
+            }
+        }
+        if self.dispatcher.is_closing(seat) {
+            // Who does not read misses the last words.
+            self.close(seat);
+            return Ok(());
+        }
+        let interest = match (is_blocked, self.dispatcher.wants_bytes(seat)) {
+            (false, _) => Interest::Read,
+            (true, true) => Interest::ReadWrite,
+            (true, false) => Interest::Write,
+        };
+        if interest != connection.interest {
+            connection.interest = interest;
+            self.set.change(seat, &connection.stream, interest)?;
+        }
+        Ok(())
+    }
+
+    /// The connection of a seat is gone.
+    fn drop_client(&mut self, seat: usize) {
+        if let Some(connection) = self.connections[seat].take() {
+            self.set.remove(seat, &connection.stream);
+            self.dispatcher.gone(seat);
+        }
+    }
+
+    /// Closes the connection of a seat.
+    fn close(&mut self, seat: usize) {
+        if let Some(connection) = &self.connections[seat] {
+            close_gracefully(&connection.stream);
+            self.drop_client(seat);
+        }
+    }
+
+    fn accept(&mut self, now: Nanos) -> io::Result<()> {
+        for _ in 0..ACCEPTS {
+            let (stream, peer) = match self.listener.accept() {
+                Ok(accepted) => accepted,
+                Err(error) if is_for_later(&error) => return Ok(()),
+                Err(error) if is_of_the_client(&error) => continue,
+                Err(error) => {
+                    (self.hosting.news)(&format!(
+                        "a client could not be accepted ({error}); close other programs or raise the limit of open \
+                         files"
+                    ));
+                    self.set.remove(LISTENER, &self.listener);
+                    self.accept_paused_until = Some(now + PAUSE);
+                    return Ok(());
+                }
+            };
+            // If it broke at once, it will come again.
+            if prepare(&stream, PATIENCE).is_err() {
+                continue;
+            }
+            let seat = match self.dispatcher.connected(now, peer) {
+                Ok(seat) => seat,
+                Err(refusal) => {
+                    // A new connection has room for a line; if it is gone already, that is as well.
+                    let _ = (&stream).write(format!("{refusal}\r\n").as_bytes());
+                    close_gracefully(&stream);
+                    continue;
+                }
+            };
+            self.set.add(seat, &stream, Interest::Read)?;
+            if seat >= self.connections.len() {
+                self.connections.resize_with(seat + 1, || None);
+            }
+            let interest = Interest::Read;
+            self.connections[seat] = Some(Connection { stream, interest });
+        }
+        Ok(())
+    }
+}

@@ -2,9 +2,9 @@
 
 mod library;
 mod log;
-mod open_files;
 #[cfg(unix)]
 mod named_memory;
+mod open_files;
 #[cfg(unix)]
 mod own_file;
 mod poll;
@@ -20,9 +20,9 @@ mod timer_slack;
 
 pub use library::{Library, one_line};
 pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
-pub use open_files::raise_open_files;
 #[cfg(unix)]
 pub use named_memory::NamedMemory;
+pub use open_files::raise_open_files;
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use poll::Interest;

@@ -4,11 +4,11 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind};
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use rustix::fs::{FlockOperation, OFlags, flock};
 
 use super::SharedMemory;
+use crate::time::{Clock as _, Monotonic, Nanos, Stop};
 
 /// How often the file may be taken away while it is made.
 const ATTEMPTS: usize = 8;
@@ -163,11 +163,12 @@ fn lock(file: &File) -> io::Result<bool> {
 
 /// The same, for some 50 ms.
 fn lock_soon(file: &File) -> io::Result<bool> {
+    let clock = Monotonic::shared();
     for _ in 0..50 {
         if lock(file)? {
             return Ok(true);
         }
-        std::thread::sleep(Duration::from_millis(1));
+        clock.wait_until(clock.now() + Nanos::from_millis(1), &Stop::new());
     }
     Ok(false)
 }

@@ -37,7 +37,7 @@ use code::Code;
 use outline::Outline;
 use structured_text::{Preparation, check_addresses, plan};
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
+use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake, shown};
 
 pub use library::{Addresses, SOURCES};
 
@@ -74,6 +74,14 @@ pub struct Prepared {
 ///
 /// What cannot be prepared, for each source in which there is something, and its place.
 pub fn prepare(sources: &[Source], settings: &Settings) -> Result<Prepared, Vec<Mistakes>> {
+    let vouched = settings.no_clock.iter();
+    let timers = vouched.filter(|name| words::TIMERS.contains(&name.to_uppercase().as_str()));
+    let wrong: Vec<Mistakes> = timers
+        .map(|name| Mistakes::of("--no-clock", timer(name)))
+        .collect();
+    if !wrong.is_empty() {
+        return Err(wrong);
+    }
     let texts: Vec<(Cow<'_, str>, Encoding)> =
         sources.iter().map(|source| decode(&source.bytes)).collect();
     let wrong: Vec<Collector<'_>> = (sources.iter().zip(&texts))
@@ -84,9 +92,19 @@ pub fn prepare(sources: &[Source], settings: &Settings) -> Result<Prepared, Vec<
     match made {
         Some((made, notes)) if mistakes.is_empty() => {
             let files = made.into_iter().zip(&texts);
-            let files = files.map(|(text, (_, encoding))| encode(text, *encoding));
+            let mut encoded = Vec::new();
+            let mut wrong = Vec::new();
+            for ((text, (_, encoding)), source) in files.zip(sources) {
+                match encode(text, *encoding) {
+                    Ok(bytes) => encoded.push(bytes),
+                    Err(mistake) => wrong.push(Mistakes::of(&source.name, mistake)),
+                }
+            }
+            if !wrong.is_empty() {
+                return Err(wrong);
+            }
             Ok(Prepared {
-                files: files.collect(),
+                files: encoded,
                 notes,
             })
         }
@@ -166,6 +184,13 @@ fn prepared(
     }
     let (home, configuration) = found?;
     let (plan, note) = plan(&codes[home], configuration, &wrong[home]);
+    for (code, (outline, wrong)) in codes.iter().zip(outlines.iter().zip(wrong)) {
+        for unit in &outline.units {
+            let known = check::variables(code, unit);
+            let is_run = |name: &str| plan.programs.contains_key(name);
+            check::check_callers(code, &unit.body, &known, is_run, wrong);
+        }
+    }
     for instance in &configuration.instances {
         let name = codes[home].capitals(instance.program);
         if !world.types.contains(&name) {
@@ -193,6 +218,14 @@ fn prepared(
     Some((files.collect(), note.into_iter().collect()))
 }
 
+fn timer(name: &str) -> Mistake {
+    let what = format!("{} runs on the clock of the PLC", shown(name));
+    Mistake::new(
+        what,
+        "leave it out: it is replaced by a timer on virtual time",
+    )
+}
+
 /// Takes out what [`prepare`] has put in; what was changed elsewhere since then stays.
 ///
 /// # Errors
@@ -209,7 +242,12 @@ pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
         return Err(Mistakes::of(&source.name, nothing_to_undo()));
     }
     let original = edit::undo(&text).map_err(|(at, mistake)| wrong(at, mistake))?;
-    Ok(encode(original, encoding))
+    encode(original, encoding).map_err(|mistake| Mistakes::of(&source.name, mistake))
+}
+
+/// Whether [`prepare`] has put something into a file.
+pub fn is_prepared(source: &Source) -> bool {
+    edit::marked(&decode(&source.bytes).0).is_some()
 }
 
 fn nothing_to_undo() -> Mistake {
@@ -238,14 +276,18 @@ fn decode(bytes: &[u8]) -> (Cow<'_, str>, Encoding) {
     (Cow::Owned(text), Encoding::Latin1)
 }
 
-fn encode(text: String, encoding: Encoding) -> Vec<u8> {
-    match encoding {
-        Encoding::Utf8 => text.into_bytes(),
-        Encoding::Latin1 => {
-            let bytes = text.chars().map(|c| u8::try_from(u32::from(c)));
-            bytes
-                .collect::<Result<_, _>>()
-                .expect("it was made of bytes and ASCII")
-        }
+/// The bytes of a text.
+///
+/// # Errors
+///
+/// Something was put into a source in Latin-1 that it cannot hold.
+fn encode(text: String, encoding: Encoding) -> Result<Vec<u8>, Mistake> {
+    if encoding == Encoding::Utf8 {
+        return Ok(text.into_bytes());
     }
+    let bytes = text.chars().map(|c| u8::try_from(u32::from(c)));
+    bytes.collect::<Result<_, _>>().map_err(|_| {
+        let what = "this file is not UTF-8 text, and names of another file do not fit into it";
+        Mistake::new(what, "save it as UTF-8")
+    })
 }

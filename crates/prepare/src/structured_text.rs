@@ -175,9 +175,7 @@ fn indent<'t>(code: &Code<'t>, at: usize) -> &'t str {
 
 /// Puts the execution controller's header and footer around statements.
 fn wrap(code: &Code<'_>, body: &Range<usize>, signal: &str, edits: &mut Edits) {
-    if body.is_empty() {
-        return;
-    }
+    // Pragmas alone are statements too, for iec2c; it takes no empty one beside them.
     let Some(bytes) = code.bytes(body) else {
         return;
     };

@@ -16,6 +16,11 @@ pub(crate) fn is_put_in(name: &str) -> bool {
     is_in(own, rest) || rest.starts_with("EXECUTE_") || TIMERS.contains(&rest)
 }
 
+/// Whether a name is one of the variables that are put in: no type or program of that name can stand beside them.
+pub(crate) fn is_variable_put_in(name: &str) -> bool {
+    is_in("HANDSHAKE GO MS DONE SIMULATED STEPPING NOW", name)
+}
+
 const TYPES: &str = "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME LTIME DATE LDATE TOD \
     TIME_OF_DAY LTOD DT DATE_AND_TIME LDT STRING WSTRING CHAR WCHAR ANY";
 

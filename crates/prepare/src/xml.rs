@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::check::{World, check_statements, check_type, check_words};
+use super::check::{World, check_callers, check_name, check_statements, check_type, check_words};
 use super::code::{Code, line_end};
 use super::edit::{Edits, Marks};
 use super::library::{self, SCHEDULE, TASK};
@@ -101,6 +101,10 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         for list in self.named("globalVars") {
             world.globals.extend(variable_names(list));
+            // CODESYS calls its lists by their names.
+            world
+                .globals
+                .extend(list.attribute("name").map(str::to_uppercase));
         }
         world
     }
@@ -109,6 +113,12 @@ impl<'a, 'i> Project<'a, 'i> {
         for node in self.named("derived") {
             let name = node.attribute("name").unwrap_or_default();
             check_type(name, node.range().start, world, self.wrong);
+        }
+        for element in ["pou", "dataType"] {
+            for node in self.named(element) {
+                let name = node.attribute("name").unwrap_or_default();
+                check_name(name, node.range().start, self.wrong);
+            }
         }
         for node in self.named("variable") {
             let name = node.attribute("name").unwrap_or_default();
@@ -129,6 +139,16 @@ impl<'a, 'i> Project<'a, 'i> {
                 "this is a method",
                 "methods are not prepared: make it a function block",
             ),
+            (
+                "Extends",
+                "this block extends another one",
+                "inheritance is not prepared: write a plain function block",
+            ),
+            (
+                "Implements",
+                "this block implements an interface",
+                "inheritance is not prepared: write a plain function block",
+            ),
         ] {
             for node in self.named(element) {
                 self.wrong.report(node.range().start, what, right);
@@ -139,6 +159,9 @@ impl<'a, 'i> Project<'a, 'i> {
     /// The bodies of programs, checked like all others.
     fn bodies(&self, world: &World) -> Vec<Body<'a, 'i>> {
         let mut found = Vec::new();
+        let run: HashSet<String> = (self.named("pouInstance"))
+            .map(|node| program(node).text.to_uppercase())
+            .collect();
         for unit in self.named("pou") {
             let mut known: HashSet<String> = HashSet::new();
             known.extend(
@@ -171,6 +194,7 @@ impl<'a, 'i> Project<'a, 'i> {
                 check_words(&code, self.wrong);
                 let all = 0..code.tokens.len();
                 check_statements(&code, &all, &known, world, self.wrong);
+                check_callers(&code, &all, &known, |name| run.contains(name), self.wrong);
                 if let (true, Some(bytes)) = (body.parent() == Some(unit), code.bytes(&all)) {
                     found.push(Body { unit, bytes });
                 }

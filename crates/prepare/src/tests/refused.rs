@@ -29,7 +29,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             saying("n := SysTimeRtcGet(1);"),
-            "SYSTIMERTCGET() reads the clock",
+            "SysTimeRtcGet() reads the clock",
         ),
         (
             saying("n := Stamp(1);"),
@@ -73,6 +73,75 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
 }
 
 #[test]
+fn classes_are_refused() {
+    let with = |block: &str| block.to_owned() + &line("VAR f : F; END_VAR", "f();");
+    for (block, says) in [
+        (
+            "FUNCTION_BLOCK F EXTENDS TON\nEND_FUNCTION_BLOCK\n",
+            "line.st:1:18: EXTENDS belongs to a class; methods, properties and inheritance are not prepared",
+        ),
+        (
+            "FUNCTION_BLOCK F IMPLEMENTS I\nVAR t : ARRAY [1..2] OF TON; END_VAR\nEND_FUNCTION_BLOCK\n",
+            "line.st:1:18: IMPLEMENTS belongs",
+        ),
+        (
+            "FUNCTION_BLOCK ABSTRACT F\nVAR n : INT; END_VAR\nEND_FUNCTION_BLOCK\n",
+            "line.st:1:16: ABSTRACT belongs",
+        ),
+        (
+            "FUNCTION_BLOCK F\nVAR n : INT; END_VAR\nn := 1;\nMETHOD PUBLIC Run : BOOL\nVAR_INST t : TON; END_VAR\nt();\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
+            "line.st:4:1: METHOD belongs",
+        ),
+        (
+            "FUNCTION_BLOCK F\nPROPERTY P : INT\nGET\nEND_GET\nEND_PROPERTY\nEND_FUNCTION_BLOCK\n",
+            "line.st:2:1: PROPERTY belongs",
+        ),
+        (
+            "FUNCTION_BLOCK F\nRETURN;\nVAR t : TON; END_VAR\nEND_FUNCTION_BLOCK\n",
+            "line.st:3:1: VAR stands among statements; declare variables before",
+        ),
+        (
+            "FUNCTION_BLOCK F\nVAR n : INT; END_VAR\nn := 1;\nACTION x: n := 2; END_ACTION\nEND_FUNCTION_BLOCK\n",
+            "line.st:4:19: END_ACTION stands among statements",
+        ),
+    ] {
+        refused(&with(block), says);
+    }
+}
+
+#[test]
+fn clocks_behind_a_dot_are_told() {
+    let saying = |statements: &str| line("VAR n : INT; END_VAR", statements);
+    refused(
+        &saying("n := SysTimeRtc.SysTimeRtcGet(n);"),
+        "line.st:3:17: SysTimeRtcGet() reads the clock of the PLC",
+    );
+    refused(
+        &saying("n := Tc2_System.F_GetSystemTime();"),
+        "F_GetSystemTime() reads",
+    );
+    refused(
+        &saying("n := Tc2_MC2.Read[n].Inner(n);"),
+        "line.st:3:6: Tc2_MC2 is not declared in these sources; also pass",
+    );
+    refused(&saying("\"DB1\".Inner(n);"), "\"DB1\" is not declared");
+}
+
+#[test]
+fn a_program_of_a_task_has_no_other_caller() {
+    let saying = |statements: &str| line("VAR n : INT; END_VAR", statements);
+    refused(
+        &saying("n := 1; two();"),
+        "line.st:3:9: two is called here, and a task runs it too; call it or give it a task",
+    );
+    refused(&saying("Two.act();"), "line.st:3:1: Two is called here");
+    // A variable of that name is something else.
+    let block = "FUNCTION_BLOCK Own VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK\n";
+    let text = block.to_owned() + &line("VAR two : Own; END_VAR", "two();");
+    super::prepared_text(&text, &super::Settings::default());
+}
+
+#[test]
 fn what_cannot_be_prepared_of_a_chart_is_told() {
     let saying = |statements: &str| line("VAR x : TIME; n : INT; END_VAR", statements);
     for (associations, says) in [
@@ -95,6 +164,12 @@ fn what_cannot_be_prepared_of_a_chart_is_told() {
     refused(
         &saying(timed),
         "line.st:4:31: the PLC measures one.T itself",
+    );
+    let stray =
+        "INITIAL_STEP one: END_STEP\nn := 2;\nTRANSITION FROM one TO one := TRUE; END_TRANSITION";
+    refused(
+        &saying(stray),
+        "line.st:4:1: n stands in a chart, outside of its parts; put statements into an ACTION",
     );
     let graphical = "INITIAL_STEP one: END_STEP\nTRANSITION FROM one TO one: LD n END_TRANSITION";
     refused(
@@ -122,6 +197,10 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
         (
             saying("n := 1;").replace(": two;", ": one;"),
             "one runs in two tasks; give each task a program of its own",
+        ),
+        (
+            saying("n := 1;").replace(": one;", ": one(f WITH slow);"),
+            "line.st:13:29: a block of this program runs in a task of its own",
         ),
         (
             saying("n := 1;").replace(": two;", ": six;"),

@@ -146,6 +146,22 @@ fn other_forms_of_a_project_survive() {
 }
 
 #[test]
+fn a_body_of_pragmas_gets_a_controller() {
+    let start = project().find("IF 1 ").expect("there is one");
+    let end = project().find("</xhtml>").expect("its end");
+    let mut text = project();
+    text.replace_range(start..end, "{n++;}");
+    assert!(prepared_text(&text).contains("THEN (*tickbus}*){n++;}(*{tickbus*) END_IF;"));
+}
+
+#[test]
+fn a_task_may_have_blanks_in_its_name() {
+    let text = project().replace("\"fast\"", "\"Main Task\"");
+    let made = prepared_text(&text);
+    assert!(made.contains("OR tickbus_execute_Main_Task THEN"), "{made}");
+}
+
+#[test]
 fn what_cannot_be_prepared_is_told_with_its_place() {
     let plain = project();
     for (text, says) in [
@@ -232,6 +248,38 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             .to_string()
             .starts_with("plc.xml:1:1: this is XML beside other sources; ")
     );
+}
+
+#[test]
+fn what_cannot_be_prepared_of_statements_is_told() {
+    let plain = project();
+    for (text, says) in [
+        (
+            plain.replace(
+                "<interface/>",
+                "<interface/><addData><Inheritance><Extends>TON</Extends></Inheritance></addData>",
+            ),
+            "plc.xml:23:43: this block extends another one; inheritance is not prepared",
+        ),
+        (
+            plain.replace("IF 1 ", "feed(); IF 1 "),
+            "plc.xml:24:63: feed is called here, and a task runs it too",
+        ),
+        (
+            plain.replace("IF 1 ", "SysTimeRtc.SysTimeRtcGet(r); IF 1 "),
+            "plc.xml:24:74: SysTimeRtcGet() reads the clock",
+        ),
+        (
+            plain.replace("IF 1 ", "Lib.Get(r); IF 1 "),
+            "plc.xml:24:63: Lib is not declared",
+        ),
+        (
+            plain.replace("\"press\"", "\"Go\""),
+            "plc.xml:22:7: tickbus puts in a variable named Go",
+        ),
+    ] {
+        refused(&text, says);
+    }
 }
 
 proptest! {

@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
+use super::addresses;
 use super::chart::{Chart, chart, is_chart};
 use super::code::Code;
 use super::lexer::Kind;
+use super::library::Addresses;
 use super::outline::{Outline, Unit, UnitKind, declared};
 use super::words;
 use tickbus_base::toml_text::{Collector, shown};
@@ -103,12 +105,23 @@ pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
             ),
             Kind::Word if words::is_put_in(text) => wrong.report(
                 code.base + token.start,
-                format!("the name {} is one of those that are put in", shown(text)),
+                format!("the name {} is reserved by tickbus", shown(text)),
                 "a program that was synchronised by hand needs no preparing; otherwise choose another name",
             ),
             _ => {}
         }
     }
+}
+
+/// Reports addresses that the program and the server's variables both have; the remarks are about those that may be.
+pub(crate) fn check_addresses(
+    code: &Code<'_>,
+    settings: &Addresses,
+    wrong: &Collector<'_>,
+) -> Vec<String> {
+    let all = (0..code.tokens.len()).filter(|at| code.kind(*at) == Some(Kind::Address));
+    all.filter_map(|at| addresses::check(code.word(at), code.start(at), settings, wrong))
+        .collect()
 }
 
 /// Reports the name of a type or program, declared at a byte of the file, that variables put in have too.
@@ -139,7 +152,7 @@ pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector
         wrong.report(
             at,
             format!("the type {} is in none of these sources", shown(name)),
-            "hand in its source too; if it comes from a library and uses no clock, name it with --no-clock",
+            "also pass its source file; if it comes from a library and uses no clock, name it with --no-clock",
         );
     }
 }
@@ -203,7 +216,10 @@ pub(crate) fn check_statements(
             if words::TIMERS.contains(&name.as_str()) {
                 wrong.report(
                     code.start(at),
-                    format!("this calls the {name} of a timer of TIA Portal"),
+                    format!(
+                        "this calls the {} of a timer of TIA Portal",
+                        shown(code.word(at))
+                    ),
                     "declare an instance of TON, TOF or TP, and call that",
                 );
             } else if words::is_clock(&name) {
@@ -227,7 +243,7 @@ pub(crate) fn check_statements(
             wrong.report(
                 code.start(at),
                 format!("{} is in none of these sources", shown(code.word(at))),
-                "hand in its source too; if it comes from a library and reads no clock, name it with --no-clock",
+                "also pass its source file; if it comes from a library and reads no clock, name it with --no-clock",
             );
         }
     }
@@ -326,7 +342,7 @@ fn check_chart(code: &Code<'_>, unit: &Unit, chart: &Chart, wrong: &Collector<'_
         if code.is_any(at, &["L", "D", "SD", "DS", "SL"]) {
             wrong.report(
                 code.start(at),
-                format!("the PLC times this {} itself", code.capitals(at)),
+                format!("the PLC times this {} itself", code.word(at)),
                 "use the qualifier N, and a TON that the action calls",
             );
         }

@@ -137,10 +137,7 @@ impl Reader<'_, '_> {
     }
 
     fn unknown(&self) -> (usize, Mistake) {
-        let what = format!(
-            "\"{}\" begins nothing that is known here",
-            shown(self.code.word(self.at))
-        );
+        let what = format!("unexpected \"{}\"", shown(self.code.word(self.at)));
         let right = "PROGRAM, FUNCTION_BLOCK, FUNCTION, TYPE, VAR_GLOBAL and CONFIGURATION of IEC 61131-3 are read; SCL of \
             TIA Portal is prepared by hand, and methods and classes are not prepared";
         (self.code.start(self.at), Mistake::new(what, right))
@@ -151,7 +148,7 @@ impl Reader<'_, '_> {
         let start = self.at;
         let found = (start..self.code.tokens.len()).find(|at| self.code.is(*at, end));
         let Some(found) = found else {
-            let what = format!("this {} has no {end}", self.code.capitals(start));
+            let what = format!("this {} has no {end}", shown(self.code.word(start)));
             return self.wrong(start, what, "end it");
         };
         self.at = found + 1;
@@ -162,8 +159,8 @@ impl Reader<'_, '_> {
         if self.code.is_word(at) {
             return Ok(at);
         }
-        let what = format!("\"{}\" is no name", shown(self.code.word(at)));
-        self.wrong(at, what, "a name stands here")
+        let what = format!("expected a name, found \"{}\"", shown(self.code.word(at)));
+        self.wrong(at, what, "write the name before it")
     }
 
     fn section(&mut self) -> Result<Section, (usize, Mistake)> {
@@ -321,7 +318,7 @@ impl Reader<'_, '_> {
             colon += 2;
         }
         if !self.code.is(colon, ":") {
-            let what = format!("\"{}\" stands here", shown(self.code.word(colon)));
+            let what = format!("unexpected \"{}\"", shown(self.code.word(colon)));
             return self.wrong(colon, what, "write PROGRAM name WITH task : program;");
         }
         let program = self.name(colon + 1)?;

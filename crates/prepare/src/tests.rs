@@ -360,8 +360,56 @@ fn an_address_that_is_taken_is_told() {
     let told = mistakes.expect_err("taken")[0].to_string();
     assert_eq!(
         told,
-        "line.st:6:13: the program has a variable at %QX0.0 already; name a free address for the server's variable"
+        "line.st:6:13: the program uses %QX0.0 already; name a free address for the server's variable"
     );
+}
+
+#[test]
+fn addresses_of_the_server_are_compared() {
+    let with = |go: &str, ms: &str, done: &str| {
+        let [go, ms, done] = [go, ms, done].map(|address| Some(address.to_owned()));
+        let addresses = Addresses { go, ms, done };
+        Settings {
+            addresses,
+            ..Settings::default()
+        }
+    };
+    let told = |text: &str, settings: &Settings| {
+        let mistakes = prepare(&[source(text)], settings).expect_err("addresses");
+        mistakes
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
+    let text = line("", "RETURN;");
+    assert_eq!(
+        told(&text, &with("%ID0", "%id0", "%ID0")),
+        "ms: go is at %id0 too; give each variable an address of its own\n\
+         done: go is at %ID0 too; give each variable an address of its own\n\
+         done: %ID0 is an input, and the PLC writes done; name an output, such as %QD100, or a marker"
+    );
+    let settings = with("%MD100", "%MD104", "%QD100");
+    assert_eq!(
+        told(&line("", "%MD100 := 5;"), &settings),
+        "line.st:3:1: the program uses %MD100 already; name a free address for the server's variable"
+    );
+    let text = line("VAR w AT %QW200 : INT; END_VAR", "w := %QW200;");
+    let made = prepare(&[source(&text)], &settings).expect("prepared");
+    assert_eq!(
+        made.notes,
+        [
+            "done at %QD100 and the program's %QW200 are the same memory on some PLCs: check that they are not on yours"
+        ]
+    );
+}
+
+#[test]
+fn bare_carriage_returns_end_lines() {
+    let text = line("VAR m : MC_Power; END_VAR", "RETURN;").replace('\n', "\r");
+    refused(&text, "line.st:2:9: the type MC_Power");
+    let text = line("VAR t : TON; END_VAR", "t();").replace('\n', "\r");
+    assert_eq!(undone(&prepared_text(&text, &Settings::default())), text);
 }
 
 #[test]

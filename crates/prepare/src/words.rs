@@ -6,7 +6,7 @@ pub(crate) const TIMERS: [&str; 4] = ["TON", "TOF", "TP", "RTC"];
 /// Prefix of the replacements.
 pub(crate) const PREFIX: &str = "TICKBUS_";
 
-/// Whether a name is one of those that are put in. Others begin with the same prefix: `tickbus export` makes them.
+/// Whether a name is reserved for what is put in. Others begin with the same prefix: `tickbus export` makes them.
 pub(crate) fn is_put_in(name: &str) -> bool {
     let name = name.to_ascii_uppercase();
     let Some(rest) = name.strip_prefix(PREFIX) else {

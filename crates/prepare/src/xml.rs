@@ -8,7 +8,10 @@ use std::ops::Range;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::check::{World, check_callers, check_name, check_statements, check_type, check_words};
+use super::addresses;
+use super::check::{
+    World, check_addresses, check_callers, check_name, check_statements, check_type, check_words,
+};
 use super::code::{Code, line_end};
 use super::edit::{Edits, Marks};
 use super::library::{self, SCHEDULE, TASK};
@@ -50,7 +53,7 @@ pub(crate) fn prepare(
     };
     let root = document.root_element();
     if !text[root.range()].starts_with("<project") {
-        let what = "this XML is no project of PLCopen";
+        let what = "this is not a PLCopen project";
         wrong.report(
             root.range().start,
             what,
@@ -64,14 +67,14 @@ pub(crate) fn prepare(
         .types
         .extend(settings.no_clock.iter().map(|name| name.to_uppercase()));
     project.check_types(&world);
-    let bodies = project.bodies(&world);
-    project.check_addresses(settings);
+    let mut shared = project.check_addresses(settings);
+    let bodies = project.bodies(&world, settings, &mut shared);
     let (plan, note) = project.plan(&world)?;
     if !wrong.is_empty() {
         return None;
     }
     let made = project.edited(&world, &plan, settings, &bodies)?;
-    Some((made, note.into_iter().collect()))
+    Some((made, note.into_iter().chain(shared).collect()))
 }
 
 struct Project<'a, 'i> {
@@ -123,7 +126,7 @@ impl<'a, 'i> Project<'a, 'i> {
         for node in self.named("variable") {
             let name = node.attribute("name").unwrap_or_default();
             if words::is_put_in(name) {
-                let what = format!("the name {} is one of those that are put in", shown(name));
+                let what = format!("the name {} is reserved by tickbus", shown(name));
                 let right = "a program that was synchronised by hand needs no preparing; otherwise choose another name";
                 self.wrong.report(node.range().start, what, right);
             }
@@ -157,7 +160,12 @@ impl<'a, 'i> Project<'a, 'i> {
     }
 
     /// The bodies of programs, checked like all others.
-    fn bodies(&self, world: &World) -> Vec<Body<'a, 'i>> {
+    fn bodies(
+        &self,
+        world: &World,
+        settings: &Settings,
+        shared: &mut BTreeSet<String>,
+    ) -> Vec<Body<'a, 'i>> {
         let mut found = Vec::new();
         let run: HashSet<String> = (self.named("pouInstance"))
             .map(|node| program(node).text.to_uppercase())
@@ -186,12 +194,13 @@ impl<'a, 'i> Project<'a, 'i> {
                     continue;
                 };
                 let code = Code::part(&masked, start);
-                if outline::endless(&code).is_some() {
-                    let what = "a comment or text in these statements has no end";
-                    self.wrong.report(start, what, "end it");
+                if let Some(token) = outline::endless(&code) {
+                    let what = "the comment or text that begins here has no end";
+                    self.wrong.report(start + token.start, what, "end it");
                     continue;
                 }
                 check_words(&code, self.wrong);
+                shared.extend(check_addresses(&code, &settings.addresses, self.wrong));
                 let all = 0..code.tokens.len();
                 check_statements(&code, &all, &known, world, self.wrong);
                 check_callers(&code, &all, &known, |name| run.contains(name), self.wrong);
@@ -221,22 +230,23 @@ impl<'a, 'i> Project<'a, 'i> {
             return None;
         }
         let inner = inner(self.text, holder)?;
-        Some((mask(&self.text[inner.clone()]), inner.start))
-    }
-
-    fn check_addresses(&self, settings: &Settings) {
-        let addresses = &settings.addresses;
-        for node in self.named("variable") {
-            let own = node.attribute("address").unwrap_or_default();
-            let mut taken = [&addresses.go, &addresses.ms, &addresses.done]
-                .into_iter()
-                .flatten();
-            if taken.any(|one| one.eq_ignore_ascii_case(own)) {
-                let what = format!("the program has a variable at {own} already");
-                let right = "name a free address for the server's variable";
-                self.wrong.report(node.range().start, what, right);
+        match mask(&self.text[inner.clone()]) {
+            Ok(masked) => Some((masked, inner.start)),
+            Err(at) => {
+                let right = "write the character itself: in these statements, references are read for quotes, &, < and > only";
+                let what = "this is a reference to an ordinary character";
+                self.wrong.report(inner.start + at, what, right);
+                None
             }
         }
+    }
+
+    fn check_addresses(&self, settings: &Settings) -> BTreeSet<String> {
+        let located = self.named("variable").filter_map(|node| {
+            let own = node.attribute("address")?;
+            addresses::check(own, node.range().start, &settings.addresses, self.wrong)
+        });
+        located.collect()
     }
 
     fn plan(&self, world: &World) -> Option<(Plan, Option<String>)> {
@@ -356,7 +366,13 @@ impl<'a, 'i> Project<'a, 'i> {
             (signal.as_str(), None, "BOOL", None),
         ];
         let external = plcopen::variables("externalVars", &external);
-        self.insert_first(child(unit, "interface")?, &external, edits)
+        match child(unit, "interface") {
+            Some(interface) => self.insert_first(interface, &external, edits),
+            None => {
+                let interface = format!("<interface>\n{external}\n</interface>");
+                self.insert_first(unit, &interface, edits)
+            }
+        }
     }
 
     fn configure(&self, plan: &Plan, edits: &mut Edits) -> Option<()> {
@@ -480,7 +496,11 @@ fn inner(text: &str, node: Node<'_, '_>) -> Option<Range<usize>> {
 }
 
 /// Text of XML with references and markup as characters and blanks, byte for byte in their places.
-fn mask(raw: &str) -> String {
+///
+/// # Errors
+///
+/// The place of a reference to a character that may stand in a word or belong to a symbol: blanks beside it would part them.
+fn mask(raw: &str) -> Result<String, usize> {
     const MARKUP: [(&str, &str); 7] = [
         ("<![CDATA[", ""),
         ("]]>", ""),
@@ -501,11 +521,9 @@ fn mask(raw: &str) -> String {
             is_data = *from == "<![CDATA[" || (is_data && *from != "]]>");
             (from.len(), (*to).to_owned())
         } else if !is_data && rest.starts_with("&#") {
-            // Line ends and blanks, mostly.
-            (
-                rest.find(';').map_or(rest.len(), |at| at + 1),
-                "\n".to_owned(),
-            )
+            let length = rest.find(';').map_or(rest.len(), |at| at + 1);
+            let character = referenced(&rest[..length]).ok_or(raw.len() - rest.len())?;
+            (length, character.to_string())
         } else {
             (c.len_utf8(), c.to_string())
         };
@@ -514,7 +532,18 @@ fn mask(raw: &str) -> String {
         masked.extend(std::iter::repeat_n(' ', blanks));
         rest = &rest[length..];
     }
-    masked
+    Ok(masked)
+}
+
+/// What `&#39;` or `&#x27;` stands for, if no other character can change what it means.
+fn referenced(reference: &str) -> Option<char> {
+    let number = reference.strip_prefix("&#")?.strip_suffix(';')?;
+    let code = match number.strip_prefix('x') {
+        Some(digits) => u32::from_str_radix(digits, 16),
+        None => number.parse(),
+    };
+    let found = char::from_u32(code.ok()?)?;
+    (!found.is_ascii() || found.is_ascii_whitespace() || "'\"&<>".contains(found)).then_some(found)
 }
 
 /// A file that holds XML beside others.

@@ -17,7 +17,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             with("m : MC_MoveAbsolute;"),
-            "line.st:2:9: the type MC_MoveAbsolute is in none of these sources; hand in its source",
+            "line.st:2:9: the type MC_MoveAbsolute is in none of these sources; also pass its source file",
         ),
         (
             with("t : Standard.TON;"),
@@ -33,7 +33,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             saying("n := Stamp(1);"),
-            "line.st:3:6: Stamp is in none of these sources; hand in",
+            "line.st:3:6: Stamp is in none of these sources; also pass",
         ),
         (
             saying("\"DB1\".TON(IN := TRUE);"),
@@ -61,7 +61,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             with("Tickbus_Now : TIME;"),
-            "line.st:2:5: the name Tickbus_Now is one of those that are put in",
+            "line.st:2:5: the name Tickbus_Now is reserved by tickbus",
         ),
         (
             saying("n := 1; (*tickbus}*)"),
@@ -204,7 +204,7 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
         ),
         (
             saying("n := 1;").replace(": two;", ": six;"),
-            "the program SIX is in none of these sources",
+            "the program six is in none of these sources",
         ),
         (
             saying("n := 1;").replace("END_RESOURCE", "END_RESOURCE\nRESOURCE x ON y"),
@@ -212,7 +212,11 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
         ),
         (
             saying("n := 1;").replace("CONFIGURATION", "NAMESPACE"),
-            "\"NAMESPACE\" begins nothing that is known here",
+            "line.st:9:1: unexpected \"NAMESPACE\"; PROGRAM, ",
+        ),
+        (
+            saying("n := 1;").replace("PROGRAM two", "PROGRAM 1x"),
+            "line.st:5:9: expected a name, found \"1x\"",
         ),
         (
             saying("n := 1;").replace("END_CONFIGURATION", ""),
@@ -224,9 +228,12 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
         ),
         (
             "PROGRAM x\nRETURN;\nEND_PROGRAM".to_owned(),
-            "line.st: there is no CONFIGURATION; hand in",
+            "line.st: there is no CONFIGURATION; also pass the source file",
         ),
-        (saying("n := 1;\0"), "line.st:3:8: this is no text in UTF-8"),
+        (
+            saying("n := 1;\0"),
+            "line.st:3:8: this file is not UTF-8 text; save it as UTF-8",
+        ),
     ] {
         refused(&text, says);
     }

@@ -191,7 +191,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             plain.replace("IF 1 ", "(* IF 1 "),
-            "a comment or text in these statements has no end",
+            "plc.xml:24:63: the comment or text that begins here has no end",
         ),
         (
             plain.replace("IF 1 ", "<b>x</b>IF 1 "),
@@ -203,11 +203,11 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             plain.replace("\"start\"", "\"tickbus_execute_x\""),
-            "the name tickbus_execute_x is one of those",
+            "the name tickbus_execute_x is reserved by tickbus",
         ),
         (
             plain.replace("%IX8.0", "%id4"),
-            "the program has a variable at %id4 already",
+            "the program uses %id4 already",
         ),
         (
             plain.replace("T#30ms", "T#1.5ms"),
@@ -234,7 +234,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             plain.replace("project", "else"),
-            "plc.xml:2:1: this XML is no project of PLCopen",
+            "plc.xml:2:1: this is not a PLCopen project",
         ),
         (plain.replace("</project>", ""), "this XML cannot be read"),
         (prepared_text(&plain), "this program was prepared before"),
@@ -248,6 +248,41 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             .to_string()
             .starts_with("plc.xml:1:1: this is XML beside other sources; ")
     );
+}
+
+#[test]
+fn a_program_without_an_interface_gets_one() {
+    let text = project().replace("        <interface/>\n", "");
+    let made = prepared_text(&text);
+    let right =
+        "<pou name=\"press\" pouType=\"program\"><!--{tickbus-->\n<interface>\n<externalVars>\n";
+    assert!(made.contains(right), "{made}");
+}
+
+#[test]
+fn references_to_characters_are_read() {
+    let text = project().replace(
+        "IF 1 ",
+        "s := &#39;it (* is&#x27;;&#13;&#10;b := &#34;\u{e4}&#228;&#34; &#60; s; IF 1 ",
+    );
+    prepared_text(&text);
+    for (statements, says) in [
+        (
+            "t := &#x54;IME();",
+            "plc.xml:24:68: this is a reference to an ordinary character; write the character",
+        ),
+        ("t := TIME&#40;);", "plc.xml:24:72: this is a reference"),
+        (
+            "s := &#39;open;",
+            "plc.xml:24:68: the comment or text that begins here has no end",
+        ),
+        ("%ID0 := 1;", "plc.xml:24:63: the program uses %ID0 already"),
+    ] {
+        refused(
+            &project().replace("IF 1 ", &format!("{statements} IF 1 ")),
+            says,
+        );
+    }
 }
 
 #[test]

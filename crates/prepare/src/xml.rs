@@ -340,8 +340,20 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         let timers: Vec<&str> = timers.iter().map(String::as_str).collect();
         let blocks = library::text(&timers, &plan.signals, &settings.addresses);
-        let units = self.named("pous").next()?;
-        self.insert_first(units, &plcopen::pous(&blocks), &mut edits)?;
+        let blocks = plcopen::pous(&blocks);
+        let unit = bodies.iter().find(|body| signal(body.unit, plan).is_some());
+        let holder = unit.and_then(|body| body.unit.parent());
+        if let Some(data) = holder.filter(|holder| holder.tag_name().name() == "data") {
+            // CODESYS keeps each unit in an extension of its own, among those of an application.
+            let start = &self.text[data.range().start..];
+            let tag = &start[..start.find("<pou")?];
+            let blocks = blocks
+                .replace("<pou ", &format!("{tag}<pou "))
+                .replace("</pou>", "</pou></data>");
+            edits.insert(data.range().end, self.lines(&blocks), Marks::Xml);
+        } else {
+            self.insert_first(self.named("pous").next()?, &blocks, &mut edits)?;
+        }
         self.configure(plan, &mut edits)?;
         Some(edits.apply(self.text))
     }
@@ -349,13 +361,7 @@ impl<'a, 'i> Project<'a, 'i> {
     /// Puts an execution controller around the statements of a program that a task runs.
     fn control(&self, body: &Body<'a, 'i>, plan: &Plan, edits: &mut Edits) -> Option<()> {
         let unit = body.unit;
-        let name = unit.attribute("name").unwrap_or_default();
-        let is_program = unit.attribute("pouType") == Some("program");
-        let Some(signal) = plan
-            .programs
-            .get(&name.to_uppercase())
-            .filter(|_| is_program)
-        else {
+        let Some(signal) = signal(unit, plan) else {
             return Some(());
         };
         let (header, footer) = header_and_footer(self.text, &body.bytes, signal);
@@ -366,13 +372,11 @@ impl<'a, 'i> Project<'a, 'i> {
             (signal.as_str(), None, "BOOL", None),
         ];
         let external = plcopen::variables("externalVars", &external);
-        match child(unit, "interface") {
-            Some(interface) => self.insert_first(interface, &external, edits),
-            None => {
-                let interface = format!("<interface>\n{external}\n</interface>");
-                self.insert_first(unit, &interface, edits)
-            }
+        if let Some(interface) = child(unit, "interface") {
+            return self.insert_first(interface, &external, edits);
         }
+        let interface = format!("<interface>\n{external}\n</interface>");
+        self.insert_first(unit, &interface, edits)
     }
 
     fn configure(&self, plan: &Plan, edits: &mut Edits) -> Option<()> {
@@ -389,8 +393,18 @@ impl<'a, 'i> Project<'a, 'i> {
         } else {
             format!("T#{}ms", plan.cycle)
         };
+        let mut instances = named(resource, "pouInstance");
+        let is_typed = |node: Node<'_, '_>| {
+            node.attribute("typeName")
+                .is_some_and(|name| !name.is_empty())
+        };
+        let (name, kind) = if instances.any(is_typed) {
+            ("tickbus_first", SCHEDULE)
+        } else {
+            (SCHEDULE, "")
+        };
         let mut task = format!(
-            "<task name=\"{TASK}\" interval=\"{interval}\" priority=\"1\">\n  <pouInstance name=\"tickbus_first\" typeName=\"{SCHEDULE}\"/>\n"
+            "<task name=\"{TASK}\" interval=\"{interval}\" priority=\"1\">\n  <pouInstance name=\"{name}\" typeName=\"{kind}\"/>\n"
         );
         let inner = tasks.iter().flat_map(|task| named(*task, "pouInstance"));
         for instance in inner.chain(alone.iter().copied()) {
@@ -466,6 +480,14 @@ fn named_attribute(node: Node<'_, '_>, name: &str) -> Option<Named> {
     let text = attribute.value().to_owned();
     let at = attribute.range_value().start;
     (!text.is_empty()).then_some(Named { text, at })
+}
+
+/// The signal of the task that runs a unit.
+fn signal<'p>(unit: Node<'_, '_>, plan: &'p Plan) -> Option<&'p String> {
+    let name = unit.attribute("name").unwrap_or_default();
+    let is_program = unit.attribute("pouType") == Some("program");
+    let found = plan.programs.get(&name.to_uppercase());
+    found.filter(|_| is_program)
 }
 
 /// The program of an instance. CODESYS leaves its type empty: there a program is its own instance.

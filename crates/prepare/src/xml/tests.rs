@@ -259,6 +259,33 @@ fn a_program_without_an_interface_gets_one() {
     assert!(made.contains(right), "{made}");
 }
 
+/// Written from memory of an export of CODESYS: units are extensions of the application, and instances have no type.
+const CODESYS: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0200">
+<types><dataTypes/><pous/></types>
+<instances><configurations><configuration name="Device"><resource name="Application">
+<task name="MainTask" interval="PT0.02S" priority="1"><pouInstance name="PLC_PRG" typeName=""/></task>
+<addData>
+<data name="http://www.3s-software.com/plcopenxml/pou" handleUnknown="implementation"><pou name="PLC_PRG" pouType="program"><interface><localVars><variable name="t"><type><derived name="TON"/></type></variable></localVars></interface><body><ST><xhtml xmlns="http://www.w3.org/1999/xhtml">t(IN := TRUE, PT := T#1s);</xhtml></ST></body></pou></data>
+</addData></resource></configuration></configurations></instances>
+</project>
+"#;
+
+#[test]
+fn blocks_stand_beside_the_programs_of_a_project() {
+    let made = prepared_text(CODESYS);
+    let data = "<data name=\"http://www.3s-software.com/plcopenxml/pou\" handleUnknown=\"implementation\"><pou name=";
+    for piece in [
+        format!("</pou></data><!--{{tickbus-->{data}\"TICKBUS_TON\""),
+        format!("</pou></data>\n{data}\"TICKBUS_SCHEDULER\""),
+        format!("</pou></data>\n{data}\"TICKBUS_SCHEDULE\" pouType=\"program\">"),
+        "<pouInstance name=\"TICKBUS_SCHEDULE\" typeName=\"\"/>\n  <pouInstance name=\"PLC_PRG\" typeName=\"\"/>".to_owned(),
+        "<pous/>".to_owned(),
+    ] {
+        assert!(made.contains(&piece), "{piece}\n{made}");
+    }
+    assert_eq!(made.matches("</data>").count(), 4);
+}
+
 #[test]
 fn references_to_characters_are_read() {
     let text = project().replace(

@@ -353,7 +353,7 @@ proptest! {
         let mut text = project();
         for (from, length, to) in damage {
             let boundary = |text: &str, at: usize| {
-                (at % (text.len() + 1)..).find(|at| text.is_char_boundary(*at)).expect("its end")
+                (at % (text.len() + 1)..=text.len()).find(|at| text.is_char_boundary(*at)).expect("its end")
             };
             let start = boundary(&text, from);
             let end = boundary(&text, (start + length).min(text.len()));

@@ -208,7 +208,7 @@ fn write(arguments: &Arguments, made: Made) -> Result<(Vec<PathBuf>, Vec<String>
     };
     replace_all(&paths, &made.files).map_err(|(path, error)| {
         let what = format!("this file cannot be written: {error}");
-        vec![wrong(&path, &what, "check the folder; no file was changed")]
+        vec![wrong(&path, &what, "check the folder")]
     })?;
     Ok((paths, made.notes))
 }

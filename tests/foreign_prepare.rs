@@ -78,6 +78,14 @@ fn main() -> ExitCode {
             the_command_tells_what_is_wrong_and_writes_nothing();
             Ok(())
         }),
+        ("the_command_writes_all_files_or_none", || {
+            the_command_writes_all_files_or_none();
+            Ok(())
+        }),
+        (
+            "prepared_programs_with_our_names_in_other_places_compile",
+            prepared_programs_with_our_names_in_other_places_compile,
+        ),
         (
             "without_a_simulation_a_prepared_program_runs_on_the_plcs_time",
             without_a_simulation_a_prepared_program_runs_on_the_plcs_time,
@@ -617,4 +625,60 @@ fn the_command_tells_what_is_wrong_and_writes_nothing() {
         stderr.contains("there is nothing to take out of this file"),
         "{stderr}"
     );
+}
+
+fn the_command_writes_all_files_or_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let original = text("tests/prepare/line.st");
+    let types = "TYPE Unused : STRUCT n : INT; END_STRUCT; END_TYPE\n";
+    std::fs::write(folder.join("line.st"), &original).expect("written");
+    std::fs::write(folder.join("types.st"), types).expect("written");
+    std::fs::create_dir_all(folder.join("prepared/types.st")).expect("a folder");
+    let (code, stdout, stderr) = command(folder, &["line.st", "types.st", "--force"]);
+    assert_eq!((code, stdout.as_str()), (Some(1), ""));
+    assert!(
+        stderr.starts_with("prepared/types.st: this file cannot be written: "),
+        "{stderr}"
+    );
+    let left = std::fs::read_dir(folder.join("prepared")).expect("a folder");
+    assert_eq!(left.count(), 1, "only the folder that was there");
+
+    std::fs::remove_dir(folder.join("prepared/types.st")).expect("removed");
+    assert_eq!(
+        command(folder, &["line.st", "types.st", "--force"]).0,
+        Some(0)
+    );
+    let both = ["prepared/line.st", "prepared/types.st", "--undo"];
+    let (code, _, stderr) = command(folder, &both);
+    assert_eq!(
+        (code, stderr.as_str()),
+        (
+            Some(0),
+            "note: prepared/types.st: there was nothing to take out\n"
+        )
+    );
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
+    assert_eq!(read("prepared/original/line.st"), original);
+    assert_eq!(read("prepared/original/types.st"), types);
+}
+
+fn prepared_programs_with_our_names_in_other_places_compile() -> Result<(), Absent> {
+    let compiler = Compiler::find()?;
+    let units = "FUNCTION_BLOCK Clock VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK\n\
+        FUNCTION since : INT VAR_INPUT n : INT; END_VAR since := n; END_FUNCTION\n\
+        FUNCTION last : INT VAR_INPUT n : INT; END_VAR last := n; END_FUNCTION\n\
+        TYPE started : STRUCT n : INT; ton : TIME; END_STRUCT; END_TYPE\n\
+        TYPE Loaded : STRUCT n : INT; END_STRUCT; END_TYPE\n\
+        PROGRAM one VAR t1 : TON; t2 : TOF; t3 : TP; t4 : RTC; c1 : Clock; n : INT; v : started; w : Loaded; END_VAR\n\
+        t1(); t2(); t3(); t4(); c1(); n := since(last(n)); v.n := w.n; END_PROGRAM\n";
+    let plant = "PROGRAM two VAR lamp AT %QX8.0 : BOOL; END_VAR lamp := TRUE; END_PROGRAM\n\
+        PROGRAM three VAR n AT %IX8.0 : BOOL; END_VAR\n{(void)0;}\nEND_PROGRAM\n\
+        CONFIGURATION plant RESOURCE cpu ON PLC TASK _fast(INTERVAL := T#10ms, PRIORITY := 0);\n\
+        TASK Fast(INTERVAL := T#30ms, PRIORITY := 1); PROGRAM a WITH _fast : one; PROGRAM b WITH Fast : two;\n\
+        PROGRAM c WITH Fast : three; END_RESOURCE END_CONFIGURATION\n";
+    let mut plc = Stepped::load(&compiler, &prepared(&(units.to_owned() + plant)));
+    plc.step(0);
+    assert_eq!(plc.outputs[8], 1);
+    Ok(())
 }

@@ -13,6 +13,8 @@ pub(crate) struct Chart {
     pub(crate) transitions: Vec<Transition>,
     /// The name of an action, and its statements.
     pub(crate) actions: Vec<(usize, Range<usize>)>,
+    /// The first token that belongs to none of them.
+    pub(crate) stray: Option<usize>,
 }
 
 /// `TRANSITION FROM one TO two := condition; END_TRANSITION`
@@ -26,19 +28,36 @@ pub(crate) struct Transition {
 
 /// Whether a body is a chart.
 pub(crate) fn is_chart(code: &Code<'_>, body: &Range<usize>) -> bool {
-    !body.is_empty()
-        && code.is_any(
-            body.start,
-            &["INITIAL_STEP", "STEP", "TRANSITION", "ACTION"],
-        )
+    is_element(code, body.start, body.end)
 }
 
-/// Reads a chart. What cannot be read is passed over: a compiler refuses it.
+/// Whether a step, transition or action begins here, and not a variable of such a name.
+fn is_element(code: &Code<'_>, at: usize, end: usize) -> bool {
+    if at >= end {
+        return false;
+    }
+    if code.is(at, "TRANSITION") {
+        let is_priority = code.word(at + 1) == "(" && code.is(at + 2, "PRIORITY");
+        return is_priority || code.is_word(at + 1);
+    }
+    code.is_any(at, &["INITIAL_STEP", "STEP", "ACTION"])
+        && code.is_word(at + 1)
+        && code.word(at + 2) == ":"
+}
+
+/// Reads a chart. What cannot be read within its parts is passed over: a compiler refuses it.
 pub(crate) fn chart(code: &Code<'_>, body: &Range<usize>) -> Chart {
     let mut found = Chart::default();
     let mut at = body.start;
     while at < body.end {
         let end = |word: &str| (at..body.end).find(|at| code.is(*at, word));
+        if !is_element(code, at, body.end) {
+            if code.word(at) != ";" {
+                found.stray.get_or_insert(at);
+            }
+            at += 1;
+            continue;
+        }
         let next = match code.capitals(at).as_str() {
             "INITIAL_STEP" | "STEP" => {
                 let end = end("END_STEP").unwrap_or(body.end);
@@ -61,12 +80,11 @@ pub(crate) fn chart(code: &Code<'_>, body: &Range<usize>) -> Chart {
                 });
                 end
             }
-            "ACTION" => {
+            _ => {
                 let end = end("END_ACTION").unwrap_or(body.end);
                 found.actions.push((at + 1, (at + 3).min(end)..end));
                 end
             }
-            _ => at,
         };
         at = next + 1;
     }

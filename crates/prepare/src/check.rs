@@ -3,10 +3,12 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
+use super::addresses;
 use super::chart::{Chart, chart, is_chart};
 use super::code::Code;
 use super::lexer::Kind;
-use super::outline::{Declared, Outline, Unit, UnitKind, declared};
+use super::library::Addresses;
+use super::outline::{Outline, Unit, UnitKind, declared};
 use super::words;
 use tickbus_base::toml_text::{Collector, shown};
 
@@ -69,6 +71,11 @@ pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &C
             check_type(code.word(at), code.start(at), world, wrong);
         }
     }
+    let types = outline.types.iter();
+    let types = types.flat_map(|inner| declared(code, inner.clone()).names);
+    for at in outline.units.iter().map(|unit| unit.name).chain(types) {
+        check_name(code.word(at), code.start(at), wrong);
+    }
     for unit in &outline.units {
         for at in unit.returns.clone().filter(|at| code.is_word(*at)) {
             check_type(code.word(at), code.start(at), world, wrong);
@@ -98,11 +105,34 @@ pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
             ),
             Kind::Word if words::is_put_in(text) => wrong.report(
                 code.base + token.start,
-                format!("the name {} is one of those that are put in", shown(text)),
+                format!("the name {} is reserved by tickbus", shown(text)),
                 "a program that was synchronised by hand needs no preparing; otherwise choose another name",
             ),
             _ => {}
         }
+    }
+}
+
+/// Reports addresses that the program and the server's variables both have; the remarks are about those that may be.
+pub(crate) fn check_addresses(
+    code: &Code<'_>,
+    settings: &Addresses,
+    wrong: &Collector<'_>,
+) -> Vec<String> {
+    let all = (0..code.tokens.len()).filter(|at| code.kind(*at) == Some(Kind::Address));
+    all.filter_map(|at| addresses::check(code.word(at), code.start(at), settings, wrong))
+        .collect()
+}
+
+/// Reports the name of a type or program, declared at a byte of the file, that variables put in have too.
+pub(crate) fn check_name(name: &str, at: usize, wrong: &Collector<'_>) {
+    if words::is_variable_put_in(name) {
+        let what = format!("tickbus puts in a variable named {}, too", shown(name));
+        wrong.report(
+            at,
+            what,
+            "choose another name for this type or program: compilers take one for the other",
+        );
     }
 }
 
@@ -122,19 +152,20 @@ pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector
         wrong.report(
             at,
             format!("the type {} is in none of these sources", shown(name)),
-            "hand in its source too; if it comes from a library and uses no clock, name it with --no-clock",
+            "also pass its source file; if it comes from a library and uses no clock, name it with --no-clock",
         );
     }
 }
 
+/// The names of a unit's variables, in capitals.
+pub(crate) fn variables(code: &Code<'_>, unit: &Unit) -> HashSet<String> {
+    let sections = unit.sections.iter();
+    let names = sections.flat_map(|section| declared(code, section.inner.clone()).names);
+    names.map(|at| code.capitals(at)).collect()
+}
+
 fn check_unit(code: &Code<'_>, unit: &Unit, world: &World, wrong: &Collector<'_>) {
-    let mut declares = Declared::default();
-    for section in &unit.sections {
-        declares
-            .names
-            .extend(declared(code, section.inner.clone()).names);
-    }
-    let mut known: HashSet<String> = declares.names.iter().map(|at| code.capitals(*at)).collect();
+    let mut known = variables(code, unit);
     if is_chart(code, &unit.body) {
         let chart = chart(code, &unit.body);
         check_chart(code, unit, &chart, wrong);
@@ -149,6 +180,13 @@ fn check_unit(code: &Code<'_>, unit: &Unit, world: &World, wrong: &Collector<'_>
         }
     } else {
         check_statements(code, &unit.body, &known, world, wrong);
+        let parts = ["END_STEP", "END_TRANSITION", "END_ACTION"];
+        if let Some(part) = (unit.body.clone()).find(|at| code.is_any(*at, &parts)) {
+            let what = format!("{} stands among statements", shown(code.word(part)));
+            let right =
+                "put the statements into actions of the chart, or the chart into a function block";
+            wrong.report(code.start(part), what, right);
+        }
     }
 }
 
@@ -178,9 +216,16 @@ pub(crate) fn check_statements(
             if words::TIMERS.contains(&name.as_str()) {
                 wrong.report(
                     code.start(at),
-                    format!("this calls the {name} of a timer of TIA Portal"),
+                    format!(
+                        "this calls the {} of a timer of TIA Portal",
+                        shown(code.word(at))
+                    ),
                     "declare an instance of TON, TOF or TP, and call that",
                 );
+            } else if words::is_clock(&name) {
+                wrong.report(code.start(at), reads_clock(code.word(at)), MEASURE);
+            } else {
+                check_chain(code, at, known, world, wrong);
             }
             continue;
         }
@@ -193,16 +238,77 @@ pub(crate) fn check_statements(
             continue;
         }
         if words::is_clock(&name) {
-            wrong.report(
-                code.start(at),
-                format!("{name}() reads the clock of the PLC"),
-                "measure with a TON, whose ET is virtual time",
-            );
+            wrong.report(code.start(at), reads_clock(code.word(at)), MEASURE);
         } else {
             wrong.report(
                 code.start(at),
                 format!("{} is in none of these sources", shown(code.word(at))),
-                "hand in its source too; if it comes from a library and reads no clock, name it with --no-clock",
+                "also pass its source file; if it comes from a library and reads no clock, name it with --no-clock",
+            );
+        }
+    }
+}
+
+const MEASURE: &str = "measure with a TON, whose ET is virtual time";
+
+fn reads_clock(name: &str) -> String {
+    format!("{}() reads the clock of the PLC", shown(name))
+}
+
+/// Reports a call behind a dot, at `at`, whose first name is not declared here: it may be that of a library.
+fn check_chain(
+    code: &Code<'_>,
+    at: usize,
+    known: &HashSet<String>,
+    world: &World,
+    wrong: &Collector<'_>,
+) {
+    // array[1].block.inner(...)
+    let mut first = at;
+    while code.word(first.wrapping_sub(1)) == "." && first >= 2 {
+        first -= 2;
+        while first > 0 && matches!(code.word(first), "^" | "]" | ")") {
+            if code.word(first) != "^" {
+                first = code.opening(first);
+            }
+            first = first.saturating_sub(1);
+        }
+    }
+    let name = code.capitals(first);
+    let is_own = known.contains(&name)
+        || world.globals.contains(&name)
+        || world.types.contains(&name)
+        || name == "THIS";
+    if !is_own {
+        wrong.report(
+            code.start(first),
+            format!("{} is not declared in these sources", shown(code.word(first))),
+            "also pass the source file that declares it; if it is a list of variables or a library that reads no clock, name it with --no-clock",
+        );
+    }
+}
+
+/// Reports calls of programs that a task runs: their execution controllers wait for the signal of that task.
+pub(crate) fn check_callers(
+    code: &Code<'_>,
+    body: &Range<usize>,
+    known: &HashSet<String>,
+    is_run: impl Fn(&str) -> bool,
+    wrong: &Collector<'_>,
+) {
+    for at in body.clone() {
+        let name = code.capitals(at);
+        if code.is_word(at)
+            && matches!(code.word(at + 1), "(" | ".")
+            && code.word(at.wrapping_sub(1)) != "."
+            && !known.contains(&name)
+            && is_run(&name)
+            && (code.word(at + 1) == "(" || code.word(at + 3) == "(")
+        {
+            wrong.report(
+                code.start(at),
+                format!("{} is called here, and a task runs it too", shown(code.word(at))),
+                "call it or give it a task, not both: its execution controller waits for one signal",
             );
         }
     }
@@ -220,6 +326,14 @@ fn is_instructions(code: &Code<'_>, at: usize) -> bool {
 
 fn check_chart(code: &Code<'_>, unit: &Unit, chart: &Chart, wrong: &Collector<'_>) {
     let steps: HashSet<String> = chart.steps.iter().map(|at| code.capitals(*at)).collect();
+    if let Some(stray) = chart.stray {
+        let what = format!(
+            "{} stands in a chart, outside of its parts",
+            shown(code.word(stray))
+        );
+        let right = "put statements into an ACTION";
+        wrong.report(code.start(stray), what, right);
+    }
     let actions: HashSet<String> = (chart.actions.iter())
         .map(|(name, _)| code.capitals(*name))
         .collect();
@@ -228,7 +342,7 @@ fn check_chart(code: &Code<'_>, unit: &Unit, chart: &Chart, wrong: &Collector<'_
         if code.is_any(at, &["L", "D", "SD", "DS", "SL"]) {
             wrong.report(
                 code.start(at),
-                format!("the PLC times this {} itself", code.capitals(at)),
+                format!("the PLC times this {} itself", code.word(at)),
                 "use the qualifier N, and a TON that the action calls",
             );
         }

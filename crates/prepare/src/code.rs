@@ -103,6 +103,20 @@ impl<'t> Code<'t> {
         end
     }
 
+    /// The index of the token that opens the bracket closed at `at`; 0 if there is none.
+    pub(crate) fn opening(&self, at: usize) -> usize {
+        let mut depth = 0_usize;
+        let found = (0..=at).rev().find(|at| {
+            match self.word(*at) {
+                ")" | "]" => depth += 1,
+                "(" | "[" => depth = depth.saturating_sub(1),
+                _ => {}
+            }
+            depth == 0
+        });
+        found.unwrap_or(0)
+    }
+
     /// The line end of this source.
     pub(crate) fn line_end(&self) -> &'static str {
         line_end(self.text)

@@ -13,6 +13,7 @@
 //! survive here. Only declarations, charts and the configuration have to be understood, so there is a lexer that keeps every
 //! byte, and an outline read from its tokens. XML is read with `roxmltree`, which knows where each element stands.
 
+mod addresses;
 mod chart;
 mod check;
 mod code;
@@ -35,9 +36,9 @@ use std::collections::BTreeSet;
 use check::World;
 use code::Code;
 use outline::Outline;
-use structured_text::{Preparation, check_addresses, plan};
+use structured_text::{Preparation, plan};
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
+use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake, shown};
 
 pub use library::{Addresses, SOURCES};
 
@@ -74,26 +75,46 @@ pub struct Prepared {
 ///
 /// What cannot be prepared, for each source in which there is something, and its place.
 pub fn prepare(sources: &[Source], settings: &Settings) -> Result<Prepared, Vec<Mistakes>> {
+    let vouched = settings.no_clock.iter();
+    let timers = vouched.filter(|name| words::TIMERS.contains(&name.to_uppercase().as_str()));
+    let wrong: Vec<Mistakes> = timers
+        .map(|name| Mistakes::of("--no-clock", timer(name)))
+        .collect();
+    let wrong = [wrong, addresses::mistakes(&settings.addresses)].concat();
+    if !wrong.is_empty() {
+        return Err(wrong);
+    }
     let texts: Vec<(Cow<'_, str>, Encoding)> =
         sources.iter().map(|source| decode(&source.bytes)).collect();
-    let wrong: Vec<Collector<'_>> = (sources.iter().zip(&texts))
-        .map(|(source, (text, _))| Collector::new(&source.name, text))
+    let lines: Vec<Cow<'_, str>> = texts.iter().map(|(text, _)| with_lines(text)).collect();
+    let wrong: Vec<Collector<'_>> = (sources.iter().zip(&lines))
+        .map(|(source, text)| Collector::new(&source.name, text))
         .collect();
     let made = prepared(&texts, settings, &wrong);
     let mistakes: Vec<Mistakes> = wrong.into_iter().filter_map(Collector::finish).collect();
     match made {
         Some((made, notes)) if mistakes.is_empty() => {
             let files = made.into_iter().zip(&texts);
-            let files = files.map(|(text, (_, encoding))| encode(text, *encoding));
+            let mut encoded = Vec::new();
+            let mut wrong = Vec::new();
+            for ((text, (_, encoding)), source) in files.zip(sources) {
+                match encode(text, *encoding) {
+                    Ok(bytes) => encoded.push(bytes),
+                    Err(mistake) => wrong.push(Mistakes::of(&source.name, mistake)),
+                }
+            }
+            if !wrong.is_empty() {
+                return Err(wrong);
+            }
             Ok(Prepared {
-                files: files.collect(),
+                files: encoded,
                 notes,
             })
         }
         _ if mistakes.is_empty() => Err(vec![Mistakes::of_file(
             sources.first().map_or("", |source| &source.name),
             "there is no CONFIGURATION",
-            "hand in the source that has the tasks and their programs, too: intervals are taken from there",
+            "also pass the source file that has the tasks and their programs: intervals are taken from there",
         )]),
         _ => Err(mistakes),
     }
@@ -110,7 +131,7 @@ fn prepared(
             let right = "take that out first, with --undo";
             wrong.report(at, "this program was prepared before", right);
         } else if let Some(at) = text.find('\0') {
-            wrong.report(at, "this is no text in UTF-8", "save it as UTF-8");
+            wrong.report(at, "this file is not UTF-8 text", "save it as UTF-8");
         }
     }
     let projects = texts
@@ -148,6 +169,7 @@ fn prepared(
     let vouched = settings.no_clock.iter().map(|name| name.to_uppercase());
     world.types.extend(vouched);
     let mut found = None;
+    let mut shared = BTreeSet::new();
     for (index, outline) in outlines.iter().enumerate() {
         check::check(&codes[index], outline, &world, &wrong[index]);
         for configuration in &outline.configurations {
@@ -157,21 +179,28 @@ fn prepared(
                 wrong[index].report(at, "this is a second CONFIGURATION", right);
             }
         }
-        let sections: Vec<_> = (outline.units.iter())
-            .flat_map(|unit| &unit.sections)
-            .chain(outline.configurations.iter().flat_map(|one| &one.globals))
-            .chain(&outline.globals)
-            .collect();
-        check_addresses(&codes[index], &sections, &settings.addresses, &wrong[index]);
+        shared.extend(check::check_addresses(
+            &codes[index],
+            &settings.addresses,
+            &wrong[index],
+        ));
     }
     let (home, configuration) = found?;
     let (plan, note) = plan(&codes[home], configuration, &wrong[home]);
+    for (code, (outline, wrong)) in codes.iter().zip(outlines.iter().zip(wrong)) {
+        for unit in &outline.units {
+            let known = check::variables(code, unit);
+            let is_run = |name: &str| plan.programs.contains_key(name);
+            check::check_callers(code, &unit.body, &known, is_run, wrong);
+        }
+    }
     for instance in &configuration.instances {
         let name = codes[home].capitals(instance.program);
         if !world.types.contains(&name) {
-            let what = format!("the program {name} is in none of these sources");
+            let shown = shown(codes[home].word(instance.program));
+            let what = format!("the program {shown} is in none of these sources");
             let at = codes[home].start(instance.program);
-            wrong[home].report(at, what, "hand in its source too");
+            wrong[home].report(at, what, "also pass its source file");
         }
     }
     if !wrong.iter().all(Collector::is_empty) {
@@ -190,7 +219,15 @@ fn prepared(
     let blocks = library::text(&timers, &plan.signals, &settings.addresses);
     let files = parts.iter().enumerate();
     let files = files.map(|(index, part)| part.text((index == home).then_some(blocks.as_str())));
-    Some((files.collect(), note.into_iter().collect()))
+    Some((files.collect(), note.into_iter().chain(shared).collect()))
+}
+
+fn timer(name: &str) -> Mistake {
+    let what = format!("{} runs on the clock of the PLC", shown(name));
+    Mistake::new(
+        what,
+        "leave it out: it is replaced by a timer on virtual time",
+    )
 }
 
 /// Takes out what [`prepare`] has put in; what was changed elsewhere since then stays.
@@ -201,6 +238,7 @@ fn prepared(
 pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
     let (text, encoding) = decode(&source.bytes);
     let wrong = |at, mistake| {
+        let text = with_lines(&text);
         let collector = Collector::new(&source.name, &text);
         let place = Some(collector.place(at));
         Mistakes::of_list(&source.name, vec![PlacedMistake { place, mistake }])
@@ -209,7 +247,12 @@ pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
         return Err(Mistakes::of(&source.name, nothing_to_undo()));
     }
     let original = edit::undo(&text).map_err(|(at, mistake)| wrong(at, mistake))?;
-    Ok(encode(original, encoding))
+    encode(original, encoding).map_err(|mistake| Mistakes::of(&source.name, mistake))
+}
+
+/// Whether [`prepare`] has put something into a file.
+pub fn is_prepared(source: &Source) -> bool {
+    edit::marked(&decode(&source.bytes).0).is_some()
 }
 
 fn nothing_to_undo() -> Mistake {
@@ -238,14 +281,27 @@ fn decode(bytes: &[u8]) -> (Cow<'_, str>, Encoding) {
     (Cow::Owned(text), Encoding::Latin1)
 }
 
-fn encode(text: String, encoding: Encoding) -> Vec<u8> {
-    match encoding {
-        Encoding::Utf8 => text.into_bytes(),
-        Encoding::Latin1 => {
-            let bytes = text.chars().map(|c| u8::try_from(u32::from(c)));
-            bytes
-                .collect::<Result<_, _>>()
-                .expect("it was made of bytes and ASCII")
-        }
+/// A text whose places are those of `text`, with the line ends by which they are counted: some old editors write bare CR.
+fn with_lines(text: &str) -> Cow<'_, str> {
+    if text.contains('\r') && !text.contains('\n') {
+        Cow::Owned(text.replace('\r', "\n"))
+    } else {
+        Cow::Borrowed(text)
     }
+}
+
+/// The bytes of a text.
+///
+/// # Errors
+///
+/// Something was put into a source in Latin-1 that it cannot hold.
+fn encode(text: String, encoding: Encoding) -> Result<Vec<u8>, Mistake> {
+    if encoding == Encoding::Utf8 {
+        return Ok(text.into_bytes());
+    }
+    let bytes = text.chars().map(|c| u8::try_from(u32::from(c)));
+    bytes.collect::<Result<_, _>>().map_err(|_| {
+        let what = "this file is not UTF-8 text, and names of another file do not fit into it";
+        Mistake::new(what, "save it as UTF-8")
+    })
 }

@@ -36,13 +36,42 @@ pub(crate) struct Signal {
 }
 
 impl Signal {
-    /// For the task called `task`, if it has one.
-    pub(crate) fn new(task: Option<&str>, interval: Option<u32>) -> Self {
-        let name = task.map_or_else(
-            || "tickbus_execute".to_owned(),
-            |task| format!("tickbus_execute_{task}"),
-        );
+    /// For the task called `task`, beside the signals of other tasks.
+    pub(crate) fn of_task<'s>(
+        task: &str,
+        interval: u32,
+        others: impl Iterator<Item = &'s Self>,
+    ) -> Self {
+        let others: Vec<String> = others.map(|one| one.name.to_uppercase()).collect();
+        let is_free = |name: &String| !others.contains(&name.to_uppercase());
+        let first = format!("tickbus_execute_{}", identifier(task));
+        let mut numbered = (2..).map(|number: usize| format!("{first}_{number}"));
+        let name = if is_free(&first) {
+            first
+        } else {
+            numbered.find(is_free).expect("numbers do not end")
+        };
+        let interval = Some(interval);
         Self { name, interval }
+    }
+
+    /// For programs without a task.
+    pub(crate) fn of_every_step() -> Self {
+        Self {
+            name: "tickbus_execute".to_owned(),
+            interval: None,
+        }
+    }
+}
+
+/// A name as part of another one: some editors take blanks and letters beyond ASCII, and no compiler two `_` side by side.
+fn identifier(name: &str) -> String {
+    let parts = name.split(|c: char| !c.is_ascii_alphanumeric());
+    let parts: Vec<&str> = parts.filter(|part| !part.is_empty()).collect();
+    if parts.is_empty() {
+        "task".to_owned()
+    } else {
+        parts.join("_")
     }
 }
 

@@ -137,10 +137,7 @@ impl Reader<'_, '_> {
     }
 
     fn unknown(&self) -> (usize, Mistake) {
-        let what = format!(
-            "\"{}\" begins nothing that is known here",
-            shown(self.code.word(self.at))
-        );
+        let what = format!("unexpected \"{}\"", shown(self.code.word(self.at)));
         let right = "PROGRAM, FUNCTION_BLOCK, FUNCTION, TYPE, VAR_GLOBAL and CONFIGURATION of IEC 61131-3 are read; SCL of \
             TIA Portal is prepared by hand, and methods and classes are not prepared";
         (self.code.start(self.at), Mistake::new(what, right))
@@ -151,7 +148,7 @@ impl Reader<'_, '_> {
         let start = self.at;
         let found = (start..self.code.tokens.len()).find(|at| self.code.is(*at, end));
         let Some(found) = found else {
-            let what = format!("this {} has no {end}", self.code.capitals(start));
+            let what = format!("this {} has no {end}", shown(self.code.word(start)));
             return self.wrong(start, what, "end it");
         };
         self.at = found + 1;
@@ -162,8 +159,8 @@ impl Reader<'_, '_> {
         if self.code.is_word(at) {
             return Ok(at);
         }
-        let what = format!("\"{}\" is no name", shown(self.code.word(at)));
-        self.wrong(at, what, "a name stands here")
+        let what = format!("expected a name, found \"{}\"", shown(self.code.word(at)));
+        self.wrong(at, what, "write the name before it")
     }
 
     fn section(&mut self) -> Result<Section, (usize, Mistake)> {
@@ -172,14 +169,47 @@ impl Reader<'_, '_> {
     }
 
     fn is_section(&self) -> bool {
-        let word = self.code.capitals(self.at);
-        word == "VAR" || word.starts_with("VAR_")
+        self.code.is_any(self.at, SECTIONS)
+    }
+
+    /// Reports what belongs to a class, or to another unit whose end is missing.
+    fn check_body(&self, body: &Range<usize>) -> Result<(), (usize, Mistake)> {
+        let code = self.code;
+        // EXTENDS is no statement, and neither is a name before another one.
+        if code.is_any(body.start, OF_CLASSES) && code.is_word(body.start + 1) {
+            return self.class(body.start);
+        }
+        for at in body.clone() {
+            let begins = at == body.start || matches!(code.word(at - 1), ";" | "END_METHOD");
+            let is_method = code.is_any(at, &["METHOD", "PROPERTY"]) && code.is_word(at + 1);
+            if (begins && is_method) || code.is_any(at, &["END_METHOD", "END_PROPERTY"]) {
+                return self.class(at);
+            }
+            let is_section = code.is_any(at, SECTIONS) && code.word(at - 1) != ".";
+            if is_section || code.is(at, "END_VAR") {
+                let what = format!("{} stands among statements", shown(code.word(at)));
+                let right = "declare variables before the first statement";
+                return self.wrong(at, what, right);
+            }
+        }
+        Ok(())
+    }
+
+    fn class<T>(&self, at: usize) -> Result<T, (usize, Mistake)> {
+        let what = format!("{} belongs to a class", shown(self.code.word(at)));
+        let right =
+            "methods, properties and inheritance are not prepared: write a plain function block";
+        self.wrong(at, what, right)
     }
 
     fn unit(&mut self, kind: UnitKind, end: &str) -> Result<Unit, (usize, Mistake)> {
         let start = self.at;
         let name = self.name(start + 1)?;
         self.at = name + 1;
+        let is_name = self.code.is_word(self.at) && !self.is_section();
+        if self.code.is_any(name, OF_CLASSES) && is_name {
+            return self.class(name);
+        }
         let mut returns = self.at..self.at;
         if kind == UnitKind::Function && self.code.is(self.at, ":") {
             let mut end = self.name(self.at + 1)? + 1;
@@ -200,6 +230,7 @@ impl Reader<'_, '_> {
             self.wrong(start, what, "end it")
         })?;
         body.start = body.start.min(body.end);
+        self.check_body(&body)?;
         Ok(Unit {
             kind,
             name,
@@ -287,10 +318,14 @@ impl Reader<'_, '_> {
             colon += 2;
         }
         if !self.code.is(colon, ":") {
-            let what = format!("\"{}\" stands here", shown(self.code.word(colon)));
+            let what = format!("unexpected \"{}\"", shown(self.code.word(colon)));
             return self.wrong(colon, what, "write PROGRAM name WITH task : program;");
         }
         let program = self.name(colon + 1)?;
+        if let Some(with) = (program..self.at).find(|at| self.code.is(*at, "WITH")) {
+            let what = "a block of this program runs in a task of its own".to_owned();
+            return self.wrong(with, what, "call the block from the program instead");
+        }
         Ok(Instance {
             start,
             name,
@@ -305,18 +340,31 @@ pub(crate) fn declared(code: &Code<'_>, inner: Range<usize>) -> Declared {
     let mut found = Declared::default();
     let mut pending = Vec::new();
     let mut at = inner.start;
+    // Members of a structure are not names of the section.
+    let mut depth = 0_usize;
     while at < inner.end {
         match code.word(at) {
             "(" | "[" => at = code.closing(at, inner.end),
             ":" => {
-                found.names.append(&mut pending);
+                // TYPE name EXTENDS base : STRUCT
+                let extends = pending.iter().position(|at| code.is(*at, "EXTENDS"));
+                if let Some(extends) = extends {
+                    found.types.extend(pending.drain(extends..).skip(1));
+                }
+                if depth == 0 {
+                    found.names.append(&mut pending);
+                }
+                pending.clear();
                 at += 1;
                 // The type, up to its initial value or the end of the declaration; a STRUCT begins declarations of its own.
                 while at < inner.end && !matches!(code.word(at), ":=" | ";") {
                     if matches!(code.word(at), "(" | "[") {
                         at = code.closing(at, inner.end);
-                    } else if code.is(at, "STRUCT") || code.is(at, "UNION") {
+                    } else if code.is_any(at, &["STRUCT", "UNION"]) {
+                        depth += 1;
                         break;
+                    } else if code.is_any(at, &["END_STRUCT", "END_UNION"]) {
+                        depth = depth.saturating_sub(1);
                     } else if code.is_word(at) && !code.is_any(at, IN_TYPES) {
                         found.types.push(at);
                     }
@@ -329,6 +377,7 @@ pub(crate) fn declared(code: &Code<'_>, inner: Range<usize>) -> Declared {
                 }
             }
             ";" => pending.clear(),
+            _ if code.is_any(at, &["END_STRUCT", "END_UNION"]) => depth = depth.saturating_sub(1),
             _ if code.is_word(at) && !code.is_any(at, BESIDE_NAMES) => pending.push(at),
             _ => {}
         }
@@ -358,9 +407,34 @@ const BESIDE_NAMES: &[&str] = &[
     "NON_RETAIN",
     "PERSISTENT",
     "STRUCT",
-    "END_STRUCT",
     "UNION",
-    "END_UNION",
     "R_EDGE",
     "F_EDGE",
+];
+
+/// Words that begin a section of variables.
+const SECTIONS: &[&str] = &[
+    "VAR",
+    "VAR_INPUT",
+    "VAR_OUTPUT",
+    "VAR_IN_OUT",
+    "VAR_EXTERNAL",
+    "VAR_GLOBAL",
+    "VAR_TEMP",
+    "VAR_STAT",
+    "VAR_INST",
+    "VAR_CONFIG",
+    "VAR_ACCESS",
+];
+
+/// Words of classes beside the name of a block.
+const OF_CLASSES: &[&str] = &[
+    "EXTENDS",
+    "IMPLEMENTS",
+    "PUBLIC",
+    "PRIVATE",
+    "PROTECTED",
+    "INTERNAL",
+    "FINAL",
+    "ABSTRACT",
 ];

@@ -76,7 +76,7 @@ pub(crate) fn plan(
         match duration::milliseconds(&stated.text) {
             Ok(interval) => {
                 shortest = Some(shortest.map_or(interval, |shortest| shortest.min(interval)));
-                let signal = Signal::new(Some(&task.name.text), Some(interval));
+                let signal = Signal::of_task(&task.name.text, interval, signals.values());
                 signals.insert(task.name.capitals(), signal);
             }
             Err(why) => wrong.report(
@@ -97,7 +97,7 @@ pub(crate) fn plan(
             .as_ref()
             .map(|task| (task, signals.get(&task.capitals())))
         {
-            None => Signal::new(None, None),
+            None => Signal::of_every_step(),
             Some((_, Some(signal))) => signal.clone(),
             Some((task, None)) => {
                 if !tasks

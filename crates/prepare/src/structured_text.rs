@@ -7,8 +7,8 @@ use super::chart::{chart, is_chart};
 use super::check::{World, all_declarations};
 use super::code::{Code, line_end};
 use super::edit::{Edits, Marks};
-use super::library::{self, Addresses, SCHEDULE, TASK};
-use super::outline::{Configuration, Outline, Section, UnitKind, declared};
+use super::library::{self, SCHEDULE, TASK};
+use super::outline::{Configuration, Outline, UnitKind, declared};
 use super::plan::{self, Named, Plan};
 use tickbus_base::toml_text::Collector;
 
@@ -175,9 +175,7 @@ fn indent<'t>(code: &Code<'t>, at: usize) -> &'t str {
 
 /// Puts the execution controller's header and footer around statements.
 fn wrap(code: &Code<'_>, body: &Range<usize>, signal: &str, edits: &mut Edits) {
-    if body.is_empty() {
-        return;
-    }
+    // Pragmas alone are statements too, for iec2c; it takes no empty one beside them.
     let Some(bytes) = code.bytes(body) else {
         return;
     };
@@ -202,25 +200,4 @@ pub(crate) fn header_and_footer(
     };
     let header = format!("IF {} THEN{lines}", library::condition(signal));
     (header, format!("{lines}END_IF;"))
-}
-
-/// Reports addresses of the variables for the server at which the program has variables of its own.
-pub(crate) fn check_addresses(
-    code: &Code<'_>,
-    sections: &[&Section],
-    addresses: &Addresses,
-    wrong: &Collector<'_>,
-) {
-    let taken = [&addresses.go, &addresses.ms, &addresses.done];
-    for at in sections.iter().flat_map(|section| section.inner.clone()) {
-        let own = code.word(at);
-        let mut taken = taken.iter().filter_map(|one| one.as_ref());
-        if own.starts_with('%') && taken.any(|one| one.eq_ignore_ascii_case(own)) {
-            wrong.report(
-                code.start(at),
-                format!("the program has a variable at {own} already"),
-                "name a free address for the server's variable",
-            );
-        }
-    }
 }

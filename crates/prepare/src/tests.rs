@@ -171,6 +171,164 @@ fn a_timer_of_the_programs_own_is_no_timer_of_the_standard() {
 }
 
 #[test]
+fn a_member_of_a_structure_is_no_type() {
+    let recipe = "TYPE Recipe : STRUCT ton : TIME; inner : STRUCT Stamp : INT; END_STRUCT; END_STRUCT; END_TYPE\n";
+    let text = recipe.to_owned() + &line("VAR r : Recipe; t : TON; END_VAR", "t(PT := r.ton);");
+    let made = prepared_text(&text, &Settings::default());
+    assert!(
+        made.contains(" t : (*{tickbus TON*)TICKBUS_TON(*tickbus}*);"),
+        "{made}"
+    );
+    assert_eq!(undone(&made), text);
+    let text = recipe.to_owned() + &line("VAR n : INT; END_VAR", "n := Stamp(1);");
+    refused(&text, "Stamp is in none");
+    let two = "TYPE A : STRUCT n : INT END_STRUCT; B : (ton, tof); END_TYPE\n";
+    let made = prepared_text(
+        &(two.to_owned() + &line("VAR a : A; b : B; END_VAR", "RETURN;")),
+        &Settings::default(),
+    );
+    assert!(made.contains("VAR a : A; b : B;"), "{made}");
+    let extended = "TYPE A EXTENDS TON : STRUCT n : INT; END_STRUCT; END_TYPE\n".to_owned();
+    let made = prepared_text(
+        &(extended + &line("VAR t : TON; END_VAR", "t();")),
+        &Settings::default(),
+    );
+    assert!(made.contains("VAR t : (*{tickbus TON"), "{made}");
+}
+
+#[test]
+fn nobody_vouches_for_a_timer_that_is_replaced() {
+    let settings = Settings {
+        no_clock: vec!["Ton".to_owned()],
+        ..Settings::default()
+    };
+    let mistakes = prepare(&[source(&line("VAR t : TON; END_VAR", "t();"))], &settings);
+    let all = mistakes.expect_err("TON")[0].to_string();
+    assert!(
+        all.contains("--no-clock: Ton runs on the clock of the PLC; leave it out"),
+        "{all}"
+    );
+}
+
+#[test]
+fn variables_named_like_parts_of_a_chart_make_no_chart() {
+    for name in [
+        "step",
+        "action",
+        "initial_step",
+        "transition",
+        "method",
+        "var_speed",
+    ] {
+        let text = line(
+            &format!("VAR {name} : INT; END_VAR"),
+            &format!("{name} := {name} + 1;"),
+        );
+        let made = prepared_text(&text, &Settings::default());
+        let wrapped = format!("tickbus_execute_fast THEN\n(*tickbus}}*){name} := ");
+        assert!(made.contains(&wrapped), "{made}");
+        refused(
+            &text.replace(" + 1", " + F(TIME())"),
+            "TIME() reads the clock",
+        );
+    }
+    let text = line("VAR action : Chosen; END_VAR", "action(n := 1);");
+    let block = "FUNCTION_BLOCK Chosen VAR_INPUT n : INT; END_VAR END_FUNCTION_BLOCK\n";
+    let made = prepared_text(&(block.to_owned() + &text), &Settings::default());
+    assert!(made.contains("THEN\n(*tickbus}*)action("), "{made}");
+}
+
+#[test]
+fn a_body_of_pragmas_gets_a_controller() {
+    let text = line("VAR n : INT; END_VAR", "{n++;}");
+    let made = prepared_text(&text, &Settings::default());
+    assert!(
+        made.contains("(*{tickbus*)IF NOT tickbus_simulated OR tickbus_execute_fast THEN\n(*tickbus}*){n++;}(*{tickbus*)\nEND_IF;"),
+        "{made}"
+    );
+    assert_eq!(undone(&made), text);
+    let chart = "INITIAL_STEP one: move(N); END_STEP\nTRANSITION FROM one TO one := TRUE; END_TRANSITION\nACTION move: {n++;} END_ACTION";
+    let made = prepared_text(&line("VAR n : INT; END_VAR", chart), &Settings::default());
+    assert!(made.contains("THEN (*tickbus}*){n++;}"), "{made}");
+}
+
+#[test]
+fn calls_behind_a_dot_are_taken_from_what_the_sources_declare() {
+    let block = "FUNCTION_BLOCK Cell VAR_OUTPUT inner : Part; END_VAR END_FUNCTION_BLOCK\n\
+        FUNCTION_BLOCK Part VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK\nVAR_GLOBAL shared : Cell; END_VAR\n";
+    let calls = "cells[n + f(1)].inner(); shared.inner(); pointer^.inner(); List.inner();";
+    let declared =
+        "VAR cells : ARRAY [1..2] OF Cell; n : INT; pointer : REF_TO Cell; f : Part; END_VAR";
+    let no_clock = vec!["List".to_owned()];
+    let settings = Settings {
+        no_clock,
+        ..Settings::default()
+    };
+    let text = block.to_owned() + &line(declared, calls);
+    assert_eq!(undone(&prepared_text(&text, &settings)), text);
+    refused(&text, "line.st:6:60: List is not declared in these sources");
+}
+
+#[test]
+fn names_of_tasks_become_names_of_signals() {
+    let named = |first: &str, second: &str| {
+        let text = line("", "RETURN;")
+            .replace("fast", first)
+            .replace("slow", second);
+        let made = prepared_text(&text, &Settings::default());
+        assert_eq!(undone(&made), text);
+        let start = made
+            .find("VAR_EXTERNAL\n    tickbus_now")
+            .expect("the scheduler's program");
+        let lines = made[start..].lines().skip(3).take(2);
+        lines
+            .map(|line| line.trim().replace("tickbus_execute_", ""))
+            .collect::<String>()
+    };
+    assert_eq!(named("_fast", "a__b_"), "fast : BOOL;a_b : BOOL;");
+    assert_eq!(named("fast", "Fast_"), "fast : BOOL;Fast_2 : BOOL;");
+    assert_eq!(named("главная", "б"), "task : BOOL;task_2 : BOOL;");
+}
+
+#[test]
+fn sources_in_other_encodings_get_what_they_can_hold() {
+    let whole = line("", "RETURN;").replace("fast", "главная");
+    let at = whole.find("CONFIGURATION").expect("there is one");
+    let mut latin = whole.as_bytes()[..at].to_vec();
+    latin.extend(b"(* \xB5s *)");
+    let first = Source {
+        name: "a.st".to_owned(),
+        bytes: latin.clone(),
+    };
+    let made = prepare(&[first, source(&whole[at..])], &Settings::default()).expect("prepared");
+    let bytes = made.files[0].clone();
+    let made = Source {
+        name: "a.st".to_owned(),
+        bytes,
+    };
+    assert!(is_prepared(&made));
+    assert_eq!(undo(&made), Ok(latin));
+    encode("ж".to_owned(), Encoding::Latin1).expect_err("not in Latin-1");
+}
+
+#[test]
+fn names_of_variables_that_are_put_in_are_no_types() {
+    let block =
+        |name: &str| format!("FUNCTION_BLOCK {name} VAR n : INT; END_VAR END_FUNCTION_BLOCK\n");
+    refused(
+        &(block("Ms") + &line("VAR m : Ms; END_VAR", "m();")),
+        "line.st:1:16: tickbus puts in a variable named Ms, too; choose another name",
+    );
+    refused(
+        &("TYPE Done : INT; END_TYPE\n".to_owned() + &line("", "RETURN;")),
+        "line.st:1:6: tickbus puts in a variable named Done",
+    );
+    let text =
+        block("Clock") + &block("since") + &line("VAR c : Clock; done : BOOL; END_VAR", "c();");
+    assert_eq!(undone(&prepared_text(&text, &Settings::default())), text);
+}
+
+#[test]
 fn blocks_that_the_user_vouches_for_are_taken() {
     let text = line("VAR f : Filter; END_VAR", "f(); Reset(1);");
     refused(&text, "Filter is in none");
@@ -202,8 +360,56 @@ fn an_address_that_is_taken_is_told() {
     let told = mistakes.expect_err("taken")[0].to_string();
     assert_eq!(
         told,
-        "line.st:6:13: the program has a variable at %QX0.0 already; name a free address for the server's variable"
+        "line.st:6:13: the program uses %QX0.0 already; name a free address for the server's variable"
     );
+}
+
+#[test]
+fn addresses_of_the_server_are_compared() {
+    let with = |go: &str, ms: &str, done: &str| {
+        let [go, ms, done] = [go, ms, done].map(|address| Some(address.to_owned()));
+        let addresses = Addresses { go, ms, done };
+        Settings {
+            addresses,
+            ..Settings::default()
+        }
+    };
+    let told = |text: &str, settings: &Settings| {
+        let mistakes = prepare(&[source(text)], settings).expect_err("addresses");
+        mistakes
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
+    let text = line("", "RETURN;");
+    assert_eq!(
+        told(&text, &with("%ID0", "%id0", "%ID0")),
+        "ms: go is at %id0 too; give each variable an address of its own\n\
+         done: go is at %ID0 too; give each variable an address of its own\n\
+         done: %ID0 is an input, and the PLC writes done; name an output, such as %QD100, or a marker"
+    );
+    let settings = with("%MD100", "%MD104", "%QD100");
+    assert_eq!(
+        told(&line("", "%MD100 := 5;"), &settings),
+        "line.st:3:1: the program uses %MD100 already; name a free address for the server's variable"
+    );
+    let text = line("VAR w AT %QW200 : INT; END_VAR", "w := %QW200;");
+    let made = prepare(&[source(&text)], &settings).expect("prepared");
+    assert_eq!(
+        made.notes,
+        [
+            "done at %QD100 and the program's %QW200 are the same memory on some PLCs: check that they are not on yours"
+        ]
+    );
+}
+
+#[test]
+fn bare_carriage_returns_end_lines() {
+    let text = line("VAR m : MC_Power; END_VAR", "RETURN;").replace('\n', "\r");
+    refused(&text, "line.st:2:9: the type MC_Power");
+    let text = line("VAR t : TON; END_VAR", "t();").replace('\n', "\r");
+    assert_eq!(undone(&prepared_text(&text, &Settings::default())), text);
 }
 
 #[test]

@@ -6,7 +6,7 @@ pub(crate) const TIMERS: [&str; 4] = ["TON", "TOF", "TP", "RTC"];
 /// Prefix of the replacements.
 pub(crate) const PREFIX: &str = "TICKBUS_";
 
-/// Whether a name is one of those that are put in. Others begin with the same prefix: `tickbus export` makes them.
+/// Whether a name is reserved for what is put in. Others begin with the same prefix: `tickbus export` makes them.
 pub(crate) fn is_put_in(name: &str) -> bool {
     let name = name.to_ascii_uppercase();
     let Some(rest) = name.strip_prefix(PREFIX) else {
@@ -14,6 +14,11 @@ pub(crate) fn is_put_in(name: &str) -> bool {
     };
     let own = "ACTION_CONTROL SCHEDULER SCHEDULE CYCLE FIRST NOW SIMULATED EXECUTE";
     is_in(own, rest) || rest.starts_with("EXECUTE_") || TIMERS.contains(&rest)
+}
+
+/// Whether a name is one of the variables that are put in: no type or program of that name can stand beside them.
+pub(crate) fn is_variable_put_in(name: &str) -> bool {
+    is_in("HANDSHAKE GO MS DONE SIMULATED STEPPING NOW", name)
 }
 
 const TYPES: &str = "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME LTIME DATE LDATE TOD \

@@ -1,14 +1,19 @@
 //! Prepares projects as `PLCopen` XML whose statements are in Structured Text.
 
+mod mask;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 
+use mask::mask;
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::check::{World, check_statements, check_type, check_words};
+use super::addresses;
+use super::check::{
+    World, check_addresses, check_callers, check_name, check_statements, check_type, check_words,
+};
 use super::code::{Code, line_end};
 use super::edit::{Edits, Marks};
 use super::library::{self, SCHEDULE, TASK};
@@ -50,7 +55,7 @@ pub(crate) fn prepare(
     };
     let root = document.root_element();
     if !text[root.range()].starts_with("<project") {
-        let what = "this XML is no project of PLCopen";
+        let what = "this is not a PLCopen project";
         wrong.report(
             root.range().start,
             what,
@@ -64,14 +69,14 @@ pub(crate) fn prepare(
         .types
         .extend(settings.no_clock.iter().map(|name| name.to_uppercase()));
     project.check_types(&world);
-    let bodies = project.bodies(&world);
-    project.check_addresses(settings);
+    let mut shared = project.check_addresses(settings);
+    let bodies = project.bodies(&world, settings, &mut shared);
     let (plan, note) = project.plan(&world)?;
     if !wrong.is_empty() {
         return None;
     }
     let made = project.edited(&world, &plan, settings, &bodies)?;
-    Some((made, note.into_iter().collect()))
+    Some((made, note.into_iter().chain(shared).collect()))
 }
 
 struct Project<'a, 'i> {
@@ -101,6 +106,10 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         for list in self.named("globalVars") {
             world.globals.extend(variable_names(list));
+            // CODESYS calls its lists by their names.
+            world
+                .globals
+                .extend(list.attribute("name").map(str::to_uppercase));
         }
         world
     }
@@ -110,10 +119,16 @@ impl<'a, 'i> Project<'a, 'i> {
             let name = node.attribute("name").unwrap_or_default();
             check_type(name, node.range().start, world, self.wrong);
         }
+        for element in ["pou", "dataType"] {
+            for node in self.named(element) {
+                let name = node.attribute("name").unwrap_or_default();
+                check_name(name, node.range().start, self.wrong);
+            }
+        }
         for node in self.named("variable") {
             let name = node.attribute("name").unwrap_or_default();
             if words::is_put_in(name) {
-                let what = format!("the name {} is one of those that are put in", shown(name));
+                let what = format!("the name {} is reserved by tickbus", shown(name));
                 let right = "a program that was synchronised by hand needs no preparing; otherwise choose another name";
                 self.wrong.report(node.range().start, what, right);
             }
@@ -129,6 +144,16 @@ impl<'a, 'i> Project<'a, 'i> {
                 "this is a method",
                 "methods are not prepared: make it a function block",
             ),
+            (
+                "Extends",
+                "this block extends another one",
+                "inheritance is not prepared: write a plain function block",
+            ),
+            (
+                "Implements",
+                "this block implements an interface",
+                "inheritance is not prepared: write a plain function block",
+            ),
         ] {
             for node in self.named(element) {
                 self.wrong.report(node.range().start, what, right);
@@ -137,8 +162,16 @@ impl<'a, 'i> Project<'a, 'i> {
     }
 
     /// The bodies of programs, checked like all others.
-    fn bodies(&self, world: &World) -> Vec<Body<'a, 'i>> {
+    fn bodies(
+        &self,
+        world: &World,
+        settings: &Settings,
+        shared: &mut BTreeSet<String>,
+    ) -> Vec<Body<'a, 'i>> {
         let mut found = Vec::new();
+        let run: HashSet<String> = (self.named("pouInstance"))
+            .map(|node| program(node).text.to_uppercase())
+            .collect();
         for unit in self.named("pou") {
             let mut known: HashSet<String> = HashSet::new();
             known.extend(
@@ -163,14 +196,16 @@ impl<'a, 'i> Project<'a, 'i> {
                     continue;
                 };
                 let code = Code::part(&masked, start);
-                if outline::endless(&code).is_some() {
-                    let what = "a comment or text in these statements has no end";
-                    self.wrong.report(start, what, "end it");
+                if let Some(token) = outline::endless(&code) {
+                    let what = "the comment or text that begins here has no end";
+                    self.wrong.report(start + token.start, what, "end it");
                     continue;
                 }
                 check_words(&code, self.wrong);
+                shared.extend(check_addresses(&code, &settings.addresses, self.wrong));
                 let all = 0..code.tokens.len();
                 check_statements(&code, &all, &known, world, self.wrong);
+                check_callers(&code, &all, &known, |name| run.contains(name), self.wrong);
                 if let (true, Some(bytes)) = (body.parent() == Some(unit), code.bytes(&all)) {
                     found.push(Body { unit, bytes });
                 }
@@ -197,22 +232,23 @@ impl<'a, 'i> Project<'a, 'i> {
             return None;
         }
         let inner = inner(self.text, holder)?;
-        Some((mask(&self.text[inner.clone()]), inner.start))
-    }
-
-    fn check_addresses(&self, settings: &Settings) {
-        let addresses = &settings.addresses;
-        for node in self.named("variable") {
-            let own = node.attribute("address").unwrap_or_default();
-            let mut taken = [&addresses.go, &addresses.ms, &addresses.done]
-                .into_iter()
-                .flatten();
-            if taken.any(|one| one.eq_ignore_ascii_case(own)) {
-                let what = format!("the program has a variable at {own} already");
-                let right = "name a free address for the server's variable";
-                self.wrong.report(node.range().start, what, right);
+        match mask(&self.text[inner.clone()]) {
+            Ok(masked) => Some((masked, inner.start)),
+            Err(at) => {
+                let right = "write the character itself: in these statements, references are read for quotes, &, < and > only";
+                let what = "this is a reference to an ordinary character";
+                self.wrong.report(inner.start + at, what, right);
+                None
             }
         }
+    }
+
+    fn check_addresses(&self, settings: &Settings) -> BTreeSet<String> {
+        let located = self.named("variable").filter_map(|node| {
+            let own = node.attribute("address")?;
+            addresses::check(own, node.range().start, &settings.addresses, self.wrong)
+        });
+        located.collect()
     }
 
     fn plan(&self, world: &World) -> Option<(Plan, Option<String>)> {
@@ -306,8 +342,20 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         let timers: Vec<&str> = timers.iter().map(String::as_str).collect();
         let blocks = library::text(&timers, &plan.signals, &settings.addresses);
-        let units = self.named("pous").next()?;
-        self.insert_first(units, &plcopen::pous(&blocks), &mut edits)?;
+        let blocks = plcopen::pous(&blocks);
+        let unit = bodies.iter().find(|body| signal(body.unit, plan).is_some());
+        let holder = unit.and_then(|body| body.unit.parent());
+        if let Some(data) = holder.filter(|holder| holder.tag_name().name() == "data") {
+            // CODESYS keeps each unit in an extension of its own, among those of an application.
+            let start = &self.text[data.range().start..];
+            let tag = &start[..start.find("<pou")?];
+            let blocks = blocks
+                .replace("<pou ", &format!("{tag}<pou "))
+                .replace("</pou>", "</pou></data>");
+            edits.insert(data.range().end, self.lines(&blocks), Marks::Xml);
+        } else {
+            self.insert_first(self.named("pous").next()?, &blocks, &mut edits)?;
+        }
         self.configure(plan, &mut edits)?;
         Some(edits.apply(self.text))
     }
@@ -315,13 +363,7 @@ impl<'a, 'i> Project<'a, 'i> {
     /// Puts an execution controller around the statements of a program that a task runs.
     fn control(&self, body: &Body<'a, 'i>, plan: &Plan, edits: &mut Edits) -> Option<()> {
         let unit = body.unit;
-        let name = unit.attribute("name").unwrap_or_default();
-        let is_program = unit.attribute("pouType") == Some("program");
-        let Some(signal) = plan
-            .programs
-            .get(&name.to_uppercase())
-            .filter(|_| is_program)
-        else {
+        let Some(signal) = signal(unit, plan) else {
             return Some(());
         };
         let (header, footer) = header_and_footer(self.text, &body.bytes, signal);
@@ -332,7 +374,11 @@ impl<'a, 'i> Project<'a, 'i> {
             (signal.as_str(), None, "BOOL", None),
         ];
         let external = plcopen::variables("externalVars", &external);
-        self.insert_first(child(unit, "interface")?, &external, edits)
+        if let Some(interface) = child(unit, "interface") {
+            return self.insert_first(interface, &external, edits);
+        }
+        let interface = format!("<interface>\n{external}\n</interface>");
+        self.insert_first(unit, &interface, edits)
     }
 
     fn configure(&self, plan: &Plan, edits: &mut Edits) -> Option<()> {
@@ -349,8 +395,18 @@ impl<'a, 'i> Project<'a, 'i> {
         } else {
             format!("T#{}ms", plan.cycle)
         };
+        let mut instances = named(resource, "pouInstance");
+        let is_typed = |node: Node<'_, '_>| {
+            node.attribute("typeName")
+                .is_some_and(|name| !name.is_empty())
+        };
+        let (name, kind) = if instances.any(is_typed) {
+            ("tickbus_first", SCHEDULE)
+        } else {
+            (SCHEDULE, "")
+        };
         let mut task = format!(
-            "<task name=\"{TASK}\" interval=\"{interval}\" priority=\"1\">\n  <pouInstance name=\"tickbus_first\" typeName=\"{SCHEDULE}\"/>\n"
+            "<task name=\"{TASK}\" interval=\"{interval}\" priority=\"1\">\n  <pouInstance name=\"{name}\" typeName=\"{kind}\"/>\n"
         );
         let inner = tasks.iter().flat_map(|task| named(*task, "pouInstance"));
         for instance in inner.chain(alone.iter().copied()) {
@@ -428,6 +484,14 @@ fn named_attribute(node: Node<'_, '_>, name: &str) -> Option<Named> {
     (!text.is_empty()).then_some(Named { text, at })
 }
 
+/// The signal of the task that runs a unit.
+fn signal<'p>(unit: Node<'_, '_>, plan: &'p Plan) -> Option<&'p String> {
+    let name = unit.attribute("name").unwrap_or_default();
+    let is_program = unit.attribute("pouType") == Some("program");
+    let found = plan.programs.get(&name.to_uppercase());
+    found.filter(|_| is_program)
+}
+
 /// The program of an instance. CODESYS leaves its type empty: there a program is its own instance.
 fn program(instance: Node<'_, '_>) -> Named {
     let named = named_attribute(instance, "typeName").or_else(|| named_attribute(instance, "name"));
@@ -453,44 +517,6 @@ fn inner(text: &str, node: Node<'_, '_>) -> Option<Range<usize>> {
     let start = whole.start + tag + 1;
     let end = whole.start + text[whole.clone()].rfind("</")?;
     (start <= end && text.as_bytes()[start - 2] != b'/').then_some(start..end)
-}
-
-/// Text of XML with references and markup as characters and blanks, byte for byte in their places.
-fn mask(raw: &str) -> String {
-    const MARKUP: [(&str, &str); 7] = [
-        ("<![CDATA[", ""),
-        ("]]>", ""),
-        ("&lt;", "<"),
-        ("&gt;", ">"),
-        ("&amp;", "&"),
-        ("&quot;", "\""),
-        ("&apos;", "'"),
-    ];
-    let mut masked = String::with_capacity(raw.len());
-    let mut rest = raw;
-    let mut is_data = false;
-    while let Some(c) = rest.chars().next() {
-        let mut markup = MARKUP.iter().filter(|(from, _)| rest.starts_with(from));
-        // In CDATA nothing but its end is markup.
-        let found = markup.find(|(from, _)| !is_data || *from == "]]>");
-        let (length, character) = if let Some((from, to)) = found {
-            is_data = *from == "<![CDATA[" || (is_data && *from != "]]>");
-            (from.len(), (*to).to_owned())
-        } else if !is_data && rest.starts_with("&#") {
-            // Line ends and blanks, mostly.
-            (
-                rest.find(';').map_or(rest.len(), |at| at + 1),
-                "\n".to_owned(),
-            )
-        } else {
-            (c.len_utf8(), c.to_string())
-        };
-        let blanks = length - character.len();
-        masked += &character;
-        masked.extend(std::iter::repeat_n(' ', blanks));
-        rest = &rest[length..];
-    }
-    masked
 }
 
 /// A file that holds XML beside others.

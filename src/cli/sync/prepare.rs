@@ -1,13 +1,13 @@
 //! `tickbus sync prepare FILE...`: puts a PLC program on virtual time, and takes it off again.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::io::Write as _;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::cli::Outcome;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_prepare::{Addresses, Settings, Source, prepare, undo};
+use tickbus_prepare::{Addresses, Settings, Source, is_prepared, prepare, undo};
 
 /// Put a PLC program on virtual time, so that it runs in lock-step with a simulation; --undo takes it off again, byte for byte.
 ///
@@ -103,8 +103,16 @@ fn changed(arguments: &Arguments) -> Result<Made, Vec<Mistakes>> {
         return Err(wrong);
     }
     if arguments.undo {
-        let (files, wrong) = split(sources.iter().map(undo));
-        let notes = Vec::new();
+        // A program of several files has some in which nothing had to be changed.
+        let any = sources.iter().any(is_prepared);
+        let mut notes = Vec::new();
+        let (files, wrong) = split(sources.iter().map(|source| {
+            if !any || is_prepared(source) {
+                return undo(source);
+            }
+            notes.push(format!("{}: there was nothing to take out", source.name));
+            Ok(source.bytes.clone())
+        }));
         return if wrong.is_empty() {
             Ok(Made { files, notes })
         } else {
@@ -198,11 +206,54 @@ fn write(arguments: &Arguments, made: Made) -> Result<(Vec<PathBuf>, Vec<String>
         })?;
         paths
     };
-    for (path, bytes) in paths.iter().zip(&made.files) {
-        fs::write(path, bytes).map_err(|error| {
-            let what = format!("this file cannot be written: {error}");
-            vec![wrong(path, &what, "check the folder")]
-        })?;
-    }
+    replace_all(&paths, &made.files).map_err(|(path, error)| {
+        let what = format!("this file cannot be written: {error}");
+        vec![wrong(&path, &what, "check the folder")]
+    })?;
     Ok((paths, made.notes))
+}
+
+/// Writes all files beside their places first, and renames them when all are complete.
+fn replace_all(paths: &[PathBuf], files: &[Vec<u8>]) -> Result<(), (PathBuf, io::Error)> {
+    let mut parts: Vec<(PathBuf, PathBuf)> = Vec::new();
+    let mut written = Ok(());
+    for (path, bytes) in paths.iter().zip(files) {
+        // A link stays one: what it points to is replaced.
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+        let mut part = target.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let result = write_part(&target, &part, bytes);
+        parts.push((part, target));
+        if let Err(error) = result {
+            written = Err((path.clone(), error));
+            break;
+        }
+    }
+    if written.is_ok() {
+        for ((part, target), path) in parts.iter().zip(paths) {
+            if let Err(error) = fs::rename(part, target) {
+                written = Err((path.clone(), error));
+                break;
+            }
+        }
+    }
+    if written.is_err() {
+        for (part, _) in &parts {
+            let _ = fs::remove_file(part);
+        }
+    }
+    written
+}
+
+/// Writes a file completely, with the rights of the one that it will replace.
+fn write_part(target: &Path, part: &Path, bytes: &[u8]) -> io::Result<()> {
+    let old = fs::metadata(target).ok();
+    if old.as_ref().is_some_and(fs::Metadata::is_dir) {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    let mut file = File::create(part)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    old.map_or(Ok(()), |old| file.set_permissions(old.permissions()))
 }

@@ -17,7 +17,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             with("m : MC_MoveAbsolute;"),
-            "line.st:2:9: the type MC_MoveAbsolute is in none of these sources; hand in its source",
+            "line.st:2:9: the type MC_MoveAbsolute is in none of these sources; also pass its source file",
         ),
         (
             with("t : Standard.TON;"),
@@ -29,11 +29,11 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             saying("n := SysTimeRtcGet(1);"),
-            "SYSTIMERTCGET() reads the clock",
+            "SysTimeRtcGet() reads the clock",
         ),
         (
             saying("n := Stamp(1);"),
-            "line.st:3:6: Stamp is in none of these sources; hand in",
+            "line.st:3:6: Stamp is in none of these sources; also pass",
         ),
         (
             saying("\"DB1\".TON(IN := TRUE);"),
@@ -61,7 +61,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             with("Tickbus_Now : TIME;"),
-            "line.st:2:5: the name Tickbus_Now is one of those that are put in",
+            "line.st:2:5: the name Tickbus_Now is reserved by tickbus",
         ),
         (
             saying("n := 1; (*tickbus}*)"),
@@ -70,6 +70,75 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
     ] {
         refused(&text, says);
     }
+}
+
+#[test]
+fn classes_are_refused() {
+    let with = |block: &str| block.to_owned() + &line("VAR f : F; END_VAR", "f();");
+    for (block, says) in [
+        (
+            "FUNCTION_BLOCK F EXTENDS TON\nEND_FUNCTION_BLOCK\n",
+            "line.st:1:18: EXTENDS belongs to a class; methods, properties and inheritance are not prepared",
+        ),
+        (
+            "FUNCTION_BLOCK F IMPLEMENTS I\nVAR t : ARRAY [1..2] OF TON; END_VAR\nEND_FUNCTION_BLOCK\n",
+            "line.st:1:18: IMPLEMENTS belongs",
+        ),
+        (
+            "FUNCTION_BLOCK ABSTRACT F\nVAR n : INT; END_VAR\nEND_FUNCTION_BLOCK\n",
+            "line.st:1:16: ABSTRACT belongs",
+        ),
+        (
+            "FUNCTION_BLOCK F\nVAR n : INT; END_VAR\nn := 1;\nMETHOD PUBLIC Run : BOOL\nVAR_INST t : TON; END_VAR\nt();\nEND_METHOD\nEND_FUNCTION_BLOCK\n",
+            "line.st:4:1: METHOD belongs",
+        ),
+        (
+            "FUNCTION_BLOCK F\nPROPERTY P : INT\nGET\nEND_GET\nEND_PROPERTY\nEND_FUNCTION_BLOCK\n",
+            "line.st:2:1: PROPERTY belongs",
+        ),
+        (
+            "FUNCTION_BLOCK F\nRETURN;\nVAR t : TON; END_VAR\nEND_FUNCTION_BLOCK\n",
+            "line.st:3:1: VAR stands among statements; declare variables before",
+        ),
+        (
+            "FUNCTION_BLOCK F\nVAR n : INT; END_VAR\nn := 1;\nACTION x: n := 2; END_ACTION\nEND_FUNCTION_BLOCK\n",
+            "line.st:4:19: END_ACTION stands among statements",
+        ),
+    ] {
+        refused(&with(block), says);
+    }
+}
+
+#[test]
+fn clocks_behind_a_dot_are_told() {
+    let saying = |statements: &str| line("VAR n : INT; END_VAR", statements);
+    refused(
+        &saying("n := SysTimeRtc.SysTimeRtcGet(n);"),
+        "line.st:3:17: SysTimeRtcGet() reads the clock of the PLC",
+    );
+    refused(
+        &saying("n := Tc2_System.F_GetSystemTime();"),
+        "F_GetSystemTime() reads",
+    );
+    refused(
+        &saying("n := Tc2_MC2.Read[n].Inner(n);"),
+        "line.st:3:6: Tc2_MC2 is not declared in these sources; also pass",
+    );
+    refused(&saying("\"DB1\".Inner(n);"), "\"DB1\" is not declared");
+}
+
+#[test]
+fn a_program_of_a_task_has_no_other_caller() {
+    let saying = |statements: &str| line("VAR n : INT; END_VAR", statements);
+    refused(
+        &saying("n := 1; two();"),
+        "line.st:3:9: two is called here, and a task runs it too; call it or give it a task",
+    );
+    refused(&saying("Two.act();"), "line.st:3:1: Two is called here");
+    // A variable of that name is something else.
+    let block = "FUNCTION_BLOCK Own VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK\n";
+    let text = block.to_owned() + &line("VAR two : Own; END_VAR", "two();");
+    super::prepared_text(&text, &super::Settings::default());
 }
 
 #[test]
@@ -95,6 +164,12 @@ fn what_cannot_be_prepared_of_a_chart_is_told() {
     refused(
         &saying(timed),
         "line.st:4:31: the PLC measures one.T itself",
+    );
+    let stray =
+        "INITIAL_STEP one: END_STEP\nn := 2;\nTRANSITION FROM one TO one := TRUE; END_TRANSITION";
+    refused(
+        &saying(stray),
+        "line.st:4:1: n stands in a chart, outside of its parts; put statements into an ACTION",
     );
     let graphical = "INITIAL_STEP one: END_STEP\nTRANSITION FROM one TO one: LD n END_TRANSITION";
     refused(
@@ -124,8 +199,12 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
             "one runs in two tasks; give each task a program of its own",
         ),
         (
+            saying("n := 1;").replace(": one;", ": one(f WITH slow);"),
+            "line.st:13:29: a block of this program runs in a task of its own",
+        ),
+        (
             saying("n := 1;").replace(": two;", ": six;"),
-            "the program SIX is in none of these sources",
+            "the program six is in none of these sources",
         ),
         (
             saying("n := 1;").replace("END_RESOURCE", "END_RESOURCE\nRESOURCE x ON y"),
@@ -133,7 +212,11 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
         ),
         (
             saying("n := 1;").replace("CONFIGURATION", "NAMESPACE"),
-            "\"NAMESPACE\" begins nothing that is known here",
+            "line.st:9:1: unexpected \"NAMESPACE\"; PROGRAM, ",
+        ),
+        (
+            saying("n := 1;").replace("PROGRAM two", "PROGRAM 1x"),
+            "line.st:5:9: expected a name, found \"1x\"",
         ),
         (
             saying("n := 1;").replace("END_CONFIGURATION", ""),
@@ -145,9 +228,12 @@ fn what_cannot_be_prepared_of_a_configuration_is_told() {
         ),
         (
             "PROGRAM x\nRETURN;\nEND_PROGRAM".to_owned(),
-            "line.st: there is no CONFIGURATION; hand in",
+            "line.st: there is no CONFIGURATION; also pass the source file",
         ),
-        (saying("n := 1;\0"), "line.st:3:8: this is no text in UTF-8"),
+        (
+            saying("n := 1;\0"),
+            "line.st:3:8: this file is not UTF-8 text; save it as UTF-8",
+        ),
     ] {
         refused(&text, says);
     }

@@ -146,6 +146,22 @@ fn other_forms_of_a_project_survive() {
 }
 
 #[test]
+fn a_body_of_pragmas_gets_a_controller() {
+    let start = project().find("IF 1 ").expect("there is one");
+    let end = project().find("</xhtml>").expect("its end");
+    let mut text = project();
+    text.replace_range(start..end, "{n++;}");
+    assert!(prepared_text(&text).contains("THEN (*tickbus}*){n++;}(*{tickbus*) END_IF;"));
+}
+
+#[test]
+fn a_task_may_have_blanks_in_its_name() {
+    let text = project().replace("\"fast\"", "\"Main Task\"");
+    let made = prepared_text(&text);
+    assert!(made.contains("OR tickbus_execute_Main_Task THEN"), "{made}");
+}
+
+#[test]
 fn what_cannot_be_prepared_is_told_with_its_place() {
     let plain = project();
     for (text, says) in [
@@ -175,7 +191,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             plain.replace("IF 1 ", "(* IF 1 "),
-            "a comment or text in these statements has no end",
+            "plc.xml:24:63: the comment or text that begins here has no end",
         ),
         (
             plain.replace("IF 1 ", "<b>x</b>IF 1 "),
@@ -187,11 +203,11 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             plain.replace("\"start\"", "\"tickbus_execute_x\""),
-            "the name tickbus_execute_x is one of those",
+            "the name tickbus_execute_x is reserved by tickbus",
         ),
         (
             plain.replace("%IX8.0", "%id4"),
-            "the program has a variable at %id4 already",
+            "the program uses %id4 already",
         ),
         (
             plain.replace("T#30ms", "T#1.5ms"),
@@ -218,7 +234,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             plain.replace("project", "else"),
-            "plc.xml:2:1: this XML is no project of PLCopen",
+            "plc.xml:2:1: this is not a PLCopen project",
         ),
         (plain.replace("</project>", ""), "this XML cannot be read"),
         (prepared_text(&plain), "this program was prepared before"),
@@ -234,6 +250,100 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
     );
 }
 
+#[test]
+fn a_program_without_an_interface_gets_one() {
+    let text = project().replace("        <interface/>\n", "");
+    let made = prepared_text(&text);
+    let right =
+        "<pou name=\"press\" pouType=\"program\"><!--{tickbus-->\n<interface>\n<externalVars>\n";
+    assert!(made.contains(right), "{made}");
+}
+
+/// Written from memory of an export of CODESYS: units are extensions of the application, and instances have no type.
+const CODESYS: &str = r#"<project xmlns="http://www.plcopen.org/xml/tc6_0200">
+<types><dataTypes/><pous/></types>
+<instances><configurations><configuration name="Device"><resource name="Application">
+<task name="MainTask" interval="PT0.02S" priority="1"><pouInstance name="PLC_PRG" typeName=""/></task>
+<addData>
+<data name="http://www.3s-software.com/plcopenxml/pou" handleUnknown="implementation"><pou name="PLC_PRG" pouType="program"><interface><localVars><variable name="t"><type><derived name="TON"/></type></variable></localVars></interface><body><ST><xhtml xmlns="http://www.w3.org/1999/xhtml">t(IN := TRUE, PT := T#1s);</xhtml></ST></body></pou></data>
+</addData></resource></configuration></configurations></instances>
+</project>
+"#;
+
+#[test]
+fn blocks_stand_beside_the_programs_of_a_project() {
+    let made = prepared_text(CODESYS);
+    let data = "<data name=\"http://www.3s-software.com/plcopenxml/pou\" handleUnknown=\"implementation\"><pou name=";
+    for piece in [
+        format!("</pou></data><!--{{tickbus-->{data}\"TICKBUS_TON\""),
+        format!("</pou></data>\n{data}\"TICKBUS_SCHEDULER\""),
+        format!("</pou></data>\n{data}\"TICKBUS_SCHEDULE\" pouType=\"program\">"),
+        "<pouInstance name=\"TICKBUS_SCHEDULE\" typeName=\"\"/>\n  <pouInstance name=\"PLC_PRG\" typeName=\"\"/>".to_owned(),
+        "<pous/>".to_owned(),
+    ] {
+        assert!(made.contains(&piece), "{piece}\n{made}");
+    }
+    assert_eq!(made.matches("</data>").count(), 4);
+}
+
+#[test]
+fn references_to_characters_are_read() {
+    let text = project().replace(
+        "IF 1 ",
+        "s := &#39;it (* is&#x27;;&#13;&#10;b := &#34;\u{e4}&#228;&#34; &#60; s; IF 1 ",
+    );
+    prepared_text(&text);
+    for (statements, says) in [
+        (
+            "t := &#x54;IME();",
+            "plc.xml:24:68: this is a reference to an ordinary character; write the character",
+        ),
+        ("t := TIME&#40;);", "plc.xml:24:72: this is a reference"),
+        (
+            "s := &#39;open;",
+            "plc.xml:24:68: the comment or text that begins here has no end",
+        ),
+        ("%ID0 := 1;", "plc.xml:24:63: the program uses %ID0 already"),
+    ] {
+        refused(
+            &project().replace("IF 1 ", &format!("{statements} IF 1 ")),
+            says,
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_prepared_of_statements_is_told() {
+    let plain = project();
+    for (text, says) in [
+        (
+            plain.replace(
+                "<interface/>",
+                "<interface/><addData><Inheritance><Extends>TON</Extends></Inheritance></addData>",
+            ),
+            "plc.xml:23:43: this block extends another one; inheritance is not prepared",
+        ),
+        (
+            plain.replace("IF 1 ", "feed(); IF 1 "),
+            "plc.xml:24:63: feed is called here, and a task runs it too",
+        ),
+        (
+            plain.replace("IF 1 ", "SysTimeRtc.SysTimeRtcGet(r); IF 1 "),
+            "plc.xml:24:74: SysTimeRtcGet() reads the clock",
+        ),
+        (
+            plain.replace("IF 1 ", "Lib.Get(r); IF 1 "),
+            "plc.xml:24:63: Lib is not declared",
+        ),
+        (
+            plain.replace("\"press\"", "\"Go\""),
+            "plc.xml:22:7: tickbus puts in a variable named Go",
+        ),
+    ] {
+        refused(&text, says);
+    }
+}
+
 proptest! {
     /// Pieces are taken out of the project and put in elsewhere.
     #[test]
@@ -243,7 +353,7 @@ proptest! {
         let mut text = project();
         for (from, length, to) in damage {
             let boundary = |text: &str, at: usize| {
-                (at % (text.len() + 1)..).find(|at| text.is_char_boundary(*at)).expect("its end")
+                (at % (text.len() + 1)..=text.len()).find(|at| text.is_char_boundary(*at)).expect("its end")
             };
             let start = boundary(&text, from);
             let end = boundary(&text, (start + length).min(text.len()));

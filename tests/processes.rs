@@ -339,14 +339,15 @@ fn what_is_wrong_is_told_before_anything_starts() {
 #[test]
 fn a_mirror_serves_several_stations() {
     let stations = "[[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n".to_owned()
-        + &["A", "B"]
+        + ["A", "B"]
             .map(|station| {
                 format!(
                     "[[signal]]\nname = \"{station} to\"\naddress = \"%QB1\"\nstation = \"{station}\"\n\
                      [[signal]]\nname = \"{station} from\"\naddress = \"%IB1\"\nstation = \"{station}\"\n"
                 )
             })
-            .concat();
+            .concat()
+            .as_str();
     let text = |fieldbus: &str| {
         let head =
             "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"socket\"\ncycle = \"1ms\"\n";

@@ -299,7 +299,7 @@ fn sent_at(scan: i128, busy: u32, until: i128) -> Vec<i128> {
     };
     let before = unit(
         "before",
-        &(piece("#Now := ", "// What is being sent") + &piece("#Is_asked := ", "#Send(")),
+        &(piece("#Now := ", "// What is being sent") + piece("#Is_asked := ", "#Send(").as_str()),
     );
     let after = unit("after", &piece("#Is_busy := ", "IF #Send.DONE"));
     let mut machine = Machine::with_functions(&[]);

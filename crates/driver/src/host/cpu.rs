@@ -272,10 +272,10 @@ mod tests {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
                     program = \"mirror\"\nscan = \"1ms\"\n[[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n"
             .to_owned()
-            + &signal("A to", "%IB0", "A")
-            + &signal("B to", "%IB2", "B")
-            + &signal("A from", "%QB0", "A")
-            + &signal("B from", "%QB2", "B");
+            + signal("A to", "%IB0", "A").as_str()
+            + signal("B to", "%IB2", "B").as_str()
+            + signal("A from", "%QB0", "A").as_str()
+            + signal("B from", "%QB2", "B").as_str();
         let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text);
         let config = config.unwrap_or_else(|wrong| panic!("{wrong}"));
         let mut driver = Driver::open(config, Manual::new()).expect("opens");

@@ -16,6 +16,7 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Mistakes, PlacedMistake, load_text};
 use tickbus_image::signal::DataType;
 
+use crate::declaration::check_name;
 use crate::logic::Access;
 use crate::{Logic, Variable};
 use frame::Frame;
@@ -84,6 +85,9 @@ pub fn parse(file: &str, text: &str) -> Result<Logic<'static>, Mistakes> {
         .disable_symbol("eval")
         .on_print(|text| log::info!("script: {text}"))
         .on_debug(|text, _, place| log::info!("script, {place}: {text}"));
+    // Rhai's own would stop the run, and the server with it.
+    engine.register_fn("sleep", |_: i64| cannot_sleep());
+    engine.register_fn("sleep", |_: f64| cannot_sleep());
     offer_registration(&mut engine, &registered);
     offer_access(&mut engine, &frame);
     let wrong = |what: String, place: Position| {
@@ -151,6 +155,10 @@ fn offer_registration(engine: &mut Engine, registered: &Arc<Mutex<Registered>>) 
                 .parse()
                 .map_err(|error| format!("\"{data_type}\" is {error}"))?;
             let mut registered = open(&into)?;
+            check_name("variable", name).map_err(|mistake| mistake.to_string())?;
+            if registered.variables.iter().any(|known| known.name == name) {
+                return Err(format!("the variable \"{name}\" is declared twice").into());
+            }
             registered.variables.push(Variable::new(name, data_type));
             Ok(())
         },
@@ -174,6 +182,10 @@ fn offer_registration(engine: &mut Engine, registered: &Arc<Mutex<Registered>>) 
         };
         engine.register_fn(name, register);
     }
+}
+
+fn cannot_sleep() -> Result<(), Failed> {
+    Err("a script cannot sleep; use time() to wait for a virtual time".into())
 }
 
 /// What was registered, as long as the script may add to it.

@@ -84,7 +84,7 @@ impl Frame {
         let at = self.find(name)?;
         let data_type = self.variables[at].data_type;
         let raw = raw(data_type, value).ok_or_else(|| {
-            format!("the variable \"{name}\" is a {data_type}, and cannot be {value}")
+            format!("the variable \"{name}\" has the type {data_type} and cannot hold {value}")
         })?;
         self.writes.push((at, raw));
         if self.is_committing {

@@ -78,6 +78,19 @@ fn what_is_wrong_with_a_script_is_told_at_its_place() {
         ("loop { }", "cell.rhai:1:"),
         ("timestamp();", "timestamp"),
         ("eval(\"1\");", "eval"),
+        (
+            "sleep(1);",
+            "cell.rhai:1:1: Runtime error: a script cannot sleep",
+        ),
+        ("sleep(1.5);", "a script cannot sleep"),
+        (
+            "variable(\"a\", \"BOOL\");\nvariable(\"a\", \"BOOL\");",
+            "cell.rhai:2:1: Runtime error: the variable \"a\" is declared twice",
+        ),
+        (
+            "variable(\"\", \"BOOL\");",
+            "cell.rhai:1:1: Runtime error: the name \"\" of a variable is empty",
+        ),
     ] {
         let told = parse("cell.rhai", text).expect_err(text).to_string();
         assert!(told.contains(part), "{part} in {told}");
@@ -97,11 +110,11 @@ fn a_hook_that_fails_or_never_ends_ends_the_run() {
         ),
         (
             "on_time(|| set(\"changes\", 40000));",
-            "is a INT, and cannot be 40000",
+            "has the type INT and cannot hold 40000",
         ),
         (
             "on_time(|| set(\"full\", 1));",
-            "is a BOOL, and cannot be 1",
+            "has the type BOOL and cannot hold 1",
         ),
         (
             "on_time(|| reader());",

@@ -41,7 +41,9 @@ impl Controls {
 
     /// Passes on what was asked.
     pub(crate) fn apply(&self, now: Nanos, server: &mut Server<'_>) {
-        for control in self.lock().drain(..) {
+        // A hook may send one, too.
+        let asked = std::mem::take(&mut *self.lock());
+        for control in asked {
             server.control(now, control);
         }
         if self.stop.is_stopped() {
@@ -75,5 +77,37 @@ pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
         Ok(FromClient::Join(declaration)) => server.join(now, seat, declaration),
         Ok(FromClient::GiveUp(reason)) => server.gave_up(seat, reason),
         Err(why) => server.violated(seat, &why),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Declaration, Logic, Settings, StartCondition};
+
+    #[test]
+    fn a_hook_may_send_a_control_while_one_is_applied() {
+        let controls = Controls::default();
+        let from_hook = controls.clone();
+        let logic = Logic::new().on_time(move |_| {
+            from_hook.send(Control::Pause);
+            Ok(())
+        });
+        let start = StartCondition::Count(1);
+        let settings = Settings {
+            paused: true,
+            ..Settings::new(Nanos::from_millis(1), start)
+        };
+        let now = Nanos::ZERO;
+        let mut server = Server::new(settings, logic, now).expect("right settings");
+        let seat = server.connected(now);
+        server.join(now, seat, Declaration::new("a"));
+        assert!(server.poll().is_some());
+        server.done(now, seat, 0, [].into_iter());
+        controls.send(Control::Run);
+        controls.apply(now, &mut server);
+        assert!(!server.is_paused(), "what the hook asks for comes next");
+        controls.apply(now, &mut server);
+        assert!(server.is_paused());
     }
 }

@@ -81,17 +81,22 @@ impl Client {
         &self.out
     }
 
+    /// How many steps were surely committed: the server went on after them.
+    fn steps(&self) -> u64 {
+        self.ran.unwrap_or(0).saturating_sub(1)
+    }
+
     /// Takes a frame of the server, without its header.
     ///
     /// # Errors
     ///
     /// The server violates the protocol.
     pub fn receive(&mut self, frame: &[u8]) -> Result<Asked, Ended> {
-        let ran = self.ran.unwrap_or(0);
+        let steps = self.steps();
         let violated = |what: String| {
             let reason = format!("the server violates the protocol: it {what}");
             Ended {
-                steps: ran.saturating_sub(1),
+                steps,
                 ..Ended::before(Cause::Protocol, reason)
             }
         };
@@ -194,7 +199,10 @@ impl Connection {
     ///
     /// The server is lost, violates the protocol or says nothing, or this client was stopped.
     pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
-        let frame = self.line.receive(limit)?;
+        let steps = self.client.steps();
+        let frame = self.line.receive(limit);
+        // The line does not know how far the run has come.
+        let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
         let asked = self.client.receive(frame);
         if let Err(ended) = &asked {
             self.give_up(&ended.reason.clone());

@@ -158,7 +158,8 @@ impl<'l> Barrier<'l> {
     /// How many steps were committed.
     pub(crate) const fn steps(&self) -> u64 {
         match self.state {
-            State::PreWrite | State::Read | State::Write => self.step.sequence - 1,
+            State::PreWrite | State::Write => self.step.sequence - 1,
+            // The number is that of the step before until its hooks of reads have run.
             _ => self.step.sequence,
         }
     }
@@ -285,8 +286,8 @@ impl<'l> Barrier<'l> {
             }
         }
         self.step = step;
-        call_all(self.logic.time.iter_mut(), &mut self.data, step)?;
         self.state = State::PreWrite;
+        call_all(self.logic.time.iter_mut(), &mut self.data, step)?;
         self.owing = 0;
         for member in &mut self.members {
             member.owes = member.is_due;

@@ -31,6 +31,7 @@ pub fn run(
     let mut server = Server::new(settings, logic, now)
         .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
     let mut locals = Locals::join(&mut server, now, participants);
+    let mut has_begun = false;
     loop {
         while let Some((seat, message)) = server.poll() {
             locals.take(seat, &message);
@@ -38,10 +39,16 @@ pub fn run(
         if let Some(outcome) = server.outcome() {
             return outcome.clone();
         }
-        if let Some(missing) = server.missing() {
-            let reason = format!("the start condition still waits for {missing}");
-            let waits = Ended::before(Cause::Configuration, reason);
-            return Err(locals.refusal().cloned().unwrap_or(waits));
+        if !has_begun {
+            has_begun = true;
+            // Nobody is left out silently.
+            if let Some(refused) = locals.refusal() {
+                return Err(refused.clone());
+            }
+            if let Some(missing) = server.missing() {
+                let reason = format!("the start condition still waits for {missing}");
+                return Err(Ended::before(Cause::Configuration, reason));
+            }
         }
         if is_paced {
             now = clock.now();

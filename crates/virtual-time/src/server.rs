@@ -203,7 +203,7 @@ impl<'l> Server<'l> {
             Phase::Ended(_) => Err("the run has ended".to_owned()),
         };
         if let Err(reason) = refused {
-            return self.refuse(seat, Some(name), Cause::Refused, &reason);
+            return self.refuse(seat, Some(name), &reason);
         }
         self.seats[seat] = Seat::Joined;
         self.news.push_back(format!("client \"{name}\" has joined"));
@@ -227,6 +227,9 @@ impl<'l> Server<'l> {
         else {
             return self.violated(seat, "answered before it was asked");
         };
+        if self.outbox.iter().any(|out| out.seat() == seat) {
+            return self.violated(seat, "answered before it was asked");
+        }
         if let Err(reason) = barrier.done(client, sequence, values) {
             return self.violated(seat, &reason);
         }
@@ -241,7 +244,8 @@ impl<'l> Server<'l> {
             Seat::Client(_) => self.blame(seat, Cause::Failed, &format!("gave up: {reason}")),
             Seat::Free | Seat::Leaving => {}
             Seat::Silent(_) | Seat::Joined => {
-                self.refuse(seat, None, Cause::Refused, "it gave up before the start");
+                let name = self.name(seat).map(str::to_owned);
+                self.refuse(seat, name, &format!("gave up before the start: {reason}"));
             }
         }
     }
@@ -274,7 +278,7 @@ impl<'l> Server<'l> {
             Seat::Client(_) => self.blame(seat, Cause::Protocol, reason),
             Seat::Silent(_) | Seat::Joined => {
                 let name = self.name(seat).map(str::to_owned);
-                self.refuse(seat, name, Cause::Protocol, reason);
+                self.refuse(seat, name, reason);
             }
             Seat::Free | Seat::Leaving => {}
         }
@@ -302,6 +306,14 @@ impl<'l> Server<'l> {
             },
         }
         self.advance(now);
+    }
+
+    /// All clients that are due were asked by `now`, and those on the server's own thread have run: from here on the others
+    /// have the time to answer. What the server took for itself is not theirs.
+    pub fn sent(&mut self, now: Nanos) {
+        if matches!(self.phase, Phase::Running(..)) {
+            self.asked = now;
+        }
     }
 
     /// The next message, and the seat that it is for.
@@ -433,7 +445,7 @@ impl<'l> Server<'l> {
     }
 
     /// Lets a client that has not started take no part.
-    fn refuse(&mut self, seat: usize, client: Option<String>, cause: Cause, reason: &str) {
+    fn refuse(&mut self, seat: usize, client: Option<String>, reason: &str) {
         if let Phase::Joining(joining, _) = &mut self.phase {
             joining.remove(seat);
         }
@@ -445,7 +457,7 @@ impl<'l> Server<'l> {
         self.news.push_back(format!("{who} was refused: {reason}"));
         let ended = Ended {
             client,
-            ..Ended::before(cause, reason)
+            ..Ended::before(Cause::Refused, reason)
         };
         self.outbox.push_back(Out::Refused(seat, Box::new(ended)));
     }

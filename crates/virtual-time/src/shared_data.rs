@@ -171,7 +171,7 @@ impl SharedData {
 
 fn no_value(variable: &Variable, value: u64) -> String {
     let Variable { name, data_type } = variable;
-    format!("the variable \"{name}\" is a {data_type}, which 0x{value:x} is no raw value of")
+    format!("0x{value:x} is not a valid {data_type}, the type of the variable \"{name}\"")
 }
 
 fn shown(owner: Option<&str>) -> String {

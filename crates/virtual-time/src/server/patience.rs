@@ -38,7 +38,7 @@ impl Server<'_> {
         for seat in 0..self.seats.len() {
             if matches!(self.seats[seat], Seat::Silent(since) if now >= since + hang) {
                 let reason = format!("did not join within {hang}");
-                self.refuse(seat, None, Cause::Hung, &reason);
+                self.refuse(seat, None, &reason);
             }
         }
         match &self.phase {
@@ -72,7 +72,7 @@ impl Server<'_> {
         let others: Vec<String> = owing.map(|name| format!("\"{name}\"")).collect();
         let others = match &*others {
             [] => String::new(),
-            _ => format!("; neither have {}", others.join(", ")),
+            _ => format!("; nor has {}", others.join(", nor ")),
         };
         let reason = match barrier.step().sequence {
             0 => format!("has not sent its initial values {limit}{others}"),

@@ -31,7 +31,7 @@ public final class Client {
     /** The step that it ran last; 0 is the initial write, and -1 before that. */
     private long ran = -1;
     /** Why the participant cannot go on. */
-    private Exception failure;
+    private Throwable failure;
 
     private Client(Frames frames, Participant participant, Declaration declaration) {
         this.frames = frames;
@@ -148,7 +148,12 @@ public final class Client {
         // The types of what is read, which the participant knows.
         expectValues(frames.left());
         in.position(in.position() + frames.left());
-        participant.initial(writes);
+        try {
+            participant.initial(writes);
+        } catch (Throwable e) {
+            failed(e);
+            return;
+        }
         done(0);
     }
 
@@ -168,13 +173,21 @@ public final class Client {
         }
         try {
             participant.run(sequence, nanos, reads, writes);
-        } catch (Exception e) {
-            failure = e;
-            // The server answers with the end.
-            giveUp(e.getMessage() == null ? e.toString() : e.getMessage());
+        } catch (Throwable e) {
+            failed(e);
             return;
         }
         done(sequence);
+    }
+
+    /** The participant cannot go on: everyone gets its reason. An error of the virtual machine goes on to the caller. */
+    private void failed(Throwable e) throws IOException {
+        failure = e;
+        // The server answers with the end.
+        giveUp(e.getMessage() == null ? e.toString() : e.getMessage());
+        if (e instanceof Error error) {
+            throw error;
+        }
     }
 
     private void expectValues(int count) throws Frames.Violation {

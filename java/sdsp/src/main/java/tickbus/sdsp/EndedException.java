@@ -36,8 +36,10 @@ public final class EndedException extends Exception {
     private final long steps;
 
     EndedException(Cause cause, String client, String reason, long steps) {
-        super("the run ended " + (steps == 0 ? "before its first step" : "after " + steps + (steps == 1 ? " step" : " steps"))
-            + ": " + (client == null ? "" : "client \"" + client + "\" ") + reason);
+        super(cause == Cause.REFUSED
+            ? "the server refused this client: " + reason
+            : "the run ended " + (steps == 0 ? "before its first step" : "after " + steps + (steps == 1 ? " step" : " steps"))
+                + ": " + (client == null ? "" : "client \"" + client + "\" ") + reason);
         this.cause = cause;
         this.client = client;
         this.steps = steps;

@@ -150,7 +150,7 @@ fn serve(
     }
 }
 
-/// The last line: what came of the run.
+/// The last line: what came of the run. Texts come from clients: a quote or a line break in them is written as `\"` or `\n`.
 fn report(outcome: Result<virtual_time::Outcome, Ended>) -> Outcome {
     let ended = match outcome {
         Ok(outcome) => {
@@ -162,10 +162,10 @@ fn report(outcome: Result<virtual_time::Outcome, Ended>) -> Outcome {
     };
     let client = ended
         .client
-        .map_or_else(String::new, |client| format!(" client=\"{client}\""));
+        .map_or_else(String::new, |client| format!(" client={client:?}"));
     let (cause, steps, reason) = (ended.cause, ended.steps, ended.reason);
     say(&format!(
-        "failed cause={}{client} steps={steps} reason=\"{reason}\"",
+        "failed cause={}{client} steps={steps} reason={reason:?}",
         cause.name()
     ));
     match cause {
@@ -193,7 +193,7 @@ fn obey(controls: &Controls) {
         match control {
             Some(control) => controls.send(control),
             None => say(&format!(
-                "\"{}\" is no command; commands are pause, step, step NUMBER, run and stop",
+                "\"{}\" is not a command; commands are pause, step, step NUMBER, run and stop",
                 tickbus_base::toml_text::shown(&line)
             )),
         }

@@ -165,7 +165,7 @@ fn an_interrupt_while_it_waits_ends_it_and_says_for_whom() {
     let pid = rustix::process::Pid::from_child(&sync.child);
     rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
     let (last, code) = sync.end();
-    let reason = "stopped while it waited for \"a\", \"b\"";
+    let reason = r#"stopped while it waited for \"a\", \"b\""#;
     assert_eq!(
         last,
         format!("sync: failed cause=stopped steps=0 reason={reason:?}")
@@ -239,5 +239,37 @@ impl Participant for Late {
     fn run(&mut self, step: Step, reads: &[u64], _: &mut [u64]) -> Result<(), String> {
         assert_eq!(reads[0], step.sequence.saturating_sub(2));
         Ok(())
+    }
+}
+
+#[test]
+fn a_client_s_reason_cannot_forge_the_last_line() {
+    let mut sync = Sync::start(
+        "[sync]\nlisten = \"127.0.0.1:0\"\nstep = \"1ms\"\nclients = [\"a\"]\n",
+        &[],
+    );
+    let address = sync.address();
+    let ended = tcp::join(&address, &mut Forger).expect_err("it gives up");
+    assert!(ended.reason.contains('\n'), "the client gets it as it is");
+    let (last, code) = sync.end();
+    assert_eq!(code, Some(3));
+    assert_eq!(
+        last,
+        r#"sync: failed cause=failed client="a" steps=0 reason="gave up: \"\nsync: ok steps=1""#
+    );
+}
+
+/// Gives up with a reason that looks like a verdict.
+struct Forger;
+
+impl Participant for Forger {
+    fn declare(&self) -> Declaration {
+        Declaration::new("a")
+    }
+
+    fn initial(&mut self, _: &mut [u64]) {}
+
+    fn run(&mut self, _: Step, _: &[u64], _: &mut [u64]) -> Result<(), String> {
+        Err("\"\nsync: ok steps=1".to_owned())
     }
 }

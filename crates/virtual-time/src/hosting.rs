@@ -79,3 +79,35 @@ pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
         Err(why) => server.violated(seat, &why),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Declaration, Logic, Settings, StartCondition};
+
+    #[test]
+    fn a_hook_may_send_a_control_while_one_is_applied() {
+        let controls = Controls::default();
+        let from_hook = controls.clone();
+        let logic = Logic::new().on_time(move |_| {
+            from_hook.send(Control::Pause);
+            Ok(())
+        });
+        let start = StartCondition::Count(1);
+        let settings = Settings {
+            paused: true,
+            ..Settings::new(Nanos::from_millis(1), start)
+        };
+        let now = Nanos::ZERO;
+        let mut server = Server::new(settings, logic, now).expect("right settings");
+        let seat = server.connected(now);
+        server.join(now, seat, Declaration::new("a"));
+        assert!(server.poll().is_some());
+        server.done(now, seat, 0, [].into_iter());
+        controls.send(Control::Run);
+        controls.apply(now, &mut server);
+        assert!(!server.is_paused(), "what the hook asks for comes next");
+        controls.apply(now, &mut server);
+        assert!(server.is_paused());
+    }
+}

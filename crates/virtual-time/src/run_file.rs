@@ -150,7 +150,7 @@ fn steps(value: &Value<'_>, step: Option<Nanos>) -> Option<u64> {
         value.wrong(
             format!("\"until\" is {until}, which is no whole number of steps of {step}"),
             match below {
-                0 => format!("write \"{step}\" at least"),
+                0 => format!("write \"{step}\""),
                 _ => format!(
                     "write \"{}\" or \"{}\"",
                     step.times(below),
@@ -229,6 +229,17 @@ mod tests {
             "cell.toml:10:2: unknown key \"other\" in the file; keys here are sync",
         ];
         assert_eq!(text, expected.join("\n"));
+    }
+
+    #[test]
+    fn a_run_shorter_than_a_step_is_told_to_have_one() {
+        let text =
+            "[sync]\nstep = \"1ms\"\nuntil = \"500us\"\nlisten = \"127.0.0.1:0\"\nclients = 1\n";
+        let told = parse(text).expect_err("it is wrong").to_string();
+        assert!(
+            told.ends_with("whole number of steps of 1ms; write \"1ms\""),
+            "{told}"
+        );
     }
 
     #[test]

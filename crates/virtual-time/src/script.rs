@@ -87,6 +87,9 @@ pub fn parse(file: &str, text: &str) -> Result<Logic<'static>, Mistakes> {
         .disable_symbol("sleep")
         .on_print(|text| log::info!("script: {text}"))
         .on_debug(|text, _, place| log::info!("script, {place}: {text}"));
+    // Rhai's own would stop the run, and the server with it.
+    engine.register_fn("sleep", |_: i64| cannot_sleep());
+    engine.register_fn("sleep", |_: f64| cannot_sleep());
     offer_registration(&mut engine, &registered);
     offer_access(&mut engine, &frame);
     let wrong = |what: String, place: Position| {
@@ -181,6 +184,10 @@ fn offer_registration(engine: &mut Engine, registered: &Arc<Mutex<Registered>>) 
         };
         engine.register_fn(name, register);
     }
+}
+
+fn cannot_sleep() -> Result<(), Failed> {
+    Err("a script cannot sleep; use time() to wait for a virtual time".into())
 }
 
 /// What was registered, as long as the script may add to it.

@@ -245,11 +245,7 @@ impl<'l> Server<'l> {
             Seat::Free | Seat::Leaving => {}
             Seat::Silent(_) | Seat::Joined => {
                 let name = self.name(seat).map(str::to_owned);
-                self.refuse(
-                    seat,
-                    name,
-                    &format!("it gave up before the start: {reason}"),
-                );
+                self.refuse(seat, name, &format!("gave up before the start: {reason}"));
             }
         }
     }
@@ -312,8 +308,8 @@ impl<'l> Server<'l> {
         self.advance(now);
     }
 
-    /// All [messages](Self::poll) were sent by `now`: from here on the clients have the time to answer. What the server itself
-    /// took for hooks and for clients of its own is not theirs.
+    /// All clients that are due were asked by `now`, and those on the server's own thread have run: from here on the others
+    /// have the time to answer. What the server took for itself is not theirs.
     pub fn sent(&mut self, now: Nanos) {
         if matches!(self.phase, Phase::Running(..)) {
             self.asked = now;

@@ -171,9 +171,7 @@ impl SharedData {
 
 fn no_value(variable: &Variable, value: u64) -> String {
     let Variable { name, data_type } = variable;
-    format!(
-        "the variable \"{name}\" has the type {data_type}, and 0x{value:x} is not a value of it"
-    )
+    format!("0x{value:x} is not a valid {data_type}, the type of the variable \"{name}\"")
 }
 
 fn shown(owner: Option<&str>) -> String {

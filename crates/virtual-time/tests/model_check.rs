@@ -53,6 +53,8 @@ enum Action {
     Lose(usize),
     /// Answers the step before once more, or before anything was asked.
     Unasked(usize),
+    /// Answers what was asked, and at once what it may be asked next.
+    Early(usize),
     GiveUp(usize),
     /// Nobody does anything any more.
     Silence,
@@ -119,7 +121,12 @@ impl World {
         for (at, client) in self.clients.iter().enumerate() {
             match (client.seat, client.owes) {
                 (None, _) => actions.push(Action::Join(at)),
-                (_, Some(_)) => actions.push(Action::Answer(at)),
+                (_, Some(_)) => {
+                    actions.push(Action::Answer(at));
+                    if self.fault.is_none() {
+                        actions.push(Action::Early(at));
+                    }
+                }
                 _ => {}
             }
             if self.fault.is_none() && client.seat.is_some() {
@@ -169,6 +176,16 @@ impl World {
                     None => self.clients[at].answered.last().copied().unwrap_or(0),
                 };
                 self.server.done(now, seat, sequence, [7].into_iter());
+            }
+            Action::Early(at) => {
+                self.fault = Some(action);
+                let sequence = self.clients[at].owes.take().expect("enabled");
+                self.clients[at].answered.push(sequence);
+                let seat = self.clients[at].seat.expect("enabled");
+                for sequence in [sequence, sequence + 1] {
+                    let value = 100 * sequence + at as u64;
+                    self.server.done(now, seat, sequence, [value].into_iter());
+                }
             }
             Action::GiveUp(at) => {
                 self.fault = Some(action);
@@ -294,7 +311,7 @@ impl World {
         assert_eq!(ended.steps, finished as u64, "{ended} by {fault:?}");
         let (at, cause) = match fault {
             Action::Lose(at) => (at, Cause::Lost),
-            Action::Unasked(at) => (at, Cause::Protocol),
+            Action::Unasked(at) | Action::Early(at) => (at, Cause::Protocol),
             Action::GiveUp(at) => (at, Cause::Failed),
             Action::Silence => {
                 let first = self.clients.iter().position(|client| client.owes.is_some());

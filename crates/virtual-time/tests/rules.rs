@@ -202,7 +202,7 @@ fn logic_that_fails_or_oversteps_ends_the_run() {
             Logic::new()
                 .variable(Variable::new("b", DataType::Bool))
                 .on_time(|access| access.set("b", 2)),
-            "is not a value of it",
+            "0x2 is not a valid BOOL",
         ),
         (
             Logic::new()

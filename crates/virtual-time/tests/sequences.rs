@@ -14,6 +14,8 @@ enum Event {
     Join(usize, usize, u32),
     /// The right answer, where one is due.
     Answer(usize),
+    /// The same, and at once the answer to the step after it.
+    Early(usize),
     Done(usize, u64, usize, u64),
     GiveUp(usize),
     Lose(usize),
@@ -28,6 +30,7 @@ fn event() -> impl Strategy<Value = Event> {
         3 => Just(Event::Connect),
         4 => (seat.clone(), 0..4_usize, 1..4_u32).prop_map(|(s, n, m)| Event::Join(s, n, m)),
         20 => seat.clone().prop_map(Event::Answer),
+        1 => seat.clone().prop_map(Event::Early),
         1 => (seat.clone(), 0..4_u64, 0..3_usize, 0..3_u64)
             .prop_map(|(s, q, n, v)| Event::Done(s, q, n, v)),
         1 => seat.clone().prop_map(Event::GiveUp),
@@ -85,6 +88,15 @@ fn play(events: &[Event], pacing: Pacing, steps: Option<u64>) {
                 let owed = seats.get_mut(seat).and_then(|seat| seat.owes.take());
                 if let Some(sequence) = owed {
                     server.done(now, *seat, sequence, [sequence % 2].into_iter());
+                }
+            }
+            Event::Early(seat) => {
+                let owed = seats.get_mut(seat).and_then(|seat| seat.owes.take());
+                if let Some(sequence) = owed {
+                    for sequence in [sequence, sequence + 1] {
+                        server.done(now, *seat, sequence, [sequence % 2].into_iter());
+                    }
+                    assert!(server.outcome().is_some(), "it did not wait to be asked");
                 }
             }
             Event::Done(seat, sequence, count, value) if here(seat) => {

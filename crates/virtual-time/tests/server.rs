@@ -7,7 +7,8 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::server::{Control, Server, ToClient};
 use tickbus_virtual_time::{
-    Cause, Declaration, Ended, Logic, Outcome, Pacing, Settings, State, Variable,
+    Cause, Declaration, Ended, Logic, Outcome, Pacing, Settings, StartCondition, State, Variable,
+    in_process,
 };
 
 const MS: i64 = 1_000_000;
@@ -194,7 +195,7 @@ fn every_violation_names_its_client_and_what_it_did() {
         ),
         (
             |bench| bench.server.done(bench.now, 1, 1, [2].into_iter()),
-            "wrote a wrong value in step 1: the variable \"b\" has the type BOOL, and 0x2 is not a value of it",
+            "wrote a wrong value in step 1: 0x2 is not a valid BOOL, the type of the variable \"b\"",
         ),
         (
             |bench| bench.server.join(bench.now, 1, declaration("b")),
@@ -297,5 +298,76 @@ fn a_stop_waits_for_the_step_but_not_for_long() {
     assert_eq!(
         bench.outcome().expect_err("it was stopped").cause,
         Cause::Stopped
+    );
+}
+
+#[test]
+fn an_answer_to_what_was_not_fetched_yet_is_a_violation() {
+    // All answers at once, as from a client that does not wait.
+    let mut bench = Bench::new(two());
+    bench.server.done(bench.now, 0, 0, [1].into_iter());
+    bench.ended("the run ended before its first step: client \"a\" answered before it was asked");
+
+    let mut bench = Bench::started(two());
+    assert_eq!(bench.asked(), [1, 1]);
+    bench.answer(1);
+    bench.server.done(bench.now, 1, 2, [1].into_iter());
+    bench.ended("the run ended after 1 step: client \"b\" answered before it was asked");
+}
+
+#[test]
+fn the_server_s_own_time_is_not_charged_to_its_clients() {
+    let mut bench = Bench::started(two());
+    bench.asked();
+    bench.now += Nanos::from_secs(11);
+    bench.server.sent(bench.now);
+    bench.pass(Nanos::ZERO);
+    assert_eq!(bench.server.outcome(), None);
+    assert_eq!(bench.server.deadline(), bench.now + Nanos::from_secs(10));
+}
+
+#[test]
+fn a_client_that_gives_up_before_the_start_is_named_with_its_reason() {
+    let now = Nanos::ZERO;
+    let mut server = Server::new(two(), Logic::new(), now).expect("right settings");
+    let seat = server.connected(now);
+    server.join(now, seat, declaration("a"));
+    server.gave_up(seat, "no paper");
+    let (_, ended) = refusal(&mut server);
+    assert_eq!(ended.cause, Cause::Refused);
+    assert_eq!(ended.client.as_deref(), Some("a"));
+    assert_eq!(ended.reason, "gave up before the start: no paper");
+    let news: Vec<String> = std::iter::from_fn(|| server.news()).collect();
+    assert_eq!(
+        news[1],
+        "client \"a\" was refused: gave up before the start: no paper"
+    );
+    assert_eq!(server.missing().as_deref(), Some("\"a\", \"b\""));
+}
+
+#[test]
+fn a_hook_of_reads_that_fails_in_the_first_step_ends_the_run_before_it() {
+    let mut one = client("one", 1, &["x"], &["x"], |_, _, _| Ok(()));
+    let logic = Logic::new().on_read("x", |_| Err("no".to_owned()));
+    let ended = in_process::run(settings(5, &["one"]), vec![&mut one], logic);
+    assert_eq!(
+        ended.expect_err("it fails").to_string(),
+        "the run ended before its first step: the server's logic failed: no"
+    );
+}
+
+#[test]
+fn no_participant_in_this_process_is_left_out() {
+    let [mut a, mut b, mut c] =
+        ["a", "b", "c"].map(|name| client(name, 1, &[], &[], |_, _, _| Ok(())));
+    let settings = Settings {
+        start: StartCondition::Count(2),
+        ..settings(5, &[])
+    };
+    let ended = in_process::run(settings, vec![&mut a, &mut b, &mut c], Logic::new());
+    let ended = ended.expect_err("the third has no place");
+    assert_eq!(
+        (ended.cause, ended.client.as_deref()),
+        (Cause::Refused, Some("c"))
     );
 }

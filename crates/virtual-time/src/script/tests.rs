@@ -78,6 +78,19 @@ fn what_is_wrong_with_a_script_is_told_at_its_place() {
         ("loop { }", "cell.rhai:1:"),
         ("timestamp();", "timestamp"),
         ("eval(\"1\");", "eval"),
+        (
+            "sleep(1);",
+            "cell.rhai:1:1: Runtime error: a script cannot sleep",
+        ),
+        ("sleep(1.5);", "a script cannot sleep"),
+        (
+            "variable(\"a\", \"BOOL\");\nvariable(\"a\", \"BOOL\");",
+            "cell.rhai:2:1: Runtime error: the variable \"a\" is declared twice",
+        ),
+        (
+            "variable(\"\", \"BOOL\");",
+            "cell.rhai:1:1: Runtime error: the name \"\" of a variable is empty",
+        ),
     ] {
         let told = parse("cell.rhai", text).expect_err(text).to_string();
         assert!(told.contains(part), "{part} in {told}");

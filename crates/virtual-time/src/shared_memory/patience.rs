@@ -12,8 +12,12 @@ const YIELDS: u32 = 400;
 /// back sooner than who lets others run.
 const LONG: Nanos = Nanos::from_millis(1);
 
-/// For how many waits that is remembered.
+/// For how many waits that is remembered at first, and at most: each time that it turns out to be so still, four times as many.
 const BUSY: u32 = 200;
+const BUSIEST: u32 = 51_200;
+
+/// How often a wait spins on a busy computer, some 2 µs: whom it waits for may need this very core.
+const FEW: u32 = 50;
 
 /// How a process waits for another one.
 #[derive(Clone, Debug)]
@@ -21,12 +25,18 @@ pub(super) struct Patience {
     spins: u32,
     /// For how many more waits others are not let run.
     busy: u32,
+    /// How many that were when others last took long; 0 if they did not.
+    was_busy: u32,
 }
 
 impl Patience {
     /// The patience of those who spin this often.
     pub(super) const fn new(spins: u32) -> Self {
-        Self { spins, busy: 0 }
+        Self {
+            spins,
+            busy: 0,
+            was_busy: 0,
+        }
     }
 
     /// How often a wait spins when this many processes take part.
@@ -37,7 +47,8 @@ impl Patience {
 
     /// Looks until `is_there`; false if it is time to sleep.
     pub(super) fn look(&mut self, mut is_there: impl FnMut() -> bool) -> bool {
-        for _ in 0..self.spins {
+        let spins = if self.busy > 0 { FEW } else { self.spins };
+        for _ in 0..spins {
             if is_there() {
                 return true;
             }
@@ -56,11 +67,13 @@ impl Patience {
             std::thread::yield_now();
             let now = clock.now();
             if now - before > LONG {
-                self.busy = BUSY;
-                break;
+                self.was_busy = (4 * self.was_busy).clamp(BUSY, BUSIEST);
+                self.busy = self.was_busy;
+                return is_there();
             }
             before = now;
         }
+        self.was_busy = 0;
         is_there()
     }
 }

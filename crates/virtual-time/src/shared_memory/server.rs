@@ -174,6 +174,7 @@ impl Host<'_, '_, '_> {
                 continue;
             }
             if self.locals.run(&mut self.server, now) {
+                self.server.sent(self.hosting.clock.now());
                 continue;
             }
             if let Some(seat) = self.server.awaited() {
@@ -194,7 +195,7 @@ impl Host<'_, '_, '_> {
 
     /// Sends all messages.
     fn send(&mut self, now: Nanos) {
-        let mut has_sent = false;
+        let mut has_asked = false;
         loop {
             while let Some(line) = self.server.news() {
                 (self.hosting.news)(&line);
@@ -202,7 +203,7 @@ impl Host<'_, '_, '_> {
             let Some((client, message)) = self.server.poll() else {
                 break;
             };
-            has_sent = true;
+            has_asked |= !matches!(message, ToClient::End(_));
             if self.locals.take(client, &message) {
                 continue;
             }
@@ -220,7 +221,7 @@ impl Host<'_, '_, '_> {
                 seat.waiting = Some((frame.to_vec(), now + FAREWELL));
             }
         }
-        if has_sent {
+        if has_asked {
             self.server.sent(self.hosting.clock.now());
         }
     }
@@ -344,5 +345,42 @@ impl Host<'_, '_, '_> {
             }
             self.patience.look(|| self.seats.iter().all(has_read));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Controls;
+    use crate::server::Control;
+    use tickbus_base::time::Monotonic;
+
+    #[test]
+    fn a_process_that_posts_what_is_no_frame_holds_nobody_up() {
+        let name = format!("test-no-frame-{}", std::process::id());
+        let settings = Settings::new(Nanos::from_millis(1), StartCondition::Count(1));
+        let listener = Listener::bind(&name, &settings).expect("a free name");
+        let memory = NamedMemory::open(&layout::path(&name)).expect("it is served");
+        let word = |at: usize, value: u64| memory.memory().word(at).store(value, SeqCst);
+        // One frame of no bytes, and two at once.
+        for (seat, posted) in [(0, 1), (1, 2)] {
+            word(layout::up(seat), posted);
+            word(layout::owner(seat), std::process::id().into());
+        }
+        let controls = Controls::default();
+        let mut refused = 0;
+        let hosting = Hosting {
+            clock: &*Monotonic::shared(),
+            controls: &controls,
+            news: &mut |line| {
+                assert!(line.contains("what is no frame"), "{line}");
+                refused += 1;
+                if refused == 2 {
+                    controls.send(Control::Stop);
+                }
+            },
+        };
+        let ended = listener.run(settings, Logic::new(), hosting);
+        assert_eq!(ended.expect_err("it is stopped").cause, Cause::Stopped);
     }
 }

@@ -147,6 +147,7 @@ impl Host<'_, '_, '_> {
             let awaited = self.server.awaited();
             if self.leaving.is_empty() && now - self.looked < ROUND {
                 if self.locals.run(&mut self.server, now) {
+                    self.server.sent(self.hosting.clock.now());
                     continue;
                 }
                 // As long as answers are due, one is read by a call that blocks: all of them are needed anyway.
@@ -165,7 +166,7 @@ impl Host<'_, '_, '_> {
 
     /// Sends all messages.
     fn send(&mut self, now: Nanos) {
-        let mut has_sent = false;
+        let mut has_asked = false;
         loop {
             while let Some(line) = self.server.news() {
                 (self.hosting.news)(&line);
@@ -173,7 +174,7 @@ impl Host<'_, '_, '_> {
             let Some((seat, message)) = self.server.poll() else {
                 break;
             };
-            has_sent = true;
+            has_asked |= !matches!(message, ToClient::End(_));
             if self.locals.take(seat, &message) {
                 continue;
             }
@@ -191,7 +192,7 @@ impl Host<'_, '_, '_> {
                 self.lose(seat, &error.to_string());
             }
         }
-        if has_sent {
+        if has_asked {
             self.server.sent(self.hosting.clock.now());
         }
     }

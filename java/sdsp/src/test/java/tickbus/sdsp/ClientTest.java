@@ -25,7 +25,7 @@ import tickbus.sdsp.EndedException.Cause;
 @Timeout(60)
 class ClientTest {
     /** Counts: writes what it reads plus one, and fails at a certain value. */
-    private static final class Counter implements Participant {
+    private static class Counter implements Participant {
         final List<String> steps = new ArrayList<>();
 
         @Override
@@ -157,6 +157,49 @@ class ClientTest {
             assertEquals("the run ended before its first step: client \"z\" gave up: 13 is too much", ended.getMessage());
             assertEquals("13 is too much", ended.getCause().getMessage());
         }
+    }
+
+    /** What the server gets as the reason of a participant that throws this in its initial values, or in its first step. */
+    private static void assertSaid(String reason, boolean inStep, Class<? extends Throwable> told, Throwable thrown) throws Exception {
+        Counter counter = new Counter() {
+            @Override
+            public void initial(long[] writes) {
+                if (!inStep) {
+                    ClientTest.<RuntimeException>sneak(thrown);
+                }
+            }
+
+            @Override
+            public void run(long sequence, long nanos, long[] reads, long[] writes) {
+                ClientTest.<RuntimeException>sneak(thrown);
+            }
+        };
+        try (FakeServer server = new FakeServer(s -> {
+            s.receive();
+            s.sendStart(1);
+            if (inStep) {
+                s.receive();
+                s.step(1, 0, 7);
+            }
+            ByteBuffer frame = s.receive();
+            assertEquals(0x03, frame.get());
+            assertEquals(reason, UTF_8.decode(frame).toString());
+            s.send(0x84, FakeServer.buffer(100).put((byte) 6).putLong(0).put((byte) 0).put((byte) 'x'));
+        })) {
+            assertThrows(told, () -> Client.join(server.address(), counter));
+        }
+    }
+
+    @SuppressWarnings("unchecked")
+    private static <E extends Throwable> void sneak(Throwable thrown) throws E {
+        throw (E) thrown;
+    }
+
+    @Test
+    void aParticipantThatFailsAnywhereSaysWhy() throws Exception {
+        assertSaid("no paper", false, EndedException.class, new IllegalStateException("no paper"));
+        assertSaid("too deep", false, StackOverflowError.class, new StackOverflowError("too deep"));
+        assertSaid("too deep", true, StackOverflowError.class, new StackOverflowError("too deep"));
     }
 
     private static EndedException endOf(FakeServer.Script script) throws Exception {

@@ -165,7 +165,7 @@ fn an_interrupt_while_it_waits_ends_it_and_says_for_whom() {
     let pid = rustix::process::Pid::from_child(&sync.child);
     rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
     let (last, code) = sync.end();
-    let reason = r#"stopped while it waited for \"a\", \"b\""#;
+    let reason = r#"stopped while it waited for "a", "b""#;
     assert_eq!(
         last,
         format!("sync: failed cause=stopped steps=0 reason={reason:?}")

@@ -83,8 +83,6 @@ pub fn parse(file: &str, text: &str) -> Result<Logic<'static>, Mistakes> {
         .set_max_array_size(LARGEST)
         .set_max_map_size(LARGEST)
         .disable_symbol("eval")
-        // It would stop the run, and the server with it.
-        .disable_symbol("sleep")
         .on_print(|text| log::info!("script: {text}"))
         .on_debug(|text, _, place| log::info!("script, {place}: {text}"));
     // Rhai's own would stop the run, and the server with it.

@@ -152,7 +152,8 @@ fn a_storm_of_connections_gives_a_bounded_number_of_log_lines() {
     log::set_boxed_logger(Box::new(Logger)).expect("the only one");
     log::set_max_level(log::LevelFilter::Info);
     let (end, address) = device();
-    storm(&end, address, 2000);
+    // Some are still on their way when the counters are read: not so many that the next power of two is passed.
+    storm(&end, address, 1500);
     let (left, untold) = (number(&end, "cause.left"), number(&end, "log.untold"));
     end.driver.close();
     let logged = LOGGED.lock().expect("no panic");
@@ -161,7 +162,7 @@ fn a_storm_of_connections_gives_a_bounded_number_of_log_lines() {
     let lines: Vec<&String> = lines
         .filter(|line| line.starts_with(left_at_once))
         .collect();
-    assert!(left >= 2000 && untold >= 1900, "{left}, {untold}");
+    assert!(left >= 1500 && untold >= 1400, "{left}, {untold}");
     // The first 20, and 32, 64, ... up to the number of messages.
     let most = 20 + (left.ilog2() as usize).saturating_sub(4);
     assert!((20..=most).contains(&lines.len()), "{lines:#?}");

@@ -26,7 +26,7 @@ use tickbus_virtual_time::{
 
 const STEP: Nanos = Nanos::from_millis(1);
 
-/// A run of two clients with so many steps of 1 ms.
+/// The server of a run with two clients and this many steps of 1 ms.
 fn of_two(steps: u64) -> Server {
     let mut settings = Settings::new(STEP, StartCondition::Count(2));
     settings.steps = Some(steps);

@@ -36,9 +36,9 @@ impl Default for Settings {
 
 /// The dispatcher. Each connection has a seat, a number that is used again when it is free.
 ///
-/// After calls that take `now`, and after [`saved`](Self::saved) and [`gone`](Self::gone): save the patch if
-/// [`unsaved`](Self::unsaved), then write what there is [`to_write`](Self::to_write) to each seat of
-/// [`next_touched`](Self::next_touched).
+/// After calls that take `now`, and after [`saved`](Self::saved) and [`gone`](Self::gone), first save the patch if
+/// [`unsaved`](Self::unsaved) returns one; then, for each seat from [`next_touched`](Self::next_touched), send the bytes of
+/// [`to_write`](Self::to_write).
 #[derive(Debug)]
 pub struct Dispatcher {
     settings: Settings,

@@ -5,7 +5,9 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 
 use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, close_gracefully, is_for_later, is_of_the_client, prepare};
+use tickbus_fieldbus::tcp::{
+    Address, bind, close_gracefully, is_for_later, is_of_the_client, prepare,
+};
 
 use crate::dispatcher::Dispatcher;
 use crate::patch_file::PatchFile;
@@ -52,9 +54,7 @@ impl Listener {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address) -> io::Result<Self> {
-        let listener = TcpListener::bind(address.to_string())?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
+        let (listener, address) = bind(address)?;
         Ok(Self { listener, address })
     }
 

@@ -91,7 +91,7 @@ impl NamedMemory {
     ///
     /// # Errors
     ///
-    /// [`ErrorKind::NotFound`] if there is none; or the file cannot be opened.
+    /// [`ErrorKind::NotFound`] if no such file exists; or it cannot be opened.
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = opened(path)?;
         let length = file.metadata()?.len();

@@ -11,7 +11,7 @@ pub struct ProcessWatch {
 }
 
 impl ProcessWatch {
-    /// Watches the process of this number; `None` if there is none.
+    /// Watches the process with this id; `None` if no such process exists.
     pub fn of(pid: u32) -> Option<Self> {
         let pid = Pid::from_raw(i32::try_from(pid).ok()?)?;
         let watch = Self {

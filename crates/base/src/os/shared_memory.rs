@@ -171,7 +171,7 @@ impl SharedMemory {
         {
             use rustix::thread::futex;
 
-            // It fails only for addresses that are none.
+            // It can only fail for an invalid address, and this one is mapped.
             let everyone = i32::MAX.unsigned_abs();
             let _ = futex::wake(self.lower_half(at), futex::Flags::empty(), everyone);
         }

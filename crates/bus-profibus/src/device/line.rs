@@ -16,7 +16,8 @@ use crate::station::Station;
 /// thread as long, and the master's slot time runs meanwhile. It is the shortest wait at 500 kbit/s, and some more.
 const NO_SLEEP: Nanos = Nanos::from_micros(30);
 
-/// At most so many looks, for a clock that stands still; on a fast computer they take longer than [`NO_SLEEP`].
+/// The clock is read at most this often per wait, in case it stands still; on a fast computer that takes longer than
+/// [`NO_SLEEP`].
 const LOOKS: u32 = 3_000;
 
 /// Serves the stations until `stop`.

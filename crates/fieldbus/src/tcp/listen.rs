@@ -47,6 +47,19 @@ pub fn listen(
     Ok(Some((listener, bound)))
 }
 
+/// Listens on `address` at once, without blocking, for a server that has no [`Port`]; returns what was bound. Port 0 lets the
+/// system choose one.
+///
+/// # Errors
+///
+/// The host is unknown, or the address cannot be listened on.
+pub fn bind(address: &Address) -> io::Result<(TcpListener, SocketAddr)> {
+    let listener = TcpListener::bind(address.to_string())?;
+    listener.set_nonblocking(true)?;
+    let bound = listener.local_addr()?;
+    Ok((listener, bound))
+}
+
 /// Counts a client for which the system had no socket, and logs that.
 pub fn not_accepted(error: &io::Error, port: &Port) {
     port.count("clients.not_accepted");

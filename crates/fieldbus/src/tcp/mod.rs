@@ -14,7 +14,7 @@ use super::BusError;
 pub use address::{Address, Host};
 pub use connect::connect;
 pub use dial::{Call, Caller, Stream, dial};
-pub use listen::{is_of_the_client, listen, not_accepted};
+pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};
 pub use stream::{close_gracefully, is_for_later, prepare};

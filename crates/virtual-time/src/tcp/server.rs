@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpListener};
 
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{Address, is_of_the_client};
+use tickbus_fieldbus::tcp::{Address, bind, is_of_the_client};
 
 use super::connection::{Arrived, BLOCKED, Connection};
 use crate::hosting::{Hosting, hear};
@@ -48,9 +48,7 @@ impl Listener {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address) -> io::Result<Self> {
-        let listener = TcpListener::bind(address.to_string())?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
+        let (listener, address) = bind(address)?;
         Ok(Self { listener, address })
     }
 

@@ -30,6 +30,9 @@ at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
+# What the zip has beyond a plain build.
+PRODUCT_FEATURES=opcua,script
+
 # The project's version, from Cargo.toml.
 version() {
     sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1

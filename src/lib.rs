@@ -29,11 +29,13 @@
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
+//! | `c_api` | the functions of `include/tickbus.h` |
 //! | [`cli`] | the `tickbus` command |
 //!
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
+mod c_api;
 pub mod cli;
 pub mod fieldbus;
 mod jni;

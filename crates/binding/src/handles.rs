@@ -16,8 +16,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus_driver::{Code, panic_text};
 
+use crate::refusal::Refusal;
+
 /// How many drivers can be open in one process at once.
-pub(super) const MAX_DRIVERS: usize = 64;
+pub const MAX_DRIVERS: usize = 64;
 
 /// A handle's low bits are the index, the rest the generation.
 const INDEX_BITS: u32 = 8;
@@ -54,7 +56,7 @@ struct Content<T> {
 }
 
 /// A table of tenants of type `T`.
-pub(super) struct Handles<T, const N: usize = MAX_DRIVERS> {
+pub struct Handles<T, const N: usize = MAX_DRIVERS> {
     places: [HandleEntry<T>; N],
 }
 
@@ -64,8 +66,15 @@ pub(super) struct Handles<T, const N: usize = MAX_DRIVERS> {
 // may thus be used and dropped by another thread than the one that made it, hence `T: Send`.
 unsafe impl<T: Send, const N: usize> Sync for Handles<T, N> {}
 
+impl<T, const N: usize> Default for Handles<T, N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<T, const N: usize> Handles<T, N> {
-    pub(super) const fn new() -> Self {
+    /// An empty table.
+    pub const fn new() -> Self {
         let places = [const {
             HandleEntry {
                 word: AtomicU64::new(word(0, FREE)),
@@ -79,7 +88,11 @@ impl<T, const N: usize> Handles<T, N> {
     }
 
     /// Reserves a place for a tenant that has yet to be created.
-    pub(super) fn reserve(&self) -> Result<Reservation<'_, T>, Code> {
+    ///
+    /// # Errors
+    ///
+    /// `TOO_MANY_DRIVERS`: all places are taken.
+    pub fn reserve(&self) -> Result<Reservation<'_, T>, Refusal> {
         for (index, place) in self.places.iter().enumerate() {
             let found = place.word.load(Ordering::Relaxed);
             let generation = (found >> STATE_BITS) + 1;
@@ -89,14 +102,19 @@ impl<T, const N: usize> Handles<T, N> {
                 return Ok(Reservation { claim, index });
             }
         }
-        Err(Code::TooManyDrivers)
+        let text = format!("{N} drivers are open, and that is the most");
+        Err(Refusal::new(Code::TooManyDrivers, text))
     }
 
     /// Calls `work` with the tenant, which no other thread can access in the meantime.
     ///
     /// A panic in `work` marks the tenant as failed; from then on it returns INTERNAL until closed.
+    ///
+    /// # Errors
+    ///
+    /// The handle was never open, is closed, in use by another thread, or its tenant has failed.
     #[inline]
-    pub(super) fn with<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
+    pub fn with<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
         let mut claim = self.claim(handle, OPEN)?;
         let Some(tenant) = claim.content().tenant.as_mut() else {
             return Err(Code::Internal);
@@ -104,16 +122,42 @@ impl<T, const N: usize> Handles<T, N> {
         match catch_unwind(AssertUnwindSafe(|| work(tenant))) {
             Ok(done) => Ok(done),
             Err(payload) => {
-                claim.content().panic = said(payload);
+                claim.content().panic = panic_message(payload);
                 claim.end = FAILED;
                 Err(Code::Internal)
             }
         }
     }
 
+    /// As [`with`](Self::with); a failed tenant is refused with the message of its panic.
+    ///
+    /// # Errors
+    ///
+    /// As [`with`](Self::with).
+    pub fn with_reason<R>(
+        &self,
+        handle: i64,
+        work: impl FnOnce(&mut T) -> R,
+    ) -> Result<R, Refusal> {
+        self.with(handle, work)
+            .map_err(|code| self.reason(handle, code))
+    }
+
+    /// Why the tenant of this handle was refused with `code`.
+    pub fn reason(&self, handle: i64, code: Code) -> Refusal {
+        match self.panic_of(handle) {
+            Some(text) => Refusal::new(code, format!("panic: {text}")),
+            None => Refusal::plain(code),
+        }
+    }
+
     /// Ends a tenancy: `close` is called with the tenant, failed or not. The place is free and the handle
     /// closed from then on, however long `close` takes.
-    pub(super) fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
+    ///
+    /// # Errors
+    ///
+    /// The handle was never open, is closed already, or in use by another thread.
+    pub fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
         let mut claim = match self.claim(handle, OPEN) {
             Err(Code::Internal) => self.claim(handle, FAILED)?,
             other => other?,
@@ -126,7 +170,7 @@ impl<T, const N: usize> Handles<T, N> {
     }
 
     /// The message of the panic that made this handle's tenant fail.
-    pub(super) fn panic_of(&self, handle: i64) -> Option<String> {
+    fn panic_of(&self, handle: i64) -> Option<String> {
         let mut claim = self.claim(handle, FAILED).ok()?;
         Some(claim.content().panic.clone())
     }
@@ -204,14 +248,14 @@ impl<T> Drop for Claim<'_, T> {
 }
 
 /// A place waiting for its tenant; free again if this is dropped before.
-pub(super) struct Reservation<'a, T> {
+pub struct Reservation<'a, T> {
     claim: Claim<'a, T>,
     index: usize,
 }
 
 impl<T> Reservation<'_, T> {
     /// Adds the tenant and returns its handle, which is positive.
-    pub(super) fn fill(mut self, tenant: T) -> i64 {
+    pub fn fill(mut self, tenant: T) -> i64 {
         self.claim.content().tenant = Some(tenant);
         self.claim.end = OPEN;
         (self.claim.generation << INDEX_BITS | self.index as u64).cast_signed()
@@ -219,7 +263,7 @@ impl<T> Reservation<'_, T> {
 }
 
 /// The message of a panic.
-pub(super) fn said(payload: Box<dyn Any + Send>) -> String {
+pub fn panic_message(payload: Box<dyn Any + Send>) -> String {
     let text = panic_text(&*payload).to_owned();
     // Dropping a payload of unknown type could panic again.
     std::mem::forget(payload);
@@ -284,7 +328,8 @@ mod tests {
         let handles: Handles<u32, 2> = Handles::new();
         let first = open(&handles, 1);
         open(&handles, 2);
-        assert_eq!(handles.reserve().err(), Some(Code::TooManyDrivers));
+        let refusal = handles.reserve().err().expect("both places are taken");
+        assert_eq!(refusal.code, Code::TooManyDrivers);
         handles.close(first, drop).expect("it is open");
         drop(handles.reserve().expect("the place is free again"));
         open(&handles, 3);
@@ -338,7 +383,7 @@ mod tests {
         let closing = catch_unwind(AssertUnwindSafe(|| {
             handles.close(handle, |_| panic!("stuck"))
         }));
-        assert_eq!(said(closing.expect_err("close panicked")), "stuck");
+        assert_eq!(panic_message(closing.expect_err("close panicked")), "stuck");
         assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
         open(&handles, 2);
     }

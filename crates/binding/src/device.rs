@@ -1,48 +1,25 @@
-//! An open driver with the buffer it shares with Java: everything that the native methods do, without a JVM.
+//! An open driver with the buffer that it shares with the simulator.
 
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Mistakes;
 use tickbus_driver::{Driver, Exchange, Snapshot};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::faults::{Fault, FaultBoard, FaultStatus};
+use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
 
-use super::shared::{NO_TIME, Shared, Word};
+use crate::fault::not_injected;
+use crate::refusal::Refusal;
+use crate::shared::{NO_TIME, Shared, Word};
 
 /// The most events handed over in one call.
-pub(super) const EVENTS: usize = 64;
+pub const EVENTS: usize = 64;
 
 /// Words per event: signal, value, time.
-pub(super) const EVENT_WORDS: usize = 3;
-
-/// The injected faults, one per line: number, state, how often begun, kind, name, effect; separated by tabs.
-pub(super) fn faults(board: &FaultBoard) -> String {
-    let mut text = String::new();
-    for fault in board.list() {
-        let FaultStatus {
-            id,
-            phase,
-            begun,
-            kind,
-            name,
-            what,
-            ..
-        } = fault;
-        // Writing to a string cannot fail; names have no control characters.
-        let _ = writeln!(
-            text,
-            "{id}\t{}\t{begun}\t{kind}\t{name}\t{what}",
-            phase.name()
-        );
-    }
-    text
-}
+pub const EVENT_WORDS: usize = 3;
 
 /// An open driver and its shared buffer; `K` keeps the buffer's memory alive.
-pub(super) struct Device<K> {
+pub struct Device<K> {
     driver: Driver,
     shared: Shared<K>,
     ticks: u64,
@@ -50,7 +27,8 @@ pub(super) struct Device<K> {
 }
 
 impl<K> Device<K> {
-    pub(super) fn new(driver: Driver, mut shared: Shared<K>) -> Self {
+    /// A driver and its buffer, whose slots get their initial values.
+    pub fn new(driver: Driver, mut shared: Shared<K>) -> Self {
         shared.slots().copy_from_slice(&driver.initial_slots());
         Self {
             driver,
@@ -62,7 +40,7 @@ impl<K> Device<K> {
 
     /// One tick: sends the slots that the simulation wrote, fills those that it reads, and the header.
     #[inline]
-    pub(super) fn exchange(&mut self) -> i32 {
+    pub fn exchange(&mut self) -> i32 {
         self.ticks += 1;
         let done = self.driver.exchange(self.time(), self.shared.slots());
         self.tell(done)
@@ -70,7 +48,7 @@ impl<K> Device<K> {
 
     /// The first half of a tick: fills the slots that the simulation reads, and the header.
     #[inline]
-    pub(super) fn receive(&mut self) -> i32 {
+    pub fn receive(&mut self) -> i32 {
         self.ticks += 1;
         let done = self.driver.receive(self.time(), self.shared.slots());
         self.tell(done)
@@ -78,12 +56,12 @@ impl<K> Device<K> {
 
     /// The second half of a tick: sends the slots that the simulation wrote.
     #[inline]
-    pub(super) fn send(&mut self) -> i32 {
+    pub fn send(&mut self) -> i32 {
         let done = self.driver.send(self.shared.slots());
         self.tell(done)
     }
 
-    /// The time that Java wrote, if any.
+    /// The time that the simulator wrote, if any.
     #[inline]
     fn time(&self) -> Option<Nanos> {
         let time = self.shared.read(Word::SimulationTime);
@@ -103,32 +81,41 @@ impl<K> Device<K> {
     }
 
     /// The data of the statistics; they are formatted after the driver is released.
-    pub(super) fn snapshot(&self) -> Snapshot {
+    pub fn snapshot(&self) -> Snapshot {
         self.driver.snapshot()
     }
 
+    /// Where the edges of a signal are counted, if they are.
+    pub fn edges_slot(&self, signal: usize) -> Option<usize> {
+        self.driver.slots().edges[signal]
+    }
+
     /// What the driver was opened with.
-    pub(super) fn config(&self) -> Arc<Config> {
+    pub fn config(&self) -> Arc<Config> {
         Arc::clone(self.driver.config())
     }
 
-    /// Injects a fault and returns its number, or an error if there are too many.
-    pub(super) fn inject(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
-        self.driver.inject_read(fault)
+    /// Injects a fault and returns its number.
+    ///
+    /// # Errors
+    ///
+    /// BAD_ARGUMENT if there are too many.
+    pub fn inject(&mut self, fault: &Fault) -> Result<u32, Refusal> {
+        self.driver.inject_read(fault).map_err(not_injected)
     }
 
     /// Ends a fault; false if no fault has this number.
-    pub(super) fn end_fault(&mut self, id: u32) -> bool {
+    pub fn end_fault(&mut self, id: u32) -> bool {
         self.driver.end_fault(id)
     }
 
     /// Where the injected faults publish their state.
-    pub(super) fn board(&self) -> Arc<FaultBoard> {
+    pub fn board(&self) -> Arc<FaultBoard> {
         Arc::clone(self.driver.board())
     }
 
     /// Moves pending events to `into`, three words each; returns their number.
-    pub(super) fn events(&mut self, into: &mut [i64]) -> usize {
+    pub fn events(&mut self, into: &mut [i64]) -> usize {
         let room = (into.len() / EVENT_WORDS).min(EVENTS);
         let count = self.driver.poll_events(&mut self.events[..room]);
         for (event, words) in self.events[..count]
@@ -144,7 +131,8 @@ impl<K> Device<K> {
         count
     }
 
-    pub(super) fn close(mut self) {
+    /// Sends what was written last, and closes the driver.
+    pub fn close(mut self) {
         self.driver.end_tick(self.shared.slots());
         self.driver.close();
     }

@@ -1,24 +1,21 @@
-//! The buffer that Java and the driver share: a header, then the slots.
+//! The buffer that the simulator and the driver share: a header, then the slots.
 //!
 //! Words of 8 bytes in native byte order. Word 0 version of this layout, 1 status, 2 sequence, 3 age
-//! in nanoseconds, 4 simulation time in nanoseconds (Java writes it; [`NO_TIME`] until then), 5 granted time in
+//! in nanoseconds, 4 simulation time in nanoseconds (the simulator writes it; [`NO_TIME`] until then), 5 granted time in
 //! nanoseconds, 6 ticks so far, 7 number of slots; the slots begin at word 8.
 
-#![allow(
-    unsafe_code,
-    reason = "the memory belongs to a direct ByteBuffer of the Java side"
-)]
+#![allow(unsafe_code, reason = "the memory belongs to the other language")]
 
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus_image::signal::Slot;
 
-/// Version of the layout; Java compares it with its own.
-pub(super) const VERSION: u64 = 1;
+/// Version of the layout; the other side compares it with its own.
+const VERSION: u64 = 1;
 
 /// The simulation time as long as none was given.
-pub(super) const NO_TIME: u64 = i64::MIN.cast_unsigned();
+pub const NO_TIME: u64 = i64::MIN.cast_unsigned();
 
 /// Words before the first slot.
 const HEADER: usize = 8;
@@ -26,19 +23,27 @@ const HEADER: usize = 8;
 /// One word of the header.
 #[derive(Clone, Copy)]
 #[repr(usize)]
-pub(super) enum Word {
+pub enum Word {
+    /// The version of the layout.
     Version = 0,
+    /// The status of the last exchange.
     Status = 1,
+    /// How many bus cycles have arrived.
     Sequence = 2,
+    /// The age of the data in nanoseconds.
     Age = 3,
+    /// The simulation time in nanoseconds, by the simulator.
     SimulationTime = 4,
+    /// How far the simulation may go, in nanoseconds.
     Granted = 5,
+    /// How many ticks there were.
     Ticks = 6,
+    /// How many slots follow.
     SlotCount = 7,
 }
 
 /// The shared buffer of one driver, and the owner of its memory.
-pub(super) struct Shared<K> {
+pub struct Shared<K> {
     words: NonNull<u64>,
     slots: usize,
     _keep: K,
@@ -49,7 +54,7 @@ unsafe impl<K: Send> Send for Shared<K> {}
 
 impl<K> Shared<K> {
     /// Size in bytes of a buffer for this many slots.
-    pub(super) const fn bytes(slots: usize) -> usize {
+    pub const fn bytes(slots: usize) -> usize {
         (HEADER + slots) * size_of::<u64>()
     }
 
@@ -61,7 +66,7 @@ impl<K> Shared<K> {
     /// `memory` must be valid for reads and writes of `bytes(slots)` bytes for as long as `keep`
     /// lives, and hold initialised bytes. While a method of this value runs, nobody else may write
     /// there; while [`slots`](Self::slots) is borrowed, nobody else may touch the slots.
-    pub(super) unsafe fn new(memory: NonNull<u8>, slots: usize, keep: K) -> Option<Self> {
+    pub unsafe fn new(memory: NonNull<u8>, slots: usize, keep: K) -> Option<Self> {
         let words = memory.cast::<u64>();
         if !words.is_aligned() {
             return None;
@@ -83,27 +88,29 @@ impl<K> Shared<K> {
 
     /// The slots, to which this side has exclusive access while they are borrowed.
     #[inline]
-    pub(super) fn slots(&mut self) -> &mut [Slot] {
+    pub fn slots(&mut self) -> &mut [Slot] {
         // SAFETY: `new` was promised HEADER + slots words, aligned and initialised, that live as long
-        // as `self`; a `Slot` is a transparent u64. Java moves slots only before and after the
-        // exchange that borrows them, on the thread that makes the call: classes `tickbus.Signal` and
-        // `tickbus.Tickbus` demand that of their callers.
+        // as `self`; a `Slot` is a transparent u64. The simulator moves slots only before and after the
+        // exchange that borrows them, on the thread that makes the call: Java's `tickbus.Signal` and
+        // `include/tickbus.h` demand that of their callers.
         unsafe {
             std::slice::from_raw_parts_mut(self.words.add(HEADER).as_ptr().cast(), self.slots)
         }
     }
 
+    /// Reads a word of the header.
     #[inline]
-    pub(super) fn read(&self, word: Word) -> u64 {
+    pub fn read(&self, word: Word) -> u64 {
         self.header(word as usize).load(Ordering::Relaxed)
     }
 
+    /// Writes a word of the header.
     #[inline]
-    pub(super) fn write(&mut self, word: Word, value: u64) {
+    pub fn write(&mut self, word: Word, value: u64) {
         self.header(word as usize).store(value, Ordering::Relaxed);
     }
 
-    /// Java threads may read the header at any time, so its words are atomic.
+    /// The simulator's threads may read the header at any time, so its words are atomic.
     #[inline]
     fn header(&self, word: usize) -> &AtomicU64 {
         debug_assert!(word < HEADER);

@@ -99,7 +99,7 @@ impl<K> Device<K> {
     ///
     /// # Errors
     ///
-    /// BAD_ARGUMENT if there are too many.
+    /// `BAD_ARGUMENT` if there are too many.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Refusal> {
         self.driver.inject_read(fault).map_err(not_injected)
     }

@@ -12,7 +12,7 @@ use crate::refusal::Refusal;
 ///
 /// # Errors
 ///
-/// BAD_ARGUMENT with every mistake in the text.
+/// `BAD_ARGUMENT` with every mistake in the text.
 pub fn read_fault(text: &str, config: &Config) -> Result<Fault, Refusal> {
     read_one(text, config.fault_scope()).map_err(not_injected)
 }

@@ -17,7 +17,7 @@ const TABLES: &str = "tables instead of driver.cfg's";
 ///
 /// # Errors
 ///
-/// BAD_CONFIG with every mistake of the file, or why the bus cannot be opened.
+/// `BAD_CONFIG` with every mistake of the file, or why the bus cannot be opened.
 pub fn open(path: &Path, tables: &str) -> Result<Driver, Refusal> {
     let config = Config::load(path).and_then(|config| config.overlaid(TABLES, tables));
     let config = config.map_err(|mistakes| {

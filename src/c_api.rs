@@ -18,6 +18,7 @@ use std::ptr::{NonNull, null, null_mut};
 use once_cell::sync::Lazy;
 use std::sync::Mutex;
 
+use tickbus_base::statistics::entries;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::nearest;
 use tickbus_binding::{
@@ -184,6 +185,20 @@ unsafe fn hand_over(text: &str, into: *mut c_char, room: usize) -> i32 {
         }
     }
     i32::try_from(text.len()).unwrap_or(i32::MAX)
+}
+
+/// Why a tick failed, with the line's own reason if it has one.
+fn why(driver: i64, code: Code) -> Refusal {
+    let snapshot = DRIVERS.with(driver, |opened| opened.device.snapshot());
+    let Ok(snapshot) = snapshot else {
+        return DRIVERS.reason(driver, code);
+    };
+    let statistics = snapshot.to_string();
+    let reason = entries(&statistics).find_map(|(key, text)| (key == "reason").then_some(text));
+    match reason.filter(|reason| !reason.is_empty()) {
+        Some(reason) => Refusal::new(code, format!("{}: {reason}", code.text())),
+        None => Refusal::plain(code),
+    }
 }
 
 /// # Safety
@@ -429,7 +444,7 @@ extern "C" fn tb_last_error() -> *const c_char {
     let last = LAST.with(|last| {
         let mut last = last.borrow_mut();
         if let Last::Tick(driver, code) = *last {
-            let text = DRIVERS.reason(driver, code).to_string();
+            let text = why(driver, code).to_string();
             *last = Last::Told(CString::new(text.replace('\0', " ")).unwrap_or_default());
         }
         match &*last {

@@ -111,6 +111,11 @@ int main(int count, char **arguments) {
         EXPECT(tb_close(other), TB_FRESH, NULL);
     }
     EXPECT(tb_exchange(driver), TB_CLOSED, NULL);
+
+    /* A tick that fails says why the line is down. */
+    EXPECT(tb_open(arguments[1], "[fieldbus]\nkind = \"sdsp\"\naddress = \"127.0.0.1:1\"\ntimeout = \"50ms\"", &other), TB_FRESH, NULL);
+    EXPECT(tb_exchange(other), TB_BUS_FAILED, "127.0.0.1:1");
+    EXPECT(tb_close(other), TB_FRESH, NULL);
     printf("misuse: ok last=%d\n", line);
     return 0;
 }

@@ -1,0 +1,16 @@
+//! Bridges to the dispatcher of a virtual laboratory, for clients that cannot connect over TCP themselves.
+//!
+//! [`AsciiBridge`] carries the lines of a client at a serial line, and does no I/O; [`serial`] puts it on a port. Upon it
+//! stands [`mqtt`]: topics of a broker as the channels of a client.
+//! docs/dispatcher.md has a section for users.
+
+mod ascii;
+mod dial;
+mod lines;
+mod link;
+pub mod mqtt;
+mod outbox;
+#[cfg(unix)]
+pub mod serial;
+
+pub use ascii::{AsciiBridge, LineEnd, Traffic};

@@ -241,7 +241,10 @@ fn read_channel(mut table: Table<'_>) -> Option<(Entry, usize)> {
         );
     }
     let number = |value: &Value<'_>| value.number("write a number such as 0.1");
-    let word = |value: &Value<'_>| value.label(100, "write a word such as \"ON\"");
+    let word = |value: &Value<'_>| {
+        let text = value.label(100, "write a word such as \"ON\"");
+        text.map(str::to_owned)
+    };
     let format = match (on, off) {
         (None, None) if factor.is_none() && offset.is_none() => Format::Plain,
         (None, None) => {
@@ -269,7 +272,7 @@ fn read_channel(mut table: Table<'_>) -> Option<(Entry, usize)> {
                     "remove either the words or these",
                 );
             }
-            let words = (word(&on)?.to_owned(), word(&off)?.to_owned());
+            let words = (word(&on)?, word(&off)?);
             if words.0 == words.1 {
                 off.wrong("on and off are the same word", "write two words");
             }

@@ -112,7 +112,8 @@ impl Between<'_, '_> {
         let news = &mut *self.hosting.news;
         let client = self.mapping.client();
         self.link.turn(now, client, &mut self.set, news)?;
-        self.set_online(self.mapping.client().is_here());
+        let is_here = client.is_here();
+        self.set_online(is_here);
         let broker = &self.broker.client;
         let told = self.mapping.publish(&mut |entry, payload| {
             let topic = entry.topic.clone();

@@ -200,4 +200,19 @@ fn mistakes_have_the_exit_codes_of_the_house() {
     ] {
         assert_eq!(end(arguments).1, Some(2), "{arguments:?}");
     }
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let map = folder.path().join("map.toml");
+    let name = map.to_str().expect("text");
+    assert_eq!(end(&["mqtt", name]).1, Some(1), "there is no file");
+    std::fs::write(&map, "[mqtt]\nbrokr = \"127.0.0.1:1883\"\n").expect("a file");
+    assert_eq!(end(&["mqtt", name]).1, Some(1));
+    if !cfg!(feature = "mqtt") {
+        let right = "[mqtt]\nbroker = \"127.0.0.1:1883\"\n[dispatcher]\nname = \"A\"\nrole = \"VP\"\n\
+                     [[channel]]\nchannel = \"I1\"\ntopic = \"a\"\n";
+        std::fs::write(&map, right).expect("a file");
+        let (last, code) = end(&["mqtt", name]);
+        assert!(last.contains("--features mqtt"), "{last}");
+        assert_eq!(code, Some(1));
+    }
 }

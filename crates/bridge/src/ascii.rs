@@ -8,6 +8,7 @@ use tickbus_dispatcher::{Channel, Counts, Number};
 
 use crate::lines::{Cut, Lines};
 use crate::outbox::{Outbox, put};
+use crate::speaker::Speaker;
 
 /// After this time in which nothing was sent, the dispatcher gets a sign of life; and within it, answers.
 const ALIVE: Nanos = Nanos::from_secs(20);
@@ -72,6 +73,8 @@ pub struct AsciiBridge {
     pings: VecDeque<(Asker, Nanos)>,
     /// When the dispatcher last got something.
     sent: Nanos,
+    /// When something last came from it, or the connection.
+    heard: Nanos,
     traffic: Traffic,
 }
 
@@ -128,8 +131,16 @@ impl AsciiBridge {
             requests: VecDeque::new(),
             pings: VecDeque::new(),
             sent: Nanos::ZERO,
+            heard: Nanos::ZERO,
             traffic: Traffic::default(),
         }
+    }
+
+    /// Since when it waits for the dispatcher without a word from it; `None` if it does not.
+    fn waits_since(&self) -> Option<Nanos> {
+        let asked = self.pings.front().map(|(_, asked)| *asked);
+        let left = matches!(self.state, State::Leaving { .. }).then_some(self.sent);
+        asked.or(left).map(|since| since.max(self.heard))
     }
 
     /// What went through so far.
@@ -138,30 +149,6 @@ impl AsciiBridge {
             overtaken: self.to_serial.overtaken + self.to_dispatcher.overtaken,
             ..self.traffic
         }
-    }
-
-    /// A connection with the dispatcher is there.
-    pub fn connected(&mut self, now: Nanos) {
-        self.from_dispatcher = Lines::default();
-        self.to_dispatcher.clear();
-        self.pings.clear();
-        self.sent = now;
-        self.state = match &self.client {
-            Some(client) => {
-                self.to_dispatcher.line(&client.line);
-                State::Introduced
-            }
-            None => State::Stranger,
-        };
-    }
-
-    /// The connection is gone. Returns whether that was to be expected, and another one is wanted at once.
-    pub fn disconnected(&mut self) -> bool {
-        let state = std::mem::replace(&mut self.state, State::Away);
-        if state == State::Here {
-            self.say(AWAY);
-        }
-        matches!(state, State::Leaving { .. })
     }
 
     /// The serial port is gone. Close the connection: to the others its client has left.
@@ -177,66 +164,14 @@ impl AsciiBridge {
         }
     }
 
-    /// Whether the dispatcher knows the client.
-    pub fn is_here(&self) -> bool {
-        self.state == State::Here
-    }
-
-    /// When [`tick`](Self::tick) has something to do even if nothing arrives.
-    pub fn deadline(&self) -> Nanos {
-        match (self.state, self.pings.front()) {
-            (State::Away, _) => Nanos::MAX,
-            (_, Some((_, asked))) if self.wants_to_hear() => (self.sent.min(*asked)) + ALIVE,
-            _ => self.sent + ALIVE,
-        }
-    }
-
-    /// Gives signs of life. Call it after what has arrived was handed over.
-    ///
-    /// # Errors
-    ///
-    /// The dispatcher does not answer: close the connection, and begin another one.
-    pub fn tick(&mut self, now: Nanos) -> Result<(), String> {
-        let is_leaving = matches!(self.state, State::Leaving { .. });
-        let oldest = self.pings.front().map(|(_, asked)| *asked);
-        let oldest = oldest.or(is_leaving.then_some(self.sent));
-        let is_due = |since: Nanos| now - since >= ALIVE;
-        if self.state == State::Away {
-            return Ok(());
-        }
-        if oldest.is_some_and(is_due) && self.wants_to_hear() {
-            return Err(format!("it has not answered for {ALIVE}"));
-        }
-        if is_due(self.sent) {
-            self.ping(now, Asker::Bridge);
-        }
-        Ok(())
-    }
-
-    /// Whether bytes from the dispatcher are wanted now; if not, the serial line has to send first.
-    pub fn wants_to_hear(&self) -> bool {
-        !self.to_serial.is_full()
-    }
-
     /// What is to be written to the serial port now.
     pub fn to_serial(&mut self) -> &[u8] {
-        self.to_serial.to_write()
+        self.to_serial.next_bytes()
     }
 
     /// The port has taken this many bytes.
     pub fn wrote_to_serial(&mut self, count: usize) {
         self.to_serial.wrote(count);
-    }
-
-    /// What is to be written to the dispatcher now.
-    pub fn to_dispatcher(&mut self) -> &[u8] {
-        self.to_dispatcher.to_write()
-    }
-
-    /// The connection has taken this many bytes.
-    pub fn wrote_to_dispatcher(&mut self, now: Nanos, count: usize) {
-        self.sent = now;
-        self.to_dispatcher.wrote(count);
     }
 
     /// Bytes have arrived from the serial port, in any pieces.
@@ -250,20 +185,6 @@ impl AsciiBridge {
                 )),
             }
         }
-    }
-
-    /// Bytes have arrived from the dispatcher, in any pieces.
-    ///
-    /// # Errors
-    ///
-    /// The dispatcher does not let the client in now: close the connection, and begin another one after a pause.
-    pub fn from_dispatcher(&mut self, now: Nanos, mut bytes: &[u8]) -> Result<(), String> {
-        while let Some(cut) = self.from_dispatcher.next(&mut bytes) {
-            if let Cut::Line(line) = cut {
-                self.heard(now, &line)?;
-            }
-        }
-        Ok(())
     }
 
     /// The client has said a line.
@@ -377,7 +298,7 @@ impl AsciiBridge {
     }
 
     /// The dispatcher has said a line.
-    fn heard(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
+    fn obey(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
         if line == b"OK PING" {
             match self.pings.pop_front() {
                 Some((Asker::Client, _)) => self.pass(line),
@@ -426,8 +347,8 @@ impl AsciiBridge {
     /// Passes a line of the dispatcher on.
     fn pass(&mut self, line: &[u8]) {
         self.traffic.heard += 1;
-        if let Ok(Line::Values(values)) = parse(line)
-            && let Ok(items) = values.collect::<Result<Vec<_>, _>>()
+        if let Some(values) = line.strip_prefix(b"P ")
+            && let Ok(items) = Values::delivered(values).collect::<Result<Vec<_>, _>>()
         {
             self.to_serial.values(line, &items);
         } else {
@@ -451,5 +372,84 @@ impl AsciiBridge {
         if !self.to_serial.is_full() {
             self.to_serial.line(line);
         }
+    }
+}
+
+impl Speaker for AsciiBridge {
+    fn connected(&mut self, now: Nanos) {
+        self.from_dispatcher = Lines::default();
+        self.to_dispatcher.clear();
+        self.pings.clear();
+        self.sent = now;
+        self.heard = now;
+        self.state = match &self.client {
+            Some(client) => {
+                self.to_dispatcher.line(&client.line);
+                State::Introduced
+            }
+            None => State::Stranger,
+        };
+    }
+
+    fn disconnected(&mut self) -> bool {
+        let state = std::mem::replace(&mut self.state, State::Away);
+        if state == State::Here {
+            self.say(AWAY);
+        }
+        matches!(state, State::Leaving { .. })
+    }
+
+    fn is_here(&self) -> bool {
+        self.state == State::Here
+    }
+
+    fn deadline(&self) -> Nanos {
+        if self.state == State::Away {
+            return Nanos::MAX;
+        }
+        if self.wants_to_hear() {
+            self.sent.min(self.waits_since().unwrap_or(self.heard)) + ALIVE
+        } else {
+            self.sent + ALIVE
+        }
+    }
+
+    fn tick(&mut self, now: Nanos) -> Result<(), String> {
+        if self.state == State::Away {
+            return Ok(());
+        }
+        let is_due = |since: Nanos| now - since >= ALIVE;
+        let waits_since = self.waits_since();
+        let wants = self.wants_to_hear();
+        if wants && waits_since.is_some_and(is_due) {
+            return Err(format!("it has not answered for {ALIVE}"));
+        }
+        if is_due(self.sent) || wants && waits_since.is_none() && is_due(self.heard) {
+            self.ping(now, Asker::Bridge);
+        }
+        Ok(())
+    }
+
+    fn wants_to_hear(&self) -> bool {
+        !self.to_serial.is_full()
+    }
+
+    fn to_write(&mut self) -> &[u8] {
+        self.to_dispatcher.next_bytes()
+    }
+
+    fn wrote(&mut self, now: Nanos, count: usize) {
+        self.sent = now;
+        self.to_dispatcher.wrote(count);
+    }
+
+    fn hear(&mut self, now: Nanos, mut bytes: &[u8]) -> Result<(), String> {
+        self.heard = now;
+        while let Some(cut) = self.from_dispatcher.next(&mut bytes) {
+            if let Cut::Line(line) = cut {
+                self.obey(now, &line)?;
+            }
+        }
+        Ok(())
     }
 }

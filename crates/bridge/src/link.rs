@@ -7,8 +7,8 @@ use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{Address, Stream, is_for_later};
 
-use crate::ascii::AsciiBridge;
 use crate::dial::Dialler;
+use crate::speaker::Speaker;
 
 /// Its key in the poll set.
 pub(crate) const DISPATCHER: usize = 1;
@@ -89,9 +89,9 @@ impl Link {
     }
 
     /// When [`turn`](Self::turn) has something to do even if nothing arrives.
-    pub(crate) fn deadline(&self, bridge: &AsciiBridge) -> Nanos {
+    pub(crate) fn deadline(&self, speaker: &dyn Speaker) -> Nanos {
         if self.connection.is_some() {
-            bridge.deadline()
+            speaker.deadline()
         } else {
             self.dialler.deadline()
         }
@@ -101,16 +101,16 @@ impl Link {
     pub(crate) fn turn(
         &mut self,
         now: Nanos,
-        bridge: &mut AsciiBridge,
+        speaker: &mut dyn Speaker,
         set: &mut PollSet,
         news: &mut dyn FnMut(&str),
     ) -> io::Result<()> {
         let is_ready = |one: &tickbus_base::os::Ready| one.key == DISPATCHER && one.is_readable;
-        if set.ready().iter().any(is_ready) && bridge.wants_to_hear() {
-            self.read(now, bridge, set, news);
+        if set.ready().iter().any(is_ready) && speaker.wants_to_hear() {
+            self.read(now, speaker, set, news);
         }
-        if let Err(why) = bridge.tick(now) {
-            self.hang_up(now, &why, bridge, set, news);
+        if let Err(why) = speaker.tick(now) {
+            self.hang_up(now, &why, speaker, set, news);
         }
         if self.connection.is_some() {
             return Ok(());
@@ -122,7 +122,7 @@ impl Link {
                 if !self.is_refused {
                     self.tell_connected(news);
                 }
-                bridge.connected(now);
+                speaker.connected(now);
             }
             Some(Err(error)) => {
                 let why = format!("no dispatcher at {} ({error})", self.address);
@@ -135,7 +135,7 @@ impl Link {
     fn read(
         &mut self,
         now: Nanos,
-        bridge: &mut AsciiBridge,
+        speaker: &mut dyn Speaker,
         set: &mut PollSet,
         news: &mut dyn FnMut(&str),
     ) {
@@ -145,7 +145,7 @@ impl Link {
         let heard = match connection.stream.read(&mut self.buffer) {
             Ok(0) => Err("it closed the connection".to_owned()),
             Ok(count) => {
-                let heard = bridge.from_dispatcher(now, &self.buffer[..count]);
+                let heard = speaker.hear(now, &self.buffer[..count]);
                 self.is_refused |= heard.is_err();
                 heard
             }
@@ -153,8 +153,8 @@ impl Link {
             Err(error) => Err(error.to_string()),
         };
         if let Err(why) = heard {
-            self.hang_up(now, &why, bridge, set, news);
-        } else if self.is_refused && bridge.is_here() {
+            self.hang_up(now, &why, speaker, set, news);
+        } else if self.is_refused && speaker.is_here() {
             self.is_refused = false;
             self.tell_connected(news);
         }
@@ -164,7 +164,7 @@ impl Link {
     pub(crate) fn write(
         &mut self,
         now: Nanos,
-        bridge: &mut AsciiBridge,
+        speaker: &mut dyn Speaker,
         set: &mut PollSet,
         news: &mut dyn FnMut(&str),
     ) -> io::Result<()> {
@@ -172,23 +172,23 @@ impl Link {
             return Ok(());
         };
         let broken = loop {
-            let bytes = bridge.to_dispatcher();
+            let bytes = speaker.to_write();
             if bytes.is_empty() {
                 break None;
             }
             match connection.stream.write(bytes) {
                 Ok(0) => break None,
-                Ok(count) => bridge.wrote_to_dispatcher(now, count),
+                Ok(count) => speaker.wrote(now, count),
                 Err(error) if is_for_later(&error) => break None,
                 Err(error) => break Some(error.to_string()),
             }
         };
         if let Some(why) = broken {
-            self.hang_up(now, &why, bridge, set, news);
+            self.hang_up(now, &why, speaker, set, news);
             return Ok(());
         }
-        let is_blocked = !bridge.to_dispatcher().is_empty();
-        connection.watch(set, bridge.wants_to_hear(), is_blocked)
+        let is_blocked = !speaker.to_write().is_empty();
+        connection.watch(set, speaker.wants_to_hear(), is_blocked)
     }
 
     /// Closes the connection, without a word.
@@ -202,12 +202,12 @@ impl Link {
         &mut self,
         now: Nanos,
         why: &str,
-        bridge: &mut AsciiBridge,
+        speaker: &mut dyn Speaker,
         set: &mut PollSet,
         news: &mut dyn FnMut(&str),
     ) {
         self.close(set);
-        if !bridge.disconnected() {
+        if !speaker.disconnected() {
             self.dialler.pause(now);
             let why = format!("the dispatcher at {} is lost ({why})", self.address);
             self.tell_away(why, news);

@@ -65,7 +65,7 @@ impl Outbox {
     }
 
     /// What is to be sent now.
-    pub(crate) fn to_write(&mut self) -> &[u8] {
+    pub(crate) fn next_bytes(&mut self) -> &[u8] {
         if self.written == self.bytes.len() {
             self.bytes.clear();
             self.written = 0;
@@ -88,7 +88,7 @@ impl Outbox {
         &self.bytes[self.written..]
     }
 
-    /// The first `count` bytes of [`to_write`](Self::to_write) were sent.
+    /// The first `count` bytes of [`next_bytes`](Self::next_bytes) were sent.
     pub(crate) fn wrote(&mut self, count: usize) {
         self.written += count;
         if self.written > FULL {
@@ -136,11 +136,11 @@ mod tests {
             made += 1;
         }
         loop {
-            let count = outbox.to_write().len().min(7);
+            let count = outbox.next_bytes().len().min(7);
             if count == 0 {
                 break;
             }
-            sent.extend_from_slice(&outbox.to_write()[..count]);
+            sent.extend_from_slice(&outbox.next_bytes()[..count]);
             outbox.wrote(count);
         }
         let sent = String::from_utf8(sent).expect("text");
@@ -162,7 +162,7 @@ mod tests {
         outbox.newest(&all);
         let mut read = Vec::new();
         loop {
-            let text = String::from_utf8(outbox.to_write().to_vec()).expect("text");
+            let text = String::from_utf8(outbox.next_bytes().to_vec()).expect("text");
             if text.is_empty() {
                 break;
             }
@@ -175,7 +175,7 @@ mod tests {
         }
         assert_eq!(
             read,
-            Vec::from_iter((1..=256).map(|i| format!("AI{i}={i}")))
+            (1..=256).map(|i| format!("AI{i}={i}")).collect::<Vec<_>>()
         );
     }
 }

@@ -4,7 +4,7 @@
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_bridge::{AsciiBridge, LineEnd};
+use tickbus_bridge::{AsciiBridge, LineEnd, Speaker as _};
 use tickbus_dispatcher::{Dispatcher, Patch, Settings};
 
 /// A bridge, a dispatcher, and clients that are connected with it directly.
@@ -76,16 +76,16 @@ impl Lab {
                 continue;
             }
             let seat = self.seat?;
-            let said = self.bridge.to_dispatcher().to_vec();
+            let said = self.bridge.to_write().to_vec();
             if !said.is_empty() {
-                self.bridge.wrote_to_dispatcher(self.now, said.len());
+                self.bridge.wrote(self.now, said.len());
                 self.dispatcher.arrived(self.now, seat, &said);
                 continue;
             }
             let heard = self.dispatcher.to_write(seat).to_vec();
             if !heard.is_empty() && self.bridge.wants_to_hear() {
                 self.dispatcher.wrote(seat, heard.len());
-                if let Err(why) = self.bridge.from_dispatcher(self.now, &heard) {
+                if let Err(why) = self.bridge.hear(self.now, &heard) {
                     self.cut();
                     return Some(why);
                 }
@@ -126,7 +126,7 @@ impl Lab {
     /// Time passes, and everyone looks at it.
     fn pass(&mut self, seconds: i64) -> Result<(), String> {
         for _ in 0..seconds {
-            self.now = self.now + Nanos::from_secs(1);
+            self.now += Nanos::from_secs(1);
             self.dispatcher.tick(self.now);
             self.settle();
             self.bridge.tick(self.now)?;
@@ -215,6 +215,16 @@ fn a_dispatcher_that_does_not_answer_is_given_up() {
     lab.seat = None;
     let why = lab.pass(60).expect_err("it does not answer");
     assert!(why.contains("20s"), "{why}");
+    // Nor is one that is only said values to.
+    let (mut lab, _) = patched();
+    lab.seat = None;
+    let given_up = (0..60).any(|value| {
+        lab.serial(&format!("P Q1={value}\r"));
+        let count = lab.bridge.to_write().len();
+        lab.bridge.wrote(lab.now, count);
+        lab.pass(1).is_err()
+    });
+    assert!(given_up);
     // One that need not answer, since the serial line is slow, is not blamed.
     let (mut lab, _) = patched();
     while lab.bridge.wants_to_hear() {
@@ -263,8 +273,8 @@ fn requests_that_may_not_have_arrived_are_sent_again() {
     let (mut lab, _) = patched();
     // It was written, but the connection broke before it arrived; a second one waits until there is a dispatcher.
     lab.bridge.from_serial(lab.now, b"CONNECT I2:PUMP:Q2\r");
-    let count = lab.bridge.to_dispatcher().len();
-    lab.bridge.wrote_to_dispatcher(lab.now, count);
+    let count = lab.bridge.to_write().len();
+    lab.bridge.wrote(lab.now, count);
     lab.restart();
     assert_eq!(lab.serial("CONNECT Q2:PUMP:I2\r"), [AWAY]);
     let pump = pump_again(&mut lab);
@@ -294,7 +304,7 @@ fn a_name_that_is_still_taken_is_asked_for_again() {
     let why = lab.settle().expect("it is taken");
     assert!(why.contains("ERR 409"), "{why}");
     assert!(lab.told().is_empty(), "it did not ask");
-    lab.now = lab.now + Nanos::from_secs(60);
+    lab.now += Nanos::from_secs(60);
     lab.dispatcher.tick(lab.now);
     for seat in 0..8 {
         if lab.dispatcher.is_closing(seat) {

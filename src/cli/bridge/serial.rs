@@ -1,8 +1,8 @@
 //! `tickbus bridge serial DEVICE`: an ASCII driver at a serial line as a client of the dispatcher.
 
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
+use super::say;
 use crate::cli::Outcome;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::{Monotonic, Stop};
@@ -61,25 +61,11 @@ fn address(text: &str) -> Result<Address, String> {
     Ok(address)
 }
 
-/// Prints a line. If the reader of stdout is gone, the bridge goes on.
-fn say(line: &str) {
-    let mut out = io::stdout().lock();
-    let _ = writeln!(out, "bridge: {line}").and_then(|()| out.flush());
-}
-
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
     let failed = |reason: String| {
         say(&format!("failed reason={reason:?}"));
         Outcome::BusFailed
     };
-    let stop = Stop::new();
-    let caught = ctrlc::set_handler({
-        let stop = stop.clone();
-        move || stop.stop()
-    });
-    if let Err(error) = caught {
-        return failed(format!("Ctrl-C cannot be caught: {error}"));
-    }
     let device = match (&arguments.pty, &arguments.device) {
         (Some(link), _) => match VirtualPort::new(link) {
             Ok(port) => Device::Virtual(port),
@@ -114,7 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     });
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
-        stop: &stop,
+        stop,
         news: &mut say,
     };
     if let Err(reason) = carry(&mut bridge, device, &arguments.dispatcher, hosting) {

@@ -92,7 +92,7 @@ impl Map {
         let count = |kind: Kind| {
             let own = self.channels.iter().map(|entry| entry.channel);
             let own = own.filter(|channel| channel.kind == kind);
-            own.map(|channel| channel.number.max(1)).max().unwrap_or(0)
+            own.map(|channel| channel.number).max().unwrap_or(0)
         };
         let [q, i, aq, ai] = Kind::ALL.map(count);
         Counts::new(q, i, aq, ai)
@@ -307,13 +307,9 @@ fn read_name(value: &Value<'_>) -> Option<Channel> {
         value.wrong(format!("\"{}\" is no channel", shown(text)), right);
         return None;
     };
-    let first = u16::from(!channel.kind.is_analog());
-    if !(first..=MOST_CHANNELS).contains(&channel.number) {
+    if !(1..=MOST_CHANNELS).contains(&channel.number) {
         let what = format!("there is no channel {channel}");
-        value.wrong(
-            what,
-            format!("write a number from {first} to {MOST_CHANNELS}"),
-        );
+        value.wrong(what, format!("write a number from 1 to {MOST_CHANNELS}"));
         return None;
     }
     Some(channel)

@@ -1,13 +1,15 @@
 //! Messages in, messages out, and a client of the dispatcher between them; no I/O.
 
+use std::collections::VecDeque;
+
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::shown;
-use tickbus_dispatcher::grammar::{Line, parse};
+use tickbus_dispatcher::client::{Client, Event, KEEP_ALIVE, Profile};
 use tickbus_dispatcher::{Channel, Number};
 
 use super::map_file::{Entry, Format, Map};
-use crate::ascii::{AsciiBridge, LineEnd};
-use crate::lines::{Cut, Lines};
+use crate::speaker::Speaker;
 
 /// Above this voltage a digital channel is on.
 const ON: f64 = 8.0;
@@ -31,40 +33,40 @@ pub struct Traffic {
     pub overtaken: u64,
 }
 
+/// So many messages may wait to be published; from then on only the newest of each topic.
+const QUEUE: usize = 256;
+
 /// A client of the dispatcher whose values are messages.
 #[derive(Debug)]
 pub struct Mapping {
     map: Map,
-    client: AsciiBridge,
-    heard: Lines,
-    /// By entries: what waits to be published, and how many messages were no value.
-    states: Vec<State>,
+    client: Client,
+    is_connected: bool,
+    /// Messages to be published, with their entries.
+    waiting: VecDeque<(usize, String)>,
+    /// By entries: how many messages were no value.
+    refused: Vec<u64>,
+    /// What an operator should know.
+    news: Vec<String>,
     traffic: Traffic,
-}
-
-#[derive(Clone, Debug, Default)]
-struct State {
-    waiting: Option<String>,
-    refused: u64,
 }
 
 impl Mapping {
     /// What `map` says.
-    pub fn new(map: Map) -> Self {
-        let mut client = AsciiBridge::new(LineEnd::Lf);
-        let (keyword, name) = (map.role.keyword(), &map.name);
-        let mut line = format!("{keyword} {name}");
-        for kind in tickbus_dispatcher::Kind::ALL {
-            line += &format!(" {}{}", kind.letters(), map.counts().of(kind));
-        }
-        client.from_serial(Nanos::ZERO, format!("{line}\n").as_bytes());
-        Self {
-            states: vec![State::default(); map.channels.len()],
-            map,
-            client,
-            heard: Lines::default(),
+    ///
+    /// # Errors
+    ///
+    /// No dispatcher can take such a client.
+    pub fn new(map: Map) -> Result<Self, Mistake> {
+        Ok(Self {
+            client: client(&map)?,
+            is_connected: false,
+            waiting: VecDeque::new(),
+            refused: vec![0; map.channels.len()],
+            news: Vec::new(),
             traffic: Traffic::default(),
-        }
+            map,
+        })
     }
 
     /// What it does.
@@ -72,118 +74,160 @@ impl Mapping {
         &self.map
     }
 
-    /// The client of the dispatcher.
-    pub fn client(&mut self) -> &mut AsciiBridge {
-        &mut self.client
-    }
-
     /// What went through so far.
     pub fn traffic(&self) -> Traffic {
-        let overtaken = self.traffic.overtaken + self.client.traffic().overtaken;
-        Traffic {
-            overtaken,
-            ..self.traffic
-        }
+        self.traffic
     }
 
-    /// The broker is gone. Close the connection with the dispatcher: to the others this client has left.
+    /// What an operator should know, and does not yet.
+    pub fn news(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.news)
+    }
+
+    /// The broker is gone. Close the connection with the dispatcher: to the others this client has left. Its values are
+    /// forgotten, since they may have changed when the broker is back.
     pub fn broker_lost(&mut self) {
-        self.client.unplugged();
-        for state in &mut self.states {
-            state.waiting = None;
+        // One like this was made before.
+        if let Ok(client) = client(&self.map) {
+            self.client = client;
         }
+        self.is_connected = false;
+        self.waiting.clear();
     }
 
-    /// A message has come from the broker. Returns what an operator should know of it.
-    pub fn message(&mut self, now: Nanos, topic: &str, payload: &[u8]) -> Vec<String> {
-        let mut news = Vec::new();
-        for (entry, state) in self.map.channels.iter().zip(&mut self.states) {
+    /// A message has come from the broker.
+    pub fn message(&mut self, topic: &str, payload: &[u8]) {
+        for (entry, refused) in self.map.channels.iter().zip(&mut self.refused) {
             if entry.topic != topic || !entry.channel.kind.is_output() {
                 continue;
             }
             let channel = entry.channel;
             if let Some(number) = entry.format.value(payload) {
                 self.traffic.received += 1;
-                let line = format!("P {channel}={number}\n");
-                self.client.from_serial(now, line.as_bytes());
+                self.client.set(channel, number);
                 continue;
             }
             self.traffic.refused += 1;
-            state.refused += 1;
+            *refused += 1;
             // Who sends one such message sends more.
-            if state.refused.is_power_of_two() {
+            if refused.is_power_of_two() {
                 let text = shown(&String::from_utf8_lossy(payload));
-                let (right, count) = (entry.format.right(), state.refused);
-                news.push(format!(
-                    "\"{text}\" from the topic \"{topic}\" is no value of {channel}, and was left out ({count} so far); \
+                let right = entry.format.right();
+                self.news.push(format!(
+                    "\"{text}\" from the topic \"{topic}\" is no value of {channel}, and was left out ({refused} so far); \
                      send {right}"
                 ));
             }
         }
-        news
     }
 
-    /// Publishes what the dispatcher has sent. Returns what an operator should know of it.
-    pub fn publish(&mut self, publish: &mut Publish<'_>) -> Vec<String> {
-        let mut news = Vec::new();
-        for (entry, state) in self.map.channels.iter().zip(&mut self.states) {
-            if let Some(payload) = state.waiting.take_if(|payload| publish(entry, payload)) {
-                drop(payload);
-                self.traffic.published += 1;
-            }
+    /// Publishes what the dispatcher has sent, as long as the broker takes it.
+    pub fn publish(&mut self, publish: &mut Publish<'_>) {
+        while let Some((at, payload)) = self.waiting.front()
+            && publish(&self.map.channels[*at], payload)
+        {
+            self.waiting.pop_front();
+            self.traffic.published += 1;
         }
-        let bytes = self.client.to_serial().to_vec();
-        self.client.wrote_to_serial(bytes.len());
-        let mut bytes = &*bytes;
-        while let Some(cut) = self.heard.next(&mut bytes) {
-            let Cut::Line(line) = cut else {
-                continue;
-            };
-            match parse(&line) {
-                Ok(Line::Values(values)) => {
-                    for (channel, number) in values.flatten() {
-                        self.value(channel, number, publish);
+    }
+}
+
+/// The client that a map describes.
+fn client(map: &Map) -> Result<Client, Mistake> {
+    let profile = Profile {
+        role: map.role,
+        name: map.name.clone(),
+        counts: map.counts(),
+        cables: Vec::new(),
+    };
+    Client::new(profile, KEEP_ALIVE)
+}
+
+impl Speaker for Mapping {
+    fn connected(&mut self, now: Nanos) {
+        self.client.connected(now);
+        self.is_connected = true;
+    }
+
+    fn disconnected(&mut self) -> bool {
+        self.is_connected = false;
+        false
+    }
+
+    fn is_here(&self) -> bool {
+        self.is_connected && self.client.is_identified()
+    }
+
+    fn wants_to_hear(&self) -> bool {
+        true
+    }
+
+    fn hear(&mut self, now: Nanos, bytes: &[u8]) -> Result<(), String> {
+        let (map, waiting) = (&self.map, &mut self.waiting);
+        let (traffic, news) = (&mut self.traffic, &mut self.news);
+        let mut put = |channel: Channel, number: Option<Number>| {
+            for (at, entry) in map.channels.iter().enumerate() {
+                if entry.channel == channel
+                    && let Some(payload) =
+                        number.map_or(Some(String::new()), |it| entry.format.payload(&it))
+                {
+                    let is_full = waiting.len() >= QUEUE;
+                    let older = waiting
+                        .iter_mut()
+                        .rev()
+                        .find(|older| is_full && older.0 == at);
+                    if let Some(older) = older {
+                        older.1 = payload;
+                        traffic.overtaken += 1;
+                    } else {
+                        waiting.push_back((at, payload));
                     }
                 }
-                _ if line.starts_with(b"ERR ") && !line.starts_with(b"ERR 503") => {
-                    let text = String::from_utf8_lossy(&line);
-                    news.push(format!("the dispatcher answers: {}", shown(&text)));
-                }
-                // The list of devices.
-                _ => {}
             }
-        }
-        news
+        };
+        let heard = self.client.hear(now, bytes, &mut |event| match event {
+            Event::Value(channel, number) => put(channel, Some(number)),
+            Event::Lost(channel) => put(channel, None),
+            Event::Refused { code, text, .. } => {
+                news.push(format!("the dispatcher answers ERR {code} {text}"));
+            }
+            _ => {}
+        });
+        heard.map_err(|error| error.to_string())
     }
 
-    fn value(&mut self, channel: Channel, number: Number, publish: &mut Publish<'_>) {
-        for (entry, state) in self.map.channels.iter().zip(&mut self.states) {
-            if entry.channel != channel {
-                continue;
-            }
-            let Some(payload) = entry.format.payload(&number) else {
-                continue;
-            };
-            if state.waiting.is_none() && publish(entry, &payload) {
-                self.traffic.published += 1;
-            } else if state.waiting.replace(payload).is_some() {
-                self.traffic.overtaken += 1;
-            }
+    fn tick(&mut self, now: Nanos) -> Result<(), String> {
+        if !self.is_connected {
+            return Ok(());
         }
+        self.client.turn(now);
+        self.client.check(now).map_err(|error| error.to_string())
+    }
+
+    fn deadline(&self) -> Nanos {
+        self.client.deadline()
+    }
+
+    fn to_write(&mut self) -> &[u8] {
+        self.client.to_write()
+    }
+
+    fn wrote(&mut self, now: Nanos, count: usize) {
+        self.client.wrote(now, count);
     }
 }
 
 impl Format {
     /// A value as a message; `None` between off and on, and for what no number can say.
     fn payload(&self, number: &Number) -> Option<String> {
-        let value = || number.as_str().parse::<f64>().ok();
+        let value = || number.to_f64();
         match self {
             Self::Plain => Some(number.as_str().to_owned()),
             Self::Scaled { factor, offset } => {
-                let scaled = decimal(value()? * factor + offset)?;
+                let scaled = decimal(value() * factor + offset)?;
                 Some(scaled.as_str().to_owned())
             }
-            Self::Words { on, off } => match value()? {
+            Self::Words { on, off } => match value() {
                 volts if volts > ON => Some(on.clone()),
                 volts if volts < OFF => Some(off.clone()),
                 _ => None,
@@ -196,7 +240,7 @@ impl Format {
         let text = std::str::from_utf8(payload).ok()?.trim();
         let number = || text.parse::<f64>().ok();
         match self {
-            Self::Plain => Number::parse(text.as_bytes()).or_else(|| decimal(number()?)),
+            Self::Plain => Number::parse(text.as_bytes()).or_else(|| Number::of(number()?)),
             Self::Scaled { factor, offset } => decimal(number()? * factor + offset),
             Self::Words { on, .. } if text == on => Number::parse(b"24"),
             Self::Words { off, .. } if text == off => Some(Number::ZERO),

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver, SyncSender, TryRecvError};
+use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::thread::JoinHandle;
 
 use rumqttc::{
@@ -15,6 +15,7 @@ use tickbus_fieldbus::tcp::Host;
 
 use super::mapping::Mapping;
 use crate::link::Link;
+use crate::speaker::Speaker as _;
 
 /// What the topic of the state says.
 const ONLINE: &str = "online";
@@ -97,38 +98,35 @@ struct Between<'b, 'h> {
 impl Between<'_, '_> {
     fn turn(&mut self) -> io::Result<()> {
         let deadline = if self.is_connected {
-            self.link.deadline(self.mapping.client())
+            self.link.deadline(self.mapping)
         } else {
             Nanos::MAX
         };
         self.set.wait(&*self.hosting.clock, deadline)?;
         let now = self.hosting.clock.now();
         while let Some(heard) = self.broker.heard() {
-            self.obey(now, heard);
+            self.obey(heard);
         }
         if !self.is_connected {
             return Ok(());
         }
         let news = &mut *self.hosting.news;
-        let client = self.mapping.client();
-        self.link.turn(now, client, &mut self.set, news)?;
-        let is_here = client.is_here();
-        self.set_online(is_here);
+        self.link.turn(now, self.mapping, &mut self.set, news)?;
+        self.set_online(self.mapping.is_here());
         let broker = &self.broker.client;
-        let told = self.mapping.publish(&mut |entry, payload| {
+        self.mapping.publish(&mut |entry, payload| {
             let topic = entry.topic.clone();
             let sent = broker.try_publish(topic, QoS::AtLeastOnce, entry.retain, payload);
             sent.is_ok()
         });
         let news = &mut *self.hosting.news;
-        for line in told {
+        for line in self.mapping.news() {
             news(&line);
         }
-        let client = self.mapping.client();
-        self.link.write(now, client, &mut self.set, news)
+        self.link.write(now, self.mapping, &mut self.set, news)
     }
 
-    fn obey(&mut self, now: Nanos, heard: Heard) {
+    fn obey(&mut self, heard: Heard) {
         let address = &self.mapping.map().broker;
         match heard {
             Heard::Connected => {
@@ -160,9 +158,7 @@ impl Between<'_, '_> {
                 }
             }
             Heard::Message(topic, payload) => {
-                for line in self.mapping.message(now, &topic, &payload) {
-                    (self.hosting.news)(&line);
-                }
+                self.mapping.message(&topic, &payload);
             }
             Heard::Refused(at) => {
                 let topic = topics(self.mapping).nth(at).unwrap_or_default();
@@ -243,10 +239,7 @@ impl Broker {
     }
 
     fn heard(&self) -> Option<Heard> {
-        match self.receiver.try_recv() {
-            Ok(heard) => Some(heard),
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => None,
-        }
+        self.receiver.try_recv().ok()
     }
 
     fn subscribe(&self, mapping: &Mapping) {

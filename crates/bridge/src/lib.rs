@@ -5,8 +5,10 @@
 //! docs/dispatcher.md has a section for users.
 
 mod ascii;
+#[cfg(any(unix, feature = "mqtt"))]
 mod dial;
 mod lines;
+#[cfg(any(unix, feature = "mqtt"))]
 mod link;
 pub mod mqtt;
 mod outbox;

@@ -24,6 +24,7 @@
 //! | [`driver_cfg`] | what a driver.cfg says, with the list of bus kinds |
 //! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`dispatcher`] | the dispatcher of a virtual laboratory: clients, patch, routing |
+//! | [`bridge`] | bridges to it: serial lines, MQTT |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
@@ -42,6 +43,7 @@ mod jni;
 
 pub use tickbus_axis as axis;
 pub use tickbus_base::{Mistake, os, statistics, time, toml_text};
+pub use tickbus_bridge as bridge;
 pub use tickbus_dispatcher as dispatcher;
 pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;

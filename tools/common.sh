@@ -31,7 +31,7 @@ at_least() {
 }
 
 # What the zip has beyond a plain build.
-PRODUCT_FEATURES=opcua,script
+PRODUCT_FEATURES=opcua,script,mqtt
 
 # The project's version, from Cargo.toml.
 version() {

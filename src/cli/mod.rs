@@ -3,6 +3,7 @@
 //! One file per subcommand, with its arguments and `run`, which returns an `Outcome`.
 
 mod axes;
+mod bridge;
 mod check;
 mod dispatch;
 mod export;
@@ -36,6 +37,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Axes(axes::Arguments),
+    Bridge(bridge::Arguments),
     Check(check::Arguments),
     Dispatch(dispatch::Arguments),
     Export(export::Arguments),
@@ -88,6 +90,7 @@ pub fn main() -> ExitCode {
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),
+        Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Dispatch(arguments) => dispatch::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

@@ -158,6 +158,11 @@ impl Counts {
         Some(usize::from(place))
     }
 
+    /// Whether a client has this channel.
+    pub fn has(self, channel: Channel) -> bool {
+        self.place(channel).is_some()
+    }
+
     /// Every channel that has a place among the outputs or the inputs, in the order of the places.
     pub(crate) fn channels(self, outputs: bool) -> impl Iterator<Item = Channel> {
         let kinds = Kind::ALL

@@ -172,7 +172,7 @@ impl<'a> Values<'a> {
     }
 
     /// The values in a line from the dispatcher, behind its keyword.
-    pub(crate) const fn delivered(text: &'a [u8]) -> Self {
+    pub const fn delivered(text: &'a [u8]) -> Self {
         Self {
             words: Words(text),
             may_be_lost: true,

@@ -1,13 +1,13 @@
 //! A serial port without hardware.
 
 use std::fs::File;
-use std::io::{self, Read as _, Write};
+use std::io::{self, Read, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fd::OwnedFd;
-use rustix::fs::{Mode, OFlags, open};
+use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
+use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
@@ -26,18 +26,36 @@ impl PseudoTerminal {
     ///
     /// The system has no more.
     pub fn open() -> io::Result<(Self, PathBuf)> {
-        let far = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
+        // A program that is started from here would keep the line from hanging up.
+        #[cfg(target_os = "linux")]
+        let flags = flags | OpenptFlags::CLOEXEC;
+        let far = openpt(flags)?;
         grantpt(&far)?;
         unlockpt(&far)?;
         let name = ptsname(&far, Vec::new())?.into_string();
         let name = name.map_err(|_| io::ErrorKind::InvalidData)?;
-        let near = open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())?;
+        let near = open(
+            &*name,
+            OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC,
+            Mode::empty(),
+        )?;
         // By default a terminal echoes its input.
         let mut attributes = tcgetattr(&near)?;
         attributes.make_raw();
         tcsetattr(&near, OptionalActions::Now, &attributes)?;
         let far = File::from(far);
         Ok((Self { far, _near: near }, name.into()))
+    }
+
+    /// The same, whose reads and writes never block; a [`PollSet`](crate::os::PollSet) can wait for it.
+    ///
+    /// # Errors
+    ///
+    /// The system refuses that.
+    pub fn never_blocking(self) -> io::Result<Self> {
+        fcntl_setfl(&self.far, OFlags::NONBLOCK)?;
+        Ok(self)
     }
 
     /// Reads what arrives within `patience`; 0 bytes if nothing does.
@@ -55,6 +73,18 @@ impl PseudoTerminal {
             return Ok(0);
         }
         self.far.read(bytes)
+    }
+}
+
+impl Read for PseudoTerminal {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.far.read(bytes)
+    }
+}
+
+impl AsFd for PseudoTerminal {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.far.as_fd()
     }
 }
 

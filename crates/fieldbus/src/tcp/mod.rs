@@ -12,7 +12,7 @@ mod stream;
 use super::BusError;
 
 pub use address::{Address, Host};
-pub use connect::connect;
+pub use connect::{connect, reach};
 pub use dial::{Call, Caller, Stream, dial};
 pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;

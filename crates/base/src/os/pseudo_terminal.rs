@@ -40,6 +40,11 @@ impl PseudoTerminal {
         Ok((Self { far, _near: near }, name.into()))
     }
 
+    /// The far end itself.
+    pub(super) fn far(&self) -> &File {
+        &self.far
+    }
+
     /// Reads what arrives within `patience`; 0 bytes if nothing does.
     ///
     /// # Errors

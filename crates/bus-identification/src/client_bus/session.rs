@@ -147,6 +147,8 @@ pub(super) struct Session<'a> {
     /// When it last looked at what is due.
     looked: Nanos,
     skipped: u64,
+    /// What the line says while the reader answers.
+    running: String,
 }
 
 impl<'a> Session<'a> {
@@ -173,6 +175,7 @@ impl<'a> Session<'a> {
             pace: Pace::new(now, cycle),
             looked: now,
             skipped: 0,
+            running: format!("the reader on {} answers", options.line.device),
         }
     }
 
@@ -281,7 +284,7 @@ impl<'a> Session<'a> {
         } else if std::mem::take(&mut station.is_left) {
             port.plc_state(index, now, PlcState::Run);
         }
-        port.running(&format!("the reader on {device} answers"));
+        port.running(&self.running);
         port.received(index, now, &station.frame);
         if let Some(receipt) = station.receipt.take() {
             port.sent(&receipt);

@@ -3,6 +3,7 @@
 #![allow(
     missing_docs,
     clippy::float_cmp,
+    clippy::format_push_string,
     reason = "tests; the values are small whole numbers"
 )]
 

@@ -28,10 +28,6 @@ import tickbus.identification.PalletRecord.Piece;
 @Tag("native")
 @DisabledOnOs(OS.WINDOWS)
 class IdentificationHeadTest {
-    private static final String[] CONTROLLER = {"%QB0", "%QB1", "%QW2", "%QL4", "%QL12", "%QL20", "%IB0", "%IB1", "%IX2.0",
-        "%IB3", "%IL4", "%IL12", "%IL20"};
-    private static final String[] MACHINE = {"%IX0.0", "%IL8", "%IL16", "%IL24", "%QX0.0", "%QB1", "%QL8", "%QL16", "%QL24"};
-
     @TempDir
     Path directory;
 
@@ -47,19 +43,24 @@ class IdentificationHeadTest {
         }
     }
 
-    /** A driver with these signals, whose names are their addresses. */
-    private Tickbus open(String kind, String device, String more, String... addresses) throws IOException {
-        StringBuilder text = new StringBuilder("[driver]\nid = 1\nname = \"" + kind + "\"\n[fieldbus]\nkind = \"" + kind
-            + "\"\ndevice = \"" + device + directory.resolve("reader") + "\"\nreconnect = [\"10ms\"]\n" + more + "\n");
+    /** A controller with these signals, whose names are their addresses. */
+    private Tickbus openController(String... addresses) throws IOException {
+        StringBuilder text = new StringBuilder("[driver]\nid = 2\nname = \"few\"\n[fieldbus]\nkind = \"ivi-client\"\n"
+            + "role = \"controller\"\nreconnect = [\"10ms\"]\ndevice = \"" + directory.resolve("reader") + "\"\n");
         for (String address : addresses) {
             text.append("[[signal]]\nname = \"").append(address).append("\"\naddress = \"").append(address).append("\"\n");
         }
-        return Tickbus.open(Files.writeString(directory.resolve(kind + ".cfg"), text));
+        return Tickbus.open(Files.writeString(directory.resolve("few.cfg"), text));
     }
 
+    /** Opens both ends as docs/identification.md has them. */
     private void openBoth() throws IOException {
-        machine = open("ivi-reader", "pty:", "", MACHINE);
-        controller = open("ivi-client", "", "role = \"controller\"", CONTROLLER);
+        String docs = Files.readString(Path.of(System.getProperty("tickbus.root"), "docs/identification.md"));
+        String[] parts = docs.replace("/tmp/reader", directory.resolve("reader").toString()).split("```toml\\R|```\\R");
+        machine = Tickbus.open(Files.writeString(directory.resolve("machine.cfg"), parts[1]));
+        // The default is to try again after a second.
+        String client = parts[3].replace("[fieldbus]", "[fieldbus]\nreconnect = [\"10ms\"]");
+        controller = Tickbus.open(Files.writeString(directory.resolve("controller.cfg"), client));
     }
 
     private void until(BooleanSupplier reached) {
@@ -75,19 +76,19 @@ class IdentificationHeadTest {
     /** The machine lets a pallet arrive. */
     private void arrive(byte[] octets) {
         ByteBuffer padded = ByteBuffer.wrap(Arrays.copyOf(octets, 24));
-        for (String address : new String[] {"%IL8", "%IL16", "%IL24"}) {
-            machine.signal(address).setLong(padded.getLong());
+        for (String name : new String[] {"brings 0", "brings 8", "brings 16"}) {
+            machine.signal(name).setLong(padded.getLong());
         }
-        machine.signal("%IX0.0").setBoolean(true);
+        machine.signal("pallet there").setBoolean(true);
     }
 
     /** The machine lets the pallet leave; returns what its carrier holds. */
     private byte[] leave() {
-        machine.signal("%IX0.0").setBoolean(false);
-        until(() -> !machine.signal("%QX0.0").getBoolean());
+        machine.signal("pallet there").setBoolean(false);
+        until(() -> !machine.signal("pallet taken").getBoolean());
         ByteBuffer octets = ByteBuffer.allocate(24);
-        for (String address : new String[] {"%QL8", "%QL16", "%QL24"}) {
-            octets.putLong(machine.signal(address).getLong());
+        for (String name : new String[] {"holds 0", "holds 8", "holds 16"}) {
+            octets.putLong(machine.signal(name).getLong());
         }
         return octets.array();
     }
@@ -127,14 +128,15 @@ class IdentificationHeadTest {
         head.readPallet();
         until(head::isDone);
         assertEquals(changed, head.pallet());
-        assertEquals(1, machine.signal("%QB1").get(), "writes");
+        assertEquals(1, machine.signal("writes").get());
     }
 
     @Test
     void octetsGoToAnyAddressAndUnsignedSignalsOfAnyWidth() throws IOException {
-        machine = open("ivi-reader", "pty:", "", MACHINE);
-        controller = open("ivi-client", "", "role = \"controller\"", "%QB0", "%QB1", "%QW2", "%QB4", "%QD5", "%IB0", "%IB1",
-            "%IX2.0", "%IB3", "%IW4", "%IB6", "%ID7");
+        openBoth();
+        controller.close();
+        controller = openController("%QB0", "%QB1", "%QW2", "%QB4", "%QD5", "%IB0", "%IB1", "%IX2.0", "%IB3", "%IW4", "%IB6",
+            "%ID7");
         IdentificationHead head = new IdentificationHead(controller);
         arrive(new byte[] {0, 1, 2, 3, 4, 5, 6, 7, 8, (byte) 0xFF});
         until(head::isPresent);
@@ -151,7 +153,7 @@ class IdentificationHeadTest {
 
     @Test
     void aSignalThatIsNotThereIsNamed() throws IOException {
-        controller = open("ivi-client", "", "role = \"controller\"", Arrays.copyOfRange(CONTROLLER, 1, 13));
+        controller = openController("%QB1", "%QW2", "%IB0", "%IB1", "%IX2.0", "%IB3");
         String told = assertThrows(IllegalArgumentException.class, () -> new IdentificationHead(controller)).getMessage();
         assertTrue(told.contains("needs a signal at %QB0"), told);
     }

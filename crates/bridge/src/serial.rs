@@ -1,11 +1,9 @@
 //! The bridge on a serial port, or on a virtual one.
 
-use std::fs;
 use std::io;
-use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
-use tickbus_base::os::{PollSet, PseudoTerminal, Ready, SerialSettings};
+use tickbus_base::os::{LinkedTerminal, PollSet, Ready, SerialSettings};
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::BusError;
 use tickbus_fieldbus::serial::{gone, open};
@@ -33,7 +31,7 @@ pub enum Device {
 #[derive(Debug)]
 pub struct VirtualPort {
     link: PathBuf,
-    port: Option<PseudoTerminal>,
+    port: Option<LinkedTerminal>,
 }
 
 impl VirtualPort {
@@ -43,25 +41,10 @@ impl VirtualPort {
     ///
     /// There is a file of this name that is not a link to a virtual port, or the system has no more ports.
     pub fn new(link: &Path) -> io::Result<Self> {
-        let (port, near) = PseudoTerminal::open()?;
-        match fs::read_link(link) {
-            // Of a bridge that was killed.
-            Ok(old) if old.starts_with("/dev/pts") => fs::remove_file(link)?,
-            Ok(_) => return Err(io::ErrorKind::AlreadyExists.into()),
-            Err(_) => {}
-        }
-        symlink(near, link)?;
         Ok(Self {
             link: link.to_owned(),
-            port: Some(port.never_blocking()?),
+            port: Some(LinkedTerminal::open(link)?),
         })
-    }
-}
-
-impl Drop for VirtualPort {
-    fn drop(&mut self) {
-        // If it is gone, that is as well.
-        let _ = fs::remove_file(&self.link);
     }
 }
 

@@ -7,6 +7,7 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_bus_dispatcher as dispatcher;
 use tickbus_bus_hilscher as hilscher;
+use tickbus_bus_identification as identification;
 use tickbus_bus_interbus as interbus;
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
@@ -127,6 +128,10 @@ kinds! {
     HilscherCifx(hilscher::cifx::Options),
     /// `kind = "interbus-ddi"`: an INTERBUS controller board.
     InterbusDdi(interbus::Options),
+    /// `kind = "ivi-client"`: asks a reader of code carriers.
+    IviClient(identification::ClientOptions),
+    /// `kind = "ivi-reader"`: a simulated reader of code carriers.
+    IviReader(identification::ReaderOptions),
     /// `kind = "sdsp"`: a client of a run on virtual time.
     Sdsp(sdsp::Options),
     /// `kind = "dispatcher"`: a client of a virtual laboratory.

@@ -1,13 +1,13 @@
 //! A serial port without hardware.
 
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Read as _, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
-use rustix::fs::{Mode, OFlags, fcntl_setfl, open};
+use rustix::fd::OwnedFd;
+use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
@@ -48,14 +48,9 @@ impl PseudoTerminal {
         Ok((Self { far, _near: near }, name.into()))
     }
 
-    /// The same, whose reads and writes never block; a [`PollSet`](crate::os::PollSet) can wait for it.
-    ///
-    /// # Errors
-    ///
-    /// The system refuses that.
-    pub fn never_blocking(self) -> io::Result<Self> {
-        fcntl_setfl(&self.far, OFlags::NONBLOCK)?;
-        Ok(self)
+    /// The far end itself.
+    pub(super) fn far(&self) -> &File {
+        &self.far
     }
 
     /// Reads what arrives within `patience`; 0 bytes if nothing does.
@@ -73,18 +68,6 @@ impl PseudoTerminal {
             return Ok(0);
         }
         self.far.read(bytes)
-    }
-}
-
-impl Read for PseudoTerminal {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.far.read(bytes)
-    }
-}
-
-impl AsFd for PseudoTerminal {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.far.as_fd()
     }
 }
 

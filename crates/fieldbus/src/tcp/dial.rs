@@ -8,7 +8,7 @@ use rustix::fd::AsFd;
 use crate::{BusError, Port};
 use tickbus_base::os::{Interest, PollSet};
 #[cfg(unix)]
-use tickbus_base::os::{PseudoTerminal, SerialPort};
+use tickbus_base::os::{LinkedTerminal, SerialPort};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::{Address, close_gracefully, connect, is_for_later, no_wait};
@@ -92,7 +92,7 @@ impl<S: Stream + ?Sized> Stream for Box<S> {
 impl Stream for SerialPort {}
 
 #[cfg(unix)]
-impl Stream for PseudoTerminal {}
+impl Stream for LinkedTerminal {}
 
 /// Connects with `address`, for a [`Caller`] that is made once the peer is known; `None` if `stop` came
 /// first. The peer may leave sent data unacknowledged for `patience`.

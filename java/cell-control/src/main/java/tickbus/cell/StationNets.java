@@ -29,8 +29,9 @@ final class StationNets {
             .place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
             .place("done");
         step(net, "feed", "supply", "loading");
-        step(net, "loaded", "loading", "looking");
-        net.transition("loader jams").delay(Delay.fixed(400 * MS)).input("loading").output("freeing");
+        // Before the time is over, even if a scan comes late.
+        net.transition("loaded").priority(1).input("loading").output("looking");
+        net.transition("loader jams").delay(Delay.fixed(500 * MS)).input("loading").output("freeing");
         step(net, "try again", "freeing", "loading");
         step(net, "sleeve known", "looking", "advancing");
         step(net, "magazine empty", "looking", "no sleeve");

@@ -154,8 +154,12 @@ public final class CellDemo {
         String java = Path.of(System.getProperty("java.home"), "bin", "java").toString();
         String client = "[fieldbus]\nkind = \"modbus-client\"\nrole = \"controller\"\nwrite_to = \"tickbus "
                 + driver.name() + "\"\naddress = \"" + PlcCommand.address(driver) + "\"\n[record]\nfile = \"none.vcd\"\nwhen = \"never\"\n";
-        return List.of(java, "--enable-native-access=ALL-UNNAMED", "-cp", options.nets(), "tickbus.cell.CellControl",
-                cfg.toString(), client, CellPage.nets(options).toString());
+        List<String> command = new ArrayList<>(List.of(java, "--enable-native-access=ALL-UNNAMED", "-cp", options.nets()));
+        // Such as where the native library is.
+        System.getProperties().stringPropertyNames().stream().filter(name -> name.startsWith("tickbus."))
+                .forEach(name -> command.add("-D" + name + "=" + System.getProperty(name)));
+        command.addAll(List.of("tickbus.cell.CellControl", cfg.toString(), client, CellPage.nets(options).toString()));
+        return command;
     }
 
     private void operate(PlcProcess plc, ShutdownGuard guard) {

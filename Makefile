@@ -1,6 +1,6 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-peeler demo-profibus demo-robot test bench soak lint dist build setup clean
+.PHONY: help demo demo-peeler demo-profibus demo-robot demo-cell test bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -17,6 +17,9 @@ demo-profibus: ## build, then watch the PLC program run the rig over PROFIBUS, b
 
 demo-robot: ## build, then run a servo robot and its PLC in lock-step and free-wheeling, and draw the paths
 	@exec tools/demo-robot
+
+demo-cell: ## build, then watch Petri nets make twelve cylinders in the manufacturing cell, with jams on the way
+	@exec tools/demo-cell
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test

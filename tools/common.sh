@@ -118,6 +118,6 @@ assemble() {
     # The command is needed for plug-ins in helper processes.
     cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$STRIPPED/$(tickbus_command)" \
         "$folder/DeviceDriver/"
-    cp java/simulator/rig.table java/simulator/peeler.table "java/simulator/target/simulator-$release.jar" \
+    cp java/simulator/*.table "java/simulator/target/simulator-$release.jar" \
         "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
 }

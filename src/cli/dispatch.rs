@@ -8,7 +8,7 @@ use super::host::span;
 use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Monotonic, Nanos, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, OnLoss, PatchFile, Settings};
+use tickbus_dispatcher::{Dispatcher, Door, OnLoss, PatchFile, Settings};
 use tickbus_fieldbus::tcp::Address;
 
 /// Serve a virtual laboratory: controllers and machines join over lines of text, and are patched together.
@@ -32,6 +32,11 @@ pub(super) struct Arguments {
     /// Disconnect a client after this time without a line from it.
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = span)]
     idle: Nanos,
+
+    /// Serve the patch bay, a page on which the laboratory is seen and patched, and print its address.
+    #[cfg(feature = "page")]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:20080", value_parser = address)]
+    page: Option<Address>,
 }
 
 fn address(text: &str) -> Result<Address, String> {
@@ -43,6 +48,15 @@ fn address(text: &str) -> Result<Address, String> {
 fn say(line: &str) {
     let mut out = io::stdout().lock();
     let _ = writeln!(out, "dispatch: {line}").and_then(|()| out.flush());
+}
+
+/// Serves the patch bay, and prints its address.
+#[cfg(feature = "page")]
+fn serve_page(address: &Address, door: &Door) -> io::Result<tickbus_web::Serving> {
+    let room = tickbus_web::Room::bind(address, tickbus_web::Limits::default())?;
+    say(&format!("page at {}", room.url()));
+    let site = tickbus_patch_bay::PatchBay::new(door.clone());
+    room.serve(std::sync::Arc::new(site), Monotonic::shared())
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
@@ -92,9 +106,24 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         ..Settings::default()
     };
     let mut dispatcher = Dispatcher::new(settings, patch);
+    let door = Door::new(&stop);
+    #[cfg(feature = "page")]
+    let _serving = match &arguments.page {
+        None => None,
+        Some(address) => match serve_page(address, &door) {
+            Ok(serving) => Some(serving),
+            Err(error) => {
+                return failed(format!(
+                    "the page cannot be served on {address} ({error}); end the program that has this port, or give \
+                     another --page"
+                ));
+            }
+        },
+    };
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         stop: &stop,
+        door: Some(&door),
         patch_file: Some(&file),
         news: &mut say,
     };

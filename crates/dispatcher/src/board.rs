@@ -1,5 +1,8 @@
 //! The board: who is plugged in, the patch, and the values that go through it.
 
+mod forces;
+mod snapshot;
+
 use std::collections::{BTreeMap, HashMap};
 
 use crate::channel::Channel;
@@ -7,6 +10,8 @@ use crate::device::{Device, Role};
 use crate::number::Number;
 use crate::outbox::{Label, Listing, Outbox};
 use crate::patch::{Patch, Pin};
+
+pub use snapshot::{ChannelState, ClientState, Connection, Snapshot};
 
 /// What an input gets when it no longer has a source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,6 +86,8 @@ pub(crate) struct Board {
     by_order: BTreeMap<u64, usize>,
     next_order: u64,
     patch: Patch,
+    /// Channels of clients that are here, and what an operator holds them at.
+    forces: BTreeMap<Pin, Number>,
     on_loss: OnLoss,
     /// Seats that have something to write, or are to be closed.
     touched: Vec<usize>,
@@ -97,6 +104,7 @@ impl Board {
             by_order: BTreeMap::new(),
             next_order: 0,
             patch,
+            forces: BTreeMap::new(),
             on_loss,
             touched: Vec::new(),
             line: 0,
@@ -166,10 +174,15 @@ impl Board {
         self.names.contains_key(name)
     }
 
+    /// Finds a client by its name.
+    pub(crate) fn find_name(&self, name: &str) -> Option<usize> {
+        self.names.get(name).copied()
+    }
+
     /// Finds a client by its name, or `P1` the first process and `R1` the first controller.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
-        if let Some(seat) = self.names.get(name) {
-            return Some(*seat);
+        if let Some(seat) = self.find_name(name) {
+            return Some(seat);
         }
         let role = match name.as_bytes().first()? {
             b'P' | b'p' => Role::Process,
@@ -230,6 +243,7 @@ impl Board {
         };
         self.names.remove(&plugged.device.name);
         self.by_order.remove(&plugged.order);
+        self.forget_forces(&plugged.device.name);
         self.begin_line();
         for (sink, source) in self.patch.of_client(&plugged.device.name) {
             if source.client != plugged.device.name
@@ -238,10 +252,8 @@ impl Board {
             {
                 output.sinks.retain(|sink| sink.seat != seat);
             }
-            if sink.client != plugged.device.name
-                && let Some(to) = self.place(&sink)
-            {
-                self.lose(to);
+            if sink.client != plugged.device.name {
+                self.lose(&sink);
             }
         }
     }
@@ -261,12 +273,15 @@ impl Board {
             if let Some(output) = self.output(from) {
                 output.sinks.retain(|other| *other != to);
             }
-            self.lose(to);
+            self.lose(sink);
         }
     }
 
-    /// Joins two channels, if both are there.
+    /// Joins two channels, if both are there and not forced.
     fn join(&mut self, sink: &Pin, source: &Pin) {
+        if self.forced(sink).is_some() || self.forced(source).is_some() {
+            return;
+        }
         if let (Some(to), Some(from)) = (self.place(sink), self.place(source))
             && let Some(output) = self.output(from)
         {
@@ -274,16 +289,9 @@ impl Board {
         }
     }
 
-    /// Sends an input the value of its source once more, as far as both are there and it is known.
+    /// Sends an input the value that it is to have once more, as far as that is known.
     pub(crate) fn refresh(&mut self, sink: &Pin) {
-        let source = self.patch.source(sink);
-        let (Some(to), Some(from)) = (self.place(sink), source.and_then(|pin| self.place(pin)))
-        else {
-            return;
-        };
-        if let Some(value) = self.output(from).map(|output| output.value)
-            && value.is_known()
-        {
+        if let (Some(to), Some(value)) = (self.place(sink), self.wanted(sink)) {
             self.deliver(to, value, true);
         }
     }
@@ -321,7 +329,10 @@ impl Board {
     }
 
     /// An input has no source any more.
-    fn lose(&mut self, to: Place) {
+    fn lose(&mut self, sink: &Pin) {
+        let Some(to) = self.place(sink).filter(|_| self.forced(sink).is_none()) else {
+            return;
+        };
         let Some(plugged) = &self.seats[to.seat].plugged else {
             return;
         };

@@ -1,5 +1,7 @@
 //! The dispatcher without its sockets: lines in, lines out, and time handed in.
 
+mod operator;
+
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
@@ -11,6 +13,8 @@ use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line,
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
+
+pub use operator::{Order, Reply};
 
 /// How a dispatcher serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,10 +87,22 @@ enum Progress {
 /// An answer to be given when the patch is saved.
 #[derive(Debug)]
 struct Promised {
-    seat: usize,
-    verb: &'static str,
+    author: Author,
     /// Inputs that then get the value of their new source.
     sinks: Vec<Pin>,
+}
+
+/// Who has changed the patch.
+#[derive(Debug)]
+enum Author {
+    Client { seat: usize, verb: &'static str },
+    Operator(Reply),
+}
+
+impl Promised {
+    fn is_to(&self, seat: usize) -> bool {
+        matches!(self.author, Author::Client { seat: it, .. } if it == seat)
+    }
 }
 
 impl Dispatcher {
@@ -155,7 +171,7 @@ impl Dispatcher {
         if self.sessions[seat].take().is_some() {
             self.count -= 1;
             self.free.push(seat);
-            self.promised.retain(|promised| promised.seat != seat);
+            self.promised.retain(|promised| !promised.is_to(seat));
             self.board.unplug(seat);
         }
     }
@@ -192,7 +208,7 @@ impl Dispatcher {
         if may_go_on
             && let Some(session) = &mut self.sessions[seat]
             && session.progress == Progress::Stuck
-            && !self.promised.iter().any(|promised| promised.seat == seat)
+            && !self.promised.iter().any(|promised| promised.is_to(seat))
         {
             session.progress = Progress::Going;
             self.resumable.push(seat);
@@ -250,21 +266,31 @@ impl Dispatcher {
 
     /// The patch was saved, or why not: who changed it is answered.
     pub fn saved(&mut self, outcome: &Result<(), String>) {
-        for Promised { seat, verb, sinks } in std::mem::take(&mut self.promised) {
-            match outcome {
-                Ok(()) => self.confirm(seat, verb),
-                Err(why) => self.refuse(
-                    seat,
-                    &Code::Internal.because(format_args!(
-                        "the patch could not be saved ({why}); it holds until the dispatcher ends"
-                    )),
-                ),
-            }
+        let outcome = outcome.as_ref().map_err(|why| {
+            Code::Internal.because(format_args!(
+                "the patch could not be saved ({why}); it holds until the dispatcher ends"
+            ))
+        });
+        for Promised { author, sinks } in std::mem::take(&mut self.promised) {
+            let client = match author {
+                Author::Client { seat, verb } => {
+                    match &outcome {
+                        Ok(()) => self.confirm(seat, verb),
+                        Err(refusal) => self.refuse(seat, refusal),
+                    }
+                    Some(seat)
+                }
+                Author::Operator(reply) => {
+                    reply.give(outcome.clone().copied());
+                    None
+                }
+            };
             self.board.begin_line();
             for sink in sinks {
                 self.board.refresh(&sink);
             }
-            if let Some(session) = &mut self.sessions[seat]
+            if let Some(seat) = client
+                && let Some(session) = &mut self.sessions[seat]
                 && session.progress == Progress::Stuck
             {
                 session.progress = Progress::Going;
@@ -481,28 +507,9 @@ impl Dispatcher {
             if !self.board.has(other, joint.channel) {
                 return Err(no_channel(&format!("{peer} has"), joint.channel));
             }
-            let (own, channel) = (joint.own.kind, joint.channel.kind);
-            if own.is_output() == channel.is_output() || own.is_analog() != channel.is_analog() {
-                return Err(Code::Mismatch.because(format_args!(
-                    "{} and {} cannot be connected; connect an output with an input, digital or analog both",
-                    joint.own, joint.channel
-                )));
-            }
             let own = Pin::new(&own_name, joint.own);
             let peer = Pin::new(&peer, joint.channel);
-            let (sink, source) = if joint.own.kind.is_output() {
-                (peer, own)
-            } else {
-                (own, peer)
-            };
-            let mut in_line = connections.iter().filter(|(other, _)| *other == sink);
-            let present = self.board.patch().source(&sink);
-            let present = present.or(in_line.next().map(|(_, source)| source));
-            if let Some(other) = present.filter(|other| **other != source) {
-                return Err(Code::Conflict.because(format_args!(
-                    "{sink} is connected to {other} already; DISCONNECT it there first"
-                )));
-            }
+            let (sink, source) = self.joint(own, peer, &connections)?;
             connections.push((sink, source));
         }
         let mut sinks = Vec::with_capacity(connections.len());
@@ -524,13 +531,8 @@ impl Dispatcher {
             if !self.board.has(seat, channel) {
                 return Err(no_channel("you have", channel));
             }
-            let own = Pin::new(&own_name, channel);
             let before = sinks.len();
-            if channel.kind.is_output() {
-                sinks.extend(self.board.patch().sinks(&own).cloned());
-            } else if self.board.patch().source(&own).is_some() {
-                sinks.push(own);
-            }
+            sinks.extend(self.connected_inputs(&Pin::new(&own_name, channel)));
             if sinks.len() == before {
                 let text = format!("{channel} is not connected");
                 return Err(Code::NotFound.because(text));
@@ -550,7 +552,8 @@ impl Dispatcher {
 
     /// Answers when the patch is saved; until then no further line of the client is looked at.
     fn promise(&mut self, seat: usize, verb: &'static str, sinks: Vec<Pin>) {
-        self.promised.push(Promised { seat, verb, sinks });
+        let author = Author::Client { seat, verb };
+        self.promised.push(Promised { author, sinks });
         if let Some(session) = &mut self.sessions[seat] {
             session.progress = Progress::Stuck;
         }

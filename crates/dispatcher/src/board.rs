@@ -48,6 +48,8 @@ struct Plugged {
     order: u64,
     outputs: Box<[Output]>,
     inputs: Box<[Input]>,
+    /// Whether an input whose source is lost gets a sign for that, and not 0.
+    hears_losses: bool,
 }
 
 /// What the board keeps for a connection.
@@ -205,9 +207,17 @@ impl Board {
             order,
             outputs,
             inputs,
+            hears_losses: false,
         }));
         for (sink, source) in connections {
             self.join(&sink, &source);
+        }
+    }
+
+    /// The client on this seat wants to hear of an input that its source is lost.
+    pub(crate) fn hear_losses(&mut self, seat: usize) {
+        if let Some(plugged) = &mut self.seats[seat].plugged {
+            plugged.hears_losses = true;
         }
     }
 
@@ -312,11 +322,17 @@ impl Board {
 
     /// An input has no source any more.
     fn lose(&mut self, to: Place) {
-        let input = self.seats[to.seat].plugged.as_ref();
-        let input = input.and_then(|plugged| plugged.inputs.get(to.channel));
-        // A client that was never sent a value assumes zero itself.
+        let Some(plugged) = &self.seats[to.seat].plugged else {
+            return;
+        };
+        let nothing = match plugged.hears_losses {
+            true => Number::LOST,
+            false => Number::ZERO,
+        };
+        let input = plugged.inputs.get(to.channel);
+        // A client that was never sent a value assumes so itself.
         if self.on_loss == OnLoss::FailSafe && input.is_some_and(|input| input.value.is_known()) {
-            self.deliver(to, Number::ZERO, false);
+            self.deliver(to, nothing, false);
         }
     }
 

@@ -125,6 +125,11 @@ impl Counts {
         self.0[kind as usize] = count;
     }
 
+    /// Whether a client that counts from 1 has this channel.
+    pub const fn has_from_1(self, channel: Channel) -> bool {
+        channel.number >= 1 && channel.number <= self.of(channel.kind)
+    }
+
     /// The place of a channel among all outputs, or among all inputs, of its client; `None` if the client does not have
     /// it.
     ///

@@ -9,6 +9,7 @@ mod export;
 mod gsd;
 mod host;
 mod import;
+mod logo;
 mod mirror;
 mod plc;
 #[cfg(unix)]
@@ -41,6 +42,7 @@ enum Command {
     Export(export::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
+    Logo(logo::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     #[cfg(unix)]
@@ -93,6 +95,7 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments),
         Command::Gsd(arguments) => gsd::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
+        Command::Logo(arguments) => logo::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         #[cfg(unix)]

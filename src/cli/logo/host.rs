@@ -75,8 +75,8 @@ struct Host<'h> {
     dialler: Dialler,
     stream: Option<TcpStream>,
     interest: Interest,
-    /// The values that came with the last read.
-    arrived: Vec<(Channel, Number)>,
+    /// The values that came with the last read; `None` ends those of a line.
+    arrived: Vec<Option<(Channel, Number)>>,
     news: News,
     counts: Counts,
     zone: TimeZone,
@@ -151,7 +151,9 @@ impl Host<'_> {
         let name = &self.client.profile().name.clone();
         let address = self.hosting.address;
         let heard = self.client.hear(now, bytes, &mut |event| match event {
-            Event::Value(channel, value) => arrived.push((channel, value)),
+            Event::Value(channel, value) => arrived.push(Some((channel, value))),
+            Event::Lost(channel) => arrived.push(Some((channel, Number::ZERO))),
+            Event::LineEnd => arrived.push(None),
             Event::Identified => {
                 counts.joined += 1;
                 news.tell_line(format!("{name} has joined the dispatcher at {address}"));
@@ -166,15 +168,19 @@ impl Host<'_> {
             }
             Event::Device(_) | Event::ListEnd | Event::Settled => {}
         });
-        for at in 0..self.arrived.len() {
-            let (channel, value) = self.arrived[at];
-            if self.terminal.would_lose_an_edge(channel, &value) {
+        let arrived = std::mem::take(&mut self.arrived);
+        for line in arrived.split(Option::is_none) {
+            let values = || line.iter().flatten();
+            if values().any(|(channel, value)| self.terminal.would_lose_an_edge(*channel, value)) {
                 // As if the scan had come in between.
                 self.scan(now);
                 self.write(now)?;
             }
-            self.terminal.set(channel, &value);
+            for (channel, value) in values() {
+                self.terminal.set(*channel, value);
+            }
         }
+        self.arrived = arrived;
         self.arrived.clear();
         heard.map_err(|error| error.to_string())
     }

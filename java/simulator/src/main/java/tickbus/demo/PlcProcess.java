@@ -222,8 +222,8 @@ public final class PlcProcess implements Plc {
         Life now = life;
         if (now != null && now.process.isAlive()) {
             now.killed = true;
-            // Terminated first, so that its last lines get into its log.
-            now.process.destroy();
+            // Terminated first, so that its last lines get into its log. Process.destroy would close its output before.
+            now.process.toHandle().destroy();
             try {
                 if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
                     destroy();

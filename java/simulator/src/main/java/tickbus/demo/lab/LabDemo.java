@@ -32,6 +32,9 @@ public final class LabDemo {
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
     private static final int ATTEMPTS = 3;
 
+    /** How the driver says that the dispatcher has taken it: it is not running yet, because nothing is connected. */
+    private static final String JOINED = "joined the dispatcher";
+
     /** How often the processes are heard and checked. */
     private static final int TICKS_PER_LOOK = 5;
 
@@ -101,35 +104,34 @@ public final class LabDemo {
 
     /** Everything from starting the dispatcher to writing the report. */
     private String play(ShutdownGuard guard, PrintStream err) {
+        String run = "";
+        String verdict;
         try (Laboratory lab = new Laboratory(options, timeline)) {
             lab.open();
             try (Simulator simulator = new Simulator(DeviceDriverFolder.scan(options.drivers()).open(), board,
                     options.control(), options.stepNanos(), TimeSource.system())) {
-                return report(verdict(simulator, lab, guard, err), simulator);
+                try {
+                    operate(simulator, lab, guard);
+                } finally {
+                    run = LabReport.run(options, simulator);
+                    keepStatistics(simulator);
+                }
             }
-        } catch (RuntimeException | Error e) {
-            // The dispatcher, the driver or the control table did not open, or the driver did not close.
-            return report(VERDICT.failed(e, err), null);
-        }
-    }
-
-    private String verdict(Simulator simulator, Laboratory lab, ShutdownGuard guard, PrintStream err) {
-        try {
-            operate(simulator, lab, guard);
             int overtaken = lab.end();
             if (overtaken > 0) {
                 throw new DemoFailure(overtaken + " values were overtaken by newer ones on their way");
             }
-            return VERDICT.ok(facts.line(overtaken) + " report=" + options.report());
+            verdict = VERDICT.ok(facts.line(overtaken) + " report=" + options.report());
         } catch (RuntimeException | Error e) {
-            return VERDICT.failed(e, err);
+            verdict = VERDICT.failed(e, err);
         }
+        return report(verdict, run);
     }
 
     private void operate(Simulator simulator, Laboratory lab, ShutdownGuard guard) {
         var driver = simulator.drivers().get(0);
         LabOperator operator = new LabOperator(board, lab, facts, timeline,
-                () -> "running".equals(driver.statistics().get("state")));
+                () -> driver.statistics().getOrDefault("reason", "").startsWith(JOINED));
         boolean[] over = new boolean[1];
         simulator.run(TickMode.REAL_TIME, () -> {
             if (guard.triggered()) {
@@ -154,14 +156,19 @@ public final class LabDemo {
         }
     }
 
-    private String report(String verdict, Simulator simulator) {
+    private void keepStatistics(Simulator simulator) {
+        try {
+            HtmlPage.keepStatistics(beside("statistics.txt"), simulator.drivers().get(0).statistics());
+        } catch (IOException e) {
+            throw new DemoFailure("the statistics cannot be written: " + e);
+        }
+    }
+
+    private String report(String verdict, String run) {
         try {
             Files.createDirectories(options.report().toAbsolutePath().getParent());
-            if (simulator != null) {
-                HtmlPage.keepStatistics(beside("statistics.txt"), simulator.drivers().get(0).statistics());
-            }
             BoardPicture.write(board, beside("board.svg"));
-            Files.writeString(options.report(), LabReport.write(options, verdict, facts, timeline, simulator));
+            Files.writeString(options.report(), LabReport.write(verdict, facts, timeline, run));
             return verdict;
         } catch (IOException e) {
             return VERDICT.isOk(verdict) ? VERDICT.failed("the report cannot be written: " + e) : verdict;

@@ -16,6 +16,7 @@ final class LabFacts {
     private int lamps;
     private long slowestLampNanos;
     private int pulses;
+    private int counted;
     private long wokeNanos;
 
     static boolean inBand(int tank, double level) {
@@ -47,8 +48,8 @@ final class LabFacts {
         pulses++;
     }
 
-    int pulses() {
-        return pulses;
+    void counted(double gauge) {
+        counted = (int) gauge;
     }
 
     void woke(long nanos) {
@@ -57,9 +58,9 @@ final class LabFacts {
 
     /** The part of the last line that states them. */
     String line(int overtaken) {
-        return text("levels=%.1f..%.1f,%.1f..%.1f held_s=%.1f lamps=%d lamp_ms=%d edges=%d lost=0 woke_ms=%d overtaken=%d",
-                min[0], max[0], min[1], max[1], heldNanos / 1e9, lamps, slowestLampNanos / 1_000_000, pulses,
-                wokeNanos / 1_000_000, overtaken);
+        return text("levels=%.1f..%.1f,%.1f..%.1f held_s=%.1f lamps=%d lamp_ms=%d edges=%d/%d woke_ms=%d overtaken=%d",
+                min[0], max[0], min[1], max[1], heldNanos / 1e9, lamps, slowestLampNanos / 1_000_000, counted,
+                pulses, wokeNanos / 1_000_000, overtaken);
     }
 
     /** Rows of a table: what, here, as it should be. */
@@ -70,7 +71,7 @@ final class LabFacts {
             {"they were held for", text("%.1f s", heldNanos / 1e9), ""},
             {"switch 3 and its lamp", lamps + " times", "through both controllers"},
             {"the slowest lamp", slowestLampNanos / 1_000_000 + " ms", "2000 ms"},
-            {"pulses of switch 4, counted by PANEL", pulses, "20, none lost"},
+            {"pulses of switch 4, counted by PANEL", counted, pulses + ", none lost"},
             {"TANKS is back in its connections after", wokeNanos / 1_000_000 + " ms", "without asking for them"},
         };
     }

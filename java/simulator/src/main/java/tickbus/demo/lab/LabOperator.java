@@ -16,7 +16,11 @@ final class LabOperator {
     private static final long SOON = 2_000 * MS;
     private static final long LATE = 10_000 * MS;
     private static final long PULSE = 50 * MS;
+    private static final long PAUSE = 150 * MS;
     private static final long HOLD = 2_000 * MS;
+
+    /** To which level, in percent, tank 2 falls while TANKS is dead. */
+    private static final double FALLEN = 22;
 
     /**
      * A step of the script.
@@ -107,6 +111,7 @@ final class LabOperator {
     private void switchLamp() {
         for (int i = 0; i < TOGGLES; i++) {
             boolean on = i % 2 == 0;
+            after(PAUSE, () -> { });
             then("lamp 3 follows switch 3", () -> {
                 tell("puts switch 3 " + (on ? "on" : "off"));
                 board.set(3, on);
@@ -124,7 +129,10 @@ final class LabOperator {
             after(PULSE, () -> board.set(4, false));
         }
         then("the gauge shows " + PULSES + " pulses, and lamp 4 is lit", () -> { },
-                () -> board.gauge() == PULSES && board.isLit(4), SOON, nanos -> tell("PANEL has counted " + PULSES));
+                () -> board.gauge() == PULSES && board.isLit(4), SOON, nanos -> {
+                    tell("PANEL has counted " + PULSES);
+                    facts.counted(board.gauge());
+                });
         after(HOLD, () -> { });
     }
 
@@ -135,6 +143,7 @@ final class LabOperator {
             lab.tanks().kill();
         }, () -> !board.valve() && !board.pump() && !board.isLit(3) && board.isLit(2), SOON,
                 nanos -> tell("the valve, the pump and lamp 3 are off; PANEL gives the alarm"));
+        then("tank 2 falls below " + FALLEN + " %", () -> { }, () -> board.level(2) < FALLEN, LATE);
         then("lamp 3 is lit again, and the alarm is over", () -> {
             tell("starts TANKS again, without its list of connections");
             lab.start(lab.tanks(), false);

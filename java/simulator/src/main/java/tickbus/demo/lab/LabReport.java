@@ -16,13 +16,12 @@ final class LabReport {
     /**
      * Writes a report.
      *
-     * @param options the options of the demo
      * @param verdict the demo's last line
      * @param facts what was measured
      * @param timeline what happened
-     * @param simulator what ran, null if it did not start
+     * @param run {@link #run}, empty if the simulator did not start
      */
-    static String write(LabOptions options, String verdict, LabFacts facts, Timeline timeline, Simulator simulator) {
+    static String write(String verdict, LabFacts facts, Timeline timeline, String run) {
         LabReport report = new LabReport();
         report.text.append("The virtual laboratory\n======================\n\n").append(verdict).append('\n');
         report.heading("What was measured");
@@ -33,6 +32,17 @@ final class LabReport {
         report.text.append(table.text("  "));
         report.heading("Timeline, in simulation time");
         timeline.events().forEach(event -> report.text.append("  ").append(event.line()).append('\n'));
+        return report.text.append(run).toString();
+    }
+
+    /**
+     * The part about the simulator, which must still run.
+     *
+     * @param options the options of the demo
+     * @param simulator what runs
+     */
+    static String run(LabOptions options, Simulator simulator) {
+        LabReport report = new LabReport();
         report.configuration(options, simulator);
         return report.text.toString();
     }
@@ -48,15 +58,11 @@ final class LabReport {
         table.row("control table", options.control());
         table.row("programs of the controllers", options.programs());
         table.row("step size", Durations.text(options.stepNanos()));
-        if (simulator != null) {
-            table.row("ticks", simulator.ticks());
-            table.row("late ticks", simulator.lateTicks());
-            table.row("dropped ticks", simulator.droppedTicks());
-        }
+        table.row("ticks", simulator.ticks());
+        table.row("late ticks", simulator.lateTicks());
+        table.row("dropped ticks", simulator.droppedTicks());
         text.append(table.text("  "));
-        if (simulator != null) {
-            simulator.drivers().forEach(this::statistics);
-        }
+        simulator.drivers().forEach(this::statistics);
     }
 
     private void statistics(ControlInterfaceDeviceDriver driver) {
@@ -66,7 +72,7 @@ final class LabReport {
             driver.statistics().forEach(table::row);
             text.append(table.text("  "));
         } catch (RuntimeException e) {
-            // A driver that has failed or is closed may have none; the rest of the report is still useful.
+            // A driver that has failed may have none; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

@@ -1,5 +1,6 @@
 //! The bus traits, the port, faults, and one room per bus.
 
+pub use tickbus_bus_dispatcher as dispatcher;
 pub use tickbus_bus_hilscher as hilscher;
 pub use tickbus_bus_interbus as interbus;
 pub use tickbus_bus_modbus as modbus;

@@ -325,9 +325,10 @@ impl Board {
         let Some(plugged) = &self.seats[to.seat].plugged else {
             return;
         };
-        let nothing = match plugged.hears_losses {
-            true => Number::LOST,
-            false => Number::ZERO,
+        let nothing = if plugged.hears_losses {
+            Number::LOST
+        } else {
+            Number::ZERO
         };
         let input = plugged.inputs.get(to.channel);
         // A client that was never sent a value assumes so itself.

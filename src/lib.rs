@@ -26,6 +26,7 @@
 //! | [`dispatcher`] | the dispatcher of a virtual laboratory: clients, patch, routing |
 //! | [`bridge`] | bridges to it: serial lines, MQTT |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
+//! | [`function_blocks`] | a small controller whose program is a plan of function blocks |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
@@ -49,6 +50,7 @@ pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;
 pub use tickbus_export as export;
 pub use tickbus_fieldbus::faults;
+pub use tickbus_function_blocks as function_blocks;
 pub use tickbus_image as image;
 pub use tickbus_image::signal;
 pub use tickbus_import as import;

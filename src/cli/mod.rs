@@ -10,6 +10,7 @@ mod export;
 mod gsd;
 mod host;
 mod import;
+mod logo;
 mod mirror;
 mod plc;
 #[cfg(unix)]
@@ -43,6 +44,7 @@ enum Command {
     Export(export::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
+    Logo(logo::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     #[cfg(unix)]
@@ -96,6 +98,7 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments),
         Command::Gsd(arguments) => gsd::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
+        Command::Logo(arguments) => logo::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         #[cfg(unix)]

@@ -33,6 +33,7 @@ struct Hand {
 impl Hand {
     fn join(laboratory: &Laboratory, identification: &str) -> Self {
         let stream = TcpStream::connect(laboratory.address()).expect("it listens");
+        stream.set_nodelay(true).expect("a TCP option");
         let lines = BufReader::new(stream.try_clone().expect("a descriptor"));
         let mut hand = Self { stream, lines };
         hand.say(&format!("{identification} V=2"));

@@ -402,6 +402,37 @@ fn a_silent_reader_is_told_and_a_command_without_an_answer_is_not_given_twice() 
 }
 
 #[test]
+fn a_reader_that_refuses_the_carriers_is_told_and_what_it_had_repeated_is_skipped() {
+    let line = Line::new();
+    let mut far = LinkedTerminal::open(&line.name()).expect("a terminal");
+    let mut controller = line.client(&[1], "carrier = \"IMC-40-256K\"");
+    let mut heard = Vec::new();
+    await_that("the line has failed", || {
+        controller.tick();
+        let mut bytes = [0; 64];
+        if let Ok(count) = far.read(&mut bytes) {
+            heard.extend_from_slice(&bytes[..count]);
+            let answer: &[u8] = match bytes[0] {
+                // Another program's command was repeated until now.
+                b'q' => b"W03\xBA\x03W03\xBA\x03q\x71\x03",
+                _ => b"d0D\xD8\x03",
+            };
+            far.write_all(answer).expect("room");
+        }
+        controller.link().state == LinkState::Failed
+    });
+    assert!(heard.starts_with(b"q\x71\x03d3\x97\x03"), "{heard:?}");
+    let link = controller.link();
+    assert_eq!(link.cause, Cause::Refused);
+    for words in [
+        "does not work with carriers of type IMC-40-256K",
+        "status 0D",
+    ] {
+        assert!(link.reason.contains(words), "{}", link.reason);
+    }
+}
+
+#[test]
 fn another_program_speaks_with_the_reader_as_with_a_serial_port() {
     let line = Line::new();
     let mut machine = line.reader(&[1]);

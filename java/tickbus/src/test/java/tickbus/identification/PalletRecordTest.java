@@ -63,7 +63,8 @@ class PalletRecordTest {
     @Test
     void whatIsNoRecordIsRefusedWithItsPlace() {
         String[][] wrong = {{"has 21 octets, and not 20", null},
-            {"octet 3 of a pallet's record is 41", "590A1609032004"}, {"are no time", "60051609032004"}, {"are no time", "59051631022004"}};
+            {"octet 3 of a pallet's record is 41", "590A1609032004"},
+            {"are no time", "60051609032004"}, {"are no time", "59051631022004"}};
         assertTrue(refusal(new byte[20]).contains(wrong[0][0]));
         for (int i = 1; i < wrong.length; i++) {
             assertTrue(refusal(octets(wrong[i][1])).contains(wrong[i][0]), wrong[i][0]);

@@ -140,11 +140,12 @@ off = \"shut\"
             self.folder.path().join("map.toml")
         }
 
-        /// The bridge, when it is connected with both.
+        /// The bridge, when values go through.
         fn bridge(&self) -> Running {
             let mut running = bridge(&["mqtt", self.map().to_str().expect("text")]);
             running.after("bridge: connected with the broker at ");
             running.after("bridge: connected with ");
+            self.subscribe().until("<online>");
             running
         }
 

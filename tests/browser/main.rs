@@ -6,11 +6,11 @@
 mod samples;
 mod webdriver;
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use serde_json::{Value, json};
+use serde_json::json;
 use tickbus::report::{self, Contents, MarkKind, Run, RunStatistics, SignalKind};
 use tickbus::time::Nanos;
 use webdriver::{Browser, save, shoot};

@@ -212,20 +212,30 @@ const board = (() => {
     return [jack.left + jack.width / 2 - origin.left, jack.top + jack.height / 2 - origin.top];
   }
 
-  /** A cable that hangs from an output, on its right, to an input, on its left. */
-  function curve([x1, y1], [x2, y2]) {
+  /** A cable that hangs from an output, on its right, to an input, on its left; `low` is where it has to pass. */
+  function curve([x1, y1], [x2, y2], low) {
     const width = cables.clientWidth;
     const reach = Math.max(28, Math.min(120, Math.abs(x2 - x1) / 2));
-    // What goes back to the left would hook around its end.
+    // What goes back to the left, to another row of boxes, would hook around its end.
     const sag = x2 > x1 ? Math.min(70, Math.hypot(x2 - x1, y2 - y1) / 7) : 0;
     const out = Math.min(x1 + reach, width + 14);
     const back = Math.max(x2 - reach, -14);
-    return `M${x1},${y1} C${out},${y1 + sag} ${back},${y2 + sag} ${x2},${y2}`;
+    // The middle of a cubic curve is where its ends have an eighth of the weight each.
+    const [down, up] = low === undefined ? [y1 + sag, y2 + sag] : [0, 0].fill((8 * low - y1 - y2) / 6);
+    return `M${x1},${y1} C${out},${down} ${back},${up} ${x2},${y2}`;
+  }
+
+  /** Below the boxes of two pins, if the cable goes back to the left in the same row: else it would run through them. */
+  function below(source, sink) {
+    const [from, to] = [source, sink].map((pin) => pin.element.closest('.client').getBoundingClientRect());
+    const isBack = to.left <= from.left && to.top < from.bottom && from.top < to.bottom;
+    return isBack ? Math.max(from.bottom, to.bottom) + 14 - cables.getBoundingClientRect().top : undefined;
   }
 
   function draw() {
     for (const { paths, input, output } of wires.values()) {
-      const line = curve(place(pins.get(output)), place(pins.get(input)));
+      const [source, sink] = [pins.get(output), pins.get(input)];
+      const line = curve(place(source), place(sink), below(source, sink));
       for (const path of paths) path.setAttribute('d', line);
     }
   }

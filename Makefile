@@ -1,7 +1,6 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-peeler demo-profibus demo-robot demo-cell test bench soak lint dist build setup clean
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot test bench soak lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list

@@ -129,6 +129,15 @@ fn mistakes_have_the_exit_codes_of_the_house() {
         "{said}"
     );
 
+    #[cfg(feature = "page")]
+    {
+        let output = run(&["--listen", "127.0.0.1:0", "--page", &address]);
+        assert_eq!(output.status.code(), Some(3));
+        let said = text(&output.stdout);
+        let expected = format!("failed reason=\"the page cannot be served on {address} (");
+        assert!(said.contains(&expected), "{said}");
+    }
+
     std::fs::write(&patch, "[patch]\n\"A:Q1\" = \"B:Q1\"\n").expect("it can be written");
     let output = run(&["--listen", "127.0.0.1:0"]);
     assert_eq!(output.status.code(), Some(1));

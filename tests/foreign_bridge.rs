@@ -140,11 +140,12 @@ off = \"shut\"
             self.folder.path().join("map.toml")
         }
 
-        /// The bridge, when it is connected with both.
+        /// The bridge, when values go through.
         fn bridge(&self) -> Running {
             let mut running = bridge(&["mqtt", self.map().to_str().expect("text")]);
             running.after("bridge: connected with the broker at ");
             running.after("bridge: connected with ");
+            self.subscribe().until("<online>");
             running
         }
 
@@ -155,7 +156,7 @@ off = \"shut\"
             command
         }
 
-        /// What the broker has from now on, retained or not, with its topic.
+        /// What the broker has from now on, with its topic, and 1 for what it had before.
         fn subscribe(&self) -> Peer {
             Peer::start(self.command("mosquitto_sub", &["-t", "hall/#", "-F", "%t %r <%p>"]))
         }
@@ -215,7 +216,7 @@ off = \"shut\"
         let lab = Lab::new()?;
         let mut bridge = lab.bridge();
         let mut topics = lab.subscribe();
-        topics.until("hall/bridge 1 <online>");
+        topics.until("<online>");
         let mut tank = lab.tank();
         tank.say("P AQ1=12.50");
         topics.until("hall/level 0 <12.5>");
@@ -251,7 +252,7 @@ off = \"shut\"
         let mut bridge = lab.bridge();
         let mut tank = lab.tank();
         tank.say("P AQ1=1");
-        lab.subscribe().until("hall/level 1 <1>");
+        lab.subscribe().until(" <1>");
         lab.publish("hall/setpoint", "5");
         assert_eq!(tank.until("P "), "P AI1=5");
         drop(lab.broker);
@@ -266,12 +267,12 @@ off = \"shut\"
         lab.broker = start_broker(lab.folder.path())?;
         bridge.after("bridge: connected with the broker at ");
         bridge.after("bridge: connected with ");
-        lab.subscribe().until("hall/level 1 <2>");
+        lab.subscribe().until(" <2>");
         lab.publish("hall/setpoint", "7");
         assert_eq!(tank.until("P "), "P AI1=7");
         // The dispatcher goes.
         let mut topics = lab.subscribe();
-        topics.until("hall/bridge 1 <online>");
+        topics.until("<online>");
         lab.dispatch.interrupt();
         topics.until("hall/bridge 0 <offline>");
         bridge.after("bridge: the dispatcher at ");
@@ -283,7 +284,7 @@ off = \"shut\"
         let lab = Lab::new()?;
         let mut bridge = lab.bridge();
         let mut topics = lab.subscribe();
-        topics.until("hall/bridge 1 <online>");
+        topics.until("<online>");
         bridge.kill();
         topics.until("hall/bridge 0 <offline>");
         // The dispatcher gives its name to the next one.

@@ -31,7 +31,7 @@ at_least() {
 }
 
 # What the zip has beyond a plain build.
-PRODUCT_FEATURES=opcua,script,mqtt
+PRODUCT_FEATURES=opcua,script,mqtt,page
 
 # The project's version, from Cargo.toml.
 version() {

@@ -176,5 +176,7 @@ fn read_cables(value: &Value<'_>) -> Option<Vec<(usize, Cable)>> {
         let cable = cable.map_err(|mistake| value.refuse(mistake)).ok()?;
         Some((value.at(), cable))
     };
-    value.list(RIGHT)?.iter().map(read).collect()
+    // All mistakes are reported, not the first alone.
+    let cables: Vec<_> = value.list(RIGHT)?.iter().map(read).collect();
+    cables.into_iter().collect()
 }

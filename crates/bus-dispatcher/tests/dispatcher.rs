@@ -33,6 +33,7 @@ struct Hand {
 impl Hand {
     fn join(laboratory: &Laboratory, identification: &str) -> Self {
         let stream = TcpStream::connect(laboratory.address()).expect("it listens");
+        stream.set_nodelay(true).expect("a TCP option");
         let lines = BufReader::new(stream.try_clone().expect("a descriptor"));
         let mut hand = Self { stream, lines };
         hand.say(&format!("{identification} V=2"));
@@ -257,4 +258,38 @@ fn a_machine_that_only_reads_stays_fresh_while_nothing_changes() {
     while machine.clock.now() - begun < rig::MAX_AGE.times(10) {
         machine.until("it is fresh", |end| end.tick().code != Code::Stale);
     }
+}
+
+#[test]
+fn the_simulator_of_the_document_joins_as_it_is_written() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/dispatcher.md");
+    let document = std::fs::read_to_string(path).expect("the document");
+    let (_, section) = document
+        .split_once("\n## A Java simulator joins\n")
+        .expect("its section");
+    let block = |start: &str| {
+        let (_, block) = section.split_once(start).expect(start);
+        block.split_once("\n```").expect("an end").0
+    };
+    let laboratory = Laboratory::empty();
+    laboratory.serve();
+    let kind = "kind    = \"dispatcher\"\n";
+    let moved = format!("{kind}address = \"{}\"\n", laboratory.address());
+    let text = format!("{}\n", block("```toml\n")).replace(kind, &moved);
+    let clock = Manual::new();
+    let mut machine = Machine {
+        end: End::open(&text, &clock),
+        clock,
+    };
+    machine.until_reason("no input has a source yet");
+    let mut logo = Hand::join(&laboratory, "VR LOGO Q08 I08 AQ02 AI03");
+    logo.say("LIST");
+    assert!(logo.until("VP:PUMP:Q01:I01:AQ01:AI00:").len() > 20);
+    for line in block("```text\n").lines() {
+        match line.strip_prefix("> ") {
+            Some(said) => logo.say(said),
+            None => assert_eq!(logo.until(line), line),
+        }
+    }
+    machine.until("Motor on", |end| end.get("Motor on") == 1.0);
 }

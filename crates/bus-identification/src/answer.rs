@@ -92,8 +92,20 @@ impl Shape {
         }
     }
 
+    /// Whether silence says more about an answer than that it is late.
+    pub(crate) const fn ends_by_silence(&self) -> bool {
+        matches!(self.data, Data::UntilSilence)
+    }
+
     /// Whether an answer is at the beginning of `bytes`; the line `is_silent` behind them or not.
     pub(crate) fn fit(&self, bytes: &[u8], is_silent: bool) -> Fit {
+        match self.fit_so_far(bytes, is_silent) {
+            Fit::Begins if is_silent && self.ends_by_silence() => Fit::No,
+            found => found,
+        }
+    }
+
+    fn fit_so_far(&self, bytes: &[u8], is_silent: bool) -> Fit {
         if bytes.first() != Some(&self.character) {
             return Fit::No;
         }

@@ -174,7 +174,12 @@ impl Client {
     pub fn deadline(&self) -> Nanos {
         let silent = self.heard + self.timing.silence();
         match &self.asked {
-            Some(asked) if asked.is_answered || !self.inbox.is_empty() => asked.limit.min(silent),
+            // Silence ends these, and nothing else.
+            Some(asked)
+                if asked.is_answered || asked.shape.ends_by_silence() && !self.inbox.is_empty() =>
+            {
+                asked.limit.min(silent)
+            }
             Some(asked) => asked.limit,
             None if self.inbox.is_empty() => Nanos::MAX,
             None => silent,

@@ -1,4 +1,8 @@
 //! The bus `ivi-client`: the heads of a reader as stations, each with a command that is given by a toggle bit.
+#![cfg_attr(
+    not(unix),
+    allow(dead_code, unused_imports, reason = "no serial ports are used there")
+)]
 
 mod session;
 

@@ -1,4 +1,8 @@
 //! The bus `ivi-reader`: a simulated reader whose heads are stations.
+#![cfg_attr(
+    not(unix),
+    allow(dead_code, unused_imports, reason = "no serial ports are used there")
+)]
 
 use std::io;
 

@@ -7,6 +7,7 @@
     reason = "tests; the values are small whole numbers"
 )]
 
+use std::io::{Read as _, Write as _};
 use std::path::PathBuf;
 
 use tempfile::TempDir;
@@ -14,7 +15,7 @@ use tickbus_base::os::{LinkedTerminal, Parity, SerialPort, SerialSettings};
 use tickbus_base::time::Monotonic;
 use tickbus_base::time::{Clock as _, Nanos};
 use tickbus_bus_identification::{
-    Access, CarrierType, Client, Command, NO_ANSWER, Outcome, Timing,
+    Access, Carrier, CarrierType, Client, Command, Head, NO_ANSWER, Outcome, Reader, Timing,
 };
 use tickbus_conformance::rig::{End, await_that};
 use tickbus_driver::Code;
@@ -323,50 +324,112 @@ fn a_line_that_is_unplugged_comes_back_by_itself() {
     assert!(pair.line.name().is_symlink());
 }
 
+/// A reader at the far end of a terminal, which takes each command that writes without a word.
+struct Taciturn {
+    terminal: LinkedTerminal,
+    reader: Reader,
+    writes: usize,
+}
+
+impl Taciturn {
+    fn new(line: &Line) -> Self {
+        let timing = Timing {
+            baud: 9600,
+            timeout: Nanos::ZERO,
+        };
+        let mut reader = Reader::new(Default::default(), timing);
+        *reader.head_mut(1) = Head {
+            is_connected: true,
+            carrier: Some(Carrier::new(CarrierType::Idc1K, &[1])),
+            ..Head::default()
+        };
+        Self {
+            terminal: LinkedTerminal::open(&line.name()).expect("a terminal"),
+            reader,
+            writes: 0,
+        }
+    }
+
+    /// Answers what has come. A client that waits for an answer sends one command at a time.
+    fn turn(&mut self) {
+        let mut bytes = [0; 256];
+        let Ok(count) = self.terminal.read(&mut bytes) else {
+            return;
+        };
+        if bytes[0] == b'k' {
+            self.writes += 1;
+            return;
+        }
+        self.reader.hear(Monotonic::shared().now(), &bytes[..count]);
+        let answer = self.reader.to_write().to_vec();
+        self.terminal.write_all(&answer).expect("room");
+        self.reader.wrote(answer.len());
+    }
+}
+
 #[test]
 fn a_silent_reader_is_told_and_a_command_without_an_answer_is_not_given_twice() {
     let line = Line::new();
-    // A reader that is switched off: the line is there.
-    let off = LinkedTerminal::open(&line.name()).expect("a terminal");
-    let mut controller = line.client(&[1], "timeout = \"20ms\"");
+    let mut far = Taciturn::new(&line);
+    let mut controller = line.client(&[1], "timeout = \"100ms\"");
     await_that("the silence is told", || {
         controller.tick();
-        controller
-            .link()
-            .reason
-            .contains("did not answer within 20ms")
+        let reason = controller.link().reason;
+        reason.contains("did not answer within 100ms")
     });
     assert_eq!(controller.link().state, LinkState::Opening);
-    drop(off);
-    let machine = line.reader(&[1]);
-    let mut pair = Pair {
-        line,
-        machine,
-        controller,
-        toggle: 0,
-    };
-    pair.put(&[1]);
-    assert_eq!(pair.ask(b'w', 0, 1, &[]), (0, vec![1]));
-    // The next command meets a line that carries nothing.
-    let cut = pair.machine.driver.inject_text("kind = \"link-down\"");
-    let cut = cut.expect("a fault");
-    await_that("it carries nothing", || {
-        pair.machine.tick();
-        pair.machine.link().cause == Cause::Injected
+    await_that("it answers", || {
+        far.turn();
+        controller.tick();
+        controller.get("present") == 1.0
     });
-    pair.command(b'k', 0, 1, &[2]);
-    await_that("the command is given up", || {
-        pair.machine.tick();
-        pair.controller.tick();
-        pair.controller.link().reason.contains("did not answer")
+    controller.set("count", 1.0);
+    controller.set("command", f64::from(b'k' | 0x80));
+    await_that("the command is over", || {
+        far.turn();
+        controller.tick();
+        controller.get("echo") == f64::from(b'k' | 0x80)
     });
-    assert!(pair.machine.driver.end_fault(cut));
-    assert_eq!(pair.answer(b'k'), (NO_ANSWER, vec![]));
-    assert_eq!(
-        pair.ask(b'w', 0, 1, &[]),
-        (0, vec![1]),
-        "it was not written"
-    );
+    assert_eq!(controller.get("status"), f64::from(NO_ANSWER));
+    // The next one is given after it.
+    controller.set("command", f64::from(b'w'));
+    await_that("the next command is over", || {
+        far.turn();
+        controller.tick();
+        controller.get("echo") == f64::from(b'w')
+    });
+    assert_eq!(far.writes, 1);
+}
+
+#[test]
+fn a_reader_that_refuses_the_carriers_is_told_and_what_it_had_repeated_is_skipped() {
+    let line = Line::new();
+    let mut far = LinkedTerminal::open(&line.name()).expect("a terminal");
+    let mut controller = line.client(&[1], "carrier = \"IMC-40-256K\"");
+    let mut heard = Vec::new();
+    await_that("the line has failed", || {
+        controller.tick();
+        let mut bytes = [0; 64];
+        if let Ok(count) = far.read(&mut bytes) {
+            heard.extend_from_slice(&bytes[..count]);
+            let answer: &[u8] = match bytes[0] {
+                // Another program's command was repeated until now.
+                b'q' => b"W03\xBA\x03W03\xBA\x03q\x71\x03",
+                _ => b"d0D\xD8\x03",
+            };
+            far.write_all(answer).expect("room");
+        }
+        controller.link().state == LinkState::Failed
+    });
+    assert!(heard.starts_with(b"q\x71\x03d3\x97\x03"), "{heard:?}");
+    let link = controller.link();
+    assert_eq!(link.cause, Cause::Refused);
+    for words in [
+        "does not work with carriers of type IMC-40-256K",
+        "status 0D",
+    ] {
+        assert!(link.reason.contains(words), "{}", link.reason);
+    }
 }
 
 #[test]
@@ -402,12 +465,12 @@ fn another_program_speaks_with_the_reader_as_with_a_serial_port() {
         },
     );
     client.ask(clock.now(), &read);
-    std::io::Write::write_all(&mut port, client.to_write()).expect("room");
+    port.write_all(client.to_write()).expect("room");
     let mut found = None;
     await_that("the answer comes", || {
         machine.tick();
         let mut bytes = [0; 16];
-        if let Ok(count) = std::io::Read::read(&mut port, &mut bytes) {
+        if let Ok(count) = port.read(&mut bytes) {
             client.hear(clock.now(), &bytes[..count]);
         }
         found = client.poll(clock.now());

@@ -63,9 +63,10 @@ impl Door {
 
     /// Does what was sent.
     pub(crate) fn serve(&self, dispatcher: &mut Dispatcher, now: Nanos) {
-        if !self.0.has_errands.swap(false, Ordering::Acquire) {
+        if !self.0.has_errands.load(Ordering::Acquire) {
             return;
         }
+        self.0.has_errands.store(false, Ordering::Relaxed);
         let errands = self.errands().as_mut().map(std::mem::take);
         for errand in errands.unwrap_or_default() {
             errand(dispatcher, now);

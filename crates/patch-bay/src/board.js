@@ -216,7 +216,8 @@ const board = (() => {
   function curve([x1, y1], [x2, y2]) {
     const width = cables.clientWidth;
     const reach = Math.max(28, Math.min(120, Math.abs(x2 - x1) / 2));
-    const sag = Math.min(40, Math.hypot(x2 - x1, y2 - y1) / 8);
+    // What goes back to the left would hook around its end.
+    const sag = x2 > x1 ? Math.min(70, Math.hypot(x2 - x1, y2 - y1) / 7) : 0;
     const out = Math.min(x1 + reach, width + 14);
     const back = Math.max(x2 - reach, -14);
     return `M${x1},${y1} C${out},${y1 + sag} ${back},${y2 + sag} ${x2},${y2}`;

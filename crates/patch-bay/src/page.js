@@ -116,6 +116,9 @@
       other.element.classList.toggle('fit', Boolean(pin) && fits(pin, other));
       other.element.classList.toggle('unfit', Boolean(pin) && other !== pin && !fits(pin, other));
     }
+    for (const wire of board.wires.values()) {
+      wire.group.classList.toggle('of-chosen', Boolean(pin) && (wire.input === pin.name || wire.output === pin.name));
+    }
     if (!pin) return;
     get('chosen-name').textContent = pin.name;
     get('chosen-tools').hidden = !mayChange;
@@ -242,15 +245,14 @@
   function setAge() {
     const isOld = performance.now() - heard > PATIENCE || source.readyState !== EventSource.OPEN;
     document.body.classList.toggle('is-old', isOld);
-    get('link').textContent = isOld ? 'no connection' : 'live';
+    const link = isOld ? 'no connection' : 'live';
+    if (get('link').textContent !== link) get('link').textContent = link;
     get('link').className = isOld ? 'tag bad' : 'tag good';
     get('age').hidden = !isOld;
     if (!isOld) return;
     const seconds = Math.round((performance.now() - heard) / 1000);
     const text = state ? `No connection to the dispatcher. What is shown is ${seconds} s old.` : 'No connection to the dispatcher.';
-    // The first words are announced; a clock that runs on would be announced again and again.
-    if (get('age').hidden || get('age').dataset.at !== String(seconds)) get('age').textContent = text;
-    get('age').dataset.at = String(seconds);
+    get('age').textContent = text;
   }
 
   let source = null;

@@ -19,11 +19,21 @@ const REST: u32 = 20;
 
 /// The newest state. Viewers who are slow miss those between, and keep nobody waiting.
 pub(crate) struct Feed {
-    state: watch::Sender<Option<Published>>,
+    state: watch::Sender<Newest>,
     /// Somebody has begun to look.
     wanted: Notify,
     /// Changes so far: what was looked at before the last one is not published.
     changes: AtomicU64,
+}
+
+/// What a viewer gets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Newest {
+    /// Nobody has looked since the last change.
+    Unknown,
+    State(Published),
+    /// There is nothing to be seen any more.
+    Ended,
 }
 
 /// A state, as it is sent.
@@ -56,14 +66,14 @@ impl Published {
 impl Feed {
     pub(crate) fn new() -> Self {
         Self {
-            state: watch::Sender::new(None),
+            state: watch::Sender::new(Newest::Unknown),
             wanted: Notify::new(),
             changes: AtomicU64::new(0),
         }
     }
 
     /// A viewer more.
-    pub(crate) fn subscribe(&self) -> watch::Receiver<Option<Published>> {
+    pub(crate) fn subscribe(&self) -> watch::Receiver<Newest> {
         let mut viewer = self.state.subscribe();
         viewer.mark_changed();
         self.wanted.notify_one();
@@ -73,7 +83,12 @@ impl Feed {
     /// Something was changed: who looks from now on sees it.
     pub(crate) fn changed(&self) {
         self.changes.fetch_add(1, Ordering::Relaxed);
-        self.state.send_replace(None);
+        self.state.send_if_modified(|present| {
+            if *present != Newest::Ended {
+                *present = Newest::Unknown;
+            }
+            false
+        });
     }
 
     /// Looks while somebody else does, until the site has ended.
@@ -81,7 +96,7 @@ impl Feed {
         loop {
             while self.state.receiver_count() == 0 {
                 // What was true then need not be when the next one comes.
-                self.state.send_replace(None);
+                self.state.send_replace(Newest::Unknown);
                 self.wanted.notified().await;
             }
             let changes = self.changes.load(Ordering::Relaxed);
@@ -89,10 +104,11 @@ impl Feed {
             let (answer, state) = Answer::new();
             site.look(answer);
             let Ok(state) = state.await else {
+                self.state.send_replace(Newest::Ended);
                 return;
             };
             if changes == self.changes.load(Ordering::Relaxed) {
-                let state = Some(Published::new(&state()));
+                let state = Newest::State(Published::new(&state()));
                 self.state.send_if_modified(|present| {
                     let is_new = *present != state;
                     *present = state;

@@ -16,7 +16,7 @@ use hyper::header::{
 use hyper::{Method, Request, Response, StatusCode};
 use tokio::time::timeout;
 
-use crate::feed::Feed;
+use crate::feed::{Feed, Newest};
 use crate::guard::{Guard, Token};
 use crate::site::{Answer, Change, Site, Verb};
 
@@ -115,10 +115,11 @@ async fn get(hall: &Hall, path: &str, token: Token) -> Result<Response<Body>, Re
     match path {
         "/state" => {
             let mut viewer = hall.feed.subscribe();
-            let state = viewer.wait_for(Option::is_some).await;
-            let state = state.ok().and_then(|state| state.clone());
-            let state = state.ok_or_else(nobody)?;
-            Ok(full(JSON, state.json()))
+            let newest = viewer.wait_for(|newest| *newest != Newest::Unknown).await;
+            match newest.as_deref() {
+                Ok(Newest::State(state)) => Ok(full(JSON, state.json())),
+                _ => Err(nobody()),
+            }
         }
         "/events" => Ok(events(&hall.feed)),
         "/access" if token == Token::Wrong => Err(no_token(token)),
@@ -141,11 +142,12 @@ fn events(feed: &Feed) -> Response<Body> {
         loop {
             let event = match timeout(BEAT, viewer.changed()).await {
                 Err(_) => Some(Bytes::from_static(b"event: beat\ndata:\n\n")),
-                Ok(Ok(())) => viewer
-                    .borrow_and_update()
-                    .as_ref()
-                    .map(|state| state.event()),
                 Ok(Err(_)) => return None,
+                Ok(Ok(())) => match &*viewer.borrow_and_update() {
+                    Newest::Unknown => None,
+                    Newest::State(state) => Some(state.event()),
+                    Newest::Ended => return None,
+                },
             };
             if let Some(event) = event {
                 return Some((Ok(Frame::data(event)), viewer));

@@ -135,7 +135,7 @@ impl Bus for Laboratory {
         Liar {
             peer: Box::new(Lying {
                 stop,
-                lying: Some(lying),
+                thread: Some(lying),
                 address: self.address(),
             }),
             cause: "protocol",
@@ -175,7 +175,7 @@ impl Bus for Laboratory {
 /// A thread that lies until this is dropped.
 struct Lying {
     stop: Stop,
-    lying: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<()>>,
     address: SocketAddr,
 }
 
@@ -184,8 +184,8 @@ impl Drop for Lying {
         self.stop.stop();
         // It wakes by a last connection.
         let _last = std::net::TcpStream::connect(self.address);
-        if let Some(lying) = self.lying.take() {
-            lying.join().expect("no panic");
+        if let Some(thread) = self.thread.take() {
+            thread.join().expect("no panic");
         }
     }
 }

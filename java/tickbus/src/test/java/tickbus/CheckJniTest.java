@@ -28,6 +28,7 @@ class CheckJniTest {
         ChildJvm.Outcome outcome = new ChildJvm(home.get())
             .with("-Xcheck:jni", "--enable-native-access=ALL-UNNAMED")
             .with("-Dtickbus.native.dir=" + System.getProperty("tickbus.native.dir"))
+            .with("-Dtickbus.root=" + System.getProperty("tickbus.root"))
             .with("-cp", ChildJvm.classPath(), "org.junit.platform.console.ConsoleLauncher", "execute")
             .with("--select-package", "tickbus", "--include-tag", "native", "--fail-if-no-tests")
             .with("--disable-banner", "--disable-ansi-colors", "--details", "summary")

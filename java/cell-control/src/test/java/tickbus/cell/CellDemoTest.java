@@ -83,6 +83,7 @@ class CellDemoTest {
         assertEquals(0, demo(nets(), "--cylinders", "4"), () -> output);
         assertTrue(verdict().matches("demo-cell: ok cylinders=4 kinds=\\S+ deadlocks=0 markings=\\d+ jams=1 recovered=1"
             + " vacuum_lost=0 refills=0 ticks=\\d+ report=.*"), verdict());
+        assertFalse(output.contains("no row of the control table"), output);
         String report = Files.readString(folder.resolve("demo/report.txt"));
         for (String part : List.of("the loader will jam", "station 1: ", " firings, now {", "all_markings", "Cylinders",
                 "Statistics of driver 1998")) {

@@ -12,7 +12,8 @@ import tickbus.Tickbus;
  * A head of a reader of code carriers, as a controller sees it over the bus {@code ivi-client}.
  *
  * <p>A command is begun by {@link #read} or {@link #write}; it goes out with the next exchange, and is over when {@link
- * #isDone} says so after one of the exchanges that follow. Then {@link #status} and {@link #data} tell what became of it.
+ * #isDone} says so after one of the exchanges that follow. Then {@link #status} and {@link #data} tell what became of
+ * it.
  *
  * <pre>{@code
  * head.readPallet();
@@ -24,9 +25,9 @@ import tickbus.Tickbus;
  *
  * <p>The head finds its signals by their addresses: {@code %QB0} is the command, {@code %QB1} a length, {@code %QW2} an
  * address, and the data begin at {@code %QB4}; {@code %IB0} is the command's echo, {@code %IB1} the status, {@code
- * %IX2.0} says whether a carrier is there, {@code %IB3} is a length, and the data begin at {@code %IB4}. Signals for data
- * can be of any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Like all signals it
- * belongs to the ticking thread.
+ * %IX2.0} says whether a carrier is there, {@code %IB3} is a length, and the data begin at {@code %IB4}. Signals for
+ * data can be of any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Like all
+ * signals it belongs to the ticking thread.
  */
 public final class IdentificationHead {
     /** The command was executed. */
@@ -183,7 +184,8 @@ public final class IdentificationHead {
     private void begin(char character, int at, int count) {
         mustBeDone();
         if (at < 0 || at > 0xFFFF) {
-            throw new IllegalArgumentException("the address " + at + " is none of a carrier; write one from 0 to 65535");
+            throw new IllegalArgumentException(
+                "the address " + at + " is none of a carrier; write one from 0 to 65535");
         }
         address.setLong(at);
         length.setLong(count);
@@ -192,14 +194,15 @@ public final class IdentificationHead {
 
     private void mustFit(int count, List<Part> data, String first) {
         if (count < 1 || count > room(data)) {
-            throw new IllegalArgumentException(count + " octets do not fit into the data of " + shown + ", which has signals for "
-                + room(data) + " from " + first + BEFORE_DATA + " on");
+            throw new IllegalArgumentException(count + " octets do not fit into the data of " + shown
+                + ", which has signals for " + room(data) + " from " + first + BEFORE_DATA + " on");
         }
     }
 
     private void mustBeDone() {
         if (!isDone()) {
-            throw new IllegalStateException("the head in " + shown + " has not answered the command before; wait for isDone()");
+            throw new IllegalStateException(
+                "the head in " + shown + " has not answered the command before; wait for isDone()");
         }
     }
 
@@ -241,7 +244,8 @@ public final class IdentificationHead {
     public byte[] data() {
         int found = status();
         if (found != DONE && found != BATTERY_LOW) {
-            throw new IllegalStateException(String.format("the command has failed with status %02X in %s; see status()", found, shown));
+            throw new IllegalStateException(
+                String.format("the command has failed with status %02X in %s; see status()", found, shown));
         }
         byte[] octets = new byte[(int) received.getLong()];
         for (Part part : receivedData) {

@@ -48,7 +48,8 @@ class IdentificationHeadTest {
         StringBuilder text = new StringBuilder("[driver]\nid = 2\nname = \"few\"\n[fieldbus]\nkind = \"ivi-client\"\n"
             + "role = \"controller\"\nreconnect = [\"10ms\"]\ndevice = \"" + directory.resolve("reader") + "\"\n");
         for (String address : addresses) {
-            text.append("[[signal]]\nname = \"").append(address).append("\"\naddress = \"").append(address).append("\"\n");
+            text.append("[[signal]]\nname = \"").append(address).append("\"\naddress = \"").append(address)
+                .append("\"\n");
         }
         return Tickbus.open(Files.writeString(directory.resolve("few.cfg"), text));
     }
@@ -97,7 +98,8 @@ class IdentificationHeadTest {
     void aControllerReadsChangesAndWritesAPallet() throws IOException {
         openBoth();
         IdentificationHead head = new IdentificationHead(controller);
-        PalletRecord pallet = new PalletRecord(LocalDateTime.of(2004, 3, 9, 16, 5, 59), Piece.METALLIC, Set.of(Content.SLEEVE));
+        PalletRecord pallet =
+            new PalletRecord(LocalDateTime.of(2004, 3, 9, 16, 5, 59), Piece.METALLIC, Set.of(Content.SLEEVE));
         assertFalse(head.isPresent());
         arrive(pallet.toOctets());
         until(head::isPresent);
@@ -135,8 +137,8 @@ class IdentificationHeadTest {
     void octetsGoToAnyAddressAndUnsignedSignalsOfAnyWidth() throws IOException {
         openBoth();
         controller.close();
-        controller = openController("%QB0", "%QB1", "%QW2", "%QB4", "%QD5", "%IB0", "%IB1", "%IX2.0", "%IB3", "%IW4", "%IB6",
-            "%ID7");
+        controller = openController("%QB0", "%QB1", "%QW2", "%QB4", "%QD5", "%IB0", "%IB1", "%IX2.0", "%IB3", "%IW4",
+            "%IB6", "%ID7");
         IdentificationHead head = new IdentificationHead(controller);
         arrive(new byte[] {0, 1, 2, 3, 4, 5, 6, 7, 8, (byte) 0xFF});
         until(head::isPresent);
@@ -154,7 +156,8 @@ class IdentificationHeadTest {
     @Test
     void aSignalThatIsNotThereIsNamed() throws IOException {
         controller = openController("%QB1", "%QW2", "%IB0", "%IB1", "%IX2.0", "%IB3");
-        String told = assertThrows(IllegalArgumentException.class, () -> new IdentificationHead(controller)).getMessage();
+        String told =
+            assertThrows(IllegalArgumentException.class, () -> new IdentificationHead(controller)).getMessage();
         assertTrue(told.contains("needs a signal at %QB0"), told);
     }
 }

@@ -28,7 +28,8 @@ class PalletRecordTest {
 
     @Test
     void aRecordHasTwentyOneOctetsFourteenOfThemDigits() {
-        PalletRecord pallet = new PalletRecord(TIME, Piece.RED_WITH_CAP, Set.of(Content.SLEEVE, Content.SPRING, Content.PIECE));
+        Set<Content> contents = Set.of(Content.SLEEVE, Content.SPRING, Content.PIECE);
+        PalletRecord pallet = new PalletRecord(TIME, Piece.RED_WITH_CAP, contents);
         byte[] octets = octets("59051609032004", 0x40, 1, 0, 1, 0, 0, 1);
         assertArrayEquals(octets, pallet.toOctets());
         assertEquals(pallet, PalletRecord.ofOctets(octets));
@@ -61,13 +62,15 @@ class PalletRecordTest {
 
     @Test
     void whatIsNoRecordIsRefusedWithItsPlace() {
-        String[][] wrong = {{"has 21 octets, and not 20", null}, {"octet 3 of a pallet's record is 41", "590A1609032004"},
+        String[][] wrong = {{"has 21 octets, and not 20", null},
+            {"octet 3 of a pallet's record is 41", "590A1609032004"},
             {"are no time", "60051609032004"}, {"are no time", "59051631022004"}};
         assertTrue(refusal(new byte[20]).contains(wrong[0][0]));
         for (int i = 1; i < wrong.length; i++) {
             assertTrue(refusal(octets(wrong[i][1])).contains(wrong[i][0]), wrong[i][0]);
         }
-        assertTrue(refusal(octets("59051609032004", 0x70)).contains("octet 14 of a pallet's record is 70; a piece is expected"));
+        assertTrue(refusal(octets("59051609032004", 0x70))
+            .contains("octet 14 of a pallet's record is 70; a piece is expected"));
         assertTrue(refusal(octets("59051609032004", 0x10, 0, 2)).contains("octet 16 of a pallet's record is 02"));
         assertThrows(IllegalArgumentException.class, () -> PalletRecord.BLANK.at(TIME.withYear(10_000)));
     }

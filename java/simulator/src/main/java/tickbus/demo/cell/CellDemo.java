@@ -8,6 +8,7 @@ import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
+import java.util.TreeMap;
 import tickbus.demo.DemoFailure;
 import tickbus.demo.HtmlPage;
 import tickbus.demo.PlcCommand;
@@ -252,7 +253,7 @@ public final class CellDemo {
                 HtmlPage.keepStatistics(statistics(options), simulator.drivers().get(0).statistics());
             }
             Path markings = CellPage.nets(options).resolve("nets.txt");
-            Files.writeString(options.report(), CellReport.write(options, verdict, timeline, cell, nets,
+            Files.writeString(options.report(), CellReport.write(options, verdict, timeline, cell, new TreeMap<>(nets),
                     Files.exists(markings) ? Files.readString(markings) : "", simulator));
             return verdict;
         } catch (IOException | RuntimeException e) {

@@ -6,7 +6,6 @@
 
 mod ascii;
 #[cfg(any(unix, feature = "mqtt"))]
-mod dial;
 mod lines;
 #[cfg(any(unix, feature = "mqtt"))]
 mod link;

@@ -5,9 +5,8 @@ use std::net::TcpStream;
 
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, Stream, is_for_later};
+use tickbus_fieldbus::tcp::{Address, Dialler, Stream, is_for_later};
 
-use crate::dial::Dialler;
 use crate::speaker::Speaker;
 
 /// Its key in the poll set.

@@ -1,17 +1,11 @@
 //! The inputs of this end, and the frames that their values make.
 
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::{Channel, Number};
+use tickbus_dispatcher::{Channel, Number, level};
 use tickbus_fieldbus::{Port, Role};
 use tickbus_image::signal::{DataType, RawValues, SignalTable, fail_safe_frame};
 
 use super::Channels;
-
-/// Below this voltage a digital input is off.
-const OFF_BELOW: f64 = 5.0;
-
-/// Above this voltage it is on. Between the two it keeps its state.
-const ON_ABOVE: f64 = 8.0;
 
 /// The inputs.
 #[derive(Debug)]
@@ -183,9 +177,7 @@ impl Inputs {
 fn bits(data_type: DataType, value: Number, before: u64) -> Option<u64> {
     let real = value.to_f64();
     match data_type {
-        DataType::Bool if real < OFF_BELOW => Some(0),
-        DataType::Bool if real > ON_ABOVE => Some(1),
-        DataType::Bool => Some(before),
+        DataType::Bool => Some(level(real).map_or(before, u64::from)),
         DataType::Real => Some(u64::from((real as f32).to_bits())),
         DataType::Lreal => Some(real.to_bits()),
         _ => {

@@ -1,14 +1,11 @@
 //! What this end writes, as values of its outputs.
 
 use tickbus_dispatcher::client::Client;
-use tickbus_dispatcher::{Channel, Number};
+use tickbus_dispatcher::{Channel, Number, ON_VOLTS};
 use tickbus_fieldbus::{DeadBands, Frames, Port, Role};
 use tickbus_image::signal::{DataType, RawValues, SignalTable};
 
 use super::Channels;
-
-/// The voltage of a digital output that is on.
-const ON: u8 = 24;
 
 /// The outputs, and the frames that were said last.
 #[derive(Debug)]
@@ -125,7 +122,7 @@ impl Outputs {
 #[expect(clippy::cast_possible_truncation, reason = "a REAL has 32 bits")]
 fn number(data_type: DataType, bits: u64) -> Option<Number> {
     match data_type {
-        DataType::Bool => Number::of(if bits == 0 { 0 } else { ON }),
+        DataType::Bool => Number::of(if bits == 0 { 0 } else { ON_VOLTS }),
         DataType::Real => Number::of(f32::from_bits(bits as u32)),
         DataType::Lreal => Number::of(f64::from_bits(bits)),
         _ if data_type.is_signed() => {

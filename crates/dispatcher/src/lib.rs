@@ -21,6 +21,7 @@ mod patch;
 mod patch_file;
 mod refusal;
 pub mod tcp;
+mod volts;
 
 pub use board::{ChannelState, ClientState, Connection, OnLoss, Snapshot, Traffic};
 pub use cable::Cable;
@@ -33,3 +34,4 @@ pub use number::{LONGEST_NUMBER, Number};
 pub use patch::{Patch, Pin};
 pub use patch_file::PatchFile;
 pub use refusal::{Code, Refusal};
+pub use volts::{ON_VOLTS, level};

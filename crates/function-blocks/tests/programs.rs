@@ -244,3 +244,33 @@ fn a_controller_has_the_terminals_that_it_is_given() {
     controller.scan(Nanos::ZERO, WallTime::default());
     assert!(controller.outputs()[11]);
 }
+
+#[test]
+fn a_damaged_program_is_refused_or_runs() {
+    let text = "[blocks]\n\
+        a = { type = \"AND\", inputs = [\"I1\", \"b\"] }\n\
+        b = { type = \"RS\", set = \"I1\", reset = \"Q1\" }\n\
+        c = { type = \"counter\", input = \"a\", reset = \"c\", limit = 3 }\n\
+        d = { type = \"on-delay\", input = \"I1\", time = \"30ms\" }\n\
+        e = { type = \"pulse\", input = \"d\", time = \"1.5s\" }\n\
+        f = { type = \"weekly-timer\", cams = [{ days = [\"Mon\"], on = \"22:00\", off = \"06:00\" }] }\n\
+        g = { type = \"comparator\", a = \"c\", b = 1 }\n\
+        h = { type = \"hysteresis\", input = \"AI1\", on = 1, off = 0 }\n\
+        [outputs]\n\
+        Q1 = \"h\"\n\
+        AQ1 = \"c\"\n";
+    let mut ran = 0;
+    for at in 0..text.len() {
+        for other in ["", "\"", "9", "[", "]", "=", "I", "\n", "\u{fc}"] {
+            let damaged = format!("{}{other}{}", &text[..at], &text[at + 1..]);
+            if let Ok(program) = Program::parse("lab.toml", &damaged, Terminals::default()) {
+                let mut controller = Controller::new(program);
+                controller.scan(Nanos::ZERO, WallTime::default());
+                controller.set_input(1, true);
+                controller.scan(Nanos::MAX, WallTime::default());
+                ran += 1;
+            }
+        }
+    }
+    assert!(ran > 100, "{ran}");
+}

@@ -11,7 +11,7 @@ use super::say;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Clock, Nanos, Pace, Stop, system_time};
 use tickbus_dispatcher::client::{Client, Event};
-use tickbus_dispatcher::{Channel, Kind, Number};
+use tickbus_dispatcher::{Channel, Kind, Number, ON_VOLTS, level};
 use tickbus_fieldbus::tcp::{Address, Dialler, close_gracefully, is_for_later};
 use tickbus_function_blocks::{Controller, WallTime};
 
@@ -189,25 +189,19 @@ impl Host<'_> {
         self.due = self.terminal.controller.scan(now, wall_time(&self.zone));
         self.terminal.changed.fill(false);
         self.counts.scans += 1;
-        let outputs = self.terminal.controller.outputs().iter();
-        for (number, is_on) in (1..).zip(outputs) {
-            let value = if *is_on {
-                Number::of(24)
-            } else {
-                Number::of(0)
-            };
-            let kind = Kind::DigitalOutput;
-            // All that a program can make can be written, but for an analog value beyond every scale: that one stays.
-            if let Some(value) = value {
-                self.client.set(Channel { kind, number }, value);
+        let (controller, client) = (&self.terminal.controller, &mut self.client);
+        let mut set = |kind, number, value: f64| {
+            // A number beyond all that can be said is not said; the last one stays.
+            if let Some(value) = Number::of(value) {
+                client.set(Channel { kind, number }, value);
             }
+        };
+        for (number, is_on) in (1..).zip(controller.outputs()) {
+            let volts = if *is_on { ON_VOLTS } else { 0 };
+            set(Kind::DigitalOutput, number, volts.into());
         }
-        let outputs = self.terminal.controller.analog_outputs().iter();
-        for (number, value) in (1..).zip(outputs) {
-            let kind = Kind::AnalogOutput;
-            if let Some(value) = Number::of(*value) {
-                self.client.set(Channel { kind, number }, value);
-            }
+        for (number, value) in (1..).zip(controller.analog_outputs()) {
+            set(Kind::AnalogOutput, number, *value);
         }
     }
 
@@ -273,12 +267,9 @@ impl Terminal {
         }
     }
 
-    /// What an input becomes: below 5 V off, above 8 V on, and between them as it was.
+    /// What an input becomes.
     fn is_on(&self, number: u16, value: &Number) -> bool {
-        const OFF: f64 = 5.0;
-        const ON: f64 = 8.0;
-        let volts = value.to_f64();
-        volts > ON || (volts >= OFF && self.inputs[usize::from(number) - 1])
+        level(value.to_f64()).unwrap_or(self.inputs[usize::from(number) - 1])
     }
 
     /// Whether this input would switch for the second time since the last scan.

@@ -6,16 +6,10 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::shown;
 use tickbus_dispatcher::client::{Client, Event, KEEP_ALIVE, Profile};
-use tickbus_dispatcher::{Channel, Number};
+use tickbus_dispatcher::{Channel, Number, level};
 
 use super::map_file::{Entry, Format, Map};
 use crate::speaker::Speaker;
-
-/// Above this voltage a digital channel is on.
-const ON: f64 = 8.0;
-
-/// Below this voltage it is off; between them it keeps its state.
-const OFF: f64 = 5.0;
 
 /// Publishes a message of an entry; false if the broker takes no more now.
 pub type Publish<'p> = dyn FnMut(&Entry, &str) -> bool + 'p;
@@ -227,10 +221,9 @@ impl Format {
                 let scaled = decimal(value() * factor + offset)?;
                 Some(scaled.as_str().to_owned())
             }
-            Self::Words { on, off } => match value() {
-                volts if volts > ON => Some(on.clone()),
-                volts if volts < OFF => Some(off.clone()),
-                _ => None,
+            Self::Words { on, off } => match level(value())? {
+                true => Some(on.clone()),
+                false => Some(off.clone()),
             },
         }
     }

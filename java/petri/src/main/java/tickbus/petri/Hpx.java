@@ -7,7 +7,10 @@ import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import java.util.Optional;
 import java.util.TreeMap;
+import java.util.regex.Matcher;
+import java.util.regex.Pattern;
 
 /**
  * Reads the interchange files of HPSim 0.9, {@code .hpx}: weights, capacities, arcs of all kinds and delays.
@@ -17,6 +20,9 @@ import java.util.TreeMap;
 public final class Hpx {
     /** HPSim's arc types, by number. */
     private static final ArcKind[] TYPES = {ArcKind.INPUT, ArcKind.INHIBITOR, ArcKind.TEST};
+    /** Left, top, right and bottom. */
+    private static final Pattern RECTANGLE =
+        Pattern.compile("[^-\\d]*(-?\\d+)[^-\\d]+(-?\\d+)[^-\\d]+(-?\\d+)[^-\\d]+(-?\\d+)[^-\\d]*");
 
     private final SourceText source;
     private final long unit;
@@ -96,6 +102,8 @@ public final class Hpx {
             .capacity(section.number("TOKENS_CAPAZITY", 1)));
         transitions.forEach((id, section) -> builder.transition(transitionNames.get(id)).delay(delay(section)));
         arcs(builder, placeNames, transitionNames);
+        places.forEach((id, section) -> centre(section).ifPresent(at -> builder.placeAt(placeNames.get(id), at)));
+        transitions.forEach((id, section) -> centre(section).ifPresent(at -> builder.transitionAt(transitionNames.get(id), at)));
         return new Imported(builder.build(), List.copyOf(warnings));
     }
 
@@ -180,6 +188,19 @@ public final class Hpx {
             names.replaceAll((id, label) -> letter + id);
         }
         return names;
+    }
+
+    /** The middle of the rectangle in which HPSim draws a node. What cannot be read is left out: the net does not need it. */
+    private static Optional<double[]> centre(Section section) {
+        Matcher sides = RECTANGLE.matcher(section.values.getOrDefault("BOUNDING_RECT", ""));
+        if (!sides.matches()) {
+            return Optional.empty();
+        }
+        double[] side = new double[4];
+        for (int i = 0; i < 4; i++) {
+            side[i] = Double.parseDouble(sides.group(i + 1));
+        }
+        return Optional.of(new double[] {(side[0] + side[2]) / 2, (side[1] + side[3]) / 2});
     }
 
     private Delay delay(Section section) {

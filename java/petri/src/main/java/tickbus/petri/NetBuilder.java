@@ -17,6 +17,9 @@ public final class NetBuilder {
     private final Map<String, Transition> transitions = new LinkedHashMap<>();
     private final List<Pending> arcs = new ArrayList<>();
     private final List<String> mistakes = new ArrayList<>();
+    private final Map<String, double[]> placesAt = new HashMap<>();
+    private final Map<String, double[]> transitionsAt = new HashMap<>();
+    private final Map<String, double[][]> bends = new HashMap<>();
     private String place;
     private String transition;
 
@@ -154,6 +157,21 @@ public final class NetBuilder {
         return this;
     }
 
+    /** Where the file draws a place. */
+    void placeAt(String name, double[] at) {
+        placesAt.put(name, at);
+    }
+
+    /** Where the file draws a transition. */
+    void transitionAt(String name, double[] at) {
+        transitionsAt.put(name, at);
+    }
+
+    /** Where the file bends an arc. */
+    void bends(ArcKind kind, String with, String by, double[][] at) {
+        bends.put(new Pending(kind, with, by, 0).text(), at);
+    }
+
     private boolean isTransition(String what) {
         if (transition == null) {
             mistakes.add(what + ": there is no transition yet; call transition(...) before it");
@@ -199,6 +217,27 @@ public final class NetBuilder {
         if (!mistakes.isEmpty()) {
             throw new NetException("net " + name, 0, "", String.join("\n", mistakes));
         }
-        return new PetriNet(name, List.copyOf(places.values()), List.copyOf(transitions.values()), made);
+        return new PetriNet(name, List.copyOf(places.values()), List.copyOf(transitions.values()), made, positions(made));
+    }
+
+    /** Null unless all nodes have a position. */
+    private Positions positions(List<Arc> made) {
+        if (!placesAt.keySet().containsAll(places.keySet()) || !transitionsAt.keySet().containsAll(transitions.keySet())) {
+            return null;
+        }
+        double[][] nodes = new double[places.size() + transitions.size()][];
+        places.values().forEach(one -> nodes[one.index()] = placesAt.get(one.name()));
+        transitions.values().forEach(one -> nodes[places.size() + one.index()] = transitionsAt.get(one.name()));
+        List<String> placeNames = List.copyOf(places.keySet());
+        List<String> transitionNames = List.copyOf(transitions.keySet());
+        Map<Arc, double[][]> bent = new HashMap<>();
+        for (Arc arc : made) {
+            double[][] points = bends.get(
+                new Pending(arc.kind(), placeNames.get(arc.place()), transitionNames.get(arc.transition()), 0).text());
+            if (points != null) {
+                bent.put(arc, points);
+            }
+        }
+        return new Positions(nodes, bent);
     }
 }

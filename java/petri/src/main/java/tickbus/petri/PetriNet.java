@@ -22,11 +22,14 @@ public final class PetriNet {
     private final Map<String, Integer> transitionsByName = new HashMap<>();
     /** What each transition needs and changes, in the order of its places. */
     final Effects effects;
+    /** Where its file draws it; null if it does not come from a file that does. */
+    final Positions positions;
 
-    PetriNet(String name, List<Place> places, List<Transition> transitions, List<Arc> arcs) {
+    PetriNet(String name, List<Place> places, List<Transition> transitions, List<Arc> arcs, Positions positions) {
         this.name = name;
         this.places = places;
         this.transitions = transitions;
+        this.positions = positions;
         this.arcs = arcs.stream()
             .sorted(Comparator.comparingInt(Arc::transition).thenComparing(Arc::kind).thenComparingInt(Arc::place))
             .toList();

@@ -27,6 +27,8 @@ final class PnmlReader {
     private XMLStreamReader xml;
     private String netName = "";
     private int nets;
+    /** Pages with nodes; each has coordinates of its own. */
+    private final Set<String> drawnOn = new HashSet<>();
 
     /** A place, a transition, or a reference to one. */
     private static final class Node {
@@ -36,6 +38,7 @@ final class PnmlReader {
         final String refers;
         String name = "";
         int initial;
+        double[] at;
         final Map<String, String> own = new HashMap<>();
 
         Node(String id, String tag, int line, String refers) {
@@ -57,6 +60,7 @@ final class PnmlReader {
         final String to;
         int weight = 1;
         ArcKind kind = ArcKind.INPUT;
+        double[][] bends = {};
 
         Link(String id, int line, String from, String to) {
             this.id = id;
@@ -174,7 +178,10 @@ final class PnmlReader {
                 claim(element);
                 children(element, inner -> pageChild(element, inner, depth + 1));
             }
-            case "place", "transition" -> node(tag, null);
+            case "place", "transition" -> {
+                drawnOn.add(within);
+                node(tag, null);
+            }
             case "referencePlace", "referenceTransition" -> node(tag, attribute(tag + " " + id(), "ref"));
             case "arc" -> arc();
             case "name", "graphics", "toolspecific" -> skip();
@@ -198,7 +205,10 @@ final class PnmlReader {
                     node.initial = source.number(at, element, "initial marking", label(element, inner), 0);
                 }
                 case "toolspecific" -> toolspecific(element, node);
-                case "graphics" -> skip();
+                case "graphics" -> {
+                    double[][] points = points();
+                    node.at = points.length == 1 ? points[0] : null;
+                }
                 default -> throw unexpected(element, inner);
             }
         });
@@ -226,7 +236,8 @@ final class PnmlReader {
                     skip();
                 }
                 case "arctype" -> link.kind = kind(element, label(element, tag).strip());
-                case "name", "graphics", "toolspecific" -> skip();
+                case "graphics" -> link.bends = points();
+                case "name", "toolspecific" -> skip();
                 default -> throw unexpected(element, tag);
             }
         });
@@ -265,6 +276,32 @@ final class PnmlReader {
             int event = xml.next();
             depth += event == XMLStreamConstants.START_ELEMENT ? 1 : event == XMLStreamConstants.END_ELEMENT ? -1 : 0;
         }
+    }
+
+    /** The positions in graphics. What cannot be read there is left out, as it does not matter to the net. */
+    private double[][] points() throws XMLStreamException {
+        List<double[]> points = new ArrayList<>();
+        int depth = 1;
+        while (depth > 0) {
+            int event = xml.next();
+            if (event == XMLStreamConstants.START_ELEMENT) {
+                depth++;
+                if (xml.getLocalName().equals("position")) {
+                    try {
+                        double x = Double.parseDouble(String.valueOf(xml.getAttributeValue(null, "x")));
+                        double y = Double.parseDouble(String.valueOf(xml.getAttributeValue(null, "y")));
+                        if (Double.isFinite(x) && Double.isFinite(y)) {
+                            points.add(new double[] {x, y});
+                        }
+                    } catch (NumberFormatException unreadable) {
+                        // Left out.
+                    }
+                }
+            } else if (event == XMLStreamConstants.END_ELEMENT) {
+                depth--;
+            }
+        }
+        return points.toArray(new double[0][]);
     }
 
     private String id() {
@@ -338,7 +375,26 @@ final class PnmlReader {
             }
         }
         arcs(builder, names);
+        if (drawnOn.size() == 1) {
+            positions(builder, names);
+        }
         return builder.build();
+    }
+
+    private void positions(NetBuilder builder, Map<String, String> names) {
+        for (Node node : nodes.values()) {
+            if (node.at != null && node.tag.equals("place")) {
+                builder.placeAt(names.get(node.id), node.at);
+            } else if (node.at != null && node.tag.equals("transition")) {
+                builder.transitionAt(names.get(node.id), node.at);
+            }
+        }
+        for (Link link : links) {
+            Ends ends = ends(link, resolve(link, "source", link.from), resolve(link, "target", link.to));
+            if (link.bends.length > 0) {
+                builder.bends(ends.kind, names.get(ends.place), names.get(ends.transition), link.bends);
+            }
+        }
     }
 
     /** The names, if all nodes of the kind have one of their own; otherwise their ids. */
@@ -403,6 +459,10 @@ final class PnmlReader {
     private record Ends(ArcKind kind, String place, String transition) {
     }
 
+    private static Ends ends(Link link, Node from, Node to) {
+        return to.isPlace() ? new Ends(ArcKind.OUTPUT, to.id, from.id) : new Ends(link.kind, from.id, to.id);
+    }
+
     private void arcs(NetBuilder builder, Map<String, String> names) {
         Map<Ends, Integer> weights = new LinkedHashMap<>();
         for (Link link : links) {
@@ -416,7 +476,7 @@ final class PnmlReader {
             if (to.isPlace() && link.kind != ArcKind.INPUT) {
                 throw source.mistake(link.line, element, link.kind + " arc to a place; expected one to a transition");
             }
-            Ends ends = to.isPlace() ? new Ends(ArcKind.OUTPUT, to.id, from.id) : new Ends(link.kind, from.id, to.id);
+            Ends ends = ends(link, from, to);
             boolean adds = ends.kind == ArcKind.INPUT || ends.kind == ArcKind.OUTPUT;
             if (weights.containsKey(ends) && !adds) {
                 throw source.mistake(link.line, element, "a second " + ends.kind + " arc between " + from.id + " and " + to.id);

@@ -14,6 +14,7 @@ final class PnmlWriter {
         for (Place place : net.places()) {
             out.append("      <place id=\"p").append(place.index()).append("\">");
             name(out, place.name());
+            graphics(out, net, place.index());
             if (place.initial() > 0) {
                 out.append("<initialMarking><text>").append(place.initial()).append("</text></initialMarking>");
             }
@@ -25,6 +26,7 @@ final class PnmlWriter {
         for (Transition transition : net.transitions()) {
             out.append("      <transition id=\"t").append(transition.index()).append("\">");
             name(out, transition.name());
+            graphics(out, net, net.places().size() + transition.index());
             Delay delay = transition.delay();
             String own = (transition.priority() != 0 ? "<priority>" + transition.priority() + "</priority>" : "")
                 + (delay.kind() != Delay.Kind.NONE ? "<delay>" + delay.kind() + " " + delay.first() + " "
@@ -39,6 +41,9 @@ final class PnmlWriter {
             String transition = "t" + arc.transition();
             out.append("      <arc id=\"a").append(number++).append("\" source=\"").append(output ? transition : place)
                 .append("\" target=\"").append(output ? place : transition).append("\">");
+            if (net.positions != null && net.positions.bends().containsKey(arc)) {
+                positions(out, net.positions.bends().get(arc));
+            }
             if (arc.weight() > 1) {
                 out.append("<inscription><text>").append(arc.weight()).append("</text></inscription>");
             }
@@ -54,6 +59,20 @@ final class PnmlWriter {
         out.append("<name><text>").append(escaped(name)).append("</text></name>");
     }
 
+    private static void graphics(StringBuilder out, PetriNet net, int node) {
+        if (net.positions != null) {
+            positions(out, net.positions.nodes()[node]);
+        }
+    }
+
+    private static void positions(StringBuilder out, double[]... points) {
+        out.append("<graphics>");
+        for (double[] point : points) {
+            out.append("<position x=\"").append(point[0]).append("\" y=\"").append(point[1]).append("\"/>");
+        }
+        out.append("</graphics>");
+    }
+
     private static void tool(StringBuilder out, String own) {
         if (!own.isEmpty()) {
             out.append("<toolspecific tool=\"").append(Pnml.TOOL).append("\" version=\"1\">").append(own)
@@ -61,7 +80,7 @@ final class PnmlWriter {
         }
     }
 
-    private static String escaped(String text) {
+    static String escaped(String text) {
         return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;");
     }
 }

@@ -1,6 +1,8 @@
 package tickbus.petri;
 
+import static org.junit.jupiter.api.Assertions.assertArrayEquals;
 import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertNull;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
@@ -113,5 +115,15 @@ class HpxTest {
                 assertTrue(expected.getMessage().contains("fuzz"), expected.getMessage());
             }
         }
+    }
+
+    @Test
+    void theRectanglesOfNodesGiveTheirPositions() {
+        String drawn = NET.replace("RUNTIME_CLASS=CHPosition\n", "RUNTIME_CLASS=CHPosition\nBOUNDING_RECT=RECT(10,-20,30,40)\n")
+            .replace("RUNTIME_CLASS=CHTransition\n", "RUNTIME_CLASS=CHTransition\nBOUNDING_RECT=RECT(0,0,5,10)\n");
+        double[][] nodes = Hpx.parse("n.hpx", drawn, 1).net().positions.nodes();
+        assertArrayEquals(new double[] {20, 10}, nodes[1]);
+        assertArrayEquals(new double[] {2.5, 5}, nodes[2]);
+        assertNull(Hpx.parse("n.hpx", drawn.replace("10,-20", "ten"), 1).net().positions);
     }
 }

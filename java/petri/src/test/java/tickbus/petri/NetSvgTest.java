@@ -1,0 +1,151 @@
+package tickbus.petri;
+
+import static org.junit.jupiter.api.Assertions.assertArrayEquals;
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertFalse;
+import static org.junit.jupiter.api.Assertions.assertNull;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+
+import java.io.StringReader;
+import java.util.ArrayList;
+import java.util.List;
+import javax.xml.parsers.DocumentBuilderFactory;
+import org.junit.jupiter.api.Test;
+import org.w3c.dom.Element;
+import org.w3c.dom.NodeList;
+import org.xml.sax.InputSource;
+
+class NetSvgTest {
+    private static final String PLACED = """
+        <pnml><net id="n" type="http://www.pnml.org/version-2009/grammar/ptnet"><page id="g">
+        <place id="a"><graphics><position x="10" y="20"/></graphics></place>
+        <place id="b"><graphics><position x="50" y="20"/></graphics></place>
+        <transition id="t"><graphics><position x="30" y="20"/></graphics></transition>
+        <arc id="1" source="a" target="t"><graphics><position x="10" y="40"/><position x="30" y="40"/></graphics></arc>
+        <arc id="2" source="t" target="b"/><arc id="3" source="b" target="t"/>
+        </page></net></pnml>
+        """;
+
+    /** The elements of a class, in their order. */
+    private static List<Element> all(String svg, String kind) throws Exception {
+        DocumentBuilderFactory factory = DocumentBuilderFactory.newInstance();
+        Element root = factory.newDocumentBuilder().parse(new InputSource(new StringReader(svg))).getDocumentElement();
+        List<Element> found = new ArrayList<>();
+        NodeList every = root.getElementsByTagName("*");
+        for (int i = 0; i < every.getLength(); i++) {
+            Element one = (Element) every.item(i);
+            if (List.of(one.getAttribute("class").split(" ")).contains(kind)) {
+                found.add(one);
+            }
+        }
+        return found;
+    }
+
+    @Test
+    void thePapersNetHasAllItsNodesArcsAndItsToken() throws Exception {
+        PetriNet net = Samples.paper();
+        String svg = NetSvg.write(net);
+        assertEquals(5, all(svg, "net-place").size());
+        assertEquals(4, all(svg, "net-transition").size());
+        assertEquals(net.arcs().size(), all(svg, "net-arc").size());
+        assertEquals(net.arcs().size(), all(svg, "net-head").size());
+        assertEquals(1, all(svg, "net-dot").size());
+        assertEquals(List.of("0"), all(svg, "net-enabled").stream().map(one -> one.getAttribute("data-transition")).toList());
+        Marking next = net.initialMarking();
+        net.fire(next, 0);
+        String after = NetSvg.write(net, next);
+        assertEquals(2, all(after, "net-dot").size());
+        assertEquals(List.of("1", "2"), all(after, "net-enabled").stream().map(one -> one.getAttribute("data-transition")).toList());
+        assertEquals(svg, NetSvg.write(Samples.paper()), "the same net does not look the same");
+    }
+
+    @Test
+    void fiveTokensAreDotsAndSixANumber() throws Exception {
+        PetriNet net = PetriNet.named("n").place("p").build();
+        for (int count = 0; count < 8; count++) {
+            String svg = NetSvg.write(net, net.marking(count));
+            assertEquals(count > 5 ? 0 : count, all(svg, "net-dot").size());
+            assertEquals(count > 5 ? List.of(Integer.toString(count)) : List.of(),
+                all(svg, "net-number").stream().map(Element::getTextContent).toList());
+        }
+    }
+
+    @Test
+    void everyKindOfArcAndNodeIsShownAndNamesAreEscaped() throws Exception {
+        String svg = NetSvg.write(Samples.everything());
+        assertEquals(2, all(svg, "net-ring").size());
+        assertEquals(1, all(svg, "net-test").size());
+        assertEquals(3, all(svg, "net-timed").size());
+        assertTrue(svg.contains("stop &amp; &lt;go&gt;"), svg);
+        assertFalse(svg.contains("<go>"), svg);
+        assertTrue(svg.contains(">2</text>"), "the weight of an arc");
+        String quoted = NetSvg.write(PetriNet.named("\" onload=\"alert(1)").place("p").build());
+        assertTrue(quoted.contains("aria-label=\"net &quot; onload=&quot;alert(1)\""), quoted);
+    }
+
+    @Test
+    void aDrawingOfTheFileIsKeptWithItsBends() {
+        PetriNet net = Pnml.parse("n.pnml", PLACED);
+        Layout layout = Layout.of(net);
+        assertFalse(layout.curved);
+        assertEquals(layout.y[0], layout.y[1]);
+        // The nearest nodes are 20 apart in the file and 64 in the drawing.
+        assertEquals(64, layout.x[2] - layout.x[0], 1e-9);
+        assertEquals(128, layout.x[1] - layout.x[0], 1e-9);
+        assertArrayEquals(new double[] {layout.x[0], layout.y[0] + 16, layout.x[0], layout.y[0] + 64, layout.x[2],
+            layout.y[0] + 64, layout.x[2], layout.y[0] + 14}, layout.routes[0], 1e-9);
+        // There and back between b and t, on both sides of the straight line.
+        assertTrue((layout.routes[1][3] - layout.y[0]) * (layout.routes[2][3] - layout.y[0]) < 0);
+        PetriNet back = Pnml.parse("back.pnml", Pnml.write(net));
+        assertEquals(NetSvg.write(net), NetSvg.write(back).replace("net back", "net n"));
+    }
+
+    @Test
+    void positionsThatMakeNoDrawingAreNotUsed() {
+        assertTrue(Layout.of(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"10\""))).curved, "two nodes upon each other");
+        assertTrue(Layout.of(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"1e9\""))).curved, "a node far away");
+        assertNull(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"right\"")).positions, "no figure");
+        assertNull(Pnml.parse("n", PLACED.replace("<position x=\"50\" y=\"20\"/>", "")).positions, "a node without");
+        String pages = PLACED.replace("<transition", "</page><page id=\"h\"><transition");
+        assertNull(Pnml.parse("n", pages).positions, "two pages, each with coordinates of its own");
+    }
+
+    @Test
+    void nodesOfALayoutNeverLieUponEachOtherAndArcsRunDownwardsUnlessTheyGoBack() {
+        SplitMix random = new SplitMix(7);
+        for (int i = 0; i < 60; i++) {
+            PetriNet net = RandomNets.any(random, 9, 9);
+            Layout layout = Layout.of(net);
+            for (int a = 0; a < layout.x.length; a++) {
+                assertTrue(layout.x[a] >= 16 && layout.x[a] + layout.labelWidth(a) <= layout.width, "within the picture");
+                assertTrue(layout.y[a] >= 16 && layout.y[a] <= layout.height, "within the picture");
+                for (int b = a + 1; b < layout.x.length; b++) {
+                    assertTrue(Math.abs(layout.y[a] - layout.y[b]) > 30 || Math.abs(layout.x[a] - layout.x[b]) > 30,
+                        net + ": nodes " + a + " and " + b);
+                }
+            }
+            for (int a = 0; a < net.arcs().size(); a++) {
+                Arc arc = net.arcs().get(a);
+                double run = layout.y[layout.target(arc)] - layout.y[layout.source(arc)];
+                assertTrue(run != 0, "an arc along a row");
+                boolean toMarked = arc.kind() == ArcKind.OUTPUT && net.place(arc.place()).initial() > 0;
+                assertTrue(!toMarked || run < 0, "an arc to a marked place goes back to it");
+            }
+        }
+    }
+
+    @Test
+    void aLongNameIsBrokenOrShortenedAndStaysWholeInTheTip() {
+        String name = "transport cylinder extended";
+        Layout layout = Layout.of(PetriNet.named("n").place(name).place("x".repeat(60)).build());
+        assertEquals(List.of("transport", "cylinder extended"), layout.label(0));
+        assertEquals(List.of("x".repeat(27) + "…"), layout.label(1));
+        assertTrue(NetSvg.write(layout.net).contains("<title>" + "x".repeat(60)));
+    }
+
+    @Test
+    void aNetWithNothingAndARingOfThousandsAreDrawn() throws Exception {
+        assertTrue(NetSvg.write(PetriNet.named("empty").build()).endsWith("</svg>\n"));
+        assertEquals(2000, all(NetSvg.write(CoordinatorTest.ring(2000)), "net-place").size());
+    }
+}

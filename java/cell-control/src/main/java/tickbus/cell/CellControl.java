@@ -11,8 +11,8 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 import tickbus.Tickbus;
 import tickbus.petri.Coordinator;
-import tickbus.petri.Dot;
 import tickbus.petri.FiringLog;
+import tickbus.petri.NetSvg;
 import tickbus.petri.Stop;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
@@ -163,7 +163,7 @@ public final class CellControl {
             String name = one.net().name();
             String file = name.replace(' ', '-');
             line(markings, name, logs.get(i).total() + " firings, now " + one.marking());
-            Files.writeString(folder.resolve(file + ".dot"), Dot.write(one.net(), one.marking()));
+            Files.writeString(folder.resolve(file + ".svg"), NetSvg.write(one.net(), one.marking()));
             Files.writeString(folder.resolve(file + ".firings"), logs.get(i).toString());
         }
         Files.writeString(folder.resolve("nets.txt"), markings);

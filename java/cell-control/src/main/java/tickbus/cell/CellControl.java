@@ -11,8 +11,8 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 import tickbus.Tickbus;
 import tickbus.petri.Coordinator;
-import tickbus.petri.Dot;
 import tickbus.petri.FiringLog;
+import tickbus.petri.NetSvg;
 import tickbus.petri.Stop;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
@@ -22,7 +22,7 @@ import tickbus.petri.control.NetController;
  * make it the PLC's end ({@link Tickbus#open(Path, String)}), and a folder for what is left at the end: each net with
  * its marking, and its firings.
  *
- * <p>Until it is told to end, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
+ * <p>Until a signal ends it, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
  */
 public final class CellControl {
     private static final long SCAN_NANOS = 5_000_000;
@@ -59,7 +59,7 @@ public final class CellControl {
     }
 
     /**
-     * Runs until it is told to end.
+     * Runs until a signal ends it.
      *
      * @param args the command line
      */
@@ -68,10 +68,10 @@ public final class CellControl {
             System.err.println("usage: CellControl CONFIG TABLES FOLDER");
             System.exit(USAGE);
         }
-        CountDownLatch told = new CountDownLatch(1);
+        CountDownLatch ending = new CountDownLatch(1);
         CountDownLatch done = new CountDownLatch(1);
         Runtime.getRuntime().addShutdownHook(new Thread(() -> {
-            told.countDown();
+            ending.countDown();
             try {
                 done.await(SECONDS_TO_END, TimeUnit.SECONDS);
             } catch (InterruptedException e) {
@@ -82,7 +82,7 @@ public final class CellControl {
         try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1])) {
             CellControl control = new CellControl(bus);
             control.prove();
-            control.run(told, System.out);
+            control.run(ending, System.out);
             control.leave(Path.of(args[2]));
         } catch (IOException | RuntimeException e) {
             System.err.println(e.getMessage() == null ? e.toString() : e.getMessage());
@@ -90,7 +90,7 @@ public final class CellControl {
         } finally {
             done.countDown();
         }
-        if (failed && told.getCount() > 0) {
+        if (failed && ending.getCount() > 0) {
             System.exit(FAILED);
         }
     }
@@ -109,13 +109,13 @@ public final class CellControl {
         thread.start();
     }
 
-    private void run(CountDownLatch told, PrintStream out) {
+    private void run(CountDownLatch ending, PrintStream out) {
         nets.run(SCAN_NANOS, () -> {
             if (nets.scans() % SCANS_PER_REPORT == 0) {
                 out.print(report());
                 out.flush();
             }
-            return told.getCount() > 0;
+            return ending.getCount() > 0;
         });
         out.print(report());
         out.flush();
@@ -163,7 +163,7 @@ public final class CellControl {
             String name = one.net().name();
             String file = name.replace(' ', '-');
             line(markings, name, logs.get(i).total() + " firings, now " + one.marking());
-            Files.writeString(folder.resolve(file + ".dot"), Dot.write(one.net(), one.marking()));
+            Files.writeString(folder.resolve(file + ".svg"), NetSvg.write(one.net(), one.marking()));
             Files.writeString(folder.resolve(file + ".firings"), logs.get(i).toString());
         }
         Files.writeString(folder.resolve("nets.txt"), markings);

@@ -40,7 +40,8 @@ public final class CellNets {
     private static BoundNet transport(int... pallets) {
         NetBuilder net = PetriNet.named("transport").place("forward", 1).place("backward").delay(300 * MS);
         for (int stop = 1; stop <= STOPS; stop++) {
-            net.place("to " + stop, among(pallets, stop)).place("at " + stop).place("leaving " + stop).place("stuck before " + stop);
+            net.place("to " + stop, among(pallets, stop)).place("at " + stop).place("leaving " + stop)
+                .place("stuck before " + stop);
             net.transition("arrives at " + stop).priority(1).input("to " + stop).output("at " + stop);
             net.transition("opens " + stop).input("at " + stop).output("leaving " + stop);
             net.transition("leaves " + stop).input("leaving " + stop).output("to " + after(stop));

@@ -90,7 +90,7 @@ class CellDemoTest {
             assertTrue(report.contains(part), report);
         }
         for (String net : List.of("station-1", "station-3", "station-4", "transport", "cell")) {
-            assertTrue(Files.readString(folder.resolve("demo/nets/" + net + ".dot")).contains("•"), net);
+            assertTrue(Files.readString(folder.resolve("demo/nets/" + net + ".svg")).contains("net-dot"), net);
             assertFalse(Files.readString(folder.resolve("demo/nets/" + net + ".firings")).isEmpty(), net);
         }
     }

@@ -45,7 +45,8 @@ class CellLoopTest {
     @BeforeEach
     void open() {
         Path cfg = Path.of(System.getProperty("tickbus.root"), "plc/cell/cell.cfg");
-        String link = "[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nlink = \"cell " + LINKS.incrementAndGet() + "\"\nrole = ";
+        String link = "[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nlink = \"cell " + LINKS.incrementAndGet()
+            + "\"\nrole = ";
         machine = Tickbus.open(cfg, link + "\"device\"\n");
         plc = Tickbus.open(cfg, link + "\"controller\"\n");
         BoundNet[] all = CellNets.all();

@@ -316,4 +316,14 @@ class CoordinatorTest {
         }
         return builder.build();
     }
+
+    @Test
+    void tokensAreThoseOfTheInitialMarkingUntilTheFirstScan() {
+        Coordinator coordinator = Coordinator.of(PetriNet.named("n").place("a", 2).place("b")
+            .transition("t").input("a").output("b").build()).build();
+        assertEquals(2, coordinator.tokens(0));
+        coordinator.scan(0);
+        assertEquals(0, coordinator.tokens(0));
+        assertEquals(2, coordinator.tokens(1));
+    }
 }

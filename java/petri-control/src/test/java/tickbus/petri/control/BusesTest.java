@@ -18,7 +18,7 @@ class BusesTest {
     @TempDir
     Path folder;
 
-    /** The machine closes its gripper when it is told to; the net counts how often it has. */
+    /** The machine closes its gripper on command; the net counts how often it has. */
     private void gripsThrice(Tickbus machine, Tickbus plc) {
         PetriNet net = PetriNet.named("gripper").place("open", 1).place("closing").place("opening")
             .transition("grip").input("open").output("closing")

@@ -154,7 +154,9 @@ public final class CellDemo {
         Path cfg = DeviceDriverFolder.scan(options.drivers()).configurations().get(driver.id());
         String java = Path.of(System.getProperty("java.home"), "bin", "java").toString();
         String client = "[fieldbus]\nkind = \"modbus-client\"\nrole = \"controller\"\nwrite_to = \"tickbus "
-                + driver.name() + "\"\naddress = \"" + PlcCommand.address(driver) + "\"\n[record]\nfile = \"none.vcd\"\nwhen = \"never\"\n";
+                + driver.name() + "\"\naddress = \"" + PlcCommand.address(driver)
+                // The machine's end records.
+                + "\"\n[record]\nfile = \"none.vcd\"\nwhen = \"never\"\n";
         List<String> command = new ArrayList<>(List.of(java, "--enable-native-access=ALL-UNNAMED", "-cp", options.nets()));
         // Such as where the native library is.
         System.getProperties().stringPropertyNames().stream().filter(name -> name.startsWith("tickbus."))

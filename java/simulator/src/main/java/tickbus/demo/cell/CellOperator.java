@@ -9,7 +9,7 @@ import tickbus.demo.Timeline;
 
 /** Fills magazines, turns the switch, provokes mishaps, and writes down what happens. */
 final class CellOperator {
-    /** So many cylinders are out when each mishap is provoked; at least one more is made after each. */
+    /** The number of cylinders that are out when each mishap is provoked; at least one more is made after it. */
     private static final int LOADER_JAMS_AFTER = 2;
     private static final int PALLET_JAMS_AFTER = 4;
     private static final int VACUUM_IS_LOST_AFTER = 6;

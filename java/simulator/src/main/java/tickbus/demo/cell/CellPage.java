@@ -42,12 +42,12 @@ final class CellPage {
         StringBuilder text = new StringBuilder("<section><h2>The nets at the end</h2>\n");
         List<Path> files = new ArrayList<>();
         try (Stream<Path> all = Files.list(folder)) {
-            all.filter(file -> file.toString().endsWith(".dot")).sorted().forEach(files::add);
+            all.filter(file -> file.toString().endsWith(".svg")).sorted().forEach(files::add);
         }
         for (Path file : files) {
-            String name = file.getFileName().toString().replace(".dot", "").replace('-', ' ');
-            text.append("<h3>").append(name).append("</h3>\n<pre>").append(Files.readString(file).replace("&", "&amp;")
-                .replace("<", "&lt;")).append("</pre>\n");
+            String name = file.getFileName().toString().replace(".svg", "").replace('-', ' ');
+            text.append("<h3>").append(name).append("</h3>\n<div style=\"overflow-x:auto\">").append(Files.readString(file))
+                    .append("</div>\n");
         }
         return text.append("</section>\n").toString();
     }

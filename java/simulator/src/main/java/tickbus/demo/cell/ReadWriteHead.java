@@ -20,7 +20,7 @@ public final class ReadWriteHead {
     ReadWriteHead() {
     }
 
-    /** The carrier in front of it; empty if there is none. */
+    /** The carrier in front of it; empty without one. */
     public Optional<CodeCarrier> carrier() {
         return Optional.ofNullable(carrier);
     }

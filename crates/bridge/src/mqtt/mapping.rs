@@ -221,10 +221,10 @@ impl Format {
                 let scaled = decimal(value() * factor + offset)?;
                 Some(scaled.as_str().to_owned())
             }
-            Self::Words { on, off } => match level(value())? {
-                true => Some(on.clone()),
-                false => Some(off.clone()),
-            },
+            Self::Words { on, off } => {
+                let word = if level(value())? { on } else { off };
+                Some(word.clone())
+            }
         }
     }
 

@@ -83,6 +83,7 @@ impl Laboratory {
                 clock: &*Monotonic::shared(),
                 stop: &ended,
                 patch_file: None,
+                door: None,
                 news: &mut |_| {},
             };
             listener.run(&mut dispatcher, hosting).expect("it serves");

@@ -1,5 +1,8 @@
 //! The dispatcher without its sockets: lines in, lines out, and time handed in.
 
+mod laboratory;
+mod requests;
+
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
@@ -7,6 +10,7 @@ use tickbus_base::time::Nanos;
 use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::Channel;
 use crate::device::{Device, Role};
+use crate::federation::{Federation, Request};
 use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, Values};
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
@@ -54,6 +58,8 @@ pub struct Dispatcher {
     promised: Vec<Promised>,
     /// When the times of all clients are looked at next.
     next_look: Nanos,
+    /// The other dispatchers of the laboratory, if there can be any.
+    federation: Option<Box<Federation>>,
 }
 
 #[derive(Debug)]
@@ -102,6 +108,7 @@ impl Dispatcher {
             resumable: Vec::new(),
             promised: Vec::new(),
             next_look: Nanos::MAX,
+            federation: None,
         }
     }
 
@@ -132,12 +139,8 @@ impl Dispatcher {
                 "{most} clients are here, and no more are served"
             )));
         }
-        let seat = self.free.pop().unwrap_or_else(|| {
-            self.sessions.push(None);
-            self.sessions.len() - 1
-        });
+        let seat = self.take_seat();
         self.count += 1;
-        self.board.seat(seat);
         self.sessions[seat] = Some(Session {
             peer,
             heard: now,
@@ -150,14 +153,33 @@ impl Dispatcher {
         Ok(seat)
     }
 
+    /// A free seat on the board, for a connection or for another dispatcher and its clients.
+    fn take_seat(&mut self) -> usize {
+        let seat = self.free.pop().unwrap_or_else(|| {
+            self.sessions.push(None);
+            self.sessions.len() - 1
+        });
+        self.board.seat(seat);
+        seat
+    }
+
     /// The connection of a seat is gone, or was closed.
     pub fn gone(&mut self, seat: usize) {
         if self.sessions[seat].take().is_some() {
             self.count -= 1;
-            self.free.push(seat);
             self.promised.retain(|promised| promised.seat != seat);
+            if let Some(federation) = &mut self.federation {
+                federation.waiting.retain(|waiting| waiting.seat != seat);
+            }
             self.board.unplug(seat);
+            self.settle();
+            self.free.push(seat);
         }
+    }
+
+    /// Where the client on a seat connected from.
+    pub fn peer(&self, seat: usize) -> Option<SocketAddr> {
+        self.session(seat).map(|session| session.peer)
     }
 
     /// Whether bytes of this client are wanted now. If not, it has to read its answers first.
@@ -193,6 +215,8 @@ impl Dispatcher {
             && let Some(session) = &mut self.sessions[seat]
             && session.progress == Progress::Stuck
             && !self.promised.iter().any(|promised| promised.seat == seat)
+            && !(self.federation.iter())
+                .any(|it| it.waiting.iter().any(|waiting| waiting.seat == seat))
         {
             session.progress = Progress::Going;
             self.resumable.push(seat);
@@ -202,7 +226,7 @@ impl Dispatcher {
     /// When [`tick`](Self::tick) has something to do even if nothing arrives.
     pub fn deadline(&self) -> Nanos {
         if self.resumable.is_empty() {
-            self.next_look
+            self.next_look.min(self.next_beat())
         } else {
             Nanos::ZERO
         }
@@ -213,6 +237,7 @@ impl Dispatcher {
         for seat in std::mem::take(&mut self.resumable) {
             self.arrived(now, seat, &[]);
         }
+        self.beat(now);
         if now < self.next_look {
             return;
         }
@@ -245,32 +270,40 @@ impl Dispatcher {
 
     /// The patch, if it was changed and not saved since.
     pub fn unsaved(&self) -> Option<&Patch> {
-        (!self.promised.is_empty()).then(|| self.board.patch())
+        let mut federation = self.federation.iter();
+        let is_unsaved = !self.promised.is_empty() || federation.any(|it| !it.due.is_empty());
+        is_unsaved.then(|| self.board.patch())
     }
 
     /// The patch was saved, or why not: who changed it is answered.
     pub fn saved(&mut self, outcome: &Result<(), String>) {
+        let outcome = outcome.as_ref().map(drop).map_err(|why| {
+            Code::Internal.because(format_args!(
+                "the patch could not be saved ({why}); it holds until the dispatcher ends"
+            ))
+        });
+        self.answer_due(&outcome);
         for Promised { seat, verb, sinks } in std::mem::take(&mut self.promised) {
-            match outcome {
+            match &outcome {
                 Ok(()) => self.confirm(seat, verb),
-                Err(why) => self.refuse(
-                    seat,
-                    &Code::Internal.because(format_args!(
-                        "the patch could not be saved ({why}); it holds until the dispatcher ends"
-                    )),
-                ),
+                Err(refusal) => self.refuse(seat, refusal),
             }
             self.board.begin_line();
             for sink in sinks {
                 self.board.refresh(&sink);
             }
-            if let Some(session) = &mut self.sessions[seat]
-                && session.progress == Progress::Stuck
-            {
-                session.progress = Progress::Going;
-                if !session.begun.is_empty() {
-                    self.resumable.push(seat);
-                }
+            self.go_on(seat);
+        }
+    }
+
+    /// A client that had to wait for its answer has got it.
+    fn go_on(&mut self, seat: usize) {
+        if let Some(session) = &mut self.sessions[seat]
+            && session.progress == Progress::Stuck
+        {
+            session.progress = Progress::Going;
+            if !session.begun.is_empty() {
+                self.resumable.push(seat);
             }
         }
     }
@@ -351,7 +384,7 @@ impl Dispatcher {
                 continue;
             }
             let line = &rest[..end];
-            if let Err(refusal) = self.obey(seat, line.strip_suffix(b"\r").unwrap_or(line)) {
+            if let Err(refusal) = self.obey(now, seat, line.strip_suffix(b"\r").unwrap_or(line)) {
                 self.refuse(seat, &refusal);
             }
             counts = self.board.device(seat).map(|device| device.counts);
@@ -360,7 +393,7 @@ impl Dispatcher {
     }
 
     /// Carries a line out.
-    fn obey(&mut self, seat: usize, line: &[u8]) -> Result<(), Refusal> {
+    fn obey(&mut self, now: Nanos, seat: usize, line: &[u8]) -> Result<(), Refusal> {
         let line = grammar::parse(line)?;
         let is_plugged = self.board.device(seat).is_some();
         let may_come_first = matches!(
@@ -374,7 +407,7 @@ impl Dispatcher {
         self.board.begin_line();
         match line {
             Line::Nothing => {}
-            Line::Identify(identification) => self.identify(seat, identification)?,
+            Line::Identify(identification) => self.identify(now, seat, identification)?,
             Line::Values(values) => self.values(seat, values)?,
             Line::Connect(joints) => self.connect(seat, joints)?,
             Line::Disconnect(channels) => self.disconnect(seat, channels)?,
@@ -395,7 +428,12 @@ impl Dispatcher {
         Ok(())
     }
 
-    fn identify(&mut self, seat: usize, identification: Identification<'_>) -> Result<(), Refusal> {
+    fn identify(
+        &mut self,
+        now: Nanos,
+        seat: usize,
+        identification: Identification<'_>,
+    ) -> Result<(), Refusal> {
         let Identification {
             role,
             name,
@@ -409,10 +447,13 @@ impl Dispatcher {
             );
             return Err(Code::Conflict.because(text));
         }
-        if self.board.is_taken(name) {
-            let text = format!("there is a client {name} already; take another name");
+        if let Some(other) = self.board.seat_of(name) {
+            let host = self.board.host(other).map(|host| format!(" on {host}"));
+            let host = host.unwrap_or_default();
+            let text = format!("there is a client {name} already{host}; take another name");
             return Err(Code::Conflict.because(text));
         }
+        let order = self.next_order(now);
         let Some(session) = &mut self.sessions[seat] else {
             return Ok(());
         };
@@ -423,10 +464,11 @@ impl Dispatcher {
             counts,
             peer: session.peer,
         };
-        self.board.plug(seat, device);
+        self.board.plug(seat, device, order);
         self.confirm(seat, Role::keyword(role));
         self.board.list(seat);
         self.board.refresh_all(seat);
+        self.settle();
         Ok(())
     }
 
@@ -491,51 +533,42 @@ impl Dispatcher {
             } else {
                 (own, peer)
             };
-            let mut in_line = connections.iter().filter(|(other, _)| *other == sink);
-            let present = self.board.patch().source(&sink);
-            let present = present.or(in_line.next().map(|(_, source)| source));
-            if let Some(other) = present.filter(|other| **other != source) {
-                return Err(Code::Conflict.because(format_args!(
-                    "{sink} is connected to {other} already; DISCONNECT it there first"
-                )));
-            }
-            connections.push((sink, source));
+            let joint = (sink, source);
+            self.check_source(&joint, &connections)?;
+            connections.push(joint);
         }
-        let mut sinks = Vec::with_capacity(connections.len());
-        for (sink, source) in connections {
-            if self.board.patch().source(&sink).is_none() {
-                self.board.connect(sink.clone(), source);
-            }
-            sinks.push(sink);
-        }
-        self.promise(seat, "CONNECT", sinks);
+        let request = Request {
+            connect: connections,
+            cut: Vec::new(),
+        };
+        self.change(seat, "CONNECT", request);
         Ok(())
     }
 
     fn disconnect(&mut self, seat: usize, channels: Channels<'_>) -> Result<(), Refusal> {
         let own_name = self.name(seat);
-        let mut sinks = Vec::new();
+        let mut cut = Vec::new();
         for channel in channels {
             let channel = channel?;
             if !self.board.has(seat, channel) {
                 return Err(no_channel("you have", channel));
             }
             let own = Pin::new(&own_name, channel);
-            let before = sinks.len();
+            let before = cut.len();
             if channel.kind.is_output() {
-                sinks.extend(self.board.patch().sinks(&own).cloned());
-            } else if self.board.patch().source(&own).is_some() {
-                sinks.push(own);
+                let sinks = self.board.patch().sinks(&own);
+                cut.extend(sinks.map(|sink| (sink.clone(), own.clone())));
+                cut.extend(self.sinks_elsewhere(&own));
+            } else if let Some(source) = self.board.patch().source(&own) {
+                cut.push((own.clone(), source.clone()));
             }
-            if sinks.len() == before {
+            if cut.len() == before {
                 let text = format!("{channel} is not connected");
                 return Err(Code::NotFound.because(text));
             }
         }
-        for sink in &sinks {
-            self.board.disconnect(sink);
-        }
-        self.promise(seat, "DISCONNECT", Vec::new());
+        let connect = Vec::new();
+        self.change(seat, "DISCONNECT", Request { connect, cut });
         Ok(())
     }
 
@@ -547,6 +580,11 @@ impl Dispatcher {
     /// Answers when the patch is saved; until then no further line of the client is looked at.
     fn promise(&mut self, seat: usize, verb: &'static str, sinks: Vec<Pin>) {
         self.promised.push(Promised { seat, verb, sinks });
+        self.stick(seat);
+    }
+
+    /// No further line of a client is looked at until it is answered.
+    fn stick(&mut self, seat: usize) {
         if let Some(session) = &mut self.sessions[seat] {
             session.progress = Progress::Stuck;
         }

@@ -1,0 +1,234 @@
+//! Connections with clients of other dispatchers: a connection belongs to the dispatcher of its sink.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::federation::message::{Body, Joint, WireJoint, joint};
+use crate::federation::{Request, Waiting};
+use crate::host::HostId;
+use crate::patch::{Patch, Pin};
+use crate::refusal::{Code, Refusal};
+
+use super::Dispatcher;
+
+impl Dispatcher {
+    /// The dispatcher to which the connections of a client's inputs belong, if it is another one.
+    pub(super) fn home(&self, client: &str) -> Option<HostId> {
+        let seat = self.board.seat_of(client)?;
+        self.board.host(seat)?;
+        self.board.order(seat).map(|order| order.host)
+    }
+
+    /// The patch in which the connections of a client's inputs are.
+    fn patch_of(&self, client: &str) -> &Patch {
+        let hosts = self.federation.as_ref().map(|federation| &federation.hosts);
+        let host = self.home(client);
+        let host = host.and_then(|id| hosts?.get(&id));
+        host.map_or(self.board.patch(), |host| &host.patch)
+    }
+
+    /// Refuses a connection if its sink has another source, on the board or among these.
+    pub(super) fn check_source(&self, joint: &Joint, others: &[Joint]) -> Result<(), Refusal> {
+        let (sink, source) = joint;
+        let mut in_line = others.iter().filter(|(other, _)| other == sink);
+        let present = self.patch_of(&sink.client).source(sink);
+        let present = present.or(in_line.next().map(|(_, source)| source));
+        match present.filter(|other| *other != source) {
+            None => Ok(()),
+            Some(other) => Err(Code::Conflict.because(format_args!(
+                "{sink} is connected to {other} already; DISCONNECT it there first"
+            ))),
+        }
+    }
+
+    /// The inputs of other dispatchers' clients that get an output, with that.
+    pub(super) fn sinks_elsewhere(&self, source: &Pin) -> Vec<Joint> {
+        let federation = self.federation.iter();
+        let hosts = federation.flat_map(|federation| federation.hosts.values());
+        let sinks = hosts.flat_map(|host| host.patch.sinks(source).cloned());
+        sinks.map(|sink| (sink, source.clone())).collect()
+    }
+
+    /// Makes and cuts connections for a client, and answers it.
+    pub(super) fn change(&mut self, seat: usize, verb: &'static str, all: Request) {
+        let federation = self.federation.as_ref();
+        let mut requests: BTreeMap<HostId, Request> = BTreeMap::new();
+        let (mut connect, mut cut) = (Vec::new(), Vec::new());
+        for joint in all.connect {
+            match self.home(&joint.0.client) {
+                // It is so already.
+                Some(_) if self.patch_of(&joint.0.client).source(&joint.0) == Some(&joint.1) => {}
+                Some(host) => requests.entry(host).or_default().connect.push(joint),
+                None => connect.push(joint),
+            }
+        }
+        for joint in all.cut {
+            let mut hosts = federation.iter().flat_map(|federation| &federation.hosts);
+            let host = hosts.find(|(_, host)| host.patch.source(&joint.0) == Some(&joint.1));
+            let host = host.map(|(id, _)| *id);
+            match host.filter(|_| self.board.patch().source(&joint.0) != Some(&joint.1)) {
+                Some(host) => requests.entry(host).or_default().cut.push(joint),
+                None => cut.push(joint.0),
+            }
+        }
+        let mut waiting = Waiting {
+            seat,
+            verb,
+            connect,
+            cut,
+            open: BTreeSet::new(),
+            made: Vec::new(),
+            refusal: None,
+        };
+        if requests.is_empty() {
+            self.finish(waiting);
+            return;
+        }
+        self.stick(seat);
+        if let Some(federation) = &mut self.federation {
+            for (host, request) in requests {
+                let number = federation.request(host, request);
+                waiting.open.insert((host, number));
+            }
+            federation.waiting.push(waiting);
+        }
+    }
+
+    /// All other dispatchers have answered.
+    fn finish(&mut self, waiting: Waiting) {
+        let Waiting {
+            seat,
+            verb,
+            connect,
+            cut,
+            made,
+            refusal,
+            ..
+        } = waiting;
+        let mut checks = connect.iter().map(|joint| self.check_source(joint, &[]));
+        let refusal = refusal.or_else(|| checks.find_map(Result::err));
+        drop(checks);
+        if let Some(refusal) = refusal {
+            if let Some(federation) = &mut self.federation {
+                for (host, cut) in made {
+                    let connect = Vec::new();
+                    federation.request(host, Request { connect, cut });
+                }
+            }
+            self.refuse(seat, &refusal);
+            self.go_on(seat);
+            return;
+        }
+        self.board.begin_line();
+        for sink in &cut {
+            self.board.disconnect(sink);
+        }
+        if connect.is_empty() && cut.is_empty() {
+            self.confirm(seat, verb);
+            self.go_on(seat);
+            return;
+        }
+        let sinks = self.connect_all(connect);
+        self.promise(seat, verb, sinks);
+    }
+
+    /// Makes connections that were checked; returns their sinks.
+    fn connect_all(&mut self, joints: Vec<Joint>) -> Vec<Pin> {
+        let mut sinks = Vec::with_capacity(joints.len());
+        for (sink, source) in joints {
+            if self.board.patch().source(&sink).is_none() {
+                self.board.connect(sink.clone(), source);
+            }
+            sinks.push(sink);
+        }
+        sinks
+    }
+
+    /// Another dispatcher asks for changes of this patch.
+    pub(super) fn requested(
+        &mut self,
+        host: HostId,
+        number: u32,
+        connect: &[WireJoint],
+        cut: &[WireJoint],
+    ) {
+        let connect: Vec<Joint> = connect.iter().filter_map(joint).collect();
+        if let Err(refusal) = self.check_request(&connect) {
+            let outcome = Err((refusal.code.number(), refusal.text));
+            self.answer(host, number, outcome);
+            return;
+        }
+        self.board.begin_line();
+        for (sink, source) in cut.iter().filter_map(joint) {
+            if self.board.patch().source(&sink) == Some(&source) {
+                self.board.disconnect(&sink);
+            }
+        }
+        let sinks = self.connect_all(connect);
+        if let Some(federation) = &mut self.federation {
+            federation.due.push((host, number, sinks));
+        }
+    }
+
+    fn check_request(&self, joints: &[Joint]) -> Result<(), Refusal> {
+        for (at, joint) in joints.iter().enumerate() {
+            for pin in [&joint.0, &joint.1] {
+                let seat = self.board.seat_of(&pin.client);
+                if !seat.is_some_and(|seat| self.board.has(seat, pin.channel)) {
+                    return Err(Code::NotFound.because(format_args!("there is no {pin} any more")));
+                }
+            }
+            if self.home(&joint.0.client).is_some() {
+                let text = format!("{} has moved to another host; try again", joint.0.client);
+                return Err(Code::NotFound.because(text));
+            }
+            self.check_source(joint, &joints[..at])?;
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, host: HostId, number: u32, outcome: Result<(), (u16, String)>) {
+        if let Some(host) = self.host(host) {
+            host.link.send(Body::Answer { number, outcome });
+        }
+    }
+
+    /// The patch was saved, or why not: other dispatchers that have changed it are answered.
+    pub(super) fn answer_due(&mut self, outcome: &Result<(), Refusal>) {
+        let due = self
+            .federation
+            .as_mut()
+            .map(|it| std::mem::take(&mut it.due));
+        for (host, number, sinks) in due.unwrap_or_default() {
+            let outcome = outcome.clone();
+            let outcome = outcome.map_err(|refusal| (refusal.code.number(), refusal.text));
+            self.answer(host, number, outcome);
+            self.board.begin_line();
+            for sink in sinks {
+                self.board.refresh(&sink);
+            }
+        }
+    }
+
+    /// Another dispatcher has answered a request.
+    pub(super) fn answered(&mut self, id: HostId, number: u32, outcome: Result<(), (u16, String)>) {
+        let request = self.host(id).and_then(|host| host.asked.remove(&number));
+        let (Some(request), Some(federation)) = (request, &mut self.federation) else {
+            return;
+        };
+        let mut all = federation.waiting.iter_mut();
+        let Some(at) = all.position(|waiting| waiting.open.remove(&(id, number))) else {
+            return;
+        };
+        let waiting = &mut federation.waiting[at];
+        match outcome {
+            Ok(()) => waiting.made.push((id, request.connect)),
+            Err((code, text)) => {
+                waiting.refusal = Some(Code::of(code).because(text));
+            }
+        }
+        if waiting.open.is_empty() {
+            let waiting = federation.waiting.swap_remove(at);
+            self.finish(waiting);
+        }
+    }
+}

@@ -95,6 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         stop: &stop,
+        door: None,
         patch_file: Some(&file),
         news: &mut say,
     };

@@ -1,6 +1,8 @@
 //! The board: who is plugged in, the patch, and the values that go through it.
 
+mod forces;
 mod remote;
+mod snapshot;
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Bound;
@@ -11,6 +13,8 @@ use crate::host::{HostId, Rank};
 use crate::number::Number;
 use crate::outbox::{Label, Listing, Outbox};
 use crate::patch::{Patch, Pin};
+
+pub use snapshot::{ChannelState, ClientState, Connection, Snapshot};
 
 /// What an input gets when it no longer has a source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -110,9 +114,13 @@ pub(crate) struct Board {
     by_order: BTreeMap<Rank, usize>,
     /// Later than every client so far.
     next_order: u64,
+    /// What other dispatchers want: outputs, and the places on their seats. A forced output has these, too.
+    supplies: BTreeMap<Place, Vec<Place>>,
     /// What has changed, if there are other dispatchers to be told.
     changes: Option<Vec<Change>>,
     patch: Patch,
+    /// Channels of clients that are here, and what an operator holds them at.
+    forces: BTreeMap<Pin, Number>,
     on_loss: OnLoss,
     /// Seats that have something to write, or are to be closed.
     touched: Vec<usize>,
@@ -128,8 +136,10 @@ impl Board {
             names: HashMap::new(),
             by_order: BTreeMap::new(),
             next_order: 0,
+            supplies: BTreeMap::new(),
             changes: None,
             patch,
+            forces: BTreeMap::new(),
             on_loss,
             touched: Vec::new(),
             line: 0,
@@ -194,10 +204,15 @@ impl Board {
             .map(|plugged| &plugged.device)
     }
 
+    /// Finds a client by its name.
+    pub(crate) fn find_name(&self, name: &str) -> Option<usize> {
+        self.names.get(name).copied()
+    }
+
     /// Finds a client by its name, or `P1` the first process and `R1` the first controller.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
-        if let Some(seat) = self.names.get(name) {
-            return Some(*seat);
+        if let Some(seat) = self.find_name(name) {
+            return Some(seat);
         }
         let role = match name.as_bytes().first()? {
             b'P' | b'p' => Role::Process,
@@ -271,7 +286,7 @@ impl Board {
                 self.part(to, from);
             }
             if !is_leaving || sink.client != name {
-                self.lose(to);
+                self.lose(&sink);
             }
         }
         self.names.remove(name);
@@ -281,6 +296,7 @@ impl Board {
     pub(crate) fn unplug(&mut self, seat: usize) {
         if let Some(plugged) = &self.seats[seat].plugged {
             let (name, order) = (plugged.device.name.clone(), plugged.order);
+            self.forget_forces(&name);
             self.take_name(&name, true);
             self.by_order.remove(&order);
             self.changed(Change::Unplugged(seat, order));
@@ -303,12 +319,15 @@ impl Board {
         self.changed(Change::Patched(sink.clone(), None));
         if let (Some(to), Some(from)) = (self.place(sink), self.place(&source)) {
             self.part(to, from);
-            self.lose(to);
+            self.lose(sink);
         }
     }
 
-    /// Joins two channels, if both are there and the input is of a client of this dispatcher.
+    /// Joins two channels, if both are there and not forced and the input is of a client of this dispatcher.
     fn join(&mut self, sink: &Pin, source: &Pin) {
+        if self.forced(sink).is_some() || self.forced(source).is_some() {
+            return;
+        }
         let (Some(to), Some(from)) = (self.place(sink), self.place(source)) else {
             return;
         };
@@ -339,16 +358,9 @@ impl Board {
         }
     }
 
-    /// Sends an input the value of its source once more, as far as both are there and it is known.
+    /// Sends an input the value that it is to have once more, as far as that is known.
     pub(crate) fn refresh(&mut self, sink: &Pin) {
-        let source = self.patch.source(sink);
-        let (Some(to), Some(from)) = (self.place(sink), source.and_then(|pin| self.place(pin)))
-        else {
-            return;
-        };
-        if let Some(value) = self.output(from).map(|output| output.value)
-            && value.is_known()
-        {
+        if let (Some(to), Some(value)) = (self.place(sink), self.wanted(sink)) {
             self.deliver(to, value, true);
         }
     }
@@ -386,7 +398,10 @@ impl Board {
     }
 
     /// An input has no source any more.
-    fn lose(&mut self, to: Place) {
+    fn lose(&mut self, sink: &Pin) {
+        let Some(to) = self.place(sink).filter(|_| self.forced(sink).is_none()) else {
+            return;
+        };
         let input = self.seats[to.seat].inputs.get(to.channel);
         // A client that was never sent a value assumes zero itself.
         if self.on_loss == OnLoss::FailSafe && input.is_some_and(|input| input.value.is_known()) {

@@ -1,6 +1,7 @@
 //! The dispatcher without its sockets: lines in, lines out, and time handed in.
 
 mod laboratory;
+mod operator;
 mod requests;
 
 use std::net::SocketAddr;
@@ -11,10 +12,14 @@ use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::Channel;
 use crate::device::{Device, Role};
 use crate::federation::{Federation, Request};
+use crate::host::HostId;
 use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, Values};
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
+
+pub use operator::{Order, Reply};
+use requests::Waiting;
 
 /// How a dispatcher serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +65,8 @@ pub struct Dispatcher {
     next_look: Nanos,
     /// The other dispatchers of the laboratory, if there can be any.
     federation: Option<Box<Federation>>,
+    /// Who waits for answers of other dispatchers.
+    waiting: Vec<Waiting>,
 }
 
 #[derive(Debug)]
@@ -89,10 +96,24 @@ enum Progress {
 /// An answer to be given when the patch is saved.
 #[derive(Debug)]
 struct Promised {
-    seat: usize,
-    verb: &'static str,
+    author: Author,
     /// Inputs that then get the value of their new source.
     sinks: Vec<Pin>,
+}
+
+/// Who has changed the patch.
+#[derive(Debug)]
+enum Author {
+    Client { seat: usize, verb: &'static str },
+    Operator(Reply),
+    /// Another dispatcher, by its request of this number.
+    Host { host: HostId, number: u32 },
+}
+
+impl Author {
+    fn is(&self, seat: usize) -> bool {
+        matches!(self, Self::Client { seat: it, .. } if *it == seat)
+    }
 }
 
 impl Dispatcher {
@@ -109,6 +130,7 @@ impl Dispatcher {
             promised: Vec::new(),
             next_look: Nanos::MAX,
             federation: None,
+            waiting: Vec::new(),
         }
     }
 
@@ -167,10 +189,8 @@ impl Dispatcher {
     pub fn gone(&mut self, seat: usize) {
         if self.sessions[seat].take().is_some() {
             self.count -= 1;
-            self.promised.retain(|promised| promised.seat != seat);
-            if let Some(federation) = &mut self.federation {
-                federation.waiting.retain(|waiting| waiting.seat != seat);
-            }
+            self.promised.retain(|promised| !promised.author.is(seat));
+            self.waiting.retain(|waiting| !waiting.author.is(seat));
             self.board.unplug(seat);
             self.settle();
             self.free.push(seat);
@@ -214,9 +234,8 @@ impl Dispatcher {
         if may_go_on
             && let Some(session) = &mut self.sessions[seat]
             && session.progress == Progress::Stuck
-            && !self.promised.iter().any(|promised| promised.seat == seat)
-            && !(self.federation.iter())
-                .any(|it| it.waiting.iter().any(|waiting| waiting.seat == seat))
+            && !self.promised.iter().any(|it| it.author.is(seat))
+            && !self.waiting.iter().any(|it| it.author.is(seat))
         {
             session.progress = Progress::Going;
             self.resumable.push(seat);
@@ -270,9 +289,7 @@ impl Dispatcher {
 
     /// The patch, if it was changed and not saved since.
     pub fn unsaved(&self) -> Option<&Patch> {
-        let mut federation = self.federation.iter();
-        let is_unsaved = !self.promised.is_empty() || federation.any(|it| !it.due.is_empty());
-        is_unsaved.then(|| self.board.patch())
+        (!self.promised.is_empty()).then(|| self.board.patch())
     }
 
     /// The patch was saved, or why not: who changed it is answered.
@@ -282,17 +299,27 @@ impl Dispatcher {
                 "the patch could not be saved ({why}); it holds until the dispatcher ends"
             ))
         });
-        self.answer_due(&outcome);
-        for Promised { seat, verb, sinks } in std::mem::take(&mut self.promised) {
-            match &outcome {
-                Ok(()) => self.confirm(seat, verb),
-                Err(refusal) => self.refuse(seat, refusal),
-            }
+        for Promised { author, sinks } in std::mem::take(&mut self.promised) {
+            self.conclude(author, outcome.clone());
             self.board.begin_line();
             for sink in sinks {
                 self.board.refresh(&sink);
             }
-            self.go_on(seat);
+        }
+    }
+
+    /// Answers who has changed the patch, or wanted to.
+    fn conclude(&mut self, author: Author, outcome: Result<(), Refusal>) {
+        match author {
+            Author::Client { seat, verb } => {
+                match outcome {
+                    Ok(()) => self.confirm(seat, verb),
+                    Err(refusal) => self.refuse(seat, &refusal),
+                }
+                self.go_on(seat);
+            }
+            Author::Operator(reply) => reply.give(outcome),
+            Author::Host { host, number } => self.answer(host, number, outcome),
         }
     }
 
@@ -447,7 +474,7 @@ impl Dispatcher {
             );
             return Err(Code::Conflict.because(text));
         }
-        if let Some(other) = self.board.seat_of(name) {
+        if let Some(other) = self.board.find_name(name) {
             let host = self.board.host(other).map(|host| format!(" on {host}"));
             let host = host.unwrap_or_default();
             let text = format!("there is a client {name} already{host}; take another name");
@@ -519,29 +546,16 @@ impl Dispatcher {
             if !self.board.has(other, joint.channel) {
                 return Err(no_channel(&format!("{peer} has"), joint.channel));
             }
-            let (own, channel) = (joint.own.kind, joint.channel.kind);
-            if own.is_output() == channel.is_output() || own.is_analog() != channel.is_analog() {
-                return Err(Code::Mismatch.because(format_args!(
-                    "{} and {} cannot be connected; connect an output with an input, digital or analog both",
-                    joint.own, joint.channel
-                )));
-            }
             let own = Pin::new(&own_name, joint.own);
             let peer = Pin::new(&peer, joint.channel);
-            let (sink, source) = if joint.own.kind.is_output() {
-                (peer, own)
-            } else {
-                (own, peer)
-            };
-            let joint = (sink, source);
-            self.check_source(&joint, &connections)?;
-            connections.push(joint);
+            connections.push(self.joint(own, peer, &connections)?);
         }
         let request = Request {
             connect: connections,
             cut: Vec::new(),
         };
-        self.change(seat, "CONNECT", request);
+        let verb = "CONNECT";
+        self.change(Author::Client { seat, verb }, request);
         Ok(())
     }
 
@@ -553,34 +567,21 @@ impl Dispatcher {
             if !self.board.has(seat, channel) {
                 return Err(no_channel("you have", channel));
             }
-            let own = Pin::new(&own_name, channel);
-            let before = cut.len();
-            if channel.kind.is_output() {
-                let sinks = self.board.patch().sinks(&own);
-                cut.extend(sinks.map(|sink| (sink.clone(), own.clone())));
-                cut.extend(self.sinks_elsewhere(&own));
-            } else if let Some(source) = self.board.patch().source(&own) {
-                cut.push((own.clone(), source.clone()));
-            }
-            if cut.len() == before {
+            let connected = self.joints_at(&Pin::new(&own_name, channel));
+            if connected.is_empty() {
                 let text = format!("{channel} is not connected");
                 return Err(Code::NotFound.because(text));
             }
+            cut.extend(connected);
         }
-        let connect = Vec::new();
-        self.change(seat, "DISCONNECT", Request { connect, cut });
+        let (connect, verb) = (Vec::new(), "DISCONNECT");
+        self.change(Author::Client { seat, verb }, Request { connect, cut });
         Ok(())
     }
 
     fn name(&self, seat: usize) -> String {
         let device = self.board.device(seat);
         device.map(|device| device.name.clone()).unwrap_or_default()
-    }
-
-    /// Answers when the patch is saved; until then no further line of the client is looked at.
-    fn promise(&mut self, seat: usize, verb: &'static str, sinks: Vec<Pin>) {
-        self.promised.push(Promised { seat, verb, sinks });
-        self.stick(seat);
     }
 
     /// No further line of a client is looked at until it is answered.

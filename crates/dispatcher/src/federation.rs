@@ -3,15 +3,14 @@
 pub(crate) mod link;
 pub(crate) mod message;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use tickbus_base::time::Nanos;
 
 use crate::board::Place;
 use crate::host::{HostId, Rank};
 use crate::name::{LONGEST_NAME, is_name};
-use crate::patch::{Patch, Pin};
-use crate::refusal::Refusal;
+use crate::patch::Patch;
 
 use link::Link;
 use message::{Body, Joint, Letter, to_wire};
@@ -56,10 +55,6 @@ pub(crate) struct Federation {
     pub(crate) hosts: BTreeMap<HostId, Host>,
     /// Names that several clients have, with the seats of these. The first keeps the name.
     pub(crate) rivals: BTreeMap<String, BTreeMap<Rank, usize>>,
-    /// Clients that wait for other dispatchers.
-    pub(crate) waiting: Vec<Waiting>,
-    /// Requests of other dispatchers that are answered when the patch is saved, with the inputs that then get their values.
-    pub(crate) due: Vec<(HostId, u32, Vec<Pin>)>,
     pub(crate) news: VecDeque<String>,
     pub(crate) next_beat: Nanos,
     /// What was said last of letters that cannot be read; it would come again with each of them.
@@ -102,29 +97,12 @@ pub(crate) struct Request {
     pub(crate) cut: Vec<Joint>,
 }
 
-/// A client that has asked for connections with clients of other dispatchers.
-#[derive(Debug)]
-pub(crate) struct Waiting {
-    pub(crate) seat: usize,
-    pub(crate) verb: &'static str,
-    /// What is to be done here when all others have agreed.
-    pub(crate) connect: Vec<Joint>,
-    pub(crate) cut: Vec<Pin>,
-    /// Requests that are not answered.
-    pub(crate) open: BTreeSet<(HostId, u32)>,
-    /// New connections that others have made, to be cut if one of them refuses.
-    pub(crate) made: Vec<(HostId, Vec<Joint>)>,
-    pub(crate) refusal: Option<Refusal>,
-}
-
 impl Federation {
     pub(crate) fn new(identity: Identity) -> Self {
         Self {
             identity,
             hosts: BTreeMap::new(),
             rivals: BTreeMap::new(),
-            waiting: Vec::new(),
-            due: Vec::new(),
             news: VecDeque::new(),
             next_beat: Nanos::ZERO,
             complaint: String::new(),

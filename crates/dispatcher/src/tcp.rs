@@ -10,6 +10,7 @@ use tickbus_fieldbus::tcp::{
 };
 
 use crate::dispatcher::Dispatcher;
+use crate::door::Door;
 use crate::patch_file::PatchFile;
 
 /// The key of the listener in the poll set; a client's key is its seat.
@@ -41,6 +42,8 @@ pub struct Hosting<'h> {
     pub clock: &'h dyn Clock,
     /// Ends it.
     pub stop: &'h Stop,
+    /// The way in for other threads, if there are any; made for the same `stop`.
+    pub door: Option<&'h Door>,
     /// Where the patch survives, if anywhere.
     pub patch_file: Option<&'h PatchFile>,
     /// Takes what an operator should know, a line each.
@@ -81,13 +84,17 @@ impl Listener {
             ready: Vec::new(),
             accept_paused_until: None,
         };
-        while !host.hosting.stop.is_stopped() {
-            host.turn()?;
+        let mut outcome = Ok(());
+        while outcome.is_ok() && !host.hosting.stop.is_stopped() {
+            outcome = host.turn();
+        }
+        if let Some(door) = host.hosting.door {
+            door.close();
         }
         for seat in 0..host.connections.len() {
             host.close(seat);
         }
-        Ok(())
+        outcome
     }
 }
 
@@ -129,6 +136,9 @@ impl Host<'_, '_> {
             if ready.is_writable {
                 self.write(ready.key)?;
             }
+        }
+        if let Some(door) = self.hosting.door {
+            door.serve(self.dispatcher, now);
         }
         self.dispatcher.tick(now);
         // Everyone who changed the patch in this turn waits for one write of the file.

@@ -7,11 +7,14 @@ use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::channel;
 use std::thread;
 
 use tickbus_base::time::{Manual, Monotonic, Nanos, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, Patch, PatchFile, Settings, Traffic};
+use tickbus_dispatcher::{
+    Dispatcher, Door, Order, Patch, PatchFile, Pin, Reply, Settings, Traffic,
+};
 use tickbus_fieldbus::tcp::Address;
 
 /// Runs `test` with a dispatcher on a free port; returns what went through.
@@ -25,6 +28,7 @@ fn serve(settings: Settings, test: impl FnOnce(SocketAddr)) -> Traffic {
             let hosting = Hosting {
                 clock: &*Monotonic::shared(),
                 stop: &stop,
+                door: None,
                 patch_file: None,
                 news: &mut |_| {},
             };
@@ -224,6 +228,7 @@ fn the_idle_rule_holds_on_the_clock_that_is_handed_in() {
             let hosting = Hosting {
                 clock: &*clock,
                 stop: &stop,
+                door: None,
                 patch_file: None,
                 news: &mut |_| {},
             };
@@ -238,6 +243,50 @@ fn the_idle_rule_holds_on_the_clock_that_is_handed_in() {
         assert!(client.lines.next().is_none(), "the connection is closed");
         stop.stop();
         served.join().expect("no panic").expect("it serves");
+    });
+}
+
+#[test]
+fn other_threads_come_in_by_the_door_and_know_when_it_closes() {
+    let stop = Stop::new();
+    let door = Door::new(&stop);
+    let listener = Listener::bind(&Address::local(0)).expect("a free port");
+    let address = listener.address();
+    thread::scope(|scope| {
+        let served = scope.spawn(|| {
+            let hosting = Hosting {
+                clock: &*Monotonic::shared(),
+                stop: &stop,
+                door: Some(&door),
+                patch_file: None,
+                news: &mut |_| {},
+            };
+            listener.run(
+                &mut Dispatcher::new(Settings::default(), Patch::new()),
+                hosting,
+            )
+        });
+        let mut pump = Client::join(address, "VP PUMP Q01 I01");
+        let mut logo = Client::join(address, "VR LOGO Q01 I01");
+        assert_eq!(pump.ask("P Q1=20\r\nPING"), "OK PING");
+        let pin = |text| Pin::parse(text).expect("a pin");
+        let (sender, answer) = channel();
+        let reply = Reply::new(move |outcome| sender.send(outcome).expect("it is waited for"));
+        // Nothing else wakes the loop now.
+        door.operate(Order::Connect(pin("PUMP:Q1"), pin("LOGO:I1")), reply);
+        assert_eq!(answer.recv().expect("an answer"), Ok(()));
+        assert_eq!(logo.hear(), "P I1=20");
+        let (sender, answer) = channel();
+        door.send(move |dispatcher, _| {
+            let clients = dispatcher.snapshot().clients.len();
+            sender.send(clients).expect("it is waited for");
+        });
+        assert_eq!(answer.recv(), Ok(2));
+        stop.stop();
+        served.join().expect("no panic").expect("it serves");
+        let (sender, answer) = channel::<()>();
+        door.send(move |_, _| drop(sender));
+        assert!(answer.recv().is_err(), "nobody is there");
     });
 }
 
@@ -257,6 +306,7 @@ fn the_process_that_is_killed() {
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         stop: &Stop::new(),
+        door: None,
         patch_file: Some(&file),
         news: &mut |line| panic!("{line}"),
     };

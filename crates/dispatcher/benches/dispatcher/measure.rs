@@ -112,6 +112,7 @@ fn start(stop: &Stop) -> (SocketAddr, thread::JoinHandle<Traffic>) {
         let hosting = Hosting {
             clock: &*Monotonic::shared(),
             stop: &stop,
+            door: None,
             patch_file: None,
             news: &mut |line| eprintln!("dispatcher: {line}"),
         };

@@ -4,6 +4,7 @@ use crate::device::Device;
 use crate::host::Rank;
 use crate::number::Number;
 use crate::outbox::Label;
+use crate::patch::Pin;
 
 use super::{Board, Change, Input, Place};
 
@@ -31,11 +32,6 @@ impl Board {
         Some(self.seats[seat].plugged.as_ref()?.order)
     }
 
-    /// The seat of the client with this very name.
-    pub(crate) fn seat_of(&self, name: &str) -> Option<usize> {
-        self.names.get(name).copied()
-    }
-
     /// The seat of the client at this place in the order of registration.
     pub(crate) fn seat_at(&self, order: Rank) -> Option<usize> {
         self.by_order.get(&order).copied()
@@ -57,7 +53,8 @@ impl Board {
     pub(crate) fn rename(&mut self, renamed: Vec<(usize, String)>) {
         for (seat, _) in &renamed {
             let name = self.device(*seat).map(|device| device.name.clone());
-            if let Some(name) = name.filter(|name| self.seat_of(name) == Some(*seat)) {
+            if let Some(name) = name.filter(|name| self.find_name(name) == Some(*seat)) {
+                self.release_all(&name);
                 self.take_name(&name, false);
             }
         }
@@ -87,22 +84,40 @@ impl Board {
     /// below ten million. `to` is the seat of the dispatcher, with a place on it that is free, or the next. `None`: there
     /// is no such output.
     pub(crate) fn supply(&mut self, to: Place, number: u32, from: Place) -> Option<()> {
-        self.output(from)?.sinks.push(to);
+        self.output(from)?;
         let input = Input::new(Label::new(number));
         let inputs = &mut self.seats[to.seat].inputs;
         match inputs.get_mut(to.channel) {
             Some(free) => *free = input,
             None => inputs.push(input),
         }
-        self.supply_again(to, from);
+        self.supplies.entry(from).or_default().push(to);
+        self.resume(to, from);
         Some(())
+    }
+
+    /// Sends another dispatcher the values of an output that it wants: unless that is forced, those to come, too.
+    pub(super) fn resume(&mut self, to: Place, from: Place) {
+        if self.forced_at(from).is_none()
+            && let Some(output) = self.output(from)
+        {
+            output.sinks.push(to);
+        }
+        self.supply_again(to, from);
+    }
+
+    /// What an output is forced to.
+    fn forced_at(&self, from: Place) -> Option<Number> {
+        let device = self.device(from.seat).filter(|_| self.has_forces())?;
+        let channel = device.counts.channels(true).nth(from.channel)?;
+        self.forced(&Pin::new(&device.name, channel))
     }
 
     /// Sends another dispatcher the value of an output once more.
     pub(crate) fn supply_again(&mut self, to: Place, from: Place) {
-        if let Some(value) = self.output(from).map(|output| output.value)
-            && value.is_known()
-        {
+        let said = self.output(from).map(|output| output.value);
+        let said = said.filter(|value| value.is_known());
+        if let Some(value) = self.forced_at(from).or(said) {
             self.deliver(to, value, true);
         }
     }
@@ -111,6 +126,12 @@ impl Board {
     pub(crate) fn end_supply(&mut self, to: Place, from: Place) {
         if let Some(output) = self.output(from) {
             output.sinks.retain(|other| *other != to);
+        }
+        if let Some(places) = self.supplies.get_mut(&from) {
+            places.retain(|other| *other != to);
+            if places.is_empty() {
+                self.supplies.remove(&from);
+            }
         }
         let waiting = &mut self.seats[to.seat].outbox.waiting;
         waiting.retain(|place| *place != to.channel);

@@ -392,7 +392,7 @@ impl Dispatcher {
         };
         let name = device.name.clone();
         self.board.place_remote(seat, device, order, &host_name);
-        let Some(holder) = self.board.seat_of(&name) else {
+        let Some(holder) = self.board.find_name(&name) else {
             self.board.rename(vec![(seat, name)]);
             return;
         };
@@ -429,7 +429,7 @@ impl Dispatcher {
             federation.rivals.remove(name);
         }
         let board = &self.board;
-        shown.retain(|(seat, text)| board.seat_of(text) != Some(*seat));
+        shown.retain(|(seat, text)| board.find_name(text) != Some(*seat));
         for (seat, text) in &shown {
             let before = board.device(*seat).map_or("", |device| &device.name);
             federation.news.push_back(if text == name {

@@ -3,17 +3,31 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::federation::message::{Body, Joint, WireJoint, joint};
-use crate::federation::{Request, Waiting};
+use crate::federation::Request;
 use crate::host::HostId;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
 
-use super::Dispatcher;
+use super::{Author, Dispatcher, Promised};
+
+/// A change of connections that other dispatchers take part in.
+#[derive(Debug)]
+pub(super) struct Waiting {
+    pub(super) author: Author,
+    /// What is to be done here when all others have agreed.
+    connect: Vec<Joint>,
+    cut: Vec<Pin>,
+    /// Requests that are not answered.
+    open: BTreeSet<(HostId, u32)>,
+    /// New connections that others have made, to be cut if one of them refuses.
+    made: Vec<(HostId, Vec<Joint>)>,
+    refusal: Option<Refusal>,
+}
 
 impl Dispatcher {
     /// The dispatcher to which the connections of a client's inputs belong, if it is another one.
     pub(super) fn home(&self, client: &str) -> Option<HostId> {
-        let seat = self.board.seat_of(client)?;
+        let seat = self.board.find_name(client)?;
         self.board.host(seat)?;
         self.board.order(seat).map(|order| order.host)
     }
@@ -40,16 +54,27 @@ impl Dispatcher {
         }
     }
 
-    /// The inputs of other dispatchers' clients that get an output, with that.
-    pub(super) fn sinks_elsewhere(&self, source: &Pin) -> Vec<Joint> {
+    /// The connections that end at this channel, whatever dispatcher they belong to.
+    pub(super) fn joints_at(&self, pin: &Pin) -> Vec<Joint> {
         let federation = self.federation.iter();
         let hosts = federation.flat_map(|federation| federation.hosts.values());
-        let sinks = hosts.flat_map(|host| host.patch.sinks(source).cloned());
-        sinks.map(|sink| (sink, source.clone())).collect()
+        let patches = std::iter::once(self.board.patch()).chain(hosts.map(|host| &host.patch));
+        let mut joints = Vec::new();
+        for patch in patches {
+            if pin.channel.kind.is_output() {
+                joints.extend(patch.sinks(pin).map(|sink| (sink.clone(), pin.clone())));
+            } else {
+                joints.extend(patch.source(pin).map(|source| (pin.clone(), source.clone())));
+            }
+        }
+        joints
     }
 
-    /// Makes and cuts connections for a client, and answers it.
-    pub(super) fn change(&mut self, seat: usize, verb: &'static str, all: Request) {
+    /// Makes and cuts connections that were checked, and answers.
+    pub(super) fn change(&mut self, author: Author, all: Request) {
+        if let Author::Client { seat, .. } = author {
+            self.stick(seat);
+        }
         let federation = self.federation.as_ref();
         let mut requests: BTreeMap<HostId, Request> = BTreeMap::new();
         let (mut connect, mut cut) = (Vec::new(), Vec::new());
@@ -71,8 +96,7 @@ impl Dispatcher {
             }
         }
         let mut waiting = Waiting {
-            seat,
-            verb,
+            author,
             connect,
             cut,
             open: BTreeSet::new(),
@@ -83,21 +107,19 @@ impl Dispatcher {
             self.finish(waiting);
             return;
         }
-        self.stick(seat);
         if let Some(federation) = &mut self.federation {
             for (host, request) in requests {
                 let number = federation.request(host, request);
                 waiting.open.insert((host, number));
             }
-            federation.waiting.push(waiting);
         }
+        self.waiting.push(waiting);
     }
 
     /// All other dispatchers have answered.
     fn finish(&mut self, waiting: Waiting) {
         let Waiting {
-            seat,
-            verb,
+            author,
             connect,
             cut,
             made,
@@ -114,8 +136,7 @@ impl Dispatcher {
                     federation.request(host, Request { connect, cut });
                 }
             }
-            self.refuse(seat, &refusal);
-            self.go_on(seat);
+            self.conclude(author, Err(refusal));
             return;
         }
         self.board.begin_line();
@@ -123,12 +144,11 @@ impl Dispatcher {
             self.board.disconnect(sink);
         }
         if connect.is_empty() && cut.is_empty() {
-            self.confirm(seat, verb);
-            self.go_on(seat);
+            self.conclude(author, Ok(()));
             return;
         }
         let sinks = self.connect_all(connect);
-        self.promise(seat, verb, sinks);
+        self.promised.push(Promised { author, sinks });
     }
 
     /// Makes connections that were checked; returns their sinks.
@@ -153,8 +173,7 @@ impl Dispatcher {
     ) {
         let connect: Vec<Joint> = connect.iter().filter_map(joint).collect();
         if let Err(refusal) = self.check_request(&connect) {
-            let outcome = Err((refusal.code.number(), refusal.text));
-            self.answer(host, number, outcome);
+            self.answer(host, number, Err(refusal));
             return;
         }
         self.board.begin_line();
@@ -164,15 +183,14 @@ impl Dispatcher {
             }
         }
         let sinks = self.connect_all(connect);
-        if let Some(federation) = &mut self.federation {
-            federation.due.push((host, number, sinks));
-        }
+        let author = Author::Host { host, number };
+        self.promised.push(Promised { author, sinks });
     }
 
     fn check_request(&self, joints: &[Joint]) -> Result<(), Refusal> {
         for (at, joint) in joints.iter().enumerate() {
             for pin in [&joint.0, &joint.1] {
-                let seat = self.board.seat_of(&pin.client);
+                let seat = self.board.find_name(&pin.client);
                 if !seat.is_some_and(|seat| self.board.has(seat, pin.channel)) {
                     return Err(Code::NotFound.because(format_args!("there is no {pin} any more")));
                 }
@@ -186,40 +204,24 @@ impl Dispatcher {
         Ok(())
     }
 
-    fn answer(&mut self, host: HostId, number: u32, outcome: Result<(), (u16, String)>) {
+    pub(super) fn answer(&mut self, host: HostId, number: u32, outcome: Result<(), Refusal>) {
+        let outcome = outcome.map_err(|refusal| (refusal.code.number(), refusal.text));
         if let Some(host) = self.host(host) {
             host.link.send(Body::Answer { number, outcome });
-        }
-    }
-
-    /// The patch was saved, or why not: other dispatchers that have changed it are answered.
-    pub(super) fn answer_due(&mut self, outcome: &Result<(), Refusal>) {
-        let due = self
-            .federation
-            .as_mut()
-            .map(|it| std::mem::take(&mut it.due));
-        for (host, number, sinks) in due.unwrap_or_default() {
-            let outcome = outcome.clone();
-            let outcome = outcome.map_err(|refusal| (refusal.code.number(), refusal.text));
-            self.answer(host, number, outcome);
-            self.board.begin_line();
-            for sink in sinks {
-                self.board.refresh(&sink);
-            }
         }
     }
 
     /// Another dispatcher has answered a request.
     pub(super) fn answered(&mut self, id: HostId, number: u32, outcome: Result<(), (u16, String)>) {
         let request = self.host(id).and_then(|host| host.asked.remove(&number));
-        let (Some(request), Some(federation)) = (request, &mut self.federation) else {
+        let Some(request) = request else {
             return;
         };
-        let mut all = federation.waiting.iter_mut();
+        let mut all = self.waiting.iter_mut();
         let Some(at) = all.position(|waiting| waiting.open.remove(&(id, number))) else {
             return;
         };
-        let waiting = &mut federation.waiting[at];
+        let waiting = &mut self.waiting[at];
         match outcome {
             Ok(()) => waiting.made.push((id, request.connect)),
             Err((code, text)) => {
@@ -227,7 +229,7 @@ impl Dispatcher {
             }
         }
         if waiting.open.is_empty() {
-            let waiting = federation.waiting.swap_remove(at);
+            let waiting = self.waiting.swap_remove(at);
             self.finish(waiting);
         }
     }

@@ -1,0 +1,118 @@
+//! Forced channels: an operator's value in place of the client's.
+//!
+//! A forced channel is taken out of the routes, and put back when it is released. So a value on its way costs nothing more
+//! because channels can be forced.
+
+use super::{Board, Place};
+use crate::number::Number;
+use crate::patch::Pin;
+
+impl Board {
+    /// What a channel is forced to.
+    pub(crate) fn forced(&self, pin: &Pin) -> Option<Number> {
+        self.forces.get(pin).copied()
+    }
+
+    /// Holds a channel of a client that is here at a value: an input has it, or an output gives it to its inputs.
+    pub(crate) fn force(&mut self, pin: Pin, value: Number) {
+        let sinks = self.fed_by(&pin);
+        if pin.channel.kind.is_output() {
+            if let Some(from) = self.place(&pin)
+                && let Some(output) = self.output(from)
+            {
+                output.sinks.clear();
+            }
+        } else if let Some(to) = self.place(&pin)
+            && let Some(from) = self.patch.source(&pin).and_then(|pin| self.place(pin))
+            && let Some(output) = self.output(from)
+        {
+            output.sinks.retain(|sink| *sink != to);
+        }
+        let from = self.place(&pin);
+        self.forces.insert(pin, value);
+        for sink in sinks {
+            self.follow(&sink);
+        }
+        for (to, from) in self.supplied(from) {
+            self.supply_again(to, from);
+        }
+    }
+
+    /// The places on the seats of other dispatchers that want an output.
+    fn supplied(&self, from: Option<Place>) -> Vec<(Place, Place)> {
+        let places = from.and_then(|from| Some((from, self.supplies.get(&from)?)));
+        let places = places.into_iter();
+        places
+            .flat_map(|(from, places)| places.iter().map(move |to| (*to, from)))
+            .collect()
+    }
+
+    pub(super) fn has_forces(&self) -> bool {
+        !self.forces.is_empty()
+    }
+
+    /// Releases all channels of a client.
+    pub(super) fn release_all(&mut self, client: &str) {
+        let of_client = self.forces.keys().filter(|pin| pin.client == client);
+        let pins: Vec<Pin> = of_client.cloned().collect();
+        for pin in pins {
+            self.release(&pin);
+        }
+    }
+
+    /// Ends that; returns whether there was anything to end.
+    pub(crate) fn release(&mut self, pin: &Pin) -> bool {
+        let was_forced = self.forces.remove(pin).is_some();
+        if was_forced {
+            for sink in self.fed_by(pin) {
+                if let Some(source) = self.patch.source(&sink).cloned() {
+                    self.join(&sink, &source);
+                }
+                self.follow(&sink);
+            }
+            let from = self.place(pin).filter(|_| pin.channel.kind.is_output());
+            for (to, from) in self.supplied(from) {
+                self.resume(to, from);
+            }
+        }
+        was_forced
+    }
+
+    /// Forgets what channels of a client that leaves were forced to.
+    pub(super) fn forget_forces(&mut self, client: &str) {
+        self.forces.retain(|pin, _| pin.client != client);
+    }
+
+    /// The value that an input is to have: its own forced one, or that of its source.
+    pub(super) fn wanted(&self, sink: &Pin) -> Option<Number> {
+        self.forced(sink).or_else(|| {
+            let source = self.patch.source(sink)?;
+            self.forced(source).or_else(|| self.said(source))
+        })
+    }
+
+    /// What the client of an output has said of it.
+    fn said(&self, source: &Pin) -> Option<Number> {
+        let place = self.place(source)?;
+        let plugged = self.seats[place.seat].plugged.as_ref()?;
+        let value = plugged.outputs.get(place.channel)?.value;
+        value.is_known().then_some(value)
+    }
+
+    /// The inputs that get another value when this channel is forced: the sinks of an output, or the input itself.
+    fn fed_by(&self, pin: &Pin) -> Vec<Pin> {
+        if pin.channel.kind.is_output() {
+            self.patch.sinks(pin).cloned().collect()
+        } else {
+            vec![pin.clone()]
+        }
+    }
+
+    /// Sends an input the value that it is to have, if that is another one.
+    fn follow(&mut self, sink: &Pin) {
+        match (self.wanted(sink), self.place(sink)) {
+            (Some(value), Some(to)) => self.deliver(to, value, false),
+            _ => self.lose(sink),
+        }
+    }
+}

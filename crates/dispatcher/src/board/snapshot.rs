@@ -1,0 +1,93 @@
+//! The board at one moment, for those who look at it.
+
+use super::{Board, Traffic};
+use crate::channel::Channel;
+use crate::device::Device;
+use crate::number::Number;
+use crate::patch::{Patch, Pin};
+
+/// Everything on the board at one moment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Snapshot {
+    /// The clients, in the order in which they came.
+    pub clients: Vec<ClientState>,
+    /// All connections, those of each dispatcher in the order of their sinks.
+    pub connections: Vec<Connection>,
+    /// What went through so far.
+    pub traffic: Traffic,
+}
+
+/// A client and its channels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClientState {
+    /// Who it is.
+    pub device: Device,
+    /// The name of its host, if it is a client of another dispatcher. Then its inputs have no values here, and of its
+    /// outputs those that are connected here.
+    pub host: Option<String>,
+    /// Its outputs, then its inputs. Analog channels from 0 to N, as the dispatcher accepts them.
+    pub channels: Vec<ChannelState>,
+}
+
+/// A channel and its value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChannelState {
+    /// Which one.
+    pub channel: Channel,
+    /// What the client has said of its output, or has been sent for its input.
+    pub value: Option<Number>,
+    /// What an operator holds it at.
+    pub forced: Option<Number>,
+}
+
+/// A connection of the patch.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Connection {
+    /// The input.
+    pub sink: Pin,
+    /// The output.
+    pub source: Pin,
+    /// Whether both channels are there. If not, it waits for them.
+    pub is_awake: bool,
+}
+
+impl Board {
+    /// The board as it is now, with the connections that belong to other dispatchers.
+    pub(crate) fn snapshot<'p>(&'p self, elsewhere: impl Iterator<Item = &'p Patch>) -> Snapshot {
+        let seats = self.by_order.values().map(|seat| &self.seats[*seat]);
+        let plugged = seats.filter_map(|seat| Some((seat.plugged.as_ref()?, &seat.inputs)));
+        let clients = plugged.map(|(plugged, inputs)| {
+            let Device { counts, name, .. } = &plugged.device;
+            let outputs = counts.channels(true).zip(&plugged.outputs);
+            let outputs = outputs.map(|(channel, output)| (channel, output.value));
+            let values = inputs.iter().map(|input| input.value);
+            let values = values.chain(std::iter::repeat(Number::UNKNOWN));
+            let inputs = counts.channels(false).zip(values);
+            let has_forces = self.has_forces();
+            let channels = outputs.chain(inputs).map(|(channel, value)| ChannelState {
+                channel,
+                value: value.is_known().then_some(value),
+                // A name is copied for each channel only while something is forced.
+                forced: has_forces
+                    .then(|| self.forced(&Pin::new(name, channel)))
+                    .flatten(),
+            });
+            ClientState {
+                device: plugged.device.clone(),
+                host: plugged.host.as_deref().map(str::to_owned),
+                channels: channels.collect(),
+            }
+        });
+        let all = std::iter::once(&self.patch).chain(elsewhere);
+        let connections = all.flat_map(Patch::iter).map(|(sink, source)| Connection {
+            sink: sink.clone(),
+            source: source.clone(),
+            is_awake: self.place(sink).is_some() && self.place(source).is_some(),
+        });
+        Snapshot {
+            clients: clients.collect(),
+            connections: connections.collect(),
+            traffic: self.traffic,
+        }
+    }
+}

@@ -12,8 +12,8 @@ use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::Channel;
 use crate::device::{Device, Role};
 use crate::federation::{Federation, Request};
-use crate::host::HostId;
 use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, Values};
+use crate::host::HostId;
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
@@ -104,10 +104,16 @@ struct Promised {
 /// Who has changed the patch.
 #[derive(Debug)]
 enum Author {
-    Client { seat: usize, verb: &'static str },
+    Client {
+        seat: usize,
+        verb: &'static str,
+    },
     Operator(Reply),
     /// Another dispatcher, by its request of this number.
-    Host { host: HostId, number: u32 },
+    Host {
+        host: HostId,
+        number: u32,
+    },
 }
 
 impl Author {
@@ -195,11 +201,6 @@ impl Dispatcher {
             self.settle();
             self.free.push(seat);
         }
-    }
-
-    /// Where the client on a seat connected from.
-    pub fn peer(&self, seat: usize) -> Option<SocketAddr> {
-        self.session(seat).map(|session| session.peer)
     }
 
     /// Whether bytes of this client are wanted now. If not, it has to read its answers first.

@@ -4,6 +4,7 @@ pub(crate) mod link;
 pub(crate) mod message;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::ops::Bound;
 
 use tickbus_base::time::Nanos;
 
@@ -146,27 +147,21 @@ impl Federation {
         &mut self,
         mut values: impl FnMut(usize) -> Option<String>,
     ) -> Option<(HostId, Letter)> {
-        let own = self.identity.host;
-        let served = self.served;
-        let ids = self.hosts.keys().copied();
-        let behind = ids.clone().filter(|id| *id > served);
-        let before = ids.filter(|id| *id <= served);
-        let ids: Vec<HostId> = behind.chain(before).collect();
-        for id in ids {
-            let Some(host) = self.hosts.get_mut(&id) else {
-                continue;
-            };
-            let mut letter = host.link.take(own);
-            if letter.is_none()
-                && host.link.is_open
+        for _ in 0..self.hosts.len() {
+            let behind = (Bound::Excluded(self.served), Bound::Unbounded);
+            let behind = self.hosts.range(behind).next();
+            let (id, _) = behind.or_else(|| self.hosts.first_key_value())?;
+            self.served = *id;
+            let host = self.hosts.get_mut(&self.served)?;
+            if let Some(letter) = host.link.take(self.identity.host) {
+                return Some((self.served, letter));
+            }
+            if host.link.is_open
                 && let Some(lines) = values(host.seat)
             {
                 host.link.send(Body::Values(lines));
-                letter = host.link.take(own);
-            }
-            if let Some(letter) = letter {
-                self.served = id;
-                return Some((id, letter));
+                let letter = host.link.take(self.identity.host)?;
+                return Some((self.served, letter));
             }
         }
         None

@@ -19,6 +19,7 @@ mod number;
 mod outbox;
 mod patch;
 mod patch_file;
+mod post;
 mod refusal;
 pub mod tcp;
 
@@ -33,4 +34,5 @@ pub use name::{LONGEST_NAME, is_name};
 pub use number::{LONGEST_NUMBER, Number};
 pub use patch::{Patch, Pin};
 pub use patch_file::PatchFile;
+pub use post::Post;
 pub use refusal::{Code, Refusal};

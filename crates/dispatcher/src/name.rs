@@ -9,8 +9,8 @@ pub fn is_name(text: &str) -> bool {
     (1..=LONGEST_NAME).contains(&text.len()) && text.bytes().all(letter)
 }
 
-/// Whether a client can be shown by this text: a name, or `NAME@HOST` while a client of another host has its name.
+/// Whether a client can be shown by this text: a name, or `NAME@HOST` while a client of another host has its name, and
+/// `NAME@HOST@2` for the second of two computers of one name.
 pub(crate) fn is_shown_name(text: &str) -> bool {
-    let (name, host) = text.split_once('@').unwrap_or((text, "host"));
-    is_name(name) && is_name(host)
+    text.split('@').all(is_name)
 }

@@ -4,11 +4,12 @@
 mod common;
 
 use std::collections::BTreeMap;
+use std::sync::mpsc::channel;
 
 use common::hosts::{Hosts, NAMES, id};
 use proptest::prelude::*;
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::{Device, OnLoss, Pin, Settings};
+use tickbus_dispatcher::{Device, Number, OnLoss, Order, Pin, Reply, Settings};
 
 const NOTHING: [&str; 0] = [];
 
@@ -87,8 +88,6 @@ fn clients_of_all_hosts_are_in_the_list_with_their_hosts_and_are_connected_by_na
     hosts.labs[0].dispatcher.gone(pump);
     assert_eq!(hosts.hear(1, logo), ["P I1=0 I2=0"]);
     hosts.join(2, "VP PUMP Q01");
-    let seat = hosts.labs[2].dispatcher.clients();
-    assert_eq!(seat, 2);
 }
 
 #[test]
@@ -201,10 +200,10 @@ fn connections_sleep_while_a_host_is_cut_off_and_wake_with_the_value_of_now() {
         assert_eq!(
             hosts.news(1),
             [
-                "the dispatcher of alpha is here, with 0 clients",
-                "the dispatcher of gamma is here, with 0 clients",
-                "the dispatcher of alpha is cut off; its connections sleep",
-                "the dispatcher of alpha is here, with 1 clients",
+                "the dispatcher of alpha is here; its clients: 0",
+                "the dispatcher of gamma is here; its clients: 0",
+                "the dispatcher of alpha is gone; connections with its clients sleep",
+                "the dispatcher of alpha is here; its clients: 1",
             ]
         );
         // One that ends is gone at once.
@@ -320,8 +319,80 @@ fn hosts_of_one_name_are_told_apart() {
             .iter()
             .filter_map(|line| line.split(':').nth(1))
             .collect();
-        assert_eq!(names[..3], ["PUMP", "PUMP@b-", "PUMP@b-.2"]);
+        assert_eq!(names[..3], ["PUMP", "PUMP@b-", "PUMP@b-@2"]);
     }
+}
+
+/// Has an operator's order carried out at a host; returns the answer when all letters are carried.
+fn order(hosts: &mut Hosts, host: usize, order: Order) -> Result<(), String> {
+    let (sender, answer) = channel();
+    let reply = Reply::new(move |outcome| sender.send(outcome).expect("it is waited for"));
+    let lab = &mut hosts.labs[host];
+    lab.dispatcher.operate(order, reply);
+    lab.settle();
+    hosts.settle();
+    let answer = answer.try_recv().expect("an answer");
+    answer.map_err(|refusal| refusal.to_string())
+}
+
+#[test]
+fn an_operator_patches_clients_of_all_hosts_and_forces_those_of_one() {
+    let mut hosts = hosts();
+    let pump = hosts.join(0, "VP PUMP Q02");
+    let logo = hosts.join(1, "VR LOGO I02");
+    hosts.ask(0, pump, "P Q1=3");
+    let pin = |text: &str| Pin::parse(text).expect(text);
+    let number = |text: &str| Number::parse(text.as_bytes()).expect(text);
+    let joint = || Order::Connect(pin("PUMP:Q1"), pin("LOGO:I1"));
+    assert_eq!(order(&mut hosts, 2, joint()), Ok(()), "both are elsewhere");
+    assert_eq!(order(&mut hosts, 2, joint()), Ok(()));
+    let other = Order::Connect(pin("PUMP:Q2"), pin("LOGO:I1"));
+    let told = order(&mut hosts, 2, other).expect_err("it has a source");
+    assert!(
+        told.starts_with("ERR 409 LOGO:I1 is connected to PUMP:Q1"),
+        "{told}"
+    );
+    assert_eq!(hosts.hear(1, logo), ["P I1=3"]);
+    assert_eq!(hosts.patch(1), ["LOGO:I1 = PUMP:Q1"]);
+
+    for (host, name) in NAMES.iter().enumerate() {
+        let seen = hosts.labs[host].dispatcher.snapshot();
+        let of: Vec<_> = seen
+            .clients
+            .iter()
+            .map(|client| client.host.as_deref())
+            .collect();
+        let expected = [Some("alpha"), Some("beta")].map(|it| it.filter(|it| it != name));
+        assert_eq!(of, expected);
+        let [connection] = &seen.connections[..] else {
+            panic!("{seen:?}");
+        };
+        assert!(connection.is_awake);
+        assert_eq!(connection.sink, pin("LOGO:I1"));
+    }
+
+    let force = |value: &str| Order::Force(pin("PUMP:Q1"), number(value));
+    let told = order(&mut hosts, 1, force("7")).expect_err("it is not here");
+    assert!(told.contains("on alpha"), "{told}");
+    assert_eq!(order(&mut hosts, 0, force("7")), Ok(()));
+    assert_eq!(hosts.hear(1, logo), ["P I1=7"]);
+    hosts.ask(0, pump, "P Q1=4");
+    assert_eq!(hosts.hear(1, logo), NOTHING);
+    // Who wants it only now gets what it is forced to.
+    let late = hosts.join(2, "VR LATE I01");
+    assert_eq!(hosts.ask(2, late, "CONNECT I1:PUMP:Q1"), ["P I1=7"]);
+    assert_eq!(order(&mut hosts, 0, Order::Release(pin("PUMP:Q1"))), Ok(()));
+    assert_eq!(hosts.hear(1, logo), ["P I1=4"]);
+    assert_eq!(hosts.hear(2, late), ["P I1=4"]);
+    hosts.ask(0, pump, "P Q1=5");
+    assert_eq!(hosts.hear(1, logo), ["P I1=5"]);
+
+    let cut = Order::Disconnect(pin("PUMP:Q1"));
+    assert_eq!(order(&mut hosts, 0, cut), Ok(()), "at two hosts");
+    assert_eq!(hosts.hear(1, logo), ["P I1=0"]);
+    assert_eq!(hosts.patch(1).len() + hosts.patch(2).len(), 0);
+    let told = order(&mut hosts, 0, Order::Disconnect(pin("LOGO:I1")));
+    assert_eq!(told, Err("ERR 404 LOGO:I1 is not connected".to_owned()));
 }
 
 #[test]
@@ -378,6 +449,7 @@ fn step() -> impl Strategy<Value = Step> {
 struct Client {
     host: usize,
     seat: usize,
+    port: u16,
     said: BTreeMap<u16, u8>,
     heard: BTreeMap<u16, u8>,
 }
@@ -386,7 +458,7 @@ impl Client {
     fn hear(&mut self, lines: &[String]) {
         let words = lines.iter().filter_map(|line| line.strip_prefix("P "));
         for word in words.flat_map(|line| line.split(' ')) {
-            let (channel, value) = word.split_once("=").expect(word);
+            let (channel, value) = word.split_once('=').expect(word);
             let channel = channel[1..].parse().expect(channel);
             self.heard.insert(channel, value.parse().expect(value));
         }
@@ -411,6 +483,7 @@ impl Clients {
                 if self.0.contains_key(at) {
                     return;
                 }
+                let port = hosts.labs[host].next_port;
                 let seat = hosts.labs[host].connect();
                 let shape = ["Q02 I02", "Q01 I02"][*shape];
                 let name = CLIENTS[at % CLIENTS.len()];
@@ -422,6 +495,7 @@ impl Clients {
                 let mut client = Client {
                     host,
                     seat,
+                    port,
                     ..Client::default()
                 };
                 client.hear(&told);
@@ -516,8 +590,7 @@ proptest! {
         for client in clients.0.values() {
             let line = boards[0].iter().find(|line| {
                 let device = Device::parse(line.as_bytes()).expect(line);
-                let own = hosts.labs[client.host].dispatcher.peer(client.seat);
-                Some(device.peer) == own
+                device.peer.port() == client.port
             });
             let device = Device::parse(line.expect("it is in the list").as_bytes()).expect("a device");
             by_name.insert(device.name.clone(), (client, device));

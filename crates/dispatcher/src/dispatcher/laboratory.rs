@@ -1,5 +1,7 @@
 //! The dispatcher as one of several: their clients on its board, and its clients on theirs.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use tickbus_base::time::Nanos;
 
 use crate::board::{Change, Place};
@@ -343,7 +345,7 @@ impl Dispatcher {
                 "host".to_owned()
             };
             federation.news.push_back(format!(
-                "the dispatcher of {} is here, with {} clients",
+                "the dispatcher of {} is here; its clients: {}",
                 host.name,
                 all.len()
             ));
@@ -358,10 +360,9 @@ impl Dispatcher {
             end_supply(&mut self.board, host, output);
         }
         host.ask_again();
-        let gone = host.clients.keys().copied();
-        let gone: Vec<u64> = gone
-            .filter(|since| !all.iter().any(|client| client.since == *since))
-            .collect();
+        let here: BTreeSet<u64> = all.iter().map(|client| client.since).collect();
+        let gone = host.clients.keys().filter(|since| !here.contains(since));
+        let gone: Vec<u64> = gone.copied().collect();
         for since in gone {
             self.remote_gone(id, since);
         }
@@ -412,16 +413,20 @@ impl Dispatcher {
             return;
         };
         let mut shown: Vec<(usize, String)> = Vec::new();
-        for (at, seat) in group.values().enumerate() {
+        // Two computers may have one name.
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for seat in group.values() {
             let host = self.board.host(*seat);
             let host = host.unwrap_or(&federation.identity.name);
-            let long = format!("{name}@{host}");
-            // Two computers may have one name.
-            let same = shown.iter().skip(1).filter(|(_, it)| it.starts_with(&long));
-            let text = match (at, same.count()) {
-                (0, _) => name.to_owned(),
-                (_, 0) => long,
-                (_, same) => format!("{long}.{}", same + 1),
+            let text = if shown.is_empty() {
+                name.to_owned()
+            } else {
+                let count = counts.entry(host).or_default();
+                *count += 1;
+                match count {
+                    1 => format!("{name}@{host}"),
+                    _ => format!("{name}@{host}@{count}"),
+                }
             };
             shown.push((*seat, text));
         }
@@ -479,7 +484,8 @@ impl Dispatcher {
             self.board.seat(host.seat);
         }
         if !name.is_empty() {
-            let news = format!("the dispatcher of {name} is cut off; its connections sleep");
+            let news =
+                format!("the dispatcher of {name} is gone; connections with its clients sleep");
             federation.news.push_back(news);
         }
         for number in asked {

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::federation::message::{Body, Joint, WireJoint, joint};
 use crate::federation::Request;
+use crate::federation::message::{Body, Joint, WireJoint, joint};
 use crate::host::HostId;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
@@ -64,7 +64,11 @@ impl Dispatcher {
             if pin.channel.kind.is_output() {
                 joints.extend(patch.sinks(pin).map(|sink| (sink.clone(), pin.clone())));
             } else {
-                joints.extend(patch.source(pin).map(|source| (pin.clone(), source.clone())));
+                joints.extend(
+                    patch
+                        .source(pin)
+                        .map(|source| (pin.clone(), source.clone())),
+                );
             }
         }
         joints
@@ -171,13 +175,18 @@ impl Dispatcher {
         connect: &[WireJoint],
         cut: &[WireJoint],
     ) {
-        let connect: Vec<Joint> = connect.iter().filter_map(joint).collect();
-        if let Err(refusal) = self.check_request(&connect) {
-            self.answer(host, number, Err(refusal));
-            return;
-        }
+        let all: Option<Vec<Joint>> = connect.iter().chain(cut).map(joint).collect();
+        let unreadable = || Code::Syntax.because("the dispatcher there cannot read this");
+        let checked = all.ok_or_else(unreadable).and_then(|mut joints| {
+            let cut = joints.split_off(connect.len());
+            self.check_request(&joints).map(|()| (joints, cut))
+        });
+        let (connect, cut) = match checked {
+            Ok(request) => request,
+            Err(refusal) => return self.answer(host, number, Err(refusal)),
+        };
         self.board.begin_line();
-        for (sink, source) in cut.iter().filter_map(joint) {
+        for (sink, source) in cut {
             if self.board.patch().source(&sink) == Some(&source) {
                 self.board.disconnect(&sink);
             }

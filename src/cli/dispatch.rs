@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use super::Outcome;
 use super::host::span;
 use tickbus_base::os::raise_open_files;
-use tickbus_base::time::{Monotonic, Nanos, Stop};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, OnLoss, PatchFile, Settings};
+use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PatchFile, Settings};
+use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
 use tickbus_fieldbus::tcp::Address;
 
 /// Serve a virtual laboratory: controllers and machines join over lines of text, and are patched together.
@@ -32,6 +33,23 @@ pub(super) struct Arguments {
     /// Disconnect a client after this time without a line from it.
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = span)]
     idle: Nanos,
+
+    /// Join the dispatchers of other hosts into one laboratory, over Zenoh: clients and patches span hosts by name.
+    #[arg(long)]
+    zenoh: bool,
+
+    /// Where a Zenoh router or another dispatcher listens, such as tcp/192.168.0.10:7447; may be given several times.
+    /// Others in the local network are found by multicast.
+    #[arg(long, value_name = "ENDPOINT", requires = "zenoh")]
+    zenoh_connect: Vec<String>,
+
+    /// Where Zenoh listens for other dispatchers, such as tcp/0.0.0.0:7447; without this, on a port that it chooses.
+    #[arg(long, value_name = "ENDPOINT", requires = "zenoh")]
+    zenoh_listen: Vec<String>,
+
+    /// The name of the laboratory; dispatchers of other laboratories on the same network are not seen.
+    #[arg(long, value_name = "NAME", requires = "zenoh", default_value = "lab")]
+    lab: String,
 }
 
 fn address(text: &str) -> Result<Address, String> {
@@ -43,6 +61,18 @@ fn address(text: &str) -> Result<Address, String> {
 fn say(line: &str) {
     let mut out = io::stdout().lock();
     let _ = writeln!(out, "dispatch: {line}").and_then(|()| out.flush());
+}
+
+fn settings(arguments: &Arguments) -> Settings {
+    Settings {
+        idle: arguments.idle,
+        on_loss: if arguments.hold {
+            OnLoss::Hold
+        } else {
+            OnLoss::FailSafe
+        },
+        ..Settings::default()
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
@@ -76,26 +106,44 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             ));
         }
     };
-    let connections = patch.len();
+    let mut dispatcher = Dispatcher::new(settings(arguments), patch);
+    let door = Door::new(&stop);
+    let mut listener = listener;
+    if arguments.zenoh {
+        let options = Options {
+            laboratory: arguments.lab.clone(),
+            connect: arguments.zenoh_connect.clone(),
+            listen: arguments.zenoh_listen.clone(),
+        };
+        let joined = match tickbus_dispatcher_zenoh::join(&options, &door) {
+            Ok(joined) => joined,
+            Err(Failure::Options(mistake)) => {
+                eprintln!("dispatch: {mistake}");
+                return Outcome::Usage;
+            }
+            Err(Failure::Network(reason)) => return failed(reason),
+        };
+        let elapsed = u64::try_from(Monotonic::shared().now().0).unwrap_or(0);
+        let since = u64::try_from(system_time().as_nanos()).unwrap_or(0);
+        let name = computer_name();
+        let identity = Identity::new(joined.host, &name, since.saturating_sub(elapsed));
+        say(&format!(
+            "in the laboratory {} as {}",
+            arguments.lab, identity.name
+        ));
+        dispatcher.federate(identity);
+        listener = listener.with_post(joined.post);
+    }
+    let connections = dispatcher.patch().len();
     say(&format!(
         "{connections} connections from {}",
         arguments.patch.display()
     ));
     say(&format!("listening on {}", listener.address()));
-    let settings = Settings {
-        idle: arguments.idle,
-        on_loss: if arguments.hold {
-            OnLoss::Hold
-        } else {
-            OnLoss::FailSafe
-        },
-        ..Settings::default()
-    };
-    let mut dispatcher = Dispatcher::new(settings, patch);
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         stop: &stop,
-        door: None,
+        door: Some(&door),
         patch_file: Some(&file),
         news: &mut say,
     };

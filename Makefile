@@ -1,6 +1,7 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-peeler demo-profibus demo-robot test bench soak lint dist build setup clean
+.PHONY: help demo demo-peeler demo-profibus demo-robot demo-cell test bench soak lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot test bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -8,6 +9,9 @@ help: ## this list
 
 demo: ## build, then watch the PLC program run the rig: three cycles, one jam, one PLC killed
 	@exec tools/demo
+
+demo-lab: ## build, then watch two controllers and two tanks in a virtual laboratory, patched over text
+	@exec tools/demo-lab
 
 demo-peeler: ## build, then watch two PLCs peel blocks of wood to veneer over the link of 2018
 	@exec tools/demo-peeler
@@ -17,6 +21,9 @@ demo-profibus: ## build, then watch the PLC program run the rig over PROFIBUS, b
 
 demo-robot: ## build, then run a servo robot and its PLC in lock-step and free-wheeling, and draw the paths
 	@exec tools/demo-robot
+
+demo-cell: ## build, then watch Petri nets make twelve cylinders in the manufacturing cell, with jams on the way
+	@exec tools/demo-cell
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test

@@ -1,6 +1,8 @@
 //! The bus traits, the port, faults, and one room per bus.
 
+pub use tickbus_bus_dispatcher as dispatcher;
 pub use tickbus_bus_hilscher as hilscher;
+pub use tickbus_bus_identification as identification;
 pub use tickbus_bus_interbus as interbus;
 pub use tickbus_bus_modbus as modbus;
 pub use tickbus_bus_opcua as opcua;

@@ -9,11 +9,8 @@
     reason = "exported names and the pointers that the JVM hands in"
 )]
 
-mod device;
 mod failure;
-mod handles;
 mod open;
-mod shared;
 
 use std::ffi::c_void;
 use std::panic::catch_unwind;
@@ -25,12 +22,11 @@ use jni::vm::JavaVM;
 use jni::{Env, EnvUnowned};
 
 use tickbus_base::time::Nanos;
+use tickbus_binding::{Device, EVENT_WORDS, EVENTS, Handles, Refusal, faults, read_fault};
 use tickbus_driver::Code;
 use tickbus_report::page_beside;
 
-use device::{Device, EVENT_WORDS, EVENTS};
 use failure::{Failure, ThrowFieldbusException};
-use handles::Handles;
 
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
@@ -118,7 +114,7 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
         let closed = DRIVERS.close(handle, Device::close);
         // The process may end right after this, and the driver's messages must not be lost.
         tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
-        closed.map_err(Failure::plain)
+        Ok::<(), Failure>(closed.map_err(Refusal::plain)?)
     })
     .resolve::<ThrowFieldbusException>();
 }
@@ -185,7 +181,7 @@ extern "system" fn Java_tickbus_Tickbus_faultsNative<'local>(
 ) -> JString<'local> {
     env.with_env(|env| {
         let board = with(handle, |device| device.board())?;
-        Ok(env.new_string(device::faults(&board))?)
+        Ok(env.new_string(faults(&board))?)
     })
     .resolve::<ThrowFieldbusException>()
 }
@@ -219,15 +215,7 @@ fn initialize(
     tables: &JString<'_>,
     layout: &JObject<'_>,
 ) -> Result<jlong, Failure> {
-    let place = DRIVERS.reserve().map_err(|code| {
-        Failure::coded(
-            code,
-            format!(
-                "{} drivers are open, and that is the most",
-                handles::MAX_DRIVERS
-            ),
-        )
-    })?;
+    let place = DRIVERS.reserve()?;
     let path = driver_cfg.try_to_string(env)?;
     let tables = if tables.is_null() {
         String::new()
@@ -249,17 +237,8 @@ fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jin
 fn inject(env: &mut Env<'_>, handle: jlong, fault: &JString<'_>) -> Result<jint, Failure> {
     let text = fault.try_to_string(env)?;
     let config = with(handle, |device| device.config())?;
-    let id = tickbus_fieldbus::faults::read_one(&text, config.fault_scope())
-        .and_then(|fault| match with(handle, |device| device.inject(&fault)) {
-            Ok(injected) => injected.map(Ok),
-            Err(failure) => Ok(Err(failure)),
-        })
-        .map_err(|mistakes| {
-            Failure::coded(
-                Code::BadArgument,
-                format!("the fault cannot be injected:\n{mistakes}"),
-            )
-        })??;
+    let fault = read_fault(&text, &config)?;
+    let id = with(handle, |device| device.inject(&fault))??;
     Ok(jint::try_from(id).unwrap_or(jint::MAX))
 }
 
@@ -278,13 +257,7 @@ fn report<'local>(
     Ok(env.new_string(page.to_string_lossy())?)
 }
 
-/// Calls `work` with the driver of `handle`; if the driver has failed, the error carries the text of its
-/// panic.
+/// Calls `work` with the driver of `handle`.
 fn with<R>(handle: jlong, work: impl FnOnce(&mut Device<open::Keep>) -> R) -> Result<R, Failure> {
-    DRIVERS
-        .with(handle, work)
-        .map_err(|code| match DRIVERS.panic_of(handle) {
-            Some(text) => Failure::coded(code, format!("panic: {text}")),
-            None => Failure::plain(code),
-        })
+    Ok(DRIVERS.with_reason(handle, work)?)
 }

@@ -24,27 +24,33 @@
 //! | [`driver_cfg`] | what a driver.cfg says, with the list of bus kinds |
 //! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`dispatcher`] | the dispatcher of a virtual laboratory: clients, patch, routing |
+//! | [`bridge`] | bridges to it: serial lines, MQTT |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
+//! | [`function_blocks`] | a small controller whose program is a plan of function blocks |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
+//! | `c_api` | the functions of `include/tickbus.h` |
 //! | [`cli`] | the `tickbus` command |
 //!
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
 //! simulation writes; `%Q` is a PLC output, which the simulation reads.
 
+mod c_api;
 pub mod cli;
 pub mod fieldbus;
 mod jni;
 
 pub use tickbus_axis as axis;
 pub use tickbus_base::{Mistake, os, statistics, time, toml_text};
+pub use tickbus_bridge as bridge;
 pub use tickbus_dispatcher as dispatcher;
 pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;
 pub use tickbus_export as export;
 pub use tickbus_fieldbus::faults;
+pub use tickbus_function_blocks as function_blocks;
 pub use tickbus_image as image;
 pub use tickbus_image::signal;
 pub use tickbus_import as import;

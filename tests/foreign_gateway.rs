@@ -1,5 +1,5 @@
 //! The gateway with PLCs behind it that speak by somebody else's software: pymodbus polls it as its remote I/O, rust7
-//! reads and writes it by S7 communication.
+//! reads and writes it by S7 communication, asyncua by OPC UA.
 #![allow(missing_docs, clippy::unnecessary_wraps, reason = "tests of one shape")]
 
 mod foreign;
@@ -22,7 +22,7 @@ use tickbus::virtual_time::{
 use tickbus_conformance::rig::eventually;
 
 /// Steps of the PLC.
-const STEPS: u64 = 1000;
+const STEPS: u64 = 400;
 
 const CONFIG: &str = r#"
 [driver]
@@ -65,13 +65,17 @@ const MODBUS: &str = "kind = \"modbus-server\"";
 const S7: &str = "kind = \"s7-server\"\n\
     db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\" }]";
 
+#[cfg(feature = "opcua")]
+const OPC_UA: &str =
+    "kind = \"opcua-server\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"";
+
 /// A PLC that finds the gateway at this address, and delays its answers by this seed; what waits for its end, and tells how
 /// many steps it had.
 type Plc = fn(SocketAddr, u32) -> Result<Box<dyn FnOnce() -> u64>, Absent>;
 
 fn main() -> ExitCode {
     foreign::main(&[(
-        "plcs_of_pymodbus_and_rust7_are_in_step_whatever_time_they_take",
+        "plcs_of_other_libraries_are_in_step_whatever_time_they_take",
         plcs_in_step,
     )])
 }
@@ -99,13 +103,28 @@ impl Participant for Machine {
 
 /// A PLC of pymodbus.
 fn pymodbus(address: SocketAddr, seed: u32) -> Result<Box<dyn FnOnce() -> u64>, Absent> {
-    let mut python = foreign::python_with("main", &["pymodbus"])?;
-    let script = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/peers/modbus_sync_plc.py"
-    );
-    let numbers = [u64::from(address.port()), STEPS, seed.into()].map(|n| n.to_string());
-    python.args([script, "127.0.0.1"]).args(numbers);
+    python_plc("pymodbus", "modbus_sync_plc.py", address, seed)
+}
+
+/// A PLC of asyncua.
+#[cfg(feature = "opcua")]
+fn asyncua(address: SocketAddr, seed: u32) -> Result<Box<dyn FnOnce() -> u64>, Absent> {
+    python_plc("asyncua", "opcua_sync_plc.py", address, seed)
+}
+
+fn python_plc(
+    library: &str,
+    script: &str,
+    address: SocketAddr,
+    seed: u32,
+) -> Result<Box<dyn FnOnce() -> u64>, Absent> {
+    let mut python = foreign::python_with("main", &[library])?;
+    python.arg(format!(
+        "{}/tests/peers/{script}",
+        env!("CARGO_MANIFEST_DIR")
+    ));
+    python.arg("127.0.0.1");
+    python.args([u64::from(address.port()), STEPS, seed.into()].map(|n| n.to_string()));
     let mut plc = python
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -113,9 +132,9 @@ fn pymodbus(address: SocketAddr, seed: u32) -> Result<Box<dyn FnOnce() -> u64>, 
         .expect("it runs");
     Ok(Box::new(move || {
         drop(plc.stdin.take());
-        let told = plc.wait_with_output().expect("it ends");
-        let told = String::from_utf8_lossy(&told.stdout).into_owned();
-        let (_, steps) = told.split_once("ok steps=").expect(&told);
+        let output = plc.wait_with_output().expect("it ends");
+        let output = String::from_utf8_lossy(&output.stdout).into_owned();
+        let (_, steps) = output.split_once("ok steps=").expect(&output);
         steps.trim().parse().expect("a number")
     }))
 }
@@ -209,5 +228,7 @@ fn plcs_in_step() -> Result<(), Absent> {
     assert_eq!(run(S7, rust7, 2)?, one, "it took other times");
     assert_eq!(run(MODBUS, pymodbus, 1)?, one, "over another bus");
     assert_eq!(run(MODBUS, pymodbus, 2)?, one, "it took other times");
+    #[cfg(feature = "opcua")]
+    assert_eq!(run(OPC_UA, asyncua, 1)?, one, "over OPC UA");
     Ok(())
 }

@@ -30,6 +30,9 @@ at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
+# What the zip has beyond a plain build.
+PRODUCT_FEATURES=opcua,script,mqtt
+
 # The project's version, from Cargo.toml.
 version() {
     sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1
@@ -115,6 +118,6 @@ assemble() {
     # The command is needed for plug-ins in helper processes.
     cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$STRIPPED/$(tickbus_command)" \
         "$folder/DeviceDriver/"
-    cp java/simulator/rig.table java/simulator/peeler.table "java/simulator/target/simulator-$release.jar" \
+    cp java/simulator/*.table "java/simulator/target/simulator-$release.jar" \
         "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
 }

@@ -8,7 +8,7 @@ use super::host::span;
 use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PatchFile, Settings};
+use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PatchFile, Post, Settings};
 use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
 use tickbus_fieldbus::tcp::Address;
 
@@ -50,6 +50,10 @@ pub(super) struct Arguments {
     /// The name of the laboratory; dispatchers of other laboratories on the same network are not seen.
     #[arg(long, value_name = "NAME", requires = "zenoh", default_value = "lab")]
     lab: String,
+    /// Serve the patch bay, a page on which the laboratory is seen and patched, and print its address.
+    #[cfg(feature = "page")]
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:20080", value_parser = address)]
+    page: Option<Address>,
 }
 
 fn address(text: &str) -> Result<Address, String> {
@@ -75,6 +79,37 @@ fn settings(arguments: &Arguments) -> Settings {
     }
 }
 
+/// Makes it a dispatcher of a laboratory of several; returns the way to the others.
+fn join(
+    arguments: &Arguments,
+    dispatcher: &mut Dispatcher,
+    door: &Door,
+) -> Result<Box<dyn Post>, Failure> {
+    let options = Options {
+        laboratory: arguments.lab.clone(),
+        connect: arguments.zenoh_connect.clone(),
+        listen: arguments.zenoh_listen.clone(),
+    };
+    let joined = tickbus_dispatcher_zenoh::join(&options, door)?;
+    let elapsed = u64::try_from(Monotonic::shared().now().0).unwrap_or_default();
+    let since = u64::try_from(system_time().as_nanos()).unwrap_or_default();
+    let since = since.saturating_sub(elapsed);
+    let identity = Identity::new(joined.host, &computer_name(), since);
+    let (lab, name) = (&arguments.lab, &identity.name);
+    say(&format!("in the laboratory {lab} as {name}"));
+    dispatcher.federate(identity);
+    Ok(joined.post)
+}
+
+/// Serves the patch bay, and prints its address.
+#[cfg(feature = "page")]
+fn serve_page(address: &Address, door: &Door) -> io::Result<tickbus_web::Serving> {
+    let room = tickbus_web::Room::bind(address, tickbus_web::Limits::default())?;
+    say(&format!("page at {}", room.url()));
+    let site = tickbus_patch_bay::PatchBay::new(door.clone());
+    room.serve(std::sync::Arc::new(site), Monotonic::shared())
+}
+
 pub(super) fn run(arguments: &Arguments) -> Outcome {
     let file = PatchFile::new(&arguments.patch);
     let patch = match file.load() {
@@ -97,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         say(&format!("failed reason=\"{reason}\""));
         Outcome::BusFailed
     };
-    let listener = match Listener::bind(&arguments.listen) {
+    let mut listener = match Listener::bind(&arguments.listen) {
         Ok(listener) => listener,
         Err(error) => {
             let address = &arguments.listen;
@@ -108,31 +143,15 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     };
     let mut dispatcher = Dispatcher::new(settings(arguments), patch);
     let door = Door::new(&stop);
-    let mut listener = listener;
     if arguments.zenoh {
-        let options = Options {
-            laboratory: arguments.lab.clone(),
-            connect: arguments.zenoh_connect.clone(),
-            listen: arguments.zenoh_listen.clone(),
-        };
-        let joined = match tickbus_dispatcher_zenoh::join(&options, &door) {
-            Ok(joined) => joined,
+        match join(arguments, &mut dispatcher, &door) {
+            Ok(post) => listener = listener.with_post(post),
             Err(Failure::Options(mistake)) => {
                 eprintln!("dispatch: {mistake}");
                 return Outcome::Usage;
             }
             Err(Failure::Network(reason)) => return failed(reason),
-        };
-        let elapsed = u64::try_from(Monotonic::shared().now().0).unwrap_or(0);
-        let since = u64::try_from(system_time().as_nanos()).unwrap_or(0);
-        let name = computer_name();
-        let identity = Identity::new(joined.host, &name, since.saturating_sub(elapsed));
-        say(&format!(
-            "in the laboratory {} as {}",
-            arguments.lab, identity.name
-        ));
-        dispatcher.federate(identity);
-        listener = listener.with_post(joined.post);
+        }
     }
     let connections = dispatcher.patch().len();
     say(&format!(
@@ -140,6 +159,19 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         arguments.patch.display()
     ));
     say(&format!("listening on {}", listener.address()));
+    #[cfg(feature = "page")]
+    let _serving = match &arguments.page {
+        None => None,
+        Some(address) => match serve_page(address, &door) {
+            Ok(serving) => Some(serving),
+            Err(error) => {
+                return failed(format!(
+                    "the page cannot be served on {address} ({error}); end the program that has this port, or give \
+                     another --page"
+                ));
+            }
+        },
+    };
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         stop: &stop,

@@ -3,12 +3,14 @@
 //! One file per subcommand, with its arguments and `run`, which returns an `Outcome`.
 
 mod axes;
+mod bridge;
 mod check;
 mod dispatch;
 mod export;
 mod gsd;
 mod host;
 mod import;
+mod logo;
 mod mirror;
 mod plc;
 #[cfg(unix)]
@@ -36,11 +38,13 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Axes(axes::Arguments),
+    Bridge(bridge::Arguments),
     Check(check::Arguments),
     Dispatch(dispatch::Arguments),
     Export(export::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
+    Logo(logo::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     #[cfg(unix)]
@@ -88,11 +92,13 @@ pub fn main() -> ExitCode {
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments),
+        Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Dispatch(arguments) => dispatch::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Gsd(arguments) => gsd::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
+        Command::Logo(arguments) => logo::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments),
         Command::Plc(arguments) => plc::run(&arguments),
         #[cfg(unix)]

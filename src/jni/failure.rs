@@ -8,45 +8,24 @@ use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
 use once_cell::sync::OnceCell;
 
-use tickbus_driver::{Code, DriverError};
-
-use super::handles::said;
+use tickbus_binding::{Refusal, panic_message};
+use tickbus_driver::Code;
 
 /// Why a native method failed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Failure {
     /// A status code, and what happened.
-    #[error("{text}")]
-    Coded { code: i32, text: String },
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// A call into the JVM failed; if it threw, the exception is still pending.
     #[error(transparent)]
     Jni(#[from] Error),
 }
 
 impl Failure {
-    /// A failure with the status table's meaning and remedy.
-    pub(super) fn plain(code: Code) -> Self {
-        Self::coded(code, code.text())
-    }
-
-    /// A failure with its own description; the remedy is the status table's.
+    /// A failure with its own description.
     pub(super) fn coded(code: Code, what: impl std::fmt::Display) -> Self {
-        let text = format!(
-            "{} ({}): {what}\n  {}",
-            code.name(),
-            code.code(),
-            code.remedy()
-        );
-        Self::Coded {
-            code: code.code(),
-            text,
-        }
-    }
-}
-
-impl From<DriverError> for Failure {
-    fn from(error: DriverError) -> Self {
-        Self::coded(error.code(), error)
+        Refusal::new(code, what).into()
     }
 }
 
@@ -86,7 +65,7 @@ impl<T: Default> ErrorPolicy<T, Failure> for ThrowFieldbusException {
                 Code::Internal,
                 format!("a call into the JVM failed: {error}"),
             ),
-            coded @ Failure::Coded { .. } => coded,
+            refused @ Failure::Refused(_) => refused,
         };
         throw(env, &failure)?;
         Ok(T::default())
@@ -99,7 +78,7 @@ impl<T: Default> ErrorPolicy<T, Failure> for ThrowFieldbusException {
     ) -> Result<T, Error> {
         throw(
             env,
-            &Failure::coded(Code::Internal, format!("panic: {}", said(payload))),
+            &Failure::coded(Code::Internal, format!("panic: {}", panic_message(payload))),
         )?;
         Ok(T::default())
     }
@@ -110,7 +89,7 @@ fn throw(env: &mut Env<'_>, failure: &Failure) -> Result<(), Error> {
         return Ok(());
     }
     let code = match failure {
-        Failure::Coded { code, .. } => *code,
+        Failure::Refused(refusal) => refusal.code.code(),
         Failure::Jni(_) => Code::Internal.code(),
     };
     let class = EXCEPTION

@@ -10,21 +10,14 @@ use jni::objects::{JByteBuffer, JObject, JValue};
 use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
 
-use tickbus_base::time::Monotonic;
+use tickbus_binding::{Device, Shared};
 use tickbus_driver::{Code, Driver};
-use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::Role;
-use tickbus_image::signal::{Area, Signal};
+use tickbus_image::signal::Signal;
 
-use super::device::Device;
 use super::failure::Failure;
-use super::shared::Shared;
 
 /// Keeps the memory of a shared buffer alive.
 pub(super) type Keep = Global<JByteBuffer<'static>>;
-
-/// The file name in mistakes in the tables handed in by Java.
-const TABLES: &str = "tables instead of driver.cfg's";
 
 /// The file named by Java: a path, or a `file:` URI for a path that the JVM cannot represent as text. The URI
 /// has the bytes of the name as percent escapes.
@@ -66,14 +59,7 @@ pub(super) fn open(
     tables: &str,
     layout: &JObject<'_>,
 ) -> Result<Device<Keep>, Failure> {
-    let config = Config::load(path).and_then(|config| config.overlaid(TABLES, tables));
-    let config = config.map_err(|mistakes| {
-        Failure::coded(
-            Code::BadConfig,
-            format!("driver.cfg cannot be used:\n{mistakes}"),
-        )
-    })?;
-    let driver = Driver::open(config, Monotonic::shared())?;
+    let driver = tickbus_binding::open(path, tables)?;
     let shared = describe(env, &driver, layout)?;
     Ok(Device::new(driver, shared))
 }
@@ -92,10 +78,7 @@ fn describe(
         &[JValue::Int(config.id), JValue::Object(&name)],
     )?;
     for (slot, signal) in config.table.signals.iter().enumerate() {
-        let written = match config.role {
-            Role::Device => signal.area == Area::Input,
-            Role::Controller => signal.area == Area::Output,
-        };
+        let written = tickbus_binding::is_written(signal, config.role);
         let station = &config.table.stations[signal.station].name;
         let edges = driver.slots().edges[slot];
         // One frame per signal, because local references would accumulate otherwise.

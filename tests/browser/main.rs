@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use tickbus::report::{self, Contents, MarkKind, Run, RunStatistics, SignalKind};
 use tickbus::time::Nanos;
-use webdriver::Browser;
+use webdriver::{Browser, save, shoot};
 
 struct Page {
     folder: tempfile::TempDir,
@@ -520,33 +520,4 @@ fn screenshots_are_taken_at_every_size() {
             save(folder.as_deref(), "print.pdf", &pdf["data"]);
         }
     }
-}
-
-fn shoot(browser: &Browser, folder: Option<&Path>, name: &str, whole: bool) {
-    let shot = browser.devtools(
-        "Page.captureScreenshot",
-        &json!({"captureBeyondViewport": whole}),
-    );
-    save(folder, name, &shot["data"]);
-}
-
-fn save(folder: Option<&Path>, name: &str, data: &Value) {
-    let data = data.as_str().expect("base64");
-    let Some(folder) = folder else { return };
-    let digit = |byte: u8| match byte {
-        b'A'..=b'Z' => u32::from(byte - b'A'),
-        b'a'..=b'z' => u32::from(byte - b'a') + 26,
-        b'0'..=b'9' => u32::from(byte - b'0') + 52,
-        b'+' => 62,
-        _ => 63,
-    };
-    let digits: Vec<u32> = data.trim_end_matches('=').bytes().map(digit).collect();
-    let mut bytes = Vec::new();
-    for group in digits.chunks(4) {
-        let bits = group.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - group.len()));
-        bytes.extend_from_slice(&bits.to_be_bytes()[1..group.len()]);
-    }
-    fs::create_dir_all(folder)
-        .and_then(|()| fs::write(folder.join(name), bytes))
-        .expect("screenshots can be saved");
 }

@@ -1,5 +1,6 @@
 //! A headless Chromium, controlled by the W3C `WebDriver` protocol through chromedriver.
 
+use std::fs;
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::Path;
@@ -77,7 +78,12 @@ impl Browser {
     /// Opens a file, and waits until it is loaded.
     pub(crate) fn open(&self, file: &Path) {
         let file = file.canonicalize().expect("the page is there");
-        self.command("url", &json!({"url": format!("file://{}", file.display())}));
+        self.go(&format!("file://{}", file.display()));
+    }
+
+    /// Opens an address, and waits until it is loaded.
+    pub(crate) fn go(&self, url: &str) {
+        self.command("url", &json!({"url": url}));
     }
 
     /// Runs a function body in the page, which may wait, and returns its result.
@@ -196,4 +202,35 @@ impl Drop for Browser {
         let _ = self.driver.kill();
         let _ = self.driver.wait();
     }
+}
+
+/// Takes a picture of the page, or of its visible part, if there is a folder for it.
+pub(crate) fn shoot(browser: &Browser, folder: Option<&Path>, name: &str, whole: bool) {
+    let shot = browser.devtools(
+        "Page.captureScreenshot",
+        &json!({"captureBeyondViewport": whole}),
+    );
+    save(folder, name, &shot["data"]);
+}
+
+/// Saves what the browser has sent in base64.
+pub(crate) fn save(folder: Option<&Path>, name: &str, data: &Value) {
+    let data = data.as_str().expect("base64");
+    let Some(folder) = folder else { return };
+    let digit = |byte: u8| match byte {
+        b'A'..=b'Z' => u32::from(byte - b'A'),
+        b'a'..=b'z' => u32::from(byte - b'a') + 26,
+        b'0'..=b'9' => u32::from(byte - b'0') + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let digits: Vec<u32> = data.trim_end_matches('=').bytes().map(digit).collect();
+    let mut bytes = Vec::new();
+    for group in digits.chunks(4) {
+        let bits = group.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - group.len()));
+        bytes.extend_from_slice(&bits.to_be_bytes()[1..group.len()]);
+    }
+    fs::create_dir_all(folder)
+        .and_then(|()| fs::write(folder.join(name), bytes))
+        .expect("screenshots can be saved");
 }

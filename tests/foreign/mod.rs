@@ -104,8 +104,13 @@ pub fn python_with(name: &str, modules: &[&str]) -> Result<Command, Absent> {
 
 /// A command from the Debian package `package`.
 pub fn command(name: &str, package: &str) -> Result<Command, Absent> {
+    command_with(name, "--version", package)
+}
+
+/// A command from the Debian package `package` that does nothing but answer when it gets `argument`.
+pub fn command_with(name: &str, argument: &str, package: &str) -> Result<Command, Absent> {
     let found = Command::new(name)
-        .arg("--version")
+        .arg(argument)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status();

@@ -68,6 +68,8 @@ struct Plugged {
     /// routed there.
     host: Option<Box<str>>,
     outputs: Box<[Output]>,
+    /// Whether an input whose source is lost gets a sign for that, and not 0.
+    hears_losses: bool,
 }
 
 /// What the board keeps for a connection.
@@ -257,6 +259,7 @@ impl Board {
             order,
             host,
             outputs,
+            hears_losses: false,
         }));
     }
 
@@ -271,6 +274,13 @@ impl Board {
         self.names.insert(name, seat);
         for (sink, source) in connections {
             self.join(&sink, &source);
+        }
+    }
+
+    /// The client on this seat wants to hear of an input that its source is lost.
+    pub(crate) fn hear_losses(&mut self, seat: usize) {
+        if let Some(plugged) = &mut self.seats[seat].plugged {
+            plugged.hears_losses = true;
         }
     }
 
@@ -402,10 +412,17 @@ impl Board {
         let Some(to) = self.place(sink).filter(|_| self.forced(sink).is_none()) else {
             return;
         };
-        let input = self.seats[to.seat].inputs.get(to.channel);
-        // A client that was never sent a value assumes zero itself.
+        let seat = &self.seats[to.seat];
+        let hears_losses = seat.plugged.as_ref().is_some_and(|it| it.hears_losses);
+        let nothing = if hears_losses {
+            Number::LOST
+        } else {
+            Number::ZERO
+        };
+        let input = seat.inputs.get(to.channel);
+        // A client that was never sent a value assumes so itself.
         if self.on_loss == OnLoss::FailSafe && input.is_some_and(|input| input.value.is_known()) {
-            self.deliver(to, Number::ZERO, false);
+            self.deliver(to, nothing, false);
         }
     }
 

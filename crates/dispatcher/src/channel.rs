@@ -125,6 +125,11 @@ impl Counts {
         self.0[kind as usize] = count;
     }
 
+    /// Whether a client that counts from 1 has this channel.
+    pub const fn has_from_1(self, channel: Channel) -> bool {
+        channel.number >= 1 && channel.number <= self.of(channel.kind)
+    }
+
     /// The place of a channel among all outputs, or among all inputs, of its client; `None` if the client does not have
     /// it.
     ///
@@ -151,6 +156,11 @@ impl Counts {
             number - 1
         };
         Some(usize::from(place))
+    }
+
+    /// Whether a client has this channel.
+    pub fn has(self, channel: Channel) -> bool {
+        self.place(channel).is_some()
     }
 
     /// Every channel that has a place among the outputs or the inputs, in the order of the places.

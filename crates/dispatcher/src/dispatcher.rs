@@ -467,6 +467,7 @@ impl Dispatcher {
             name,
             counts,
             is_version_2,
+            hears_losses,
         } = identification;
         if let Some(device) = self.board.device(seat) {
             let text = format!(
@@ -493,6 +494,9 @@ impl Dispatcher {
             peer: session.peer,
         };
         self.board.plug(seat, device, order);
+        if hears_losses {
+            self.board.hear_losses(seat);
+        }
         self.confirm(seat, Role::keyword(role));
         self.board.list(seat);
         self.board.refresh_all(seat);

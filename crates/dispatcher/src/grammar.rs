@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! line       = [ident | values | connect | disconnect | "LIST" | "PING" | "BYE"] (CRLF | LF)
-//! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) ["V=2"]
+//! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) ["V=2" | "V=3"]
 //! values     = "P" *(channel "=" number)
 //! connect    = "CONNECT" 1*(channel ":" name ":" channel)
 //! disconnect = "DISCONNECT" 1*channel
@@ -53,8 +53,10 @@ pub struct Identification<'a> {
     pub name: &'a str,
     /// Its channels.
     pub counts: Counts,
-    /// Whether it wants confirmations.
+    /// Whether it wants confirmations: version 2 and later.
     pub is_version_2: bool,
+    /// Whether it wants to hear of an input that its source is lost: version 3.
+    pub hears_losses: bool,
 }
 
 /// Reads a line, without its end.
@@ -79,7 +81,7 @@ pub fn parse(line: &[u8]) -> Result<Line<'_>, Refusal> {
         .iter()
         .position(|verb| keyword.eq_ignore_ascii_case(verb.as_bytes()));
     let simple = match verb {
-        Some(0) => return Ok(Line::Values(Values(words))),
+        Some(0) => return Ok(Line::Values(Values::said(words))),
         Some(1) => {
             return words
                 .not_empty("I1:NAME:Q2")
@@ -112,13 +114,14 @@ fn identification(role: Role, mut words: Words<'_>) -> Result<Identification<'_>
         )));
     };
     let mut counts = [None; 4];
-    let mut is_version_2 = false;
+    let mut version = 1;
     while let Some(word) = words.word() {
         if word.eq_ignore_ascii_case(b"V") && words.take(b'=') {
-            if words.word() != Some(b"2") {
-                return Err(Code::Syntax.because("the version is 2, as V=2"));
-            }
-            is_version_2 = true;
+            version = match words.word() {
+                Some(b"2") => 2,
+                Some(b"3") => 3,
+                _ => return Err(Code::Syntax.because("the version is 2 or 3, as V=2")),
+            };
             break;
         }
         let Some((kind, count)) = Kind::with_number(word) else {
@@ -147,25 +150,49 @@ fn identification(role: Role, mut words: Words<'_>) -> Result<Identification<'_>
         role,
         name,
         counts: Counts::new(q, i, aq, ai),
-        is_version_2,
+        is_version_2: version >= 2,
+        hears_losses: version >= 3,
     })
 }
 
 /// The values of a line, each checked when it is reached.
 #[derive(Clone, Debug)]
-pub struct Values<'a>(Words<'a>);
+pub struct Values<'a> {
+    words: Words<'a>,
+    /// Whether `?` may stand for the value of an input that has lost its source.
+    may_be_lost: bool,
+}
+
+impl<'a> Values<'a> {
+    const fn said(words: Words<'a>) -> Self {
+        Self {
+            words,
+            may_be_lost: false,
+        }
+    }
+
+    /// The values in a line from the dispatcher, behind its keyword.
+    pub const fn delivered(text: &'a [u8]) -> Self {
+        Self {
+            words: Words(text),
+            may_be_lost: true,
+        }
+    }
+}
 
 impl Iterator for Values<'_> {
     type Item = Result<(Channel, Number), Refusal>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.0.item(|words| {
+        let may_be_lost = self.may_be_lost;
+        self.words.item(|words| {
             let channel = words.channel()?;
             if !words.take(b'=') {
                 return Err(words.unexpected("= and a number, as in Q1=20"));
             }
             let text = words.word().unwrap_or_default();
             match Number::parse(text) {
+                _ if may_be_lost && text == b"?" => Ok((channel, Number::LOST)),
                 Some(number) => Ok((channel, number)),
                 None => Err(Code::Syntax.because(format_args!(
                     "\"{}\" is no number for {channel}; write one such as 20 or -4.5, of up to 23 characters",
@@ -190,6 +217,13 @@ pub struct Joint<'a> {
 /// The connections of a line, each checked when it is reached.
 #[derive(Clone, Debug)]
 pub struct Joints<'a>(Words<'a>);
+
+impl<'a> Joints<'a> {
+    /// The connections in a text without a keyword.
+    pub(crate) const fn of(text: &'a [u8]) -> Self {
+        Self(Words(text))
+    }
+}
 
 impl<'a> Iterator for Joints<'a> {
     type Item = Result<Joint<'a>, Refusal>;
@@ -319,12 +353,18 @@ impl<'a> Words<'a> {
 fn shown(bytes: &[u8]) -> String {
     const LONGEST: usize = 40;
 
-    let text = bytes.iter().take(LONGEST).map(|byte| match byte {
-        b' '..=b'~' if *byte != b'"' => char::from(*byte),
-        _ => '?',
-    });
+    let text = printable(&bytes[..bytes.len().min(LONGEST)]).replace('"', "?");
     let end = if bytes.len() > LONGEST { ".." } else { "" };
-    text.chain(end.chars()).collect()
+    text + end
+}
+
+/// What somebody sent, with ? in place of what cannot be shown.
+pub(crate) fn printable(bytes: &[u8]) -> String {
+    let character = |byte: &u8| match byte {
+        b' '..=b'~' => char::from(*byte),
+        _ => '?',
+    };
+    bytes.iter().map(character).collect()
 }
 
 /// Reads a line of values in its usual form at the beginning of `bytes`, in one pass: the places of the outputs of a

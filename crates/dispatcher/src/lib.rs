@@ -4,10 +4,12 @@
 //! outputs it has, asks for connections, and sends its values; the dispatcher passes them on along the patch.
 //! docs/dispatcher.md has the protocol, for users and for authors of clients.
 //!
-//! [`Dispatcher`] does no I/O; [`tcp`] puts it on a port.
+//! [`Dispatcher`] does no I/O; [`tcp`] puts it on a port. [`client::Client`] is the other end, without I/O as well.
 
 mod board;
+mod cable;
 mod channel;
+pub mod client;
 mod device;
 mod dispatcher;
 mod door;
@@ -24,6 +26,7 @@ mod refusal;
 pub mod tcp;
 
 pub use board::{ChannelState, ClientState, Connection, OnLoss, Snapshot, Traffic};
+pub use cable::Cable;
 pub use channel::{Channel, Counts, Kind, MOST_CHANNELS};
 pub use device::{Device, Role};
 pub use dispatcher::{Dispatcher, Order, Reply, Settings};

@@ -29,6 +29,14 @@ impl Number {
         Self { bytes }
     };
 
+    /// What stands for a value when the source of an input is lost: `?`.
+    pub(crate) const LOST: Self = {
+        let mut bytes = [0; LONGEST_NUMBER + 1];
+        bytes[0] = b'?';
+        bytes[LONGEST_NUMBER] = 1;
+        Self { bytes }
+    };
+
     /// Reads `["-"] 1*DIGIT ["." 1*DIGIT]`; `None` for everything else, and for more than 23 characters that count.
     pub fn parse(text: &[u8]) -> Option<Self> {
         let (is_negative, digits) = match text {
@@ -59,6 +67,52 @@ impl Number {
             number.push(fraction)?;
         }
         Some(number)
+    }
+
+    /// The number that a floating-point value shows: shorter by digits behind the point if they are too many. `None` for
+    /// what is not finite, and for what has more than 23 characters before the point.
+    ///
+    /// Takes `f32` and `f64`, which are not shown alike.
+    pub fn of(value: impl fmt::Display) -> Option<Self> {
+        /// As much of a text as may count.
+        struct Text {
+            bytes: [u8; LONGEST_NUMBER],
+            length: usize,
+            whole: usize,
+            has_point: bool,
+        }
+
+        impl fmt::Write for Text {
+            fn write_str(&mut self, text: &str) -> fmt::Result {
+                for byte in text.bytes() {
+                    self.has_point |= byte == b'.';
+                    self.whole += usize::from(!self.has_point);
+                    let place = self.bytes.get_mut(self.length);
+                    *place.ok_or(fmt::Error)? = byte;
+                    self.length += 1;
+                }
+                Ok(())
+            }
+        }
+
+        let mut text = Text {
+            bytes: [0; LONGEST_NUMBER],
+            length: 0,
+            whole: 0,
+            has_point: false,
+        };
+        if fmt::write(&mut text, format_args!("{value}")).is_err() {
+            // The whole part may get longer by rounding.
+            let digits = LONGEST_NUMBER.checked_sub(text.whole + 2)?;
+            text.length = 0;
+            fmt::write(&mut text, format_args!("{value:.digits$}")).ok()?;
+        }
+        Self::parse(&text.bytes[..text.length])
+    }
+
+    /// The nearest floating-point value.
+    pub fn to_f64(&self) -> f64 {
+        self.as_str().parse().unwrap_or_default()
     }
 
     /// Reads the number at the beginning of `bytes` if it has no superfluous zeros, which is the usual case, and something
@@ -175,6 +229,33 @@ mod tests {
     }
 
     #[test]
+    fn floating_point_values_become_numbers_and_back() {
+        for (number, expected) in [
+            (Number::of(0.1_f32), Some("0.1")),
+            (Number::of(0.1_f64), Some("0.1")),
+            (Number::of(-0.0_f64), Some("0")),
+            (Number::of(-12.5_f32), Some("-12.5")),
+            (Number::of(16_777_216_f32), Some("16777216")),
+            (Number::of(1e21_f64), Some("1000000000000000000000")),
+            (Number::of(9.5e22_f64), Some("95000000000000000000000")),
+            (Number::of(1e23_f64), None),
+            (Number::of(1e-300_f64), Some("0")),
+            (
+                Number::of(-1.0 / 3.0 * 1e-5_f64),
+                Some("-0.0000033333333333333"),
+            ),
+            (Number::of(f64::NAN), None),
+            (Number::of(f64::INFINITY), None),
+            (Number::of(f64::NEG_INFINITY), None),
+            (Number::of(u32::MAX), Some("4294967295")),
+            (Number::of(i32::MIN), Some("-2147483648")),
+        ] {
+            assert_eq!(number.as_ref().map(Number::as_str), expected);
+        }
+        assert_eq!(Number::parse(b"-20.5").map(|it| it.to_f64()), Some(-20.5));
+    }
+
+    #[test]
     fn what_is_no_number_is_none() {
         for text in [
             "",
@@ -198,6 +279,14 @@ mod tests {
     }
 
     proptest::proptest! {
+        #[test]
+        fn what_fits_is_not_rounded(value in -1e6_f32..1e6) {
+            let number = Number::of(value).expect("it fits");
+            if number.len() < LONGEST_NUMBER - 1 {
+                proptest::prop_assert_eq!(number.as_str().parse::<f32>(), Ok(value));
+            }
+        }
+
         #[test]
         fn the_quick_way_reads_what_the_thorough_one_reads(text in "-?[0-9]{1,13}([.][0-9]{1,12})?", rest in "[ \r\na-]{1}[ -~]{0,30}") {
             let all = format!("{text}{rest}");

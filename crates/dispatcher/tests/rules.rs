@@ -40,6 +40,36 @@ fn version_2_is_answered() {
 }
 
 #[test]
+fn version_3_hears_that_a_source_is_lost_and_is_back() {
+    for (on_loss, lost) in [
+        (OnLoss::FailSafe, &["P I1=? I2=?"][..]),
+        (OnLoss::Hold, &[]),
+    ] {
+        let settings = Settings {
+            on_loss,
+            ..Settings::default()
+        };
+        let mut lab = Lab::with(settings, Patch::new());
+        let pump = lab.join("VP PUMP Q02");
+        let logo = lab.join("VR LOGO I02 V=3");
+        lab.say(logo, "CONNECT I1:PUMP:Q1 I2:PUMP:Q2");
+        lab.say(pump, "P Q1=0 Q2=1");
+        assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=0 I2=1"]);
+        lab.dispatcher.gone(pump);
+        assert_eq!(lab.hear(logo), lost);
+        let pump = lab.join("VP PUMP Q02");
+        assert_eq!(lab.hear(logo), NOTHING, "it has said nothing yet");
+        lab.say(pump, "P Q1=0 Q2=2");
+        let back = match on_loss {
+            OnLoss::FailSafe => "P I1=0 I2=2",
+            OnLoss::Hold => "P I2=2",
+        };
+        assert_eq!(lab.hear(logo), [back]);
+        refused(&lab.ask(pump, "P Q1=?"), 400);
+    }
+}
+
+#[test]
 fn version_1_gets_lists_values_and_refusals_only() {
     let mut lab = Lab::new();
     let logo = lab.connect();
@@ -70,7 +100,7 @@ fn every_mistake_has_its_code_and_changes_nothing() {
         "VR LOGO Q1 X1",
         "VR LOGO Q",
         "VR LOGO V=2",
-        "VR LOGO Q1 V=3",
+        "VR LOGO Q1 V=4",
         "VR LOGO Q1 V=2 I1",
         "VX LOGO Q1",
         "VR:LOGO Q1",

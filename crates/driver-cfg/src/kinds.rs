@@ -5,7 +5,9 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_bus_dispatcher as dispatcher;
 use tickbus_bus_hilscher as hilscher;
+use tickbus_bus_identification as identification;
 use tickbus_bus_interbus as interbus;
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
@@ -126,17 +128,20 @@ kinds! {
     HilscherCifx(hilscher::cifx::Options),
     /// `kind = "interbus-ddi"`: an INTERBUS controller board.
     InterbusDdi(interbus::Options),
+    /// `kind = "ivi-client"`: asks a reader of code carriers.
+    IviClient(identification::ClientOptions),
+    /// `kind = "ivi-reader"`: a simulated reader of code carriers.
+    IviReader(identification::ReaderOptions),
     /// `kind = "sdsp"`: a client of a run on virtual time.
     Sdsp(sdsp::Options),
+    /// `kind = "dispatcher"`: a client of a virtual laboratory.
+    Dispatcher(dispatcher::Options),
     /// `kind = "plugin"`: a vendor's shared library.
     Plugin(plugin::Options),
     /// `kind = "mailbox"`: the example of `examples/bus-mailbox`.
     #[cfg(feature = "example-bus")]
     Mailbox(tickbus_bus_mailbox::Options),
 }
-
-/// Bus kinds that a later version will have.
-const PLANNED: [&str; 1] = ["dispatcher"];
 
 impl Options {
     /// The recording that replaces the peer, as named in the driver.cfg.
@@ -233,17 +238,8 @@ fn read_events(value: &Value<'_>, has_writes: bool) -> Option<Events> {
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {
-    if PLANNED.contains(&name) {
-        let built: Vec<String> = BUILT.iter().map(|kind| format!("\"{kind}\"")).collect();
-        kind.wrong(
-            format!("bus kind \"{name}\" is not in this version"),
-            format!("this version has {}", built.join(", ")),
-        );
-    } else {
-        let known: Vec<&str> = BUILT.iter().copied().chain(PLANNED).collect();
-        kind.wrong(
-            format!("bus kind \"{}\" is unknown", shown(name)),
-            did_you_mean(name, "bus kinds", &known),
-        );
-    }
+    kind.wrong(
+        format!("bus kind \"{}\" is unknown", shown(name)),
+        did_you_mean(name, "bus kinds", BUILT),
+    );
 }

@@ -1,6 +1,8 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
 mod library;
+#[cfg(unix)]
+mod linked_terminal;
 mod log;
 #[cfg(unix)]
 mod named_memory;
@@ -19,6 +21,8 @@ mod shared_memory;
 mod timer_slack;
 
 pub use library::{Library, one_line};
+#[cfg(unix)]
+pub use linked_terminal::LinkedTerminal;
 pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
 #[cfg(unix)]
 pub use named_memory::NamedMemory;

@@ -26,18 +26,31 @@ impl PseudoTerminal {
     ///
     /// The system has no more.
     pub fn open() -> io::Result<(Self, PathBuf)> {
-        let far = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
+        // A program that is started from here would keep the line from hanging up.
+        #[cfg(target_os = "linux")]
+        let flags = flags | OpenptFlags::CLOEXEC;
+        let far = openpt(flags)?;
         grantpt(&far)?;
         unlockpt(&far)?;
         let name = ptsname(&far, Vec::new())?.into_string();
         let name = name.map_err(|_| io::ErrorKind::InvalidData)?;
-        let near = open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())?;
+        let near = open(
+            &*name,
+            OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC,
+            Mode::empty(),
+        )?;
         // By default a terminal echoes its input.
         let mut attributes = tcgetattr(&near)?;
         attributes.make_raw();
         tcsetattr(&near, OptionalActions::Now, &attributes)?;
         let far = File::from(far);
         Ok((Self { far, _near: near }, name.into()))
+    }
+
+    /// The far end itself.
+    pub(super) fn far(&self) -> &File {
+        &self.far
     }
 
     /// Reads what arrives within `patience`; 0 bytes if nothing does.

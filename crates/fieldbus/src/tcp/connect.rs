@@ -1,7 +1,7 @@
 //! Connecting.
 
 use std::io::{self, ErrorKind};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
 
 use rustix::io::Errno;
 use socket2::{Domain, Protocol, Socket, Type};
@@ -45,6 +45,25 @@ pub fn connect(
     Ok(Some((stream, peer)))
 }
 
+/// Connects for a client that has no [`Port`]; blocks for a few seconds per address of the host.
+///
+/// # Errors
+///
+/// The host is unknown, or does not answer.
+pub fn reach(address: &Address) -> io::Result<TcpStream> {
+    let mut failed = io::Error::other("the host has no address");
+    let mut connect = |address: SocketAddr| {
+        let reached = TcpStream::connect_timeout(&address, PATIENCE.to_duration());
+        let reached = reached.and_then(|stream| not_itself(&stream).map(|()| stream));
+        reached.map_err(|error| failed = error).ok()
+    };
+    let reached = address
+        .to_string()
+        .to_socket_addrs()?
+        .find_map(&mut connect);
+    reached.ok_or(failed)
+}
+
 /// Tries the addresses of a host one after another; `None` if `stop` came first.
 fn reach_any(
     addresses: &[SocketAddr],
@@ -54,7 +73,7 @@ fn reach_any(
 ) -> Result<Option<TcpStream>, BusError> {
     let mut failed = None;
     for address in addresses {
-        match reach(*address, set, port, stop) {
+        match reach_one(*address, set, port, stop) {
             Ok(reached) => return Ok(reached),
             Err(error) => failed = Some((address, error)),
         }
@@ -72,7 +91,7 @@ fn reach_any(
     }))
 }
 
-fn reach(
+fn reach_one(
     address: SocketAddr,
     set: &mut PollSet,
     port: &Port,
@@ -94,11 +113,7 @@ fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::
             if let Some(error) = stream.take_error()? {
                 return Err(error);
             }
-            // If the system happens to choose the destination port for this end, the socket connects to
-            // itself.
-            if stream.local_addr()? == stream.peer_addr()? {
-                return Err(ErrorKind::ConnectionRefused.into());
-            }
+            not_itself(stream)?;
             return Ok(true);
         }
         if port.clock().now() >= limit {
@@ -106,6 +121,14 @@ fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::
         }
     }
     Ok(false)
+}
+
+/// If the system happens to choose the destination port for this end, the socket connects to itself.
+fn not_itself(stream: &TcpStream) -> io::Result<()> {
+    if stream.local_addr()? == stream.peer_addr()? {
+        return Err(ErrorKind::ConnectionRefused.into());
+    }
+    Ok(())
 }
 
 /// Starts to connect, without waiting.

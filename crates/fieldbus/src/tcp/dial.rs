@@ -6,9 +6,9 @@ use std::net::{SocketAddr, TcpStream};
 use rustix::fd::AsFd;
 
 use crate::{BusError, Port};
-#[cfg(unix)]
-use tickbus_base::os::SerialPort;
 use tickbus_base::os::{Interest, PollSet};
+#[cfg(unix)]
+use tickbus_base::os::{LinkedTerminal, SerialPort};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::{Address, close_gracefully, connect, is_for_later, no_wait};
@@ -82,8 +82,17 @@ impl Stream for TcpStream {
     }
 }
 
+impl<S: Stream + ?Sized> Stream for Box<S> {
+    fn close(&mut self) {
+        (**self).close();
+    }
+}
+
 #[cfg(unix)]
 impl Stream for SerialPort {}
+
+#[cfg(unix)]
+impl Stream for LinkedTerminal {}
 
 /// Connects with `address`, for a [`Caller`] that is made once the peer is known; `None` if `stop` came
 /// first. The peer may leave sent data unacknowledged for `patience`.

@@ -4,6 +4,7 @@
 mod address;
 mod connect;
 mod dial;
+mod dialler;
 mod listen;
 mod resolve;
 mod server;
@@ -12,8 +13,9 @@ mod stream;
 use super::BusError;
 
 pub use address::{Address, Host};
-pub use connect::connect;
+pub use connect::{connect, reach};
 pub use dial::{Call, Caller, Stream, dial};
+pub use dialler::Dialler;
 pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};

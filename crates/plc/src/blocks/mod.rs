@@ -6,6 +6,7 @@
 mod action;
 mod axis;
 mod bistable;
+mod counter;
 mod edge;
 mod rtc;
 mod simulation_time;
@@ -14,6 +15,7 @@ mod timer;
 pub use action::{ActionControl, Qualifiers};
 pub use axis::{AxisCommand, AxisControl, AxisInputs, Execute};
 pub use bistable::{Rs, Sr};
+pub use counter::Ctu;
 pub use edge::{FTrig, RTrig};
 pub use rtc::Rtc;
 pub use simulation_time::{Simulation, SimulationTime};

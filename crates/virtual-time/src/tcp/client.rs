@@ -1,10 +1,10 @@
 //! The client: it blocks while it waits for the server.
 
 use std::io::{self, Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
+use std::net::TcpStream;
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, prepare};
+use tickbus_fieldbus::tcp::{Address, prepare, reach};
 
 use super::is_later;
 use crate::client::{Client, Connection, Line, client_of, silent};
@@ -12,9 +12,6 @@ use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a read blocks before it is asked whether to stop.
 const LOOK: Nanos = Nanos::from_millis(50);
-
-/// How long an address may take to answer at first.
-const CONNECTING: Nanos = Nanos::from_secs(5);
 
 /// How long the server's machine may be silent, on the level of TCP.
 const PATIENCE: Nanos = Nanos::from_secs(10);
@@ -52,13 +49,7 @@ pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connect
 }
 
 fn open(address: &Address) -> io::Result<TcpStream> {
-    let mut failed = io::Error::other("the host has no address");
-    let mut reach = |address: SocketAddr| {
-        let reached = TcpStream::connect_timeout(&address, CONNECTING.to_duration());
-        reached.map_err(|error| failed = error).ok()
-    };
-    let reached = address.to_string().to_socket_addrs()?.find_map(&mut reach);
-    let stream = reached.ok_or(failed)?;
+    let stream = reach(address)?;
     prepare(&stream, PATIENCE)?;
     stream.set_nonblocking(false)?;
     stream.set_read_timeout(Some(LOOK.to_duration()))?;

@@ -103,6 +103,11 @@ public final class Coordinator {
         return new Marking(net, enabling.tokens.clone());
     }
 
+    /** The tokens in the place with this index now; before the first scan, those of the initial marking. */
+    public int tokens(int place) {
+        return scans == 0 ? net.place(place).initial() : enabling.tokens[place];
+    }
+
     /** How many scans there have been, with the one that stopped it. */
     public long scans() {
         return scans;

@@ -4,10 +4,7 @@ import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
-import java.io.BufferedReader;
-import java.io.File;
 import java.io.IOException;
-import java.net.InetSocketAddress;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.List;
@@ -29,56 +26,14 @@ class LockStepTest {
     @TempDir
     Path folder;
 
-    /** {@code tickbus sync} on a port of its own. */
-    private static final class Sync implements AutoCloseable {
-        private final Process process;
-        private final BufferedReader out;
-        private final InetSocketAddress address;
-
-        Sync(Path folder) throws IOException {
-            String file = Files.readString(Path.of(System.getProperty("tickbus.root"), "examples", "robot", "robot.toml"));
-            Path here = folder.resolve("robot.toml");
-            Files.writeString(here, file.replace(":20060", ":0"));
-            String command = File.separatorChar == '\\' ? "tickbus.exe" : "tickbus";
-            process = new ProcessBuilder(Path.of(System.getProperty("tickbus.native.dir"), command).toString(), "sync",
-                here.toString()).redirectError(ProcessBuilder.Redirect.INHERIT).start();
-            out = process.inputReader();
-            String line = await("sync: listening on ");
-            address = new InetSocketAddress("127.0.0.1", Integer.parseInt(line.substring(line.lastIndexOf(':') + 1)));
-        }
-
-        /** Waits for a line of its output that begins like this. */
-        String await(String begin) throws IOException {
-            StringBuilder all = new StringBuilder();
-            for (String line = out.readLine(); line != null; line = out.readLine()) {
-                if (line.startsWith(begin)) {
-                    return line;
-                }
-                all.append(line).append('\n');
-            }
-            throw new AssertionError("no line that begins with \"" + begin + "\" in:\n" + all);
-        }
-
-        CompletableFuture<Outcome> join(Participant participant) {
-            return CompletableFuture.supplyAsync(() -> {
-                try {
-                    return Client.join(address, participant);
-                } catch (EndedException e) {
-                    throw new CompletionException(e);
-                }
-            }, task -> new Thread(task).start());
-        }
-
-        @Override
-        public void close() {
-            process.destroy();
-        }
+    private Sync robot() throws IOException {
+        return new Sync(folder, Files.readString(Path.of(System.getProperty("tickbus.root"), "examples", "robot", "robot.toml")));
     }
 
     @Test
     void plantAndPlcGiveTheTraceHashOfThoseInRustWhoeverIsFirst() throws IOException {
         for (int run = 0; run < 3; run++) {
-            try (Sync sync = new Sync(folder)) {
+            try (Sync sync = robot()) {
                 boolean plcFirst = run % 2 == 0;
                 CompletableFuture<Outcome> first = sync.join(plcFirst ? new RobotProgram() : new RobotPlant());
                 CompletableFuture<Outcome> second = sync.join(plcFirst ? new RobotPlant() : new RobotProgram());
@@ -94,7 +49,7 @@ class LockStepTest {
 
     @Test
     void aPlantThatBreaksDownEndsTheRunForAllWithItsReason() throws IOException {
-        try (Sync sync = new Sync(folder)) {
+        try (Sync sync = robot()) {
             CompletableFuture<Outcome> plc = sync.join(new RobotProgram());
             CompletableFuture<Outcome> plant = sync.join(new RobotPlant() {
                 @Override

@@ -5,6 +5,8 @@ import java.nio.file.Path;
 import java.util.List;
 import java.util.Map;
 import java.util.function.Supplier;
+import tickbus.demo.board.TestingBoard;
+import tickbus.demo.cell.ManufacturingCell;
 import tickbus.demo.peeler.Peeler;
 import tickbus.demo.rig.Rig;
 import tickbus.simulator.Arguments;
@@ -36,7 +38,8 @@ public final class Main {
 
               --drivers DIR    the DeviceDriver folder: driver jars, and one .cfg file per driver
               --control FILE   control table that connects hardware components and machine
-              --machine NAME   rig (default), peeler, or none: only link drivers with one another
+              --machine NAME   rig (default), peeler, board, cell, or none: only link drivers with one
+                               another
               --step TIME      simulation step size (default 2ms)
               --mode MODE      real-time (default), or best-effort: as fast as possible
               --duration TIME  how much simulation time to run (default: until Ctrl-C)
@@ -50,7 +53,7 @@ public final class Main {
             """;
 
     private static final Map<String, Supplier<Machine>> MACHINES = Map.of("rig", Rig::new, "peeler", Peeler::new,
-            "none", NoMachine::new);
+            "board", TestingBoard::new, "cell", ManufacturingCell::new, "none", NoMachine::new);
 
     /** A machine may have many variables that a plant does not use; only the first ones are listed. */
     private static final int MOST_NOTES = 10;

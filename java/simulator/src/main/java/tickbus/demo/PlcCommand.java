@@ -64,8 +64,13 @@ public final class PlcCommand {
         return List.of("--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
     }
 
-    /** The address on which a driver listens; its driver.cfg may leave the port to the system. */
-    private static String address(ControlInterfaceDeviceDriver driver) {
+    /**
+     * The address on which a driver listens; its driver.cfg may leave the port to the system.
+     *
+     * @param driver open
+     * @return such as {@code 127.0.0.1:20030}
+     */
+    public static String address(ControlInterfaceDeviceDriver driver) {
         long limit = System.nanoTime() + LISTENING_NANOS;
         while (true) {
             var statistics = driver.statistics();
@@ -75,7 +80,7 @@ public final class PlcCommand {
             }
             if (System.nanoTime() - limit > 0 || statistics.getOrDefault("state", "").equals("failed")) {
                 throw new DemoFailure("the driver does not listen at any address, so no PLC process can connect to it;"
-                        + " its driver.cfg needs kind = \"socket\". The driver says: "
+                        + " its driver.cfg needs a kind that listens, such as \"socket\". The driver says: "
                         + statistics.getOrDefault("reason", "nothing"));
             }
             LockSupport.parkNanos(5_000_000);

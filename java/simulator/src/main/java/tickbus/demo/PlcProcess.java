@@ -15,6 +15,7 @@ import java.util.Queue;
 import java.util.concurrent.ConcurrentLinkedQueue;
 import java.util.concurrent.TimeUnit;
 import java.util.function.Supplier;
+import java.util.regex.Pattern;
 
 /**
  * A PLC as a separate process, such as {@code tickbus plc}: started, killed, restarted, and reliably ended.
@@ -30,8 +31,8 @@ public final class PlcProcess implements Plc {
     private static final long SECONDS_TO_DIE = 5;
     private static final int LAST_WORDS = 5;
 
-    /** The prefix of lines for people. */
-    private static final String WORDS = "plc: ";
+    /** How lines for people begin: with the name of the command. */
+    private static final Pattern WORDS = Pattern.compile("[a-z]+: ");
 
     private final Supplier<List<String>> command;
     private final Path log;
@@ -69,7 +70,7 @@ public final class PlcProcess implements Plc {
                         blockTime = now;
                         block = Map.copyOf(lines);
                         lines.clear();
-                    } else if (!line.startsWith(WORDS) && entry.isPresent()) {
+                    } else if (!WORDS.matcher(line).lookingAt() && entry.isPresent()) {
                         lines.put(entry.get().getKey(), entry.get().getValue());
                     } else if (!line.isEmpty()) {
                         news.add(line);
@@ -221,14 +222,15 @@ public final class PlcProcess implements Plc {
         Life now = life;
         if (now != null && now.process.isAlive()) {
             now.killed = true;
-            // Terminated first, so that its last lines get into its log.
-            now.process.destroy();
+            // Terminated first, so that its last lines get into its log. Process.destroy would close its output before.
+            now.process.toHandle().destroy();
             try {
                 if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
                     destroy();
                     // Killing takes effect only after a moment.
                     now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS);
                 }
+                now.reader.join(TimeUnit.SECONDS.toMillis(SECONDS_TO_DIE));
             } catch (InterruptedException e) {
                 destroy();
                 Thread.currentThread().interrupt();

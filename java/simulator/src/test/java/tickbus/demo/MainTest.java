@@ -82,7 +82,7 @@ class MainTest {
         "--list; --drivers is missing",
         "--drivers; --drivers needs a value behind it",
         "--drivers a --drivers b; --drivers is given twice",
-        "--machine mill; --machine is \"mill\"§ it must be one of none, peeler, rig",
+        "--machine mill; --machine is \"mill\"§ it must be one of board, cell, none, peeler, rig",
         "--machine none --step 0ms; --step is 0ms§ it must be above 0",
         "--machine none --step 5; is no duration",
     })

@@ -49,6 +49,13 @@ public final class DriverFolder {
         return ofPeelingLine(folder, name -> "kind = \"socket\"\naddress = \"127.0.0.1:0\"\ncycle = \"10ms\"");
     }
 
+    /** The same with the driver of the testing board. */
+    public static Path ofTestingBoard(Path folder) throws IOException {
+        make(folder);
+        Files.copy(Path.of("../../plc/lab/board.cfg"), folder.resolve("board.cfg"));
+        return folder;
+    }
+
     /** The tickbus command beside the native library. */
     public static Path tickbus() {
         boolean windows = System.getProperty("os.name").startsWith("Windows");

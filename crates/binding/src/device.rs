@@ -1,0 +1,139 @@
+//! An open driver with the buffer that it shares with the simulator.
+
+use std::sync::Arc;
+
+use tickbus_base::time::Nanos;
+use tickbus_driver::{Driver, Exchange, Snapshot};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::{Fault, FaultBoard};
+use tickbus_image::Event;
+
+use crate::fault::not_injected;
+use crate::refusal::Refusal;
+use crate::shared::{NO_TIME, Shared, Word};
+
+/// The most events handed over in one call.
+pub const EVENTS: usize = 64;
+
+/// Words per event: signal, value, time.
+pub const EVENT_WORDS: usize = 3;
+
+/// An open driver and its shared buffer; `K` keeps the buffer's memory alive.
+pub struct Device<K> {
+    driver: Driver,
+    shared: Shared<K>,
+    ticks: u64,
+    events: [Event; EVENTS],
+}
+
+impl<K> Device<K> {
+    /// A driver and its buffer, whose slots get their initial values.
+    pub fn new(driver: Driver, mut shared: Shared<K>) -> Self {
+        shared.slots().copy_from_slice(&driver.initial_slots());
+        Self {
+            driver,
+            shared,
+            ticks: 0,
+            events: [Event::default(); EVENTS],
+        }
+    }
+
+    /// One tick: sends the slots that the simulation wrote, fills those that it reads, and the header.
+    #[inline]
+    pub fn exchange(&mut self) -> i32 {
+        self.ticks += 1;
+        let done = self.driver.exchange(self.time(), self.shared.slots());
+        self.tell(done)
+    }
+
+    /// The first half of a tick: fills the slots that the simulation reads, and the header.
+    #[inline]
+    pub fn receive(&mut self) -> i32 {
+        self.ticks += 1;
+        let done = self.driver.receive(self.time(), self.shared.slots());
+        self.tell(done)
+    }
+
+    /// The second half of a tick: sends the slots that the simulation wrote.
+    #[inline]
+    pub fn send(&mut self) -> i32 {
+        let done = self.driver.send(self.shared.slots());
+        self.tell(done)
+    }
+
+    /// The time that the simulator wrote, if any.
+    #[inline]
+    fn time(&self) -> Option<Nanos> {
+        let time = self.shared.read(Word::SimulationTime);
+        (time != NO_TIME).then_some(Nanos(time.cast_signed()))
+    }
+
+    #[inline]
+    fn tell(&mut self, done: Exchange) -> i32 {
+        self.shared
+            .write(Word::Status, i64::from(done.code.code()).cast_unsigned());
+        self.shared.write(Word::Sequence, done.sequence);
+        self.shared.write(Word::Age, done.age.0.cast_unsigned());
+        self.shared
+            .write(Word::Granted, done.granted.0.cast_unsigned());
+        self.shared.write(Word::Ticks, self.ticks);
+        done.code.code()
+    }
+
+    /// The data of the statistics; they are formatted after the driver is released.
+    pub fn snapshot(&self) -> Snapshot {
+        self.driver.snapshot()
+    }
+
+    /// Where the edges of a signal are counted, if they are.
+    pub fn edges_slot(&self, signal: usize) -> Option<usize> {
+        self.driver.slots().edges[signal]
+    }
+
+    /// What the driver was opened with.
+    pub fn config(&self) -> Arc<Config> {
+        Arc::clone(self.driver.config())
+    }
+
+    /// Injects a fault and returns its number.
+    ///
+    /// # Errors
+    ///
+    /// `BAD_ARGUMENT` if there are too many.
+    pub fn inject(&mut self, fault: &Fault) -> Result<u32, Refusal> {
+        self.driver.inject_read(fault).map_err(not_injected)
+    }
+
+    /// Ends a fault; false if no fault has this number.
+    pub fn end_fault(&mut self, id: u32) -> bool {
+        self.driver.end_fault(id)
+    }
+
+    /// Where the injected faults publish their state.
+    pub fn board(&self) -> Arc<FaultBoard> {
+        Arc::clone(self.driver.board())
+    }
+
+    /// Moves pending events to `into`, three words each; returns their number.
+    pub fn events(&mut self, into: &mut [i64]) -> usize {
+        let room = (into.len() / EVENT_WORDS).min(EVENTS);
+        let count = self.driver.poll_events(&mut self.events[..room]);
+        for (event, words) in self.events[..count]
+            .iter()
+            .zip(into.chunks_exact_mut(EVENT_WORDS))
+        {
+            words.copy_from_slice(&[
+                i64::from(event.signal),
+                event.value.0.cast_signed(),
+                event.time.0,
+            ]);
+        }
+        count
+    }
+
+    /// Sends what was written last, and closes the driver.
+    pub fn close(mut self) {
+        self.driver.end_tick(self.shared.slots());
+        self.driver.close();
+    }
+}

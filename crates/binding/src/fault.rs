@@ -1,0 +1,46 @@
+//! Injected faults, as text.
+
+use std::fmt::Write as _;
+
+use tickbus_driver::Code;
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::{Fault, FaultBoard, FaultStatus, read_one};
+
+use crate::refusal::Refusal;
+
+/// A fault as in driver.cfg: the keys of a `[[fault]]` table.
+///
+/// # Errors
+///
+/// `BAD_ARGUMENT` with every mistake in the text.
+pub fn read_fault(text: &str, config: &Config) -> Result<Fault, Refusal> {
+    read_one(text, config.fault_scope()).map_err(not_injected)
+}
+
+pub(crate) fn not_injected(why: impl std::fmt::Display) -> Refusal {
+    let text = format!("the fault cannot be injected:\n{why}");
+    Refusal::new(Code::BadArgument, text)
+}
+
+/// The injected faults, one per line: number, state, how often begun, kind, name, effect; separated by tabs.
+pub fn faults(board: &FaultBoard) -> String {
+    let mut text = String::new();
+    for fault in board.list() {
+        let FaultStatus {
+            id,
+            phase,
+            begun,
+            kind,
+            name,
+            what,
+            ..
+        } = fault;
+        // Writing to a string cannot fail; names have no control characters.
+        let _ = writeln!(
+            text,
+            "{id}\t{}\t{begun}\t{kind}\t{name}\t{what}",
+            phase.name()
+        );
+    }
+    text
+}

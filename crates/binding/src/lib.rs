@@ -1,0 +1,18 @@
+//! What the bindings to other languages share: everything that Java and C do with an open driver, without either.
+//!
+//! [`Handles`] is the table of open drivers: checked numbers instead of pointers. A [`Device`] is one of them, with the
+//! [`Shared`] buffer of slots through which its values go.
+
+mod device;
+mod fault;
+mod handles;
+mod opening;
+mod refusal;
+mod shared;
+
+pub use device::{Device, EVENT_WORDS, EVENTS};
+pub use fault::{faults, read_fault};
+pub use handles::{Handles, MAX_DRIVERS, Reservation, panic_message};
+pub use opening::{is_written, open};
+pub use refusal::Refusal;
+pub use shared::{NO_TIME, Shared, Word};

@@ -1,0 +1,455 @@
+//! A client at a serial line, as a client of the dispatcher: lines in, lines out, and time handed in.
+
+use std::collections::VecDeque;
+
+use tickbus_base::time::Nanos;
+use tickbus_dispatcher::grammar::{Identification, LONGEST_LINE, Line, Values, parse};
+use tickbus_dispatcher::{Channel, Counts, Number};
+
+use crate::lines::{Cut, Lines};
+use crate::outbox::{Outbox, put};
+use crate::speaker::Speaker;
+
+/// After this time in which nothing was sent, the dispatcher gets a sign of life; and within it, answers.
+const ALIVE: Nanos = Nanos::from_secs(20);
+
+/// How many requests wait until the dispatcher has carried them out.
+const REQUESTS: usize = 64;
+
+/// What the client hears when the dispatcher has gone.
+const AWAY: &[u8] = b"ERR 503 the dispatcher does not answer; the bridge goes on calling it, and sends your values and \
+                      connections then";
+
+/// How a line ends on the serial side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LineEnd {
+    /// A line feed.
+    Lf,
+    /// A carriage return and a line feed.
+    CrLf,
+    /// A carriage return.
+    Cr,
+}
+
+impl LineEnd {
+    const fn bytes(self) -> &'static [u8] {
+        match self {
+            Self::Lf => b"\n",
+            Self::CrLf => b"\r\n",
+            Self::Cr => b"\r",
+        }
+    }
+}
+
+/// What went through a bridge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// Lines from the serial side.
+    pub said: u64,
+    /// Lines from the dispatcher for the serial side.
+    pub heard: u64,
+    /// Values that a newer one has replaced, because a side was slow.
+    pub overtaken: u64,
+    /// Lines from the serial side that reached nobody: too long, too many, or for a dispatcher that was not there.
+    pub dropped: u64,
+}
+
+/// A bridge between a serial line and a connection with the dispatcher.
+///
+/// It passes lines on as they are. On top of that it introduces the client again when a connection was lost, with its
+/// newest values and the requests that may not have arrived; gives signs of life; and keeps the newest values where a side
+/// is slow.
+#[derive(Debug)]
+pub struct AsciiBridge {
+    from_serial: Lines,
+    from_dispatcher: Lines,
+    to_serial: Outbox,
+    to_dispatcher: Outbox,
+    state: State,
+    client: Option<Client>,
+    /// CONNECT, DISCONNECT and LIST lines that may not have been carried out yet.
+    requests: VecDeque<Vec<u8>>,
+    /// Who waits for the next `OK PING`, and since when.
+    pings: VecDeque<(Asker, Nanos)>,
+    /// When the dispatcher last got something.
+    sent: Nanos,
+    /// When something last came from it, or the connection.
+    heard: Nanos,
+    traffic: Traffic,
+}
+
+/// The client, by what it has said.
+#[derive(Debug)]
+struct Client {
+    /// The line with which it has identified itself.
+    line: Vec<u8>,
+    counts: Counts,
+    /// It has not heard the answer to that yet.
+    is_waiting: bool,
+    /// The newest values of its outputs.
+    outputs: Vec<(Channel, Number)>,
+}
+
+/// How far the connection with the dispatcher is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// There is no connection.
+    Away,
+    /// The dispatcher does not know who this is.
+    Stranger,
+    /// The identification was sent, and is not answered.
+    Introduced,
+    /// The dispatcher knows the client.
+    Here,
+    /// BYE was sent: by the client, or because it begins anew.
+    Leaving {
+        /// The client has said it.
+        by_client: bool,
+    },
+}
+
+/// Who has sent a PING.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asker {
+    Client,
+    /// The bridge, as a sign of life.
+    Bridge,
+    /// The bridge, to learn that a request was carried out.
+    Request,
+}
+
+impl AsciiBridge {
+    /// A bridge to a serial line whose lines end with `end`; those from there may end in any way.
+    pub fn new(end: LineEnd) -> Self {
+        Self {
+            from_serial: Lines::default(),
+            from_dispatcher: Lines::default(),
+            to_serial: Outbox::new(end.bytes()),
+            to_dispatcher: Outbox::new(b"\r\n"),
+            state: State::Away,
+            client: None,
+            requests: VecDeque::new(),
+            pings: VecDeque::new(),
+            sent: Nanos::ZERO,
+            heard: Nanos::ZERO,
+            traffic: Traffic::default(),
+        }
+    }
+
+    /// Since when it waits for the dispatcher without a word from it; `None` if it does not.
+    fn waits_since(&self) -> Option<Nanos> {
+        let asked = self.pings.front().map(|(_, asked)| *asked);
+        let left = matches!(self.state, State::Leaving { .. }).then_some(self.sent);
+        asked.or(left).map(|since| since.max(self.heard))
+    }
+
+    /// What went through so far.
+    pub fn traffic(&self) -> Traffic {
+        Traffic {
+            overtaken: self.to_serial.overtaken + self.to_dispatcher.overtaken,
+            ..self.traffic
+        }
+    }
+
+    /// The serial port is gone. Close the connection: to the others its client has left.
+    pub fn unplugged(&mut self) {
+        self.state = State::Away;
+        self.from_serial = Lines::default();
+        self.to_serial.clear();
+        self.requests.clear();
+        if let Some(client) = &mut self.client {
+            // They may have changed when the port is back.
+            client.outputs.clear();
+            client.is_waiting = false;
+        }
+    }
+
+    /// What is to be written to the serial port now.
+    pub fn to_serial(&mut self) -> &[u8] {
+        self.to_serial.next_bytes()
+    }
+
+    /// The port has taken this many bytes.
+    pub fn wrote_to_serial(&mut self, count: usize) {
+        self.to_serial.wrote(count);
+    }
+
+    /// Bytes have arrived from the serial port, in any pieces.
+    pub fn from_serial(&mut self, now: Nanos, mut bytes: &[u8]) {
+        while let Some(cut) = self.from_serial.next(&mut bytes) {
+            self.traffic.said += 1;
+            match cut {
+                Cut::Line(line) => self.said(now, line),
+                Cut::TooLong => self.refuse(&format!(
+                    "413 the line is longer than {LONGEST_LINE} bytes with its end; send several lines"
+                )),
+            }
+        }
+    }
+
+    /// The client has said a line.
+    fn said(&mut self, now: Nanos, line: Vec<u8>) {
+        let parsed = parse(&line);
+        match (&parsed, self.state) {
+            (Ok(Line::Nothing), _) => {}
+            (Ok(Line::Identify(identification)), _) => {
+                let identification = *identification;
+                self.identify(&line, identification);
+            }
+            (Ok(Line::Bye), State::Away) => self.client = None,
+            (Ok(Line::Bye), _) => {
+                self.client = None;
+                self.requests.clear();
+                self.leave(true);
+            }
+            (_, State::Leaving { .. }) => self.traffic.dropped += 1,
+            (Ok(Line::Ping), State::Away) => self.refuse_away(),
+            (Ok(Line::Ping), _) => self.ping(now, Asker::Client),
+            (Ok(Line::Values(values)), _) if self.keep(values.clone()) => {
+                if self.state == State::Here {
+                    let items: Vec<_> = values.clone().flatten().collect();
+                    self.to_dispatcher.values(&line, &items);
+                }
+            }
+            (Ok(Line::Connect(_) | Line::Disconnect(_) | Line::List), _)
+                if self.client.is_some() =>
+            {
+                self.request(now, line);
+            }
+            // The dispatcher says best what is wrong.
+            (_, State::Here) if self.to_dispatcher.is_full() => self.traffic.dropped += 1,
+            (_, State::Here) => self.to_dispatcher.line(&line),
+            (Err(refusal), _) => {
+                let text = refusal.to_string();
+                self.traffic.dropped += 1;
+                self.say(text.as_bytes());
+            }
+            (Ok(_), _) if self.client.is_none() => {
+                self.refuse("401 say first who you are, such as VR NAME Q08 I08 AQ02 AI03");
+            }
+            (Ok(_), _) => self.refuse("404 these are no values of your outputs"),
+        }
+    }
+
+    fn identify(&mut self, line: &[u8], identification: Identification<'_>) {
+        self.requests.clear();
+        self.client = Some(Client {
+            line: line.to_vec(),
+            counts: identification.counts,
+            is_waiting: true,
+            outputs: Vec::new(),
+        });
+        match self.state {
+            State::Away => self.say(AWAY),
+            State::Stranger => {
+                self.to_dispatcher.line(line);
+                self.state = State::Introduced;
+            }
+            // A program that connects itself would come with a new connection.
+            State::Introduced | State::Here => self.leave(false),
+            State::Leaving { .. } => {}
+        }
+    }
+
+    fn leave(&mut self, by_client: bool) {
+        self.to_dispatcher.line(b"BYE");
+        self.state = State::Leaving { by_client };
+    }
+
+    /// Keeps values as the newest ones, if all of them are right.
+    fn keep(&mut self, values: Values<'_>) -> bool {
+        let Some(client) = &mut self.client else {
+            return false;
+        };
+        let counts = client.counts;
+        let is_right = |item: &(Channel, Number)| item.0.kind.is_output() && counts.has(item.0);
+        let Ok(items) = values.collect::<Result<Vec<_>, _>>() else {
+            return false;
+        };
+        if !items.iter().all(is_right) {
+            return false;
+        }
+        for item in items {
+            put(&mut client.outputs, item);
+        }
+        true
+    }
+
+    fn request(&mut self, now: Nanos, line: Vec<u8>) {
+        if self.requests.len() >= REQUESTS {
+            self.refuse("503 the dispatcher does not answer, and 64 lines wait for it already; send it again later");
+            return;
+        }
+        if self.state == State::Here {
+            self.to_dispatcher.line(&line);
+            self.ping(now, Asker::Request);
+        }
+        self.requests.push_back(line);
+    }
+
+    fn ping(&mut self, now: Nanos, asker: Asker) {
+        if self.to_dispatcher.is_full() {
+            self.traffic.dropped += u64::from(asker == Asker::Client);
+            return;
+        }
+        self.to_dispatcher.line(b"PING");
+        self.sent = now;
+        self.pings.push_back((asker, now));
+    }
+
+    /// The dispatcher has said a line.
+    fn obey(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
+        if line == b"OK PING" {
+            match self.pings.pop_front() {
+                Some((Asker::Client, _)) => self.pass(line),
+                Some((Asker::Request, _)) => drop(self.requests.pop_front()),
+                Some((Asker::Bridge, _)) | None => {}
+            }
+            return Ok(());
+        }
+        match self.state {
+            State::Away | State::Leaving { by_client: false } => {}
+            State::Introduced => self.introduced(now, line)?,
+            State::Leaving { by_client: true } | State::Stranger | State::Here => self.pass(line),
+        }
+        Ok(())
+    }
+
+    /// The dispatcher has answered to the identification.
+    fn introduced(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
+        let Some(client) = &mut self.client else {
+            return Ok(());
+        };
+        let is_first = std::mem::take(&mut client.is_waiting);
+        if line.starts_with(b"ERR ") {
+            if is_first {
+                self.pass(line);
+            }
+            // The name is taken, as it is for a while when a cable was pulled; or there are too many clients.
+            if line.starts_with(b"ERR 409") || line.starts_with(b"ERR 429") {
+                let text = String::from_utf8_lossy(line);
+                return Err(format!("it answers {text}"));
+            }
+            self.client = None;
+            self.state = State::Stranger;
+            return Ok(());
+        }
+        self.to_dispatcher.newest(&client.outputs);
+        self.state = State::Here;
+        self.pass(line);
+        for at in 0..self.requests.len() {
+            self.to_dispatcher.line(&self.requests[at]);
+            self.ping(now, Asker::Request);
+        }
+        Ok(())
+    }
+
+    /// Passes a line of the dispatcher on.
+    fn pass(&mut self, line: &[u8]) {
+        self.traffic.heard += 1;
+        if let Some(values) = line.strip_prefix(b"P ")
+            && let Ok(items) = Values::delivered(values).collect::<Result<Vec<_>, _>>()
+        {
+            self.to_serial.values(line, &items);
+        } else {
+            self.to_serial.line(line);
+        }
+    }
+
+    fn refuse_away(&mut self) {
+        self.traffic.dropped += 1;
+        self.say(AWAY);
+    }
+
+    fn refuse(&mut self, why: &str) {
+        self.traffic.dropped += 1;
+        self.say(format!("ERR {why}").as_bytes());
+    }
+
+    /// Says a line of the bridge's own.
+    fn say(&mut self, line: &[u8]) {
+        // A flood of mistakes is not answered for longer than the line can carry the answers.
+        if !self.to_serial.is_full() {
+            self.to_serial.line(line);
+        }
+    }
+}
+
+impl Speaker for AsciiBridge {
+    fn connected(&mut self, now: Nanos) {
+        self.from_dispatcher = Lines::default();
+        self.to_dispatcher.clear();
+        self.pings.clear();
+        self.sent = now;
+        self.heard = now;
+        self.state = match &self.client {
+            Some(client) => {
+                self.to_dispatcher.line(&client.line);
+                State::Introduced
+            }
+            None => State::Stranger,
+        };
+    }
+
+    fn disconnected(&mut self) -> bool {
+        let state = std::mem::replace(&mut self.state, State::Away);
+        if state == State::Here {
+            self.say(AWAY);
+        }
+        matches!(state, State::Leaving { .. })
+    }
+
+    fn is_here(&self) -> bool {
+        self.state == State::Here
+    }
+
+    fn deadline(&self) -> Nanos {
+        if self.state == State::Away {
+            return Nanos::MAX;
+        }
+        if self.wants_to_hear() {
+            self.sent.min(self.waits_since().unwrap_or(self.heard)) + ALIVE
+        } else {
+            self.sent + ALIVE
+        }
+    }
+
+    fn tick(&mut self, now: Nanos) -> Result<(), String> {
+        if self.state == State::Away {
+            return Ok(());
+        }
+        let is_due = |since: Nanos| now - since >= ALIVE;
+        let waits_since = self.waits_since();
+        let wants = self.wants_to_hear();
+        if wants && waits_since.is_some_and(is_due) {
+            return Err(format!("it has not answered for {ALIVE}"));
+        }
+        if is_due(self.sent) || wants && waits_since.is_none() && is_due(self.heard) {
+            self.ping(now, Asker::Bridge);
+        }
+        Ok(())
+    }
+
+    fn wants_to_hear(&self) -> bool {
+        !self.to_serial.is_full()
+    }
+
+    fn to_write(&mut self) -> &[u8] {
+        self.to_dispatcher.next_bytes()
+    }
+
+    fn wrote(&mut self, now: Nanos, count: usize) {
+        self.sent = now;
+        self.to_dispatcher.wrote(count);
+    }
+
+    fn hear(&mut self, now: Nanos, mut bytes: &[u8]) -> Result<(), String> {
+        self.heard = now;
+        while let Some(cut) = self.from_dispatcher.next(&mut bytes) {
+            if let Cut::Line(line) = cut {
+                self.obey(now, &line)?;
+            }
+        }
+        Ok(())
+    }
+}

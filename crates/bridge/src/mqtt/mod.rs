@@ -1,0 +1,14 @@
+//! MQTT topics as the channels of a client of the dispatcher.
+//!
+//! [`Map`] says which topic goes with which channel, [`Mapping`] does what it says without I/O, and `run` connects it with
+//! the broker and the dispatcher.
+
+mod map_file;
+mod mapping;
+#[cfg(feature = "mqtt")]
+mod run;
+
+pub use map_file::{Entry, Format, Map};
+pub use mapping::{Mapping, Publish, Traffic};
+#[cfg(feature = "mqtt")]
+pub use run::{Hosting, run};

@@ -1,0 +1,319 @@
+//! The bridge between a broker and the dispatcher.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::thread::JoinHandle;
+
+use rumqttc::{
+    Client, Connection, Event, LastWill, MqttOptions, Outgoing, Packet, QoS, SubscribeFilter,
+    SubscribeReasonCode,
+};
+use tickbus_base::os::PollSet;
+use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_fieldbus::tcp::Host;
+
+use super::mapping::Mapping;
+use crate::link::Link;
+use crate::speaker::Speaker as _;
+
+/// What the topic of the state says.
+const ONLINE: &str = "online";
+const OFFLINE: &str = "offline";
+
+/// After this time without a sign of life the broker takes the bridge for gone, and the bridge the broker.
+const ALIVE: Nanos = Nanos::from_secs(10);
+
+/// How long after the broker was lost it is called again.
+const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// How many messages may wait between the threads, in each direction.
+const QUEUE: usize = 256;
+
+/// The longest message, in bytes, that is received: what is no number is reported, and does not end the connection.
+const LONGEST: usize = 16 * 1024 * 1024;
+
+/// What a bridge works with.
+pub struct Hosting<'h> {
+    /// The clock.
+    pub clock: Arc<dyn Clock>,
+    /// Ends it.
+    pub stop: &'h Stop,
+    /// Takes what an operator should know, a line each.
+    pub news: &'h mut dyn FnMut(&str),
+}
+
+/// What comes from the broker's side.
+enum Heard {
+    Connected,
+    Lost(String),
+    Message(String, Vec<u8>),
+    /// It has room again.
+    Room,
+    Refused(usize),
+}
+
+/// Carries values between the broker and the dispatcher until stopped. What goes away is called again.
+///
+/// # Errors
+///
+/// The system cannot wait for sockets, or has no more threads.
+pub fn run(mapping: &mut Mapping, hosting: Hosting<'_>) -> io::Result<()> {
+    let set = PollSet::new(hosting.stop)?;
+    let broker = Broker::call(mapping, &hosting)?;
+    let mut host = Between {
+        link: Link::new(&mapping.map().dispatcher, hosting.stop),
+        mapping,
+        set,
+        is_connected: false,
+        is_online: false,
+        told: String::new(),
+        broker,
+        hosting,
+    };
+    while !host.hosting.stop.is_stopped() {
+        host.turn()?;
+    }
+    host.set_online(false);
+    host.link.close(&mut host.set);
+    if host.is_connected {
+        host.broker.leave();
+    }
+    Ok(())
+}
+
+struct Between<'b, 'h> {
+    mapping: &'b mut Mapping,
+    hosting: Hosting<'h>,
+    set: PollSet,
+    link: Link,
+    broker: Broker,
+    is_connected: bool,
+    /// What was published as the state.
+    is_online: bool,
+    /// Why the broker is not there, as it was reported last.
+    told: String,
+}
+
+impl Between<'_, '_> {
+    fn turn(&mut self) -> io::Result<()> {
+        let deadline = if self.is_connected {
+            self.link.deadline(self.mapping)
+        } else {
+            Nanos::MAX
+        };
+        self.set.wait(&*self.hosting.clock, deadline)?;
+        let now = self.hosting.clock.now();
+        while let Some(heard) = self.broker.heard() {
+            self.obey(heard);
+        }
+        if !self.is_connected {
+            return Ok(());
+        }
+        let news = &mut *self.hosting.news;
+        self.link.turn(now, self.mapping, &mut self.set, news)?;
+        self.set_online(self.mapping.is_here());
+        let broker = &self.broker.client;
+        self.mapping.publish(&mut |entry, payload| {
+            let topic = entry.topic.clone();
+            let sent = broker.try_publish(topic, QoS::AtLeastOnce, entry.retain, payload);
+            sent.is_ok()
+        });
+        let news = &mut *self.hosting.news;
+        for line in self.mapping.news() {
+            news(&line);
+        }
+        self.link.write(now, self.mapping, &mut self.set, news)
+    }
+
+    fn obey(&mut self, heard: Heard) {
+        let address = &self.mapping.map().broker;
+        match heard {
+            Heard::Connected => {
+                let line = format!("connected with the broker at {address}");
+                (self.hosting.news)(&line);
+                self.told.clear();
+                self.is_connected = true;
+                self.is_online = false;
+                self.broker.subscribe(self.mapping);
+            }
+            Heard::Lost(why) => {
+                let what = if self.is_connected {
+                    "is lost"
+                } else {
+                    "does not answer"
+                };
+                let line = format!(
+                    "the broker at {address} {what} ({why}); it is called again each second"
+                );
+                if self.is_connected {
+                    self.is_connected = false;
+                    self.is_online = false;
+                    self.mapping.broker_lost();
+                    self.link.close(&mut self.set);
+                }
+                if line != self.told {
+                    (self.hosting.news)(&line);
+                    self.told = line;
+                }
+            }
+            Heard::Message(topic, payload) => {
+                self.mapping.message(&topic, &payload);
+            }
+            Heard::Refused(at) => {
+                let topic = topics(self.mapping).nth(at).unwrap_or_default();
+                let line = format!(
+                    "the broker refuses the subscription of \"{topic}\"; let this client read it"
+                );
+                (self.hosting.news)(&line);
+            }
+            Heard::Room => {}
+        }
+    }
+
+    /// Publishes whether values go through.
+    fn set_online(&mut self, is_online: bool) {
+        if is_online == self.is_online || !self.is_connected {
+            return;
+        }
+        if let Some(status) = &self.mapping.map().status {
+            let payload = if is_online { ONLINE } else { OFFLINE };
+            let sent = self
+                .broker
+                .client
+                .try_publish(status, QoS::AtLeastOnce, true, payload);
+            if sent.is_err() {
+                return;
+            }
+        }
+        self.is_online = is_online;
+    }
+}
+
+/// The topics that are subscribed to.
+fn topics(mapping: &Mapping) -> impl Iterator<Item = &str> {
+    let outputs = mapping.map().channels.iter();
+    let outputs = outputs.filter(|entry| entry.channel.kind.is_output());
+    outputs.map(|entry| &*entry.topic)
+}
+
+/// The connection with the broker: a thread that drives it.
+struct Broker {
+    client: Client,
+    receiver: Receiver<Heard>,
+    thread: JoinHandle<()>,
+    stop: Stop,
+}
+
+impl Broker {
+    fn call(mapping: &Mapping, hosting: &Hosting<'_>) -> io::Result<Self> {
+        let map = mapping.map();
+        // Without the brackets of an IPv6 address.
+        let host = match &map.broker.host {
+            Host::Ip(ip) => ip.to_string(),
+            Host::Name(name) => name.clone(),
+        };
+        let mut options = MqttOptions::new(&map.name, host, map.broker.port);
+        options.set_keep_alive(ALIVE.to_duration());
+        options.set_max_packet_size(LONGEST, LONGEST);
+        if let Some(status) = &map.status {
+            options.set_last_will(LastWill::new(status, OFFLINE, QoS::AtLeastOnce, true));
+        }
+        let (client, connection) = Client::new(options, QUEUE);
+        let (sender, receiver) = mpsc::sync_channel(QUEUE);
+        let stop = Stop::new();
+        let driver = Driver {
+            sender,
+            clock: Arc::clone(&hosting.clock),
+            stop: stop.clone(),
+            waker: hosting.stop.clone(),
+        };
+        let thread = std::thread::Builder::new().name("tickbus-mqtt".to_owned());
+        let thread = thread.spawn(move || driver.run(connection))?;
+        Ok(Self {
+            client,
+            receiver,
+            thread,
+            stop,
+        })
+    }
+
+    fn heard(&self) -> Option<Heard> {
+        self.receiver.try_recv().ok()
+    }
+
+    fn subscribe(&self, mapping: &Mapping) {
+        let filters: Vec<_> = topics(mapping)
+            .map(|topic| SubscribeFilter::new(topic.to_owned(), QoS::AtLeastOnce))
+            .collect();
+        if !filters.is_empty() {
+            // If the broker was lost meanwhile, it is done again when it is there.
+            let _ = self.client.try_subscribe_many(filters);
+        }
+    }
+
+    /// Says good-bye, so that the broker does not publish the will.
+    fn leave(self) {
+        self.stop.stop();
+        if self.client.try_disconnect().is_ok() {
+            drop(self.client);
+            // What still comes is not wanted; the thread ends when the last words are written, or cannot be.
+            while self.receiver.recv().is_ok() {}
+            let _ = self.thread.join();
+        }
+    }
+}
+
+/// Drives the connection, on its own thread.
+struct Driver {
+    sender: SyncSender<Heard>,
+    clock: Arc<dyn Clock>,
+    /// Ends this thread.
+    stop: Stop,
+    /// Wakes the other one.
+    waker: Stop,
+}
+
+impl Driver {
+    fn run(self, mut connection: Connection) {
+        for event in connection.iter() {
+            let goes_on = match event {
+                Ok(Event::Outgoing(Outgoing::Disconnect)) => false,
+                Ok(Event::Incoming(packet)) => self.heard(packet),
+                Ok(Event::Outgoing(_)) => true,
+                Err(_) if self.stop.is_stopped() => false,
+                Err(error) => {
+                    let goes_on = self.tell(Heard::Lost(error.to_string()));
+                    self.clock.wait_until(self.clock.now() + PAUSE, &self.stop);
+                    goes_on
+                }
+            };
+            if !goes_on {
+                return;
+            }
+        }
+    }
+
+    fn heard(&self, packet: Packet) -> bool {
+        match packet {
+            Packet::ConnAck(_) => self.tell(Heard::Connected),
+            Packet::Publish(message) => {
+                self.tell(Heard::Message(message.topic, message.payload.to_vec()))
+            }
+            Packet::PubAck(_) => self.tell(Heard::Room),
+            Packet::SubAck(answer) => {
+                let codes = answer.return_codes.iter().enumerate();
+                let mut refused = codes.filter(|(_, code)| **code == SubscribeReasonCode::Failure);
+                refused.all(|(at, _)| self.tell(Heard::Refused(at)))
+            }
+            _ => true,
+        }
+    }
+
+    /// Tells the other thread; false if that has ended.
+    fn tell(&self, heard: Heard) -> bool {
+        let is_told = self.sender.send(heard).is_ok();
+        self.waker.wake();
+        is_told
+    }
+}

@@ -1,0 +1,72 @@
+//! The kind `dispatcher`, for the list of bus kinds.
+
+use tickbus_axis::Axis;
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table};
+use tickbus_dispatcher::Kind;
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::{Signal, SignalTable, Station};
+
+use super::{DispatcherBus, Options};
+
+impl BusKind for Options {
+    const NAME: &'static str = "dispatcher";
+
+    fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        Self::read(role, moved, table)
+    }
+}
+
+impl BusOptions for Options {
+    fn summary(&self, _role: Role, table: &SignalTable) -> Vec<String> {
+        let counts = self.channels(table).counts;
+        let counts = Kind::ALL.map(|kind| format!("{}{:02}", kind.letters(), counts.of(kind)));
+        let mut who = self.part().keyword().to_owned();
+        if let Some(name) = &self.name {
+            who = format!("{who} {name}");
+        }
+        let mut parts = vec![format!(
+            "joins the dispatcher at {} as {who} {}",
+            self.address,
+            counts.join(" ")
+        )];
+        if !self.cables.is_empty() {
+            let cables = self.cables.iter().map(|(_, cable)| cable.to_string());
+            parts.push(format!("asks for {}", cables.collect::<Vec<_>>().join(" ")));
+        }
+        parts
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let bus = DispatcherBus::new(self, setup).map_err(OpenError::Config)?;
+        Ok(Bus::Free(Box::new(bus)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
+        Some(self.set_address(address))
+    }
+
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, _station: &Station) -> String {
+        self.at
+            .get(&signal.name)
+            .map(ToString::to_string)
+            .unwrap_or_default()
+    }
+}

@@ -1,0 +1,180 @@
+//! The options of the bus in a driver.cfg.
+
+use std::collections::BTreeMap;
+
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::{Collector, Table, Value};
+use tickbus_dispatcher::client::Profile;
+use tickbus_dispatcher::{
+    Cable, Channel, Kind, LONGEST_NAME, MOST_CHANNELS, Role as Part, is_name,
+};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::{At, BusSetup, Role};
+use tickbus_image::signal::SignalTable;
+
+use super::channels::{Channels, kind_of};
+
+/// The port of `tickbus dispatch`.
+const PORT: u16 = 20_070;
+
+/// The options of the bus `dispatcher`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Where the dispatcher listens.
+    pub address: Address,
+    /// The name in the laboratory, if stated.
+    pub name: Option<String>,
+    /// The connections that it asks for, each with its offset in the file.
+    pub cables: Vec<(usize, Cable)>,
+    /// Signals with a channel of their own, by name: `[fieldbus.at]`.
+    pub at: BTreeMap<String, Channel>,
+    pub(super) role: Role,
+    /// The offset of the `[fieldbus]` table, for mistakes.
+    offset: usize,
+}
+
+impl Options {
+    /// Reads `address`, `name` and `connect`. `moved` says that [`set_address`](Self::set_address) follows.
+    pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        let address = table.take("address");
+        let name = table.take("name");
+        let connect = table.take("connect");
+        let address = address.map_or(Some(Address::local(PORT)), |value| {
+            let address = Address::read(&value)?;
+            if !moved && let Err(mistake) = address.check_dialled() {
+                value.refuse(mistake);
+            }
+            Some(address)
+        });
+        let name = name.map_or(Some(None), |value| read_name(&value).map(Some));
+        let cables = connect.map_or(Some(Vec::new()), |value| read_cables(&value));
+        Some(Self {
+            address: address?,
+            name: name?,
+            cables: cables?,
+            at: BTreeMap::new(),
+            role,
+            offset: table.at(),
+        })
+    }
+
+    /// Replaces the address of the driver.cfg.
+    pub(super) fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
+        let address: Address = address.parse()?;
+        address.check_dialled()?;
+        self.address = address;
+        Ok(())
+    }
+
+    /// The channels of all signals.
+    pub fn channels(&self, table: &SignalTable) -> Channels {
+        Channels::new(table, self.role, &self.at)
+    }
+
+    /// Takes the lines of `[fieldbus.at]`: channels.
+    pub(super) fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        for line in lines {
+            let signal = &table.signals[line.signal];
+            let kind = kind_of(signal, self.role);
+            let letters = kind.letters();
+            let channel = Channel::parse(line.text.as_bytes());
+            let fits = |channel: &Channel| {
+                channel.kind == kind && (1..=MOST_CHANNELS).contains(&channel.number)
+            };
+            let Some(channel) = channel.filter(fits) else {
+                line.wrong(
+                    format!("\"{}\" is no channel for \"{}\"", line.text, signal.name),
+                    format!("write one from {letters}1 to {letters}{MOST_CHANNELS}"),
+                );
+                continue;
+            };
+            if let Some((other, _)) = self.at.iter().find(|(_, taken)| **taken == channel) {
+                line.wrong(
+                    format!("{channel} is the channel of \"{other}\", too"),
+                    "give each signal a channel of its own",
+                );
+                continue;
+            }
+            self.at.insert(signal.name.clone(), channel);
+        }
+    }
+
+    /// Reports what the signals lack.
+    pub(super) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let counts = self.channels(table).counts;
+        for kind in Kind::ALL {
+            let count = counts.of(kind);
+            if count > MOST_CHANNELS {
+                collector.report(
+                    self.offset,
+                    format!("the signals make {count} channels {}", kind.letters()),
+                    format!("a client of a dispatcher has up to {MOST_CHANNELS} of a kind; write a second driver.cfg"),
+                );
+            }
+        }
+        for (at, cable) in &self.cables {
+            if let Err(mistake) = cable.check(counts) {
+                collector.collect(*at, mistake);
+            }
+        }
+    }
+
+    /// What it says of itself to the dispatcher.
+    ///
+    /// # Errors
+    ///
+    /// No name is stated, and the driver's cannot be one.
+    pub(super) fn profile(&self, setup: &BusSetup<'_>) -> Result<Profile, Mistake> {
+        let name = match (&self.name, self.role) {
+            (Some(name), _) => name.clone(),
+            (None, Role::Device) => setup.name.to_owned(),
+            // One driver.cfg may serve both ends.
+            (None, Role::Controller) => format!("{}-PLC", setup.name),
+        };
+        if !is_name(&name) {
+            return Err(Mistake::new(
+                format!("the driver's name makes \"{name}\", which no dispatcher takes"),
+                format!(
+                    "write a \"name\" of 1 to {LONGEST_NAME} letters, digits, _, - and . into [fieldbus]"
+                ),
+            ));
+        }
+        let profile = Profile {
+            role: self.part(),
+            name,
+            counts: self.channels(setup.table).counts,
+            cables: self.cables.iter().map(|(_, cable)| cable.clone()).collect(),
+        };
+        profile.check().map(|()| profile)
+    }
+
+    /// What it is in the laboratory.
+    pub(super) const fn part(&self) -> Part {
+        match self.role {
+            Role::Device => Part::Process,
+            Role::Controller => Part::Controller,
+        }
+    }
+}
+
+fn read_name(value: &Value<'_>) -> Option<String> {
+    let right = format!(
+        "write a name of 1 to {LONGEST_NAME} letters, digits, _, - and ., such as name = \"PUMP\""
+    );
+    let name = value.text(&right)?;
+    if !is_name(name) {
+        value.wrong("no dispatcher takes this name", right);
+        return None;
+    }
+    Some(name.to_owned())
+}
+
+fn read_cables(value: &Value<'_>) -> Option<Vec<(usize, Cable)>> {
+    const RIGHT: &str = "write connections in quotes, such as connect = [\"I1:PUMP:Q2\"]";
+    let read = |value: &Value<'_>| {
+        let cable = Cable::parse(value.text(RIGHT)?);
+        let cable = cable.map_err(|mistake| value.refuse(mistake)).ok()?;
+        Some((value.at(), cable))
+    };
+    value.list(RIGHT)?.iter().map(read).collect()
+}

@@ -1,0 +1,249 @@
+//! The one who asks: one command at a time, without I/O.
+
+use tickbus_base::time::Nanos;
+
+use crate::answer::{Fit, Shape};
+use crate::{Answer, CarrierType, Command};
+
+/// Bytes that are kept of what nobody asked for.
+const INBOX: usize = 1024;
+
+/// What became of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// An answer; [`Client::data`] has its data. It ends the command, unless that was for all heads, or is repeated.
+    Answered(Answer),
+    /// The command for all heads is over: no more answers have come.
+    Over,
+    /// No answer has come in time.
+    Silent,
+}
+
+/// Timing of a serial line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// Bits per second; a character has ten.
+    pub baud: u32,
+    /// How long a reader may take for an answer, beside the time of its characters.
+    pub timeout: Nanos,
+}
+
+impl Timing {
+    /// The time of this many characters.
+    pub fn characters(&self, count: usize) -> Nanos {
+        let bits = i64::try_from(count).unwrap_or(i64::MAX).saturating_mul(10);
+        Nanos(bits.saturating_mul(1_000_000_000) / i64::from(self.baud.max(1)))
+    }
+
+    /// The silence that ends what has no known length, and after which the next byte begins a command: that of five
+    /// characters, and at least 100 ms, for which a busy computer may hold bytes back.
+    pub fn silence(&self) -> Nanos {
+        self.characters(5).max(Nanos::from_millis(100))
+    }
+}
+
+/// The command that was sent last.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    shape: Shape,
+    /// Until when its answer may come.
+    limit: Nanos,
+    /// A head has answered a command for all heads.
+    is_answered: bool,
+    ends_auto: bool,
+}
+
+/// The client's end of a line: commands and received bytes go in, bytes to send and [`Outcome`]s come out.
+///
+/// What is no answer to what was asked is skipped, byte by byte, so that after noise the next right answer is found.
+#[derive(Debug)]
+pub struct Client {
+    carriers: CarrierType,
+    timing: Timing,
+    asked: Option<Asked>,
+    /// The repeated command, if any.
+    auto: Option<Shape>,
+    request: Vec<u8>,
+    written: usize,
+    inbox: Vec<u8>,
+    /// When the last byte arrived.
+    heard: Nanos,
+    data: Vec<u8>,
+    skipped: u64,
+}
+
+impl Client {
+    /// For a reader of these carriers. (To let it know of them is a command of its own.)
+    pub fn new(carriers: CarrierType, timing: Timing) -> Self {
+        Self {
+            carriers,
+            timing,
+            asked: None,
+            auto: None,
+            request: Vec::new(),
+            written: 0,
+            inbox: Vec::new(),
+            heard: Nanos(0),
+            data: Vec::new(),
+            skipped: 0,
+        }
+    }
+
+    /// Whether a command waits for its answer.
+    pub const fn is_busy(&self) -> bool {
+        self.asked.is_some()
+    }
+
+    /// Begins a command at `now`. A repeated one takes the place of the one before, and is over with
+    /// [`EndAuto`](Command::EndAuto).
+    ///
+    /// # Panics
+    ///
+    /// When another one [waits](Self::is_busy), or the command cannot be [appended](Command::append).
+    pub fn ask(&mut self, now: Nanos, command: &Command<'_>) {
+        assert!(self.asked.is_none(), "one command at a time");
+        let shape = Shape::of(command);
+        self.request.clear();
+        self.written = 0;
+        command.append(self.carriers.family(), &mut self.request);
+        let characters =
+            self.request.len() + shape.longest() * if shape.has_many() { 4 } else { 1 };
+        let limit = now + self.timing.timeout + self.timing.characters(characters);
+        self.asked = Some(Asked {
+            shape,
+            limit,
+            is_answered: false,
+            ends_auto: *command == Command::EndAuto,
+        });
+        if let Command::Access { is_auto: true, .. } = command {
+            self.auto = Some(shape);
+        }
+    }
+
+    /// The bytes to be sent.
+    pub fn to_write(&self) -> &[u8] {
+        &self.request[self.written..]
+    }
+
+    /// The first `count` of [these](Self::to_write) are on their way.
+    pub fn wrote(&mut self, count: usize) {
+        self.written += count;
+    }
+
+    /// Bytes arrived.
+    pub fn hear(&mut self, now: Nanos, bytes: &[u8]) {
+        self.heard = now;
+        self.inbox.extend_from_slice(bytes);
+        let old = self.inbox.len().saturating_sub(INBOX);
+        self.skip(old);
+    }
+
+    /// What has come about by `now`; to be called until it is `None`.
+    pub fn poll(&mut self, now: Nanos) -> Option<Outcome> {
+        let is_silent = now - self.heard >= self.timing.silence();
+        if let Some(answer) = self.find(is_silent) {
+            return Some(Outcome::Answered(answer));
+        }
+        let Some(asked) = self.asked else {
+            // The beginning of a repeated answer, without its end.
+            if is_silent && !self.inbox.is_empty() {
+                let rest = self.inbox.len();
+                self.skip(rest);
+            }
+            return None;
+        };
+        if asked.is_answered && (is_silent || now >= asked.limit) {
+            self.asked = None;
+            return Some(Outcome::Over);
+        }
+        if now < asked.limit {
+            return None;
+        }
+        // What seemed to be the beginning of an answer is none; an answer may stand behind it.
+        while !self.inbox.is_empty() {
+            self.skip(1);
+            if let Some(answer) = self.find(true) {
+                return Some(Outcome::Answered(answer));
+            }
+        }
+        self.asked = None;
+        Some(Outcome::Silent)
+    }
+
+    /// Until when to wait for bytes, if there is nothing to be sent; [`Nanos::MAX`] for ever.
+    pub fn deadline(&self) -> Nanos {
+        let silent = self.heard + self.timing.silence();
+        match &self.asked {
+            Some(asked) if asked.is_answered || !self.inbox.is_empty() => asked.limit.min(silent),
+            Some(asked) => asked.limit,
+            None if self.inbox.is_empty() => Nanos::MAX,
+            None => silent,
+        }
+    }
+
+    /// The data of the last answer.
+    pub fn data(&self) -> &[u8] {
+        &self.data
+    }
+
+    /// How many bytes were no part of an answer.
+    pub const fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    fn skip(&mut self, count: usize) {
+        self.inbox.drain(..count);
+        self.skipped += count as u64;
+    }
+
+    /// Takes the first answer out of the inbox, and skips what is before it.
+    fn find(&mut self, is_silent: bool) -> Option<Answer> {
+        let asked = self.asked.map(|asked| asked.shape);
+        let shapes = [asked, self.auto].into_iter().flatten();
+        let mut at = 0;
+        let found = loop {
+            if at == self.inbox.len() {
+                break None;
+            }
+            let rest = &self.inbox[at..];
+            let mut fits = shapes
+                .clone()
+                .map(|shape| (shape, shape.fit(rest, is_silent)));
+            match fits.find(|(_, fit)| *fit != Fit::No) {
+                None => at += 1,
+                Some((
+                    _,
+                    Fit::Whole {
+                        answer,
+                        length,
+                        data,
+                    },
+                )) => {
+                    self.data.clear();
+                    self.data
+                        .extend_from_slice(&rest[data..data + answer.length]);
+                    break Some((answer, length));
+                }
+                Some(_) => break None,
+            }
+        };
+        self.skip(at);
+        let (answer, length) = found?;
+        self.inbox.drain(..length);
+        if let Some(asked) = &mut self.asked
+            && asked.shape.is_of(answer.command)
+        {
+            asked.is_answered = true;
+            if asked.ends_auto {
+                self.auto = None;
+            }
+            if !asked.shape.has_many() || answer.head.is_none() {
+                self.asked = None;
+            }
+        }
+        Some(answer)
+    }
+}
+
+#[cfg(test)]
+mod tests;

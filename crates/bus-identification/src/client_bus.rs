@@ -1,0 +1,94 @@
+//! The bus `ivi-client`: the heads of a reader as stations, each with a command that is given by a toggle bit.
+
+mod session;
+
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_base::toml_text::Table;
+use tickbus_fieldbus::{BusError, Free, Port};
+#[cfg(unix)]
+use tickbus_fieldbus::{serial, tcp::Call};
+use tickbus_image::signal::SignalTable;
+
+use crate::LineOptions;
+use crate::heads::HeadNumbers;
+use session::Station;
+
+/// What the controller reads of a head, before the data of the answer.
+pub(crate) const INPUTS: [&str; 4] = ["echo", "status", "flags", "length"];
+
+/// What the controller writes of a head, before the data of the command.
+pub(crate) const OUTPUTS: [&str; 4] = ["command", "length", "address", "address"];
+
+/// Their lengths.
+pub(crate) const BEFORE_DATA: [usize; 2] = [INPUTS.len(), OUTPUTS.len()];
+
+/// The status, beyond those of a reader, of a command without an answer: the reader may have executed it.
+pub const NO_ANSWER: u8 = 0xFF;
+
+/// The default time-out for an answer, beside the time of its characters.
+const TIMEOUT: Nanos = Nanos::from_secs(1);
+
+/// The options of the bus `ivi-client`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ClientOptions {
+    /// The line.
+    pub line: LineOptions,
+    /// How long the reader may take for an answer, beside the time of its characters.
+    pub timeout: Nanos,
+    pub(crate) heads: HeadNumbers,
+}
+
+impl ClientOptions {
+    /// Reads the keys of the bus.
+    pub(crate) fn read(table: &mut Table<'_>) -> Option<Self> {
+        let line = LineOptions::read(table, false);
+        let heads = HeadNumbers::read(table);
+        let timeout = table.take("timeout");
+        let timeout = timeout.map_or(Some(TIMEOUT), |value| value.duration());
+        Some(Self {
+            line: line?,
+            heads: heads?,
+            timeout: timeout?,
+        })
+    }
+}
+
+/// The bus of kind `ivi-client`.
+#[derive(Debug)]
+pub(crate) struct IviClient {
+    options: ClientOptions,
+    cycle: Nanos,
+    /// Kept when the line breaks: no command is given twice.
+    stations: Vec<Station>,
+}
+
+impl IviClient {
+    pub(crate) fn new(options: &ClientOptions, table: &SignalTable, cycle: Nanos) -> Self {
+        let stations = table.stations.iter().enumerate();
+        let stations = stations
+            .map(|(index, station)| Station::new(options.heads.of(index), station.input_bytes));
+        Self {
+            options: options.clone(),
+            cycle,
+            stations: stations.collect(),
+        }
+    }
+}
+
+impl Free for IviClient {
+    #[cfg(unix)]
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let line = &self.options.line;
+        let mut call = Call::new(serial::open(&line.device, line.settings())?);
+        port.tell("device", &line.device);
+        port.opening(&format!("asking the reader on {}", line.device));
+        let now = port.clock().now();
+        let mut session = session::Session::new(&self.options, &mut self.stations, self.cycle, now);
+        call.run(&mut session, port, stop)
+    }
+
+    #[cfg(not(unix))]
+    fn run(&mut self, _port: &mut Port, _stop: &Stop) -> Result<(), BusError> {
+        Err(crate::line::no_serial_port())
+    }
+}

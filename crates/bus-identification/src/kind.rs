@@ -1,0 +1,112 @@
+//! The kinds `ivi-client` and `ivi-reader`, for the list of bus kinds.
+
+use tickbus_axis::Axis;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Collector, Table};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_image::signal::{Area, Signal, SignalTable, Station};
+
+use crate::heads::meaning;
+use crate::{ClientOptions, ReaderOptions, client_bus, reader_bus};
+
+impl BusKind for ClientOptions {
+    const NAME: &'static str = "ivi-client";
+
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        if role == Role::Device {
+            table.wrong(
+                "an \"ivi-client\" is the controller's end of the line, which asks the reader",
+                "write role = \"controller\"; the machine's end is kind = \"ivi-reader\"",
+            );
+        }
+        Self::read(table)
+    }
+}
+
+impl BusOptions for ClientOptions {
+    fn summary(&self, _role: Role, table: &SignalTable) -> Vec<String> {
+        vec![
+            format!("asks a reader on {}", self.line),
+            self.heads.shown(table),
+            format!("carriers {}", self.line.carriers.name()),
+        ]
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let bus = client_bus::IviClient::new(self, setup.table, setup.cycle.unwrap_or(CYCLE));
+        Ok(Bus::Free(Box::new(bus)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        self.heads.read_station(count, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.heads.fit(table, client_bus::BEFORE_DATA, collector);
+    }
+
+    fn place(&self, signal: &Signal, _station: &Station) -> String {
+        meaning(
+            signal.byte,
+            match signal.area {
+                Area::Input => &client_bus::INPUTS,
+                Area::Output => &client_bus::OUTPUTS,
+            },
+        )
+    }
+}
+
+impl BusKind for ReaderOptions {
+    const NAME: &'static str = "ivi-reader";
+
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        if role == Role::Controller {
+            table.wrong(
+                "an \"ivi-reader\" is the machine's end of the line, a simulated reader",
+                "remove role = \"controller\"; the controller's end is kind = \"ivi-client\"",
+            );
+        }
+        Self::read(table)
+    }
+}
+
+impl BusOptions for ReaderOptions {
+    fn summary(&self, _role: Role, table: &SignalTable) -> Vec<String> {
+        vec![
+            format!("a simulated reader on {}", self.line),
+            self.heads.shown(table),
+            format!("carriers {}", self.line.carriers.name()),
+        ]
+    }
+
+    fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        let bus = reader_bus::IviReader::new(self, setup.table, setup.cycle.unwrap_or(CYCLE));
+        Ok(Bus::Free(Box::new(bus)))
+    }
+
+    fn cycle(&self) -> Option<Nanos> {
+        Some(CYCLE)
+    }
+
+    fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
+        self.heads.read_station(count, table);
+    }
+
+    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+        self.heads.fit(table, reader_bus::BEFORE_DATA, collector);
+    }
+
+    fn place(&self, signal: &Signal, _station: &Station) -> String {
+        meaning(
+            signal.byte,
+            match signal.area {
+                Area::Input => &reader_bus::INPUTS,
+                Area::Output => &reader_bus::OUTPUTS,
+            },
+        )
+    }
+}

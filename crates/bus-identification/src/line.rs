@@ -1,0 +1,129 @@
+//! The serial line in a driver.cfg.
+
+use std::fmt;
+use std::path::Path;
+
+use tickbus_base::os::{Parity, SerialSettings};
+use tickbus_base::toml_text::{Table, Value};
+#[cfg(not(unix))]
+use tickbus_fieldbus::BusError;
+use tickbus_fieldbus::serial;
+
+use crate::{CarrierType, Timing};
+
+/// The rates of the readers' switches, in bits per second.
+const RATES: [u32; 6] = [300, 600, 1200, 2400, 4800, 9600];
+
+/// What a device begins with that is made, and not found.
+const PSEUDO: &str = "pty:";
+
+/// The line, and what is at its reader's heads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LineOptions {
+    /// The system's name of the serial port; or `pty:` and the name that the port gets.
+    pub device: String,
+    /// Bits per second.
+    pub baud: u32,
+    /// The type of the carriers.
+    pub carriers: CarrierType,
+}
+
+impl LineOptions {
+    /// Reads `device`, `baud` and `carrier`. Only one who `may_make` it can name a port of its own.
+    pub(crate) fn read(table: &mut Table<'_>, may_make: bool) -> Option<Self> {
+        let device = table.require(
+            "device",
+            "name the serial port, such as device = \"/dev/ttyUSB0\"",
+        );
+        let baud = table.take("baud");
+        let carriers = table.take("carrier");
+        let device = device.and_then(|value| read_device(&value, may_make));
+        let baud = baud.map_or(Some(RATES[5]), |value| read_baud(&value));
+        let carriers = carriers.map_or(Some(CarrierType::default()), |value| {
+            value.choice("carriers", &CarrierType::ALL)
+        });
+        Some(Self {
+            device: device?,
+            baud: baud?,
+            carriers: carriers?,
+        })
+    }
+
+    /// The port's settings.
+    pub(crate) const fn settings(&self) -> SerialSettings {
+        SerialSettings {
+            baud: self.baud,
+            parity: Parity::None,
+            two_stop_bits: false,
+            rs485: false,
+        }
+    }
+
+    /// With this time-out.
+    pub(crate) const fn timing(&self, timeout: tickbus_base::time::Nanos) -> Timing {
+        Timing {
+            baud: self.baud,
+            timeout,
+        }
+    }
+
+    /// The name of a port that this end makes.
+    pub(crate) fn made(&self) -> Option<&Path> {
+        self.device.strip_prefix(PSEUDO).map(Path::new)
+    }
+
+    /// The name by which the port is opened.
+    pub(crate) fn port(&self) -> &str {
+        self.device.strip_prefix(PSEUDO).unwrap_or(&self.device)
+    }
+}
+
+impl fmt::Display for LineOptions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.made() {
+            Some(link) => write!(f, "a pseudo-terminal, {}", link.display())?,
+            None => f.write_str(&self.device)?,
+        }
+        write!(f, " at {}", self.settings())
+    }
+}
+
+fn read_device(value: &Value<'_>, may_make: bool) -> Option<String> {
+    let device = serial::read_device(value)?;
+    let Some(link) = device.strip_prefix(PSEUDO) else {
+        return Some(device);
+    };
+    if !may_make {
+        value.wrong(
+            "a pseudo-terminal is made by the reader",
+            format!("write the name that it gets there: device = \"{link}\""),
+        );
+        return None;
+    }
+    if !Path::new(link).is_absolute() {
+        value.wrong(
+            format!("\"{link}\" does not begin with a slash"),
+            "write where the port is to be, such as device = \"pty:/tmp/reader\"",
+        );
+        return None;
+    }
+    Some(device)
+}
+
+fn read_baud(value: &Value<'_>) -> Option<u32> {
+    let baud = value.whole(1..=i128::from(u32::MAX))?;
+    let found = RATES.iter().find(|rate| i128::from(**rate) == baud);
+    if found.is_none() {
+        value.wrong(
+            format!("{baud} is no rate of these readers"),
+            "the rates are 300, 600, 1200, 2400, 4800, 9600",
+        );
+    }
+    found.copied()
+}
+
+/// Serial ports are not supported on this system yet.
+#[cfg(not(unix))]
+pub(crate) fn no_serial_port() -> BusError {
+    BusError::Link("this version has serial ports on Linux and macOS alone".to_owned())
+}

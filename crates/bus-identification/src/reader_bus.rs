@@ -1,0 +1,262 @@
+//! The bus `ivi-reader`: a simulated reader whose heads are stations.
+
+use std::io;
+
+use tickbus_base::time::{Nanos, Pace, Stop};
+use tickbus_base::toml_text::Table;
+use tickbus_fieldbus::serial::gone;
+use tickbus_fieldbus::tcp::Caller;
+use tickbus_fieldbus::{BusError, Free, Port};
+#[cfg(unix)]
+use tickbus_fieldbus::{serial, tcp::Call};
+use tickbus_image::signal::SignalTable;
+
+use crate::heads::HeadNumbers;
+use crate::{Carrier, CarrierType, HEADS, Head, LineOptions, Reader, Status};
+
+/// What the machine writes of a head, before the data that a carrier comes with.
+pub(crate) const INPUTS: [&str; 8] = [
+    "flags", "fault", "unused", "unused", "number", "number", "number", "number",
+];
+
+/// What the machine reads of a head, before its carrier's data.
+pub(crate) const OUTPUTS: [&str; 8] = [
+    "flags", "writes", "unused", "unused", "unused", "unused", "unused", "unused",
+];
+
+/// Their lengths.
+pub(crate) const BEFORE_DATA: [usize; 2] = [INPUTS.len(), OUTPUTS.len()];
+
+/// A carrier is before the head; in what the machine reads: the head has taken it over.
+const PRESENT: u8 = 1;
+/// The head's cable is unplugged.
+const UNPLUGGED: u8 = 2;
+/// The carrier is protected against writing.
+const PROTECTED: u8 = 4;
+
+/// The options of the bus `ivi-reader`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReaderOptions {
+    /// The line.
+    pub line: LineOptions,
+    pub(crate) heads: HeadNumbers,
+}
+
+impl ReaderOptions {
+    /// Reads the keys of the bus.
+    pub(crate) fn read(table: &mut Table<'_>) -> Option<Self> {
+        let line = LineOptions::read(table, true);
+        let heads = HeadNumbers::read(table);
+        Some(Self {
+            line: line?,
+            heads: heads?,
+        })
+    }
+}
+
+/// The bus of kind `ivi-reader`.
+#[derive(Debug)]
+pub(crate) struct IviReader {
+    options: ReaderOptions,
+    cycle: Nanos,
+    stations: Vec<Station>,
+}
+
+/// A station, which is a head.
+#[derive(Debug)]
+struct Station {
+    head: u8,
+    /// What the machine reads.
+    frame: Vec<u8>,
+}
+
+impl IviReader {
+    pub(crate) fn new(options: &ReaderOptions, table: &SignalTable, cycle: Nanos) -> Self {
+        let stations = table.stations.iter().enumerate();
+        let stations = stations.map(|(index, station)| Station {
+            head: options.heads.of(index),
+            frame: vec![0; station.output_bytes],
+        });
+        Self {
+            options: options.clone(),
+            cycle,
+            stations: stations.collect(),
+        }
+    }
+}
+
+impl Free for IviReader {
+    #[cfg(unix)]
+    fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
+        let line = self.options.line.clone();
+        if let Some(link) = line.made() {
+            let terminal = tickbus_base::os::LinkedTerminal::open(link).map_err(|error| {
+                BusError::Link(format!(
+                    "cannot make the pseudo-terminal {} ({error}); remove what is there, or name a folder that can be \
+                     written",
+                    link.display()
+                ))
+            })?;
+            return self.serve(Call::new(terminal), port, stop);
+        }
+        let device = serial::open(&line.device, line.settings())?;
+        self.serve(Call::new(device), port, stop)
+    }
+
+    #[cfg(not(unix))]
+    fn run(&mut self, _port: &mut Port, _stop: &Stop) -> Result<(), BusError> {
+        Err(crate::line::no_serial_port())
+    }
+}
+
+#[cfg(unix)]
+impl IviReader {
+    fn serve<S: tickbus_fieldbus::tcp::Stream>(
+        &mut self,
+        mut call: Call<S>,
+        port: &mut Port,
+        stop: &Stop,
+    ) -> Result<(), BusError> {
+        let device = self.options.line.port();
+        port.tell("device", device);
+        port.opening(&format!("listening on {device}"));
+        let mut heads: [Head; HEADS] = Default::default();
+        for station in &self.stations {
+            heads[usize::from(station.head) - 1].is_connected = true;
+        }
+        // A reader has no time-out.
+        let timing = self.options.line.timing(Nanos::ZERO);
+        let mut serving = Serving {
+            line: &self.options.line,
+            stations: &mut self.stations,
+            reader: Reader::new(heads, timing),
+            pace: Pace::new(port.clock().now(), self.cycle),
+            is_heard: false,
+        };
+        call.run(&mut serving, port, stop)
+    }
+}
+
+/// A reader on a line.
+struct Serving<'a> {
+    line: &'a LineOptions,
+    stations: &'a mut [Station],
+    reader: Reader,
+    pace: Pace,
+    /// A command has come since the machine was told the last time.
+    is_heard: bool,
+}
+
+impl Serving<'_> {
+    /// Takes over what the machine says of its heads and carriers.
+    fn take(&mut self, now: Nanos, port: &mut Port) {
+        let Some(mut frames) = port.look(0..self.stations.len(), now) else {
+            return;
+        };
+        for (index, station) in self.stations.iter().enumerate() {
+            let head = self.reader.head_mut(station.head);
+            place(head, frames.frame(index), self.line.carriers);
+        }
+        let receipt = frames.receipt();
+        port.sent(&receipt);
+    }
+
+    /// Tells the machine what its carriers hold now.
+    fn tell(&mut self, now: Nanos, port: &mut Port) {
+        if !std::mem::take(&mut self.is_heard) {
+            return;
+        }
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            show(self.reader.head(station.head), &mut station.frame);
+            port.received(index, now, &station.frame);
+        }
+        port.running("a client is asking");
+    }
+
+    fn count(heard: crate::Heard, port: &Port) -> bool {
+        for _ in 0..heard.damaged {
+            port.count("ivi-reader.damaged");
+        }
+        heard.commands > 0
+    }
+}
+
+/// Lets a head be as the machine writes it. A carrier that was there keeps its octets.
+fn place(head: &mut Head, frame: &[u8], kind: CarrierType) {
+    let [flags, fault, ..] = *frame else {
+        return;
+    };
+    head.is_connected = flags & UNPLUGGED == 0;
+    head.fault = (fault != 0).then_some(Status(fault));
+    if flags & PRESENT == 0 {
+        head.carrier = None;
+        return;
+    }
+    let carrier = head.carrier.get_or_insert_with(|| {
+        let data = &frame[INPUTS.len()..];
+        let mut carrier = Carrier::new(kind, &data[..data.len().min(kind.size())]);
+        let number = &frame[4..INPUTS.len()];
+        if number != [0; 4] {
+            carrier.number.extend_from_slice(number);
+        }
+        carrier
+    });
+    carrier.is_protected = flags & PROTECTED != 0;
+}
+
+/// Writes what the machine reads of a head. The data of a carrier that has left stay until the next one comes.
+fn show(head: &Head, frame: &mut [u8]) {
+    let (before, data) = frame.split_at_mut(OUTPUTS.len());
+    before[0] = if head.carrier.is_some() { PRESENT } else { 0 };
+    before[1] = head.writes;
+    if let Some(carrier) = &head.carrier {
+        let count = data.len().min(carrier.octets.len());
+        data[..count].copy_from_slice(&carrier.octets[..count]);
+    }
+}
+
+impl Caller for Serving<'_> {
+    fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
+        // A line that is down by an injected fault carries nothing.
+        if !port.is_up(now) {
+            return Ok(());
+        }
+        self.take(now, port);
+        let heard = self.reader.hear(now, bytes);
+        self.is_heard |= Self::count(heard, port);
+        self.tell(now, port);
+        Ok(())
+    }
+
+    fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        if self.pace.take(now) {
+            self.take(now, port);
+        }
+        if port.is_up(now) {
+            let heard = self.reader.turn(now);
+            Self::count(heard, port);
+        }
+        Ok(())
+    }
+
+    fn to_write(&self, _now: Nanos) -> &[u8] {
+        self.reader.to_write()
+    }
+
+    fn wrote(&mut self, _now: Nanos, count: usize, _port: &mut Port) {
+        self.reader.wrote(count);
+    }
+
+    fn deadline(&self, port: &Port) -> Nanos {
+        let stale = port.stale_at(port.clock().now());
+        self.reader.deadline().min(self.pace.due()).min(stale)
+    }
+
+    fn left(&mut self) -> BusError {
+        gone(self.line.port(), "it was closed")
+    }
+
+    fn broke(&mut self, error: &io::Error) -> BusError {
+        gone(self.line.port(), error)
+    }
+}

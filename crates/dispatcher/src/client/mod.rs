@@ -1,0 +1,503 @@
+//! A client of a dispatcher, without its socket: bytes and time in; values, answers and bytes out.
+
+mod lines;
+mod outputs;
+
+use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
+
+use crate::cable::Cable;
+use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
+use crate::device::{Device, Role};
+use crate::name::{LONGEST_NAME, is_name};
+use crate::number::Number;
+use crate::refusal::Code;
+
+use lines::{Heard, Lines};
+use outputs::Outputs;
+
+/// How often a client says or asks something, if it has nothing else to say: well within the 60 s after which a
+/// dispatcher disconnects.
+pub const KEEP_ALIVE: Nanos = Nanos::from_secs(20);
+
+/// A dispatcher that has not answered, or not read, for this long is given up.
+pub const PATIENCE: Nanos = Nanos::from_secs(10);
+
+/// A connection that was refused is asked for again after this time: its other client may have come.
+pub const ASK_AGAIN: Nanos = Nanos::from_secs(5);
+
+/// What a client says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Profile {
+    /// What it is.
+    pub role: Role,
+    /// Its name.
+    pub name: String,
+    /// Its channels. It counts all of them from 1.
+    pub counts: Counts,
+    /// The connections that it asks for.
+    pub cables: Vec<Cable>,
+}
+
+impl Profile {
+    /// Checks that a dispatcher can take it.
+    ///
+    /// # Errors
+    ///
+    /// The name, the counts or a connection breaks a rule.
+    pub fn check(&self) -> Result<(), Mistake> {
+        if !is_name(&self.name) {
+            return Err(Mistake::new(
+                format!("\"{}\" cannot be the name of a client", self.name),
+                format!("take 1 to {LONGEST_NAME} letters, digits, _, - and ."),
+            ));
+        }
+        for kind in Kind::ALL {
+            let (count, letters) = (self.counts.of(kind), kind.letters());
+            if count > MOST_CHANNELS {
+                return Err(Mistake::new(
+                    format!("there are {count} channels {letters}"),
+                    format!("a client has up to {MOST_CHANNELS} of a kind"),
+                ));
+            }
+        }
+        self.cables
+            .iter()
+            .try_for_each(|cable| cable.check(self.counts))
+    }
+}
+
+/// What a client hears.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// The dispatcher has taken it. The list of devices follows.
+    Identified,
+    /// The value of an input.
+    Value(Channel, Number),
+    /// The source of an input is gone, or was disconnected: it has no value until there is a source again.
+    Lost(Channel),
+    /// The end of a line of values: what was said together before belongs together.
+    LineEnd,
+    /// A device of the list; itself, too.
+    Device(Device),
+    /// The end of the list.
+    ListEnd,
+    /// Every connection was asked for once, and the values that the inputs have at first have arrived.
+    Settled,
+    /// A connection is there.
+    Connected(&'a Cable),
+    /// The dispatcher refused this connection; it is asked for again. Or, without one, another line.
+    Refused {
+        /// The connection.
+        cable: Option<&'a Cable>,
+        /// The number of the refusal, such as 404.
+        code: u16,
+        /// Its text.
+        text: String,
+    },
+}
+
+/// Why a connection with a dispatcher cannot go on.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ClientError {
+    /// The dispatcher does not take this client. It may do so later: names become free.
+    #[error("{0}")]
+    Refused(String),
+    /// The dispatcher says something that it should not.
+    #[error("{0}")]
+    Protocol(String),
+    /// The dispatcher neither answers nor reads.
+    #[error("{0}")]
+    Silent(String),
+}
+
+/// A client, from one connection to the next: it keeps the values of its outputs, and says them anew.
+///
+/// After [`connected`](Self::connected) the owner of the socket calls [`hear`](Self::hear) with what arrives,
+/// [`turn`](Self::turn) at [`deadline`](Self::deadline) and after all else, writes [`to_write`](Self::to_write) and reports
+/// that by [`wrote`](Self::wrote), and asks [`check`](Self::check) last whether the connection may go on.
+#[derive(Debug)]
+pub struct Client {
+    profile: Profile,
+    keep_alive: Nanos,
+    progress: Progress,
+    /// What is to be done about each of the cables.
+    wishes: Box<[Wish]>,
+    outputs: Outputs,
+    lines: Lines,
+    out: Vec<u8>,
+    written: usize,
+    wants_list: bool,
+    is_settled: bool,
+    /// When it has last made bytes, or all of them were written.
+    said: Nanos,
+    /// When the last complete line came, or the connection.
+    heard: Nanos,
+}
+
+/// How far a connection has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Progress {
+    Apart,
+    Connected,
+    /// Taken by the dispatcher, and between two requests.
+    Idle,
+    /// This request waits for its answer, and others for it: so each answer belongs to one.
+    Asking(Request),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Request {
+    Identify,
+    Connect(usize),
+    List,
+    Ping,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wish {
+    Granted,
+    /// To be asked for at this time.
+    At(Nanos),
+}
+
+impl Client {
+    /// A client that is not connected. It says something, if only `PING`, whenever nothing was said or heard for
+    /// `keep_alive`: [`KEEP_ALIVE`], or shorter to notice a lost dispatcher earlier.
+    ///
+    /// # Errors
+    ///
+    /// No dispatcher can take this profile.
+    pub fn new(profile: Profile, keep_alive: Nanos) -> Result<Self, Mistake> {
+        profile.check()?;
+        let outputs = Outputs::new(profile.counts);
+        Ok(Self {
+            keep_alive,
+            progress: Progress::Apart,
+            wishes: vec![Wish::At(Nanos::ZERO); profile.cables.len()].into(),
+            out: Vec::with_capacity(outputs.longest() + 256),
+            outputs,
+            lines: Lines::new(),
+            written: 0,
+            wants_list: false,
+            is_settled: false,
+            said: Nanos::ZERO,
+            heard: Nanos::ZERO,
+            profile,
+        })
+    }
+
+    /// What it says of itself.
+    pub const fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// A connection was established: all is said anew.
+    pub fn connected(&mut self, now: Nanos) {
+        self.progress = Progress::Connected;
+        self.wishes.fill(Wish::At(now));
+        self.outputs.repeat();
+        self.lines.clear();
+        self.out.clear();
+        self.written = 0;
+        self.wants_list = false;
+        self.is_settled = false;
+        self.said = now;
+        self.heard = now;
+    }
+
+    /// Whether the dispatcher has taken this client.
+    pub fn is_identified(&self) -> bool {
+        !matches!(
+            self.progress,
+            Progress::Apart | Progress::Connected | Progress::Asking(Request::Identify)
+        )
+    }
+
+    /// When the dispatcher was last heard, or the connection established.
+    pub const fn heard(&self) -> Nanos {
+        self.heard
+    }
+
+    /// Sets an output. It is said if that differs from what was said last; of several values between two writes, the
+    /// newest.
+    ///
+    /// # Panics
+    ///
+    /// When the client has no such output.
+    pub fn set(&mut self, channel: Channel, value: Number) {
+        self.outputs.set(channel, value);
+    }
+
+    /// Whether everything that was set has been written.
+    pub fn is_all_written(&self) -> bool {
+        self.is_identified() && !self.outputs.has_news() && self.to_write().is_empty()
+    }
+
+    /// Asks for the list of devices.
+    pub fn ask_list(&mut self) {
+        self.wants_list = true;
+    }
+
+    /// Bytes have arrived, in any pieces.
+    ///
+    /// # Errors
+    ///
+    /// The connection cannot go on.
+    pub fn hear(
+        &mut self,
+        now: Nanos,
+        bytes: &[u8],
+        events: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), ClientError> {
+        let mut lines = std::mem::take(&mut self.lines);
+        let result = lines.each(bytes, &mut |line| {
+            self.heard = now;
+            self.obey(now, line, events)
+        });
+        self.lines = lines;
+        result
+    }
+
+    fn obey(
+        &mut self,
+        now: Nanos,
+        line: &[u8],
+        events: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), ClientError> {
+        match lines::read(line)? {
+            Heard::Nothing => {}
+            Heard::Values(values) => {
+                for item in values {
+                    let (channel, value) =
+                        item.map_err(|refusal| lines::nonsense(line, &refusal.text))?;
+                    if self.profile.counts.has_from_1(channel) && !channel.kind.is_output() {
+                        events(if value == Number::LOST {
+                            Event::Lost(channel)
+                        } else {
+                            Event::Value(channel, value)
+                        });
+                    } else if channel.number != 0 || self.profile.counts.of(channel.kind) == 0 {
+                        // The dispatcher has a channel 0 of each analog kind, which this client does not use.
+                        return Err(lines::nonsense(
+                            line,
+                            &format!("{channel} is no input of this client"),
+                        ));
+                    }
+                }
+                events(Event::LineEnd);
+            }
+            Heard::Device(device) => events(Event::Device(device)),
+            Heard::ListEnd => events(Event::ListEnd),
+            Heard::Done(verb) => self.done(line, verb, events)?,
+            Heard::Refused(code, text) => self.refused(now, code, text, events)?,
+        }
+        Ok(())
+    }
+
+    fn done(
+        &mut self,
+        line: &[u8],
+        verb: &[u8],
+        events: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), ClientError> {
+        let Progress::Asking(request) = self.progress else {
+            return Err(lines::nonsense(line, "nothing was asked"));
+        };
+        let expected = match request {
+            Request::Identify => self.profile.role.keyword(),
+            Request::Connect(_) => "CONNECT",
+            Request::List => "LIST",
+            Request::Ping => "PING",
+        };
+        if verb != expected.as_bytes() {
+            return Err(lines::nonsense(
+                line,
+                &format!("OK {expected} was expected"),
+            ));
+        }
+        self.progress = Progress::Idle;
+        match request {
+            Request::Identify => events(Event::Identified),
+            Request::Connect(at) => {
+                self.wishes[at] = Wish::Granted;
+                events(Event::Connected(&self.profile.cables[at]));
+            }
+            Request::List => {}
+            Request::Ping => {
+                if !std::mem::replace(&mut self.is_settled, true) {
+                    events(Event::Settled);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn refused(
+        &mut self,
+        now: Nanos,
+        code: u16,
+        text: String,
+        events: &mut dyn FnMut(Event<'_>),
+    ) -> Result<(), ClientError> {
+        let name = &self.profile.name;
+        if code == Code::TimeOut.number() {
+            return Err(ClientError::Refused(format!(
+                "the dispatcher has disconnected \"{name}\" ({text}); see whether this computer was held up, and connect \
+                 anew"
+            )));
+        }
+        let mut cable = None;
+        match self.progress {
+            Progress::Apart | Progress::Connected | Progress::Asking(Request::Identify) => {
+                return Err(ClientError::Refused(if code == Code::Conflict.number() {
+                    format!(
+                        "the dispatcher has another client \"{name}\"; give this one a \"name\" of its own, or end the \
+                         other one (a client whose computer was lost keeps its name for up to 60 s)"
+                    )
+                } else {
+                    format!("the dispatcher does not take \"{name}\": {text} (ERR {code})")
+                }));
+            }
+            Progress::Asking(request) => {
+                self.progress = Progress::Idle;
+                if let Request::Connect(at) = request {
+                    self.wishes[at] = Wish::At(now + ASK_AGAIN);
+                    cable = Some(&self.profile.cables[at]);
+                }
+            }
+            Progress::Idle => {}
+        }
+        events(Event::Refused { cable, code, text });
+        Ok(())
+    }
+
+    /// Makes what is to be said at `now`.
+    pub fn turn(&mut self, now: Nanos) {
+        // While the system has not taken everything, newer values replace those that wait.
+        if !self.to_write().is_empty() {
+            return;
+        }
+        match self.progress {
+            Progress::Apart | Progress::Asking(Request::Identify) => return,
+            Progress::Connected => {
+                let Profile {
+                    role, name, counts, ..
+                } = &self.profile;
+                let [q, i, aq, ai] = Kind::ALL.map(|kind| counts.of(kind));
+                let line = format!(
+                    "{} {name} Q{q:02} I{i:02} AQ{aq:02} AI{ai:02} V=3",
+                    role.keyword()
+                );
+                self.ask(now, Request::Identify, &line);
+                return;
+            }
+            Progress::Idle => self.ask_next(now),
+            Progress::Asking(_) => {}
+        }
+        if self.outputs.has_news() {
+            self.outputs.write(&mut self.out);
+            self.said = now;
+        }
+    }
+
+    fn ask_next(&mut self, now: Nanos) {
+        let is_due = |wish: &Wish| matches!(wish, Wish::At(at) if *at <= now);
+        if let Some(at) = self.wishes.iter().position(is_due) {
+            let line = format!("CONNECT {}", self.profile.cables[at]);
+            self.ask(now, Request::Connect(at), &line);
+        } else if std::mem::take(&mut self.wants_list) {
+            self.ask(now, Request::List, "LIST");
+        } else if now >= self.next_ping() {
+            self.ask(now, Request::Ping, "PING");
+        }
+    }
+
+    fn ask(&mut self, now: Nanos, request: Request, line: &str) {
+        self.out.extend_from_slice(line.as_bytes());
+        self.out.extend_from_slice(b"\r\n");
+        self.progress = Progress::Asking(request);
+        self.said = now;
+    }
+
+    fn next_ping(&self) -> Nanos {
+        if self.is_settled {
+            self.said.min(self.heard) + self.keep_alive
+        } else {
+            self.said
+        }
+    }
+
+    /// The bytes to be written.
+    pub fn to_write(&self) -> &[u8] {
+        &self.out[self.written..]
+    }
+
+    /// The system has taken `count` bytes of [`to_write`](Self::to_write).
+    ///
+    /// # Panics
+    ///
+    /// When there were fewer.
+    pub fn wrote(&mut self, now: Nanos, count: usize) {
+        assert!(
+            count <= self.to_write().len(),
+            "more was taken than there was"
+        );
+        self.written += count;
+        if self.written == self.out.len() {
+            self.out.clear();
+            self.written = 0;
+            self.said = now;
+            self.turn(now);
+        }
+    }
+
+    /// Checks whether the dispatcher still answers and reads.
+    ///
+    /// # Errors
+    ///
+    /// It does not.
+    pub fn check(&self, now: Nanos) -> Result<(), ClientError> {
+        if now < self.given_up() {
+            return Ok(());
+        }
+        let does = if self.to_write().is_empty() {
+            "answered"
+        } else {
+            "read"
+        };
+        Err(ClientError::Silent(format!(
+            "the dispatcher has not {does} for {PATIENCE}; see whether it still runs, and the cable"
+        )))
+    }
+
+    fn given_up(&self) -> Nanos {
+        if matches!(self.progress, Progress::Asking(_)) || !self.to_write().is_empty() {
+            self.said.max(self.heard) + PATIENCE
+        } else {
+            Nanos::MAX
+        }
+    }
+
+    /// When [`turn`](Self::turn) or [`check`](Self::check) has something to do although nothing arrives and nothing
+    /// can be written.
+    pub fn deadline(&self) -> Nanos {
+        let mut deadline = self.given_up();
+        match self.progress {
+            Progress::Connected => deadline = self.said,
+            Progress::Idle => {
+                deadline = deadline.min(self.next_ping());
+                for wish in &self.wishes {
+                    if let Wish::At(at) = wish {
+                        deadline = deadline.min(*at);
+                    }
+                }
+            }
+            Progress::Apart | Progress::Asking(_) => {}
+        }
+        deadline
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+//! The patch bay: the board of a dispatcher as a web page.
+//!
+//! docs/dispatcher.md has it, for users and for programs.
+
+mod json;
+
+use tickbus_dispatcher::{Door, Number, Order, Pin, Reply};
+use tickbus_web::{Answer, Asset, Change, Outcome, Refused, Site, State, Verb};
+
+/// The files of the page.
+const ASSETS: &[Asset] = &[
+    Asset {
+        path: "/",
+        kind: "text/html; charset=utf-8",
+        text: include_str!("page.html"),
+    },
+    Asset {
+        path: "/report.css",
+        kind: "text/css; charset=utf-8",
+        text: tickbus_report::STYLE,
+    },
+    Asset {
+        path: "/patch-bay.css",
+        kind: "text/css; charset=utf-8",
+        text: include_str!("page.css"),
+    },
+    Asset {
+        path: "/board.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("board.js"),
+    },
+    Asset {
+        path: "/patch-bay.js",
+        kind: "text/javascript; charset=utf-8",
+        text: include_str!("page.js"),
+    },
+];
+
+/// The page of the dispatcher behind a door.
+#[derive(Clone, Debug)]
+pub struct PatchBay {
+    door: Door,
+}
+
+impl PatchBay {
+    /// The page of this dispatcher.
+    pub const fn new(door: Door) -> Self {
+        Self { door }
+    }
+}
+
+impl Site for PatchBay {
+    fn assets(&self) -> &[Asset] {
+        ASSETS
+    }
+
+    fn look(&self, answer: Answer<State>) {
+        self.door.send(move |dispatcher, _| {
+            let snapshot = dispatcher.snapshot();
+            answer.give(Box::new(move || json::state(&snapshot)));
+        });
+    }
+
+    fn change(&self, change: Change, answer: Answer<Outcome>) {
+        match order(&change) {
+            Ok(order) => {
+                let reply = Reply::new(move |outcome| {
+                    answer.give(outcome.map_err(|refusal| Refused {
+                        status: refusal.code.number(),
+                        text: refusal.text,
+                    }));
+                });
+                self.door.operate(order, reply);
+            }
+            Err(refused) => answer.give(Err(refused)),
+        }
+    }
+}
+
+/// The order that a change is.
+fn order(change: &Change) -> Result<Order, Refused> {
+    let path = &*change.path;
+    let wrong = |status, text: &str| Refused {
+        status,
+        text: text.to_owned(),
+    };
+    let parts = path.strip_prefix('/').and_then(|it| it.split_once('/'));
+    let Some((what @ ("patch" | "force"), pin)) = parts else {
+        let text = "there is nothing to change here; change /patch/NAME:I1 or /force/NAME:I1";
+        return Err(wrong(404, text));
+    };
+    let pin = Pin::parse(pin).ok_or_else(|| {
+        wrong(
+            400,
+            "the path has no channel of a client; write it such as /patch/LOGO:I1",
+        )
+    })?;
+    Ok(match (what, change.verb) {
+        ("patch", Verb::Put) => {
+            let other = Pin::parse(&change.body).ok_or_else(|| {
+                wrong(
+                    400,
+                    "the body is no channel of a client; send one such as PUMP:Q1",
+                )
+            })?;
+            Order::Connect(pin, other)
+        }
+        ("patch", Verb::Delete) => Order::Disconnect(pin),
+        (_, Verb::Put) => {
+            let number = Number::parse(change.body.as_bytes()).ok_or_else(|| {
+                wrong(
+                    400,
+                    "the body is no number; send one such as 24 or -3.5, of at most 23 characters",
+                )
+            })?;
+            Order::Force(pin, number)
+        }
+        (_, Verb::Delete) => Order::Release(pin),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(verb: Verb, path: &str, body: &str) -> Result<Order, u16> {
+        let change = Change {
+            verb,
+            path: path.to_owned(),
+            body: body.to_owned(),
+        };
+        order(&change).map_err(|refused| refused.status)
+    }
+
+    #[test]
+    fn a_change_is_an_order_or_a_mistake() {
+        let pin = |text| Pin::parse(text).expect("a pin");
+        let number = Number::parse(b"-3.5").expect("a number");
+        let (sink, source) = (pin("LOGO:AI1"), pin("PUMP:AQ0"));
+        assert_eq!(
+            read(Verb::Put, "/patch/LOGO:AI1", "PUMP:AQ0"),
+            Ok(Order::Connect(sink.clone(), source))
+        );
+        assert_eq!(
+            read(Verb::Delete, "/patch/LOGO:AI1", ""),
+            Ok(Order::Disconnect(sink.clone()))
+        );
+        assert_eq!(
+            read(Verb::Put, "/force/LOGO:AI1", "-3.50"),
+            Ok(Order::Force(sink.clone(), number))
+        );
+        assert_eq!(
+            read(Verb::Delete, "/force/LOGO:AI1", ""),
+            Ok(Order::Release(sink))
+        );
+        for (verb, path, body, status) in [
+            (Verb::Put, "/", "", 404),
+            (Verb::Put, "/state", "", 404),
+            (Verb::Put, "/wire/LOGO:I1", "1", 404),
+            (Verb::Put, "/patch/LOGO", "PUMP:Q1", 400),
+            (Verb::Put, "/patch/LOGO:X1", "PUMP:Q1", 400),
+            (Verb::Put, "/patch/LO%47O:I1", "PUMP:Q1", 400),
+            (Verb::Put, "/patch/LOGO:I1", "PUMP", 400),
+            (Verb::Put, "/force/LOGO:I1", "on", 400),
+            (Verb::Put, "/force/LOGO:I1", "1e3", 400),
+            (Verb::Delete, "/force/LOGO:I1/x", "", 400),
+        ] {
+            assert_eq!(read(verb, path, body), Err(status), "{path} {body}");
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Who may look, and who may change something.
+//!
+//! A page of another site, open in the same browser, can send requests to this machine. It can neither forge `Origin`
+//! nor send `Authorization` without having been allowed to; by a name of its own that suddenly means this machine (DNS
+//! rebinding) it would be of one origin with the room, but then `Host` has that name.
+
+use std::fmt::Write as _;
+use std::io;
+use std::net::IpAddr;
+
+use hyper::header::{AUTHORIZATION, HOST, HeaderMap, HeaderName, ORIGIN};
+
+/// Lets requests in.
+pub(crate) struct Guard {
+    token: String,
+    /// The name under which the room is served.
+    host: String,
+}
+
+/// Whether a request has the token.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Token {
+    Right,
+    Wrong,
+    Missing,
+}
+
+impl Guard {
+    /// Guards a room that is served as `host`, with a new token.
+    pub(crate) fn new(host: &str) -> io::Result<Self> {
+        let mut random = [0; 16];
+        getrandom::fill(&mut random).map_err(io::Error::other)?;
+        let mut token = String::new();
+        for byte in random {
+            // Into a text, which takes everything.
+            let _ = write!(token, "{byte:02x}");
+        }
+        let host = host.to_ascii_lowercase();
+        Ok(Self { token, host })
+    }
+
+    pub(crate) fn token(&self) -> &str {
+        &self.token
+    }
+
+    /// Whether the request is meant for this room, and comes from nowhere else; if not, why.
+    pub(crate) fn check_source(&self, headers: &HeaderMap) -> Result<(), &'static str> {
+        const HOSTS: &str = "the Host header is not this room's; open the address that was printed";
+
+        let host = only(headers, &HOST).ok_or(HOSTS)?;
+        if !self.is_own(host) {
+            return Err(HOSTS);
+        }
+        if headers.contains_key(ORIGIN) {
+            let origin = only(headers, &ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
+            if !origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
+                return Err(
+                    "the request comes from a page of another site; open the address that was printed",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a `Host` means this room: by an address, which cannot be rebound, or by its name. The port is not compared:
+    /// a tunnel may have another one.
+    fn is_own(&self, host: &str) -> bool {
+        let name = match host.rsplit_once(':') {
+            Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
+            _ => host,
+        };
+        let inner = name.strip_prefix('[').and_then(|it| it.strip_suffix(']'));
+        inner.unwrap_or(name).parse::<IpAddr>().is_ok()
+            || name.eq_ignore_ascii_case("localhost")
+            || name.eq_ignore_ascii_case(&self.host)
+    }
+
+    pub(crate) fn token_of(&self, headers: &HeaderMap) -> Token {
+        if !headers.contains_key(AUTHORIZATION) {
+            return Token::Missing;
+        }
+        let given = only(headers, &AUTHORIZATION).and_then(|it| it.strip_prefix("Bearer "));
+        // The time that this takes does not tell how much of it is right.
+        let is_right = given.is_some_and(|given| {
+            let pairs = given.bytes().zip(self.token.bytes());
+            let differences = pairs.fold(0, |all, (one, other)| all | (one ^ other));
+            given.len() == self.token.len() && differences == 0
+        });
+        if is_right { Token::Right } else { Token::Wrong }
+    }
+}
+
+/// The value of a header that stands there once.
+fn only<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
+    let mut all = headers.get_all(name).iter();
+    let first = all.next()?.to_str().ok()?;
+    all.next().is_none().then_some(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use hyper::header::HeaderValue;
+
+    use super::*;
+
+    fn headers(all: &[(HeaderName, &'static str)]) -> HeaderMap {
+        let mut map = HeaderMap::new();
+        for (name, value) in all {
+            map.append(name, HeaderValue::from_static(value));
+        }
+        map
+    }
+
+    #[test]
+    fn a_request_is_for_this_room_by_address_or_by_its_name() {
+        let guard = Guard::new("Lab.example").expect("random numbers");
+        for host in [
+            "127.0.0.1:20080",
+            "localhost:20080",
+            "LOCALHOST",
+            "[::1]:8",
+            "192.168.0.20",
+            "lab.example:1",
+        ] {
+            assert_eq!(
+                guard.check_source(&headers(&[(HOST, host)])),
+                Ok(()),
+                "{host}"
+            );
+        }
+        for host in [
+            "evil.example",
+            "evil.example:20080",
+            "127.0.0.1.evil.example",
+            "localhost.evil.example",
+            "",
+            ":80",
+            "127.0.0.1:80@evil.example",
+            "[::1].evil.example",
+        ] {
+            assert!(
+                guard.check_source(&headers(&[(HOST, host)])).is_err(),
+                "{host}"
+            );
+        }
+        assert!(guard.check_source(&headers(&[])).is_err());
+        let two = headers(&[(HOST, "localhost"), (HOST, "localhost")]);
+        assert!(guard.check_source(&two).is_err());
+    }
+
+    #[test]
+    fn a_page_of_another_site_is_refused() {
+        let guard = Guard::new("127.0.0.1").expect("random numbers");
+        let of = |origin| headers(&[(HOST, "127.0.0.1:80"), (ORIGIN, origin)]);
+        assert_eq!(guard.check_source(&of("http://127.0.0.1:80")), Ok(()));
+        for origin in [
+            "http://evil.example",
+            "http://127.0.0.1:81",
+            "http://127.0.0.1",
+            "https://127.0.0.1:80",
+            "null",
+            "",
+        ] {
+            assert!(guard.check_source(&of(origin)).is_err(), "{origin}");
+        }
+    }
+
+    #[test]
+    fn the_token_is_right_or_wrong() {
+        let guard = Guard::new("127.0.0.1").expect("random numbers");
+        let other = Guard::new("127.0.0.1").expect("random numbers");
+        assert_eq!(guard.token().len(), 32);
+        assert_ne!(guard.token(), other.token());
+        let with = |text: &str| {
+            let mut map = HeaderMap::new();
+            map.insert(AUTHORIZATION, HeaderValue::from_str(text).expect("text"));
+            map
+        };
+        let right = format!("Bearer {}", guard.token());
+        assert_eq!(guard.token_of(&with(&right)), Token::Right);
+        for text in [
+            "",
+            "Bearer ",
+            &right[..38],
+            &format!("{right}0"),
+            guard.token(),
+            other.token(),
+        ] {
+            assert_eq!(guard.token_of(&with(text)), Token::Wrong, "{text}");
+        }
+        assert_eq!(guard.token_of(&HeaderMap::new()), Token::Missing);
+    }
+}

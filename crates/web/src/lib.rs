@@ -1,0 +1,18 @@
+//! The web room: where live pages are served.
+//!
+//! A [`Site`] brings the files of a page, makes its state when somebody looks, and carries out changes. The [`Room`] has
+//! the rest: one thread, a token without which nothing can be changed, the refusal of requests from other sites, limits,
+//! and server-sent events of which every viewer gets the newest.
+//!
+//! It stands on hyper, not on the framework axum around it: axum's own server has no limit of time for headers nor of
+//! connections, and a page has so few paths that a `match` is their router.
+
+mod feed;
+mod guard;
+mod patient;
+mod room;
+mod serve;
+mod site;
+
+pub use room::{Limits, Room, Serving};
+pub use site::{Answer, Asset, Change, Outcome, Refused, Site, State, Verb};

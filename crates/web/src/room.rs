@@ -1,0 +1,179 @@
+//! The room itself: its address and its thread.
+
+use std::fmt;
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tickbus_base::time::Clock;
+use tickbus_fieldbus::tcp::{Address, bind};
+use tokio::sync::{Semaphore, oneshot};
+
+use crate::feed::Feed;
+use crate::guard::Guard;
+use crate::patient::Patient;
+use crate::serve::{Hall, answer};
+use crate::site::Site;
+
+/// The longest head of a request, in bytes: four times what a browser sends.
+const HEAD: usize = 16 * 1024;
+
+/// How long nobody is accepted after the system had no socket.
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// What is refused so that the rest is served.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Connections at a time; further ones are closed at once.
+    pub connections: usize,
+    /// How long a request may take to arrive, and how long a viewer may read nothing.
+    pub patience: Duration,
+}
+
+impl Default for Limits {
+    /// 512 connections, 20 s.
+    fn default() -> Self {
+        Self {
+            connections: 512,
+            patience: Duration::from_secs(20),
+        }
+    }
+}
+
+/// An address that is listened on, and its token.
+pub struct Room {
+    listener: TcpListener,
+    address: SocketAddr,
+    guard: Guard,
+    host: String,
+    limits: Limits,
+}
+
+impl fmt::Debug for Room {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Room")
+            .field("address", &self.address)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Room {
+    /// Listens; port 0 lets the system choose one.
+    ///
+    /// # Errors
+    ///
+    /// The host is unknown, or the address cannot be listened on.
+    pub fn bind(address: &Address, limits: Limits) -> io::Result<Self> {
+        let (listener, bound) = bind(address)?;
+        let host = if bound.ip().is_unspecified() {
+            // Not an address to be opened.
+            "localhost".to_owned()
+        } else {
+            address.host.to_string()
+        };
+        Ok(Self {
+            listener,
+            address: bound,
+            guard: Guard::new(&host)?,
+            host,
+            limits,
+        })
+    }
+
+    /// The address that it listens on.
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// What is to be opened in a browser, with the token. A browser sends what stands behind `#` to nobody.
+    pub fn url(&self) -> String {
+        let port = self.address.port();
+        format!("http://{}:{port}/#token={}", self.host, self.guard.token())
+    }
+
+    /// Serves a page, in a thread of its own, until what is returned is dropped.
+    ///
+    /// # Errors
+    ///
+    /// The system has no thread, or cannot wait for sockets.
+    pub fn serve(self, site: Arc<dyn Site>, clock: Arc<dyn Clock>) -> io::Result<Serving> {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_io()
+            .enable_time()
+            .build()?;
+        let (stop, stopped) = oneshot::channel();
+        let thread = thread::Builder::new().name("web".to_owned()).spawn(move || {
+            let limits = self.limits;
+            let hall = Arc::new(Hall {
+                site: Arc::clone(&site),
+                guard: self.guard,
+                feed: Feed::new(),
+                patience: limits.patience,
+            });
+            runtime.block_on(async {
+                tokio::select! {
+                    () = accept(self.listener, &hall, limits) => {}
+                    () = async { hall.feed.run(site, clock).await; std::future::pending().await } => {}
+                    _ = stopped => {}
+                }
+            });
+        })?;
+        Ok(Serving {
+            stop: Some(stop),
+            thread: Some(thread),
+        })
+    }
+}
+
+/// A page that is served; dropping it ends that.
+#[derive(Debug)]
+pub struct Serving {
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            // A panic has been reported by itself.
+            let _ = thread.join();
+        }
+    }
+}
+
+async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
+    let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
+        return;
+    };
+    let seats = Arc::new(Semaphore::new(limits.connections));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            tokio::time::sleep(PAUSE).await;
+            continue;
+        };
+        let Ok(seat) = Arc::clone(&seats).try_acquire_owned() else {
+            continue;
+        };
+        // Without it an event may wait for the confirmation of the one before.
+        let _ = stream.set_nodelay(true);
+        let hall = Arc::clone(hall);
+        tokio::spawn(async move {
+            let service = service_fn(|request| answer(&hall, request));
+            let stream = TokioIo::new(Patient::new(stream, limits.patience));
+            // How a browser hangs up is nobody's business.
+            let _ = http1::Builder::new()
+                .timer(TokioTimer::new())
+                .header_read_timeout(limits.patience)
+                .max_buf_size(HEAD)
+                .serve_connection(stream, service)
+                .await;
+            drop(seat);
+        });
+    }
+}

@@ -1,0 +1,215 @@
+//! One request and its answer.
+
+use std::convert::Infallible;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures_util::stream::unfold;
+use http_body_util::combinators::UnsyncBoxBody;
+use http_body_util::{BodyExt as _, Full, Limited, StreamBody};
+use hyper::body::{Bytes, Frame, Incoming};
+use hyper::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
+    X_CONTENT_TYPE_OPTIONS,
+};
+use hyper::{Method, Request, Response, StatusCode};
+use tokio::time::timeout;
+
+use crate::feed::Feed;
+use crate::guard::{Guard, Token};
+use crate::site::{Answer, Change, Site, Verb};
+
+/// The largest body of a request, in bytes.
+const BODY: usize = 4096;
+
+/// A viewer hears something at least this often; a page that does not knows that what it shows is old.
+const BEAT: Duration = Duration::from_secs(2);
+
+/// The page and its own files; nothing from elsewhere, nothing inline, in nobody's frame.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
+     base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+const JSON: &str = "application/json";
+
+/// What all connections share.
+pub(crate) struct Hall {
+    pub(crate) site: Arc<dyn Site>,
+    pub(crate) guard: Guard,
+    pub(crate) feed: Feed,
+    pub(crate) patience: Duration,
+}
+
+type Body = UnsyncBoxBody<Bytes, Infallible>;
+
+/// A status and a sentence.
+type Refusal = (StatusCode, String);
+
+pub(crate) async fn answer(
+    hall: &Hall,
+    request: Request<Incoming>,
+) -> Result<Response<Body>, Infallible> {
+    let answered = respond(hall, request).await;
+    let mut response = answered.unwrap_or_else(|(status, text)| {
+        let mut quoted = String::new();
+        quote(&text, &mut quoted);
+        let json = format!("{{\"code\":{},\"text\":{quoted}}}\n", status.as_u16());
+        let mut response = full(JSON, json);
+        *response.status_mut() = status;
+        response
+    });
+    let headers = response.headers_mut();
+    for (name, value) in [
+        (CACHE_CONTROL, "no-store"),
+        (CONTENT_SECURITY_POLICY, POLICY),
+        (REFERRER_POLICY, "no-referrer"),
+        (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (
+            HeaderName::from_static("cross-origin-resource-policy"),
+            "same-origin",
+        ),
+    ] {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    Ok(response)
+}
+
+async fn respond(hall: &Hall, request: Request<Incoming>) -> Result<Response<Body>, Refusal> {
+    if request.uri().authority().is_some() {
+        let text = "this is no proxy; ask for a path";
+        return Err((StatusCode::BAD_REQUEST, text.to_owned()));
+    }
+    hall.guard
+        .check_source(request.headers())
+        .map_err(|why| (StatusCode::FORBIDDEN, why.to_owned()))?;
+    let token = hall.guard.token_of(request.headers());
+    let path = request.uri().path().to_owned();
+    let verb = match *request.method() {
+        Method::GET => return get(hall, &path, token).await,
+        Method::PUT => Verb::Put,
+        Method::DELETE => Verb::Delete,
+        _ => {
+            let text = "use GET to look, PUT and DELETE to change";
+            return Err((StatusCode::METHOD_NOT_ALLOWED, text.to_owned()));
+        }
+    };
+    if token != Token::Right {
+        return Err(no_token(token));
+    }
+    let body = body(hall, request).await?;
+    let (answer, outcome) = Answer::new();
+    hall.site.change(Change { verb, path, body }, answer);
+    let outcome = outcome.await.map_err(|_| nobody())?;
+    hall.feed.changed();
+    outcome.map_err(|refused| {
+        let status = StatusCode::from_u16(refused.status);
+        (
+            status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR),
+            refused.text,
+        )
+    })?;
+    Ok(full(JSON, "{\"code\":200,\"text\":\"done\"}\n".to_owned()))
+}
+
+async fn get(hall: &Hall, path: &str, token: Token) -> Result<Response<Body>, Refusal> {
+    match path {
+        "/state" => {
+            let mut viewer = hall.feed.subscribe();
+            let state = viewer.wait_for(Option::is_some).await;
+            let state = state.ok().and_then(|state| state.clone());
+            let state = state.ok_or_else(nobody)?;
+            Ok(full(JSON, state.json()))
+        }
+        "/events" => Ok(events(&hall.feed)),
+        "/access" if token == Token::Wrong => Err(no_token(token)),
+        "/access" => Ok(full(
+            JSON,
+            format!("{{\"may_change\":{}}}\n", token == Token::Right),
+        )),
+        _ => {
+            let asset = hall.site.assets().iter().find(|asset| asset.path == path);
+            let asset =
+                asset.ok_or_else(|| (StatusCode::NOT_FOUND, format!("there is no {path} here")))?;
+            Ok(full(asset.kind, asset.text))
+        }
+    }
+}
+
+/// The newest state, each time that it is another one and the viewer has taken the last.
+fn events(feed: &Feed) -> Response<Body> {
+    let stream = unfold(feed.subscribe(), |mut viewer| async {
+        loop {
+            let event = match timeout(BEAT, viewer.changed()).await {
+                Err(_) => Some(Bytes::from_static(b"event: beat\ndata:\n\n")),
+                Ok(Ok(())) => viewer
+                    .borrow_and_update()
+                    .as_ref()
+                    .map(|state| state.event()),
+                Ok(Err(_)) => return None,
+            };
+            if let Some(event) = event {
+                return Some((Ok(Frame::data(event)), viewer));
+            }
+        }
+    });
+    respond_with("text/event-stream", StreamBody::new(stream).boxed_unsync())
+}
+
+async fn body(hall: &Hall, request: Request<Incoming>) -> Result<String, Refusal> {
+    let body = Limited::new(request.into_body(), BODY).collect();
+    let Ok(body) = timeout(hall.patience, body).await else {
+        let text = "the body did not arrive in time; send it at once";
+        return Err((StatusCode::REQUEST_TIMEOUT, text.to_owned()));
+    };
+    let body = body.map_err(|error| {
+        if error.is::<http_body_util::LengthLimitError>() {
+            let text = format!("the body has more than {BODY} bytes; one value is sent at a time");
+            (StatusCode::PAYLOAD_TOO_LARGE, text)
+        } else {
+            (StatusCode::BAD_REQUEST, "the body broke off".to_owned())
+        }
+    })?;
+    let text = String::from_utf8(body.to_bytes().into());
+    let text = text.map_err(|_| (StatusCode::BAD_REQUEST, "the body is no UTF-8".to_owned()))?;
+    Ok(text.trim().to_owned())
+}
+
+fn no_token(token: Token) -> Refusal {
+    let what = if token == Token::Wrong {
+        "the token is not this room's"
+    } else {
+        "there is no token"
+    };
+    let text = format!("{what}; send Authorization: Bearer and the token of the printed address");
+    (StatusCode::UNAUTHORIZED, text)
+}
+
+fn nobody() -> Refusal {
+    let text = "what this page shows has ended; start it again";
+    (StatusCode::SERVICE_UNAVAILABLE, text.to_owned())
+}
+
+fn full(kind: &'static str, text: impl Into<Bytes>) -> Response<Body> {
+    respond_with(kind, Full::new(text.into()).boxed_unsync())
+}
+
+fn respond_with(kind: &'static str, body: Body) -> Response<Body> {
+    let mut response = Response::new(body);
+    let kind = HeaderValue::from_static(kind);
+    response.headers_mut().insert(CONTENT_TYPE, kind);
+    response
+}
+
+/// Adds a text as JSON.
+fn quote(text: &str, json: &mut String) {
+    json.push('"');
+    for c in text.chars() {
+        // Writing into a text takes everything.
+        let _ = match c {
+            '"' | '\\' => write!(json, "\\{c}"),
+            c if c.is_control() => write!(json, "\\u{:04x}", u32::from(c)),
+            c => write!(json, "{c}"),
+        };
+    }
+    json.push('"');
+}

@@ -1,0 +1,365 @@
+//! The room over real sockets: who gets in, what is refused, and that nobody waits for anybody else.
+#![allow(missing_docs, reason = "tests")]
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use tickbus_base::time::Monotonic;
+use tickbus_fieldbus::tcp::Address;
+use tickbus_web::{
+    Answer, Asset, Change, Limits, Outcome, Refused, Room, Serving, Site, State, Verb,
+};
+
+/// A page with one text that can be put.
+#[derive(Default)]
+struct Toy {
+    text: Mutex<String>,
+    looks: AtomicU64,
+}
+
+impl Site for Toy {
+    fn assets(&self) -> &[Asset] {
+        &[Asset {
+            path: "/",
+            kind: "text/html; charset=utf-8",
+            text: "<p>toy",
+        }]
+    }
+
+    fn look(&self, answer: Answer<State>) {
+        self.looks.fetch_add(1, Ordering::SeqCst);
+        let text = self.text.lock().expect("no panic").clone();
+        // More than sockets keep, without so much being put.
+        let padding = " ".repeat(if text.starts_with("large") { 1 << 22 } else { 0 });
+        answer.give(Box::new(move || format!("\"{text}\"{padding}")));
+    }
+
+    fn change(&self, change: Change, answer: Answer<Outcome>) {
+        if change.path == "/nobody" {
+            return;
+        }
+        answer.give(match (change.verb, &*change.path) {
+            (Verb::Put, "/text") => {
+                *self.text.lock().expect("no panic") = change.body;
+                Ok(())
+            }
+            _ => Err(Refused {
+                status: 409,
+                text: "say \"text\"".to_owned(),
+            }),
+        });
+    }
+}
+
+struct Fixture {
+    toy: Arc<Toy>,
+    address: SocketAddr,
+    token: String,
+    _serving: Serving,
+}
+
+fn serve(limits: Limits) -> Fixture {
+    let room = Room::bind(&Address::local(0), limits).expect("a free port");
+    let (address, url) = (room.address(), room.url());
+    let prefix = format!("http://{address}/#token=");
+    let token = url.strip_prefix(&prefix).expect(&url).to_owned();
+    let toy = Arc::new(Toy::default());
+    let site: Arc<Toy> = Arc::clone(&toy);
+    let serving = room.serve(site, Monotonic::shared()).expect("a thread");
+    Fixture {
+        toy,
+        address,
+        token,
+        _serving: serving,
+    }
+}
+
+impl Fixture {
+    fn connect(&self) -> TcpStream {
+        TcpStream::connect(self.address).expect("it listens")
+    }
+
+    /// Sends a request with these further headers, and returns the answer, head and body.
+    fn ask(&self, line: &str, headers: &str, body: &str) -> String {
+        let mut stream = self.connect();
+        let length = body.len();
+        write!(
+            stream,
+            "{line} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n{body}",
+            self.address
+        )
+        .expect("it reads");
+        read(stream)
+    }
+
+    fn put(&self, text: &str) -> String {
+        let headers = format!("Authorization: Bearer {}\r\n", self.token);
+        self.ask("PUT /text", &headers, text)
+    }
+
+    fn view(&self) -> Viewer {
+        let mut stream = self.connect();
+        write!(
+            stream,
+            "GET /events HTTP/1.1\r\nHost: {}\r\n\r\n",
+            self.address
+        )
+        .expect("it reads");
+        let mut viewer = Viewer(BufReader::new(stream));
+        assert!(viewer.line().starts_with("HTTP/1.1 200"));
+        viewer
+    }
+}
+
+fn read(mut stream: TcpStream) -> String {
+    let mut text = String::new();
+    // A server that refuses a body may close before it has read it.
+    let _ = stream.read_to_string(&mut text);
+    text
+}
+
+struct Viewer(BufReader<TcpStream>);
+
+impl Viewer {
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.0.read_line(&mut line).expect("text");
+        assert!(!line.is_empty(), "the stream has ended");
+        line
+    }
+
+    /// The next state.
+    fn state(&mut self) -> String {
+        loop {
+            let line = self.line();
+            if let Some(data) = line.strip_prefix("data: ") {
+                return data.trim_end().to_owned();
+            }
+        }
+    }
+}
+
+#[track_caller]
+fn assert_status(answer: &str, status: u16) {
+    assert!(
+        answer.starts_with(&format!("HTTP/1.1 {status} ")),
+        "{answer}"
+    );
+}
+
+#[test]
+fn a_page_is_served_with_its_headers() {
+    let fixture = serve(Limits::default());
+    let answer = fixture.ask("GET /", "", "");
+    assert_status(&answer, 200);
+    assert!(answer.ends_with("<p>toy"), "{answer}");
+    for header in [
+        "cache-control: no-store",
+        "content-security-policy: default-src 'none'; script-src 'self'",
+        "frame-ancestors 'none'",
+        "referrer-policy: no-referrer",
+        "x-content-type-options: nosniff",
+        "cross-origin-resource-policy: same-origin",
+    ] {
+        assert!(answer.contains(header), "{header} in {answer}");
+    }
+    assert!(
+        !answer.contains(&fixture.token),
+        "the token is not in the page"
+    );
+    assert_status(&fixture.ask("GET /other", "", ""), 404);
+    assert_status(&fixture.ask("POST /text", "", ""), 405);
+    assert_status(&fixture.ask("OPTIONS /text", "", ""), 405);
+}
+
+#[test]
+fn who_has_no_token_only_looks() {
+    let fixture = serve(Limits::default());
+    assert!(
+        fixture
+            .ask("GET /access", "", "")
+            .ends_with("{\"may_change\":false}\n")
+    );
+    let right = format!("Authorization: Bearer {}\r\n", fixture.token);
+    assert!(
+        fixture
+            .ask("GET /access", &right, "")
+            .ends_with("{\"may_change\":true}\n")
+    );
+    let wrong = "Authorization: Bearer 0123456789abcdef0123456789abcdef\r\n";
+    assert_status(&fixture.ask("GET /access", wrong, ""), 401);
+    let referer = format!(
+        "Referer: http://{}/?token={}\r\n",
+        fixture.address, fixture.token
+    );
+    for headers in ["", wrong, &*referer] {
+        assert_status(&fixture.ask("PUT /text", headers, "x"), 401);
+    }
+    let in_path = format!("PUT /text?token={}", fixture.token);
+    assert_status(&fixture.ask(&in_path, "", "x"), 401);
+    assert_eq!(*fixture.toy.text.lock().expect("no panic"), "");
+    assert!(fixture.ask("GET /state", "", "").ends_with("\r\n\"\""));
+    assert_status(&fixture.put(" new \n"), 200);
+    let state = fixture.ask("GET /state", "", "");
+    assert!(
+        state.ends_with("\r\n\"new\""),
+        "what was put is there: {state}"
+    );
+    let refused = fixture.ask("DELETE /text", &right, "");
+    assert_status(&refused, 409);
+    assert!(
+        refused.ends_with("{\"code\":409,\"text\":\"say \\\"text\\\"\"}\n"),
+        "{refused}"
+    );
+    assert_status(&fixture.ask("PUT /nobody", &right, ""), 503);
+}
+
+#[test]
+fn other_sites_and_other_hosts_are_refused_even_with_the_token() {
+    let fixture = serve(Limits::default());
+    let right = format!("Authorization: Bearer {}\r\n", fixture.token);
+    for path in ["GET /", "GET /state", "GET /events", "PUT /text"] {
+        let headers = format!("{right}Origin: http://evil.example\r\n");
+        assert_status(&fixture.ask(path, &headers, "x"), 403);
+        let mut stream = fixture.connect();
+        write!(
+            stream,
+            "{path} HTTP/1.1\r\nHost: evil.example:{}\r\nConnection: close\r\n{right}\r\n",
+            fixture.address.port()
+        )
+        .expect("it reads");
+        assert_status(&read(stream), 403);
+    }
+    let absolute = format!("GET http://evil.example:{}/state", fixture.address.port());
+    assert_status(&fixture.ask(&absolute, "", ""), 400);
+    let own = format!("{right}Origin: http://{}\r\n", fixture.address);
+    assert_status(&fixture.ask("PUT /text", &own, "x"), 200);
+}
+
+#[test]
+fn large_bodies_and_heads_are_refused() {
+    let fixture = serve(Limits::default());
+    assert_status(&fixture.put(&"x".repeat(4096)), 200);
+    assert_status(&fixture.put(&"y".repeat(4097)), 413);
+    let right = format!("Authorization: Bearer {}\r\n", fixture.token);
+    let mut stream = fixture.connect();
+    write!(
+        stream,
+        "PUT /text HTTP/1.1\r\nHost: {}\r\nTransfer-Encoding: chunked\r\n{right}\r\n",
+        fixture.address
+    )
+    .expect("it reads");
+    // Until the server has had enough; it never says how much will come.
+    let mut writer = stream.try_clone().expect("a descriptor");
+    while writer.write_all(b"400\r\n").is_ok()
+        && writer.write_all(&[b'z'; 0x400]).is_ok()
+        && writer.write_all(b"\r\n").is_ok()
+    {}
+    drop(stream);
+    let head = format!("X: {}\r\n", "x".repeat(64 * 1024));
+    let answer = fixture.ask("GET /", &head, "");
+    assert!(
+        answer.is_empty() || answer.starts_with("HTTP/1.1 431 "),
+        "{answer}"
+    );
+    assert!(
+        fixture.ask("GET /state", "", "").contains("xxxx"),
+        "nothing of it was kept"
+    );
+}
+
+#[test]
+fn a_viewer_hears_the_newest_state_and_a_beat_without_one() {
+    let fixture = serve(Limits::default());
+    let mut viewer = fixture.view();
+    assert_eq!(viewer.state(), "\"\"");
+    fixture.put("one");
+    assert_eq!(viewer.state(), "\"one\"");
+    while viewer.line() != "event: beat\n" {}
+}
+
+#[test]
+fn nobody_is_asked_while_nobody_looks() {
+    let fixture = serve(Limits::default());
+    fixture.ask("GET /", "", "");
+    fixture.put("x");
+    assert_eq!(fixture.toy.looks.load(Ordering::SeqCst), 0);
+    fixture.view().state();
+    assert!(fixture.toy.looks.load(Ordering::SeqCst) > 0);
+}
+
+#[test]
+fn who_does_not_read_keeps_nobody_waiting_and_gets_the_newest() {
+    let fixture = serve(Limits::default());
+    let mut lazy = fixture.view();
+    assert_eq!(lazy.state(), "\"\"");
+    let mut diligent = fixture.view();
+    diligent.state();
+    // Far more than a socket keeps.
+    for number in 0..4_000 {
+        let text = format!("{number:04}{}", "x".repeat(4_000));
+        fixture.put(&text);
+        if number % 40 == 0 {
+            while diligent.state()[1..5] != text[..4] {}
+        }
+    }
+    let mut seen = 0;
+    while lazy.state()[1..5] != *"3999" {
+        seen += 1;
+    }
+    assert!(seen < 4_000, "it has missed those between");
+}
+
+#[test]
+fn a_viewer_who_never_reads_is_given_up() {
+    let limits = Limits {
+        patience: Duration::from_millis(100),
+        ..Limits::default()
+    };
+    let fixture = serve(limits);
+    let lazy = fixture.view();
+    let mut number = 0_u64;
+    let mut writer = lazy.0.get_ref();
+    // Its socket is full at some time, and closed some time later: a connection that is closed with bytes unread is reset.
+    while writer.write_all(b" ").is_ok() {
+        number += 1;
+        fixture.put(&format!("large {number}"));
+    }
+}
+
+#[test]
+fn two_hundred_viewers_are_served_and_those_above_the_limit_are_not() {
+    let limits = Limits {
+        connections: 201,
+        ..Limits::default()
+    };
+    let fixture = serve(limits);
+    let mut viewers: Vec<Viewer> = (0..200).map(|_| fixture.view()).collect();
+    for viewer in &mut viewers {
+        assert_eq!(viewer.state(), "\"\"");
+    }
+    fixture.put("all");
+    for viewer in &mut viewers {
+        while viewer.state() != "\"all\"" {}
+    }
+    let last = fixture.view();
+    let mut refused = fixture.connect();
+    let mut nothing = String::new();
+    let _ = refused.read_to_string(&mut nothing);
+    assert_eq!(nothing, "", "it is closed at once");
+    drop(last);
+    // The seat is free as soon as the room has noticed.
+    while !fixture.ask("GET /", "", "").starts_with("HTTP/1.1 200") {}
+}
+
+#[test]
+fn ten_thousand_connections_come_and_go() {
+    let fixture = serve(Limits::default());
+    for _ in 0..10_000 {
+        drop(fixture.connect());
+    }
+    while !fixture.ask("GET /", "", "").starts_with("HTTP/1.1 200") {}
+}

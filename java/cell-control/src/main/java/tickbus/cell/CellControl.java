@@ -1,0 +1,171 @@
+package tickbus.cell;
+
+import java.io.IOException;
+import java.io.PrintStream;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.concurrent.CompletableFuture;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.TimeUnit;
+import tickbus.Tickbus;
+import tickbus.petri.Coordinator;
+import tickbus.petri.Dot;
+import tickbus.petri.FiringLog;
+import tickbus.petri.Stop;
+import tickbus.petri.control.BoundNet;
+import tickbus.petri.control.NetController;
+
+/**
+ * The cell's control as a process: {@code CellControl CONFIG TABLES FOLDER}, with the cell's driver.cfg, the tables that
+ * make it the PLC's end ({@link Tickbus#open(Path, String)}), and a folder for what is left at the end: each net with
+ * its marking, and its firings.
+ *
+ * <p>Until it is told to end, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
+ */
+public final class CellControl {
+    private static final long SCAN_NANOS = 5_000_000;
+    private static final int SCANS_PER_REPORT = 20;
+    private static final int LOGGED = 20_000;
+    private static final long SECONDS_TO_END = 4;
+    private static final int USAGE = 2;
+    private static final int FAILED = 1;
+
+    private final List<FiringLog> logs = new ArrayList<>();
+    private final List<Coordinator> coordinators = new ArrayList<>();
+    private final NetController nets;
+    /** How often each transition of each net fired. */
+    private final long[][] fired;
+    private final CompletableFuture<Proof> proof = new CompletableFuture<>();
+
+    private CellControl(Tickbus bus) {
+        BoundNet[] all = CellNets.all();
+        fired = new long[all.length][];
+        for (int i = 0; i < all.length; i++) {
+            FiringLog log = new FiringLog(all[i].net(), LOGGED);
+            long[] counts = new long[all[i].net().transitions().size()];
+            fired[i] = counts;
+            logs.add(log);
+            all[i].listener((scan, nanos, transition, choices) -> {
+                counts[transition]++;
+                log.fired(scan, nanos, transition, choices);
+            });
+        }
+        nets = NetController.of(bus, all);
+        for (BoundNet one : all) {
+            coordinators.add(nets.coordinator(one.net().name()));
+        }
+    }
+
+    /**
+     * Runs until it is told to end.
+     *
+     * @param args the command line
+     */
+    public static void main(String[] args) {
+        if (args.length != 3) {
+            System.err.println("usage: CellControl CONFIG TABLES FOLDER");
+            System.exit(USAGE);
+        }
+        CountDownLatch told = new CountDownLatch(1);
+        CountDownLatch done = new CountDownLatch(1);
+        Runtime.getRuntime().addShutdownHook(new Thread(() -> {
+            told.countDown();
+            try {
+                done.await(SECONDS_TO_END, TimeUnit.SECONDS);
+            } catch (InterruptedException e) {
+                Thread.currentThread().interrupt();
+            }
+        }, "end of the nets"));
+        boolean failed = false;
+        try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1])) {
+            CellControl control = new CellControl(bus);
+            control.prove();
+            control.run(told, System.out);
+            control.leave(Path.of(args[2]));
+        } catch (IOException | RuntimeException e) {
+            System.err.println(e.getMessage() == null ? e.toString() : e.getMessage());
+            failed = true;
+        } finally {
+            done.countDown();
+        }
+        if (failed && told.getCount() > 0) {
+            System.exit(FAILED);
+        }
+    }
+
+    /** Beside the control, on a thread that may take its time. */
+    private void prove() {
+        Thread thread = new Thread(() -> {
+            try {
+                proof.complete(Proof.of(CellNets.composition(1, 3, 4)));
+            } catch (RuntimeException | Error e) {
+                proof.completeExceptionally(e);
+            }
+        }, "analysis of the nets");
+        thread.setDaemon(true);
+        thread.setPriority(Thread.MIN_PRIORITY);
+        thread.start();
+    }
+
+    private void run(CountDownLatch told, PrintStream out) {
+        nets.run(SCAN_NANOS, () -> {
+            if (nets.scans() % SCANS_PER_REPORT == 0) {
+                out.print(report());
+                out.flush();
+            }
+            return told.getCount() > 0;
+        });
+        out.print(report());
+        out.flush();
+    }
+
+    private String report() {
+        StringBuilder text = new StringBuilder();
+        line(text, "plc.scans", nets.scans());
+        line(text, "stale_scans", nets.staleScans());
+        line(text, "loader_freed", count(0, "try again"));
+        line(text, "pallet_freed", count(3, "free before 1") + count(3, "free before 2") + count(3, "free before 3")
+            + count(3, "free before 4"));
+        line(text, "vacuum_lost", count(2, "vacuum lost"));
+        line(text, "refilled", count(0, "magazine filled") + count(1, "parts filled") + count(1, "heads filled")
+            + count(2, "caps filled"));
+        List<Stop> stops = nets.stops();
+        line(text, "stops", stops.size());
+        if (!stops.isEmpty()) {
+            line(text, "stop", stops.get(0).message().replace('\n', ' '));
+        }
+        if (proof.isDone() && !proof.isCompletedExceptionally()) {
+            Proof known = proof.join();
+            line(text, "markings", known.markings());
+            line(text, "deadlocks", known.deadlocks());
+            line(text, "all_markings", known.complete());
+            line(text, "safe", known.safe());
+        }
+        return text.append('\n').toString();
+    }
+
+    private static void line(StringBuilder text, String key, Object value) {
+        text.append(key).append('=').append(value).append('\n');
+    }
+
+    private long count(int net, String transition) {
+        return fired[net][coordinators.get(net).net().transition(transition).index()];
+    }
+
+    /** Each net with its marking, and its last firings. */
+    private void leave(Path folder) throws IOException {
+        Files.createDirectories(folder);
+        StringBuilder markings = new StringBuilder();
+        for (int i = 0; i < coordinators.size(); i++) {
+            Coordinator one = coordinators.get(i);
+            String name = one.net().name();
+            String file = name.replace(' ', '-');
+            line(markings, name, logs.get(i).total() + " firings, now " + one.marking());
+            Files.writeString(folder.resolve(file + ".dot"), Dot.write(one.net(), one.marking()));
+            Files.writeString(folder.resolve(file + ".firings"), logs.get(i).toString());
+        }
+        Files.writeString(folder.resolve("nets.txt"), markings);
+    }
+}

@@ -1,0 +1,19 @@
+package tickbus.cell;
+
+import tickbus.petri.Inputs;
+
+/** What is made of a sleeve: of each colour, every second cylinder gets a cap. */
+final class Plan {
+    private static final int RED = 1;
+    private static final int METALLIC = 2;
+
+    private final boolean[] capNext = new boolean[3];
+
+    /** The code of the kind for the sleeve in front of station 1's sensors; the next of its colour is of the other kind. */
+    int next(Inputs in) {
+        int colour = in.isOn("S1 inductive") ? METALLIC : in.isOn("S1 optical") ? RED : 0;
+        boolean cap = capNext[colour];
+        capNext[colour] = !cap;
+        return 0x10 + 0x20 * colour + (cap ? 0x10 : 0);
+    }
+}

@@ -1,0 +1,143 @@
+package tickbus.cell;
+
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertFalse;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+
+import java.io.BufferedReader;
+import java.io.ByteArrayOutputStream;
+import java.io.IOException;
+import java.io.OutputStream;
+import java.io.PrintStream;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.concurrent.TimeUnit;
+import java.util.jar.Attributes;
+import java.util.jar.JarOutputStream;
+import java.util.jar.Manifest;
+import org.junit.jupiter.api.BeforeEach;
+import org.junit.jupiter.api.Tag;
+import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.condition.DisabledOnOs;
+import org.junit.jupiter.api.condition.OS;
+import org.junit.jupiter.api.io.TempDir;
+import tickbus.demo.cell.CellDemo;
+
+/** The whole chain: simulator, driver, Modbus, the nets' process. */
+@Tag("native")
+class CellDemoTest {
+    @TempDir
+    Path folder;
+
+    private String output;
+
+    /** The driver's classes are on the test's class path; the folder's jar only names them. */
+    @BeforeEach
+    void fill() throws IOException {
+        Manifest manifest = new Manifest();
+        manifest.getMainAttributes().put(Attributes.Name.MANIFEST_VERSION, "1.0");
+        manifest.getMainAttributes().putValue("Device-Driver-Class", "DeviceDrivers.FieldbusDriver");
+        Files.createDirectories(folder.resolve("drivers"));
+        try (OutputStream file = Files.newOutputStream(folder.resolve("drivers/driver.jar"));
+                JarOutputStream jar = new JarOutputStream(file, manifest)) {
+            jar.finish();
+        }
+        String cfg = Files.readString(root().resolve("plc/cell/cell.cfg"));
+        Files.writeString(folder.resolve("drivers/cell.cfg"), cfg.replace("127.0.0.1:15020", "127.0.0.1:0"));
+    }
+
+    private static Path root() {
+        return Path.of(System.getProperty("tickbus.root"));
+    }
+
+    private List<String> arguments(String nets, String... more) {
+        List<String> arguments = new ArrayList<>(List.of("--drivers", folder.resolve("drivers").toString(), "--control",
+            root().resolve("java/simulator/cell.table").toString(), "--report", folder.resolve("demo/report.txt").toString(),
+            "--nets", nets));
+        arguments.addAll(List.of(more));
+        return arguments;
+    }
+
+    private int demo(String nets, String... more) {
+        ByteArrayOutputStream bytes = new ByteArrayOutputStream();
+        PrintStream out = new PrintStream(bytes, true, StandardCharsets.UTF_8);
+        int code = CellDemo.run(arguments(nets, more).toArray(String[]::new), out, out);
+        output = bytes.toString(StandardCharsets.UTF_8);
+        return code;
+    }
+
+    private String verdict() {
+        return output.strip().substring(output.strip().lastIndexOf('\n') + 1);
+    }
+
+    /** The nets' process finds the native library by the same property as this one. */
+    private static String nets() {
+        return System.getProperty("java.class.path");
+    }
+
+    @Test
+    void netsMakeFourCylindersOverModbusAndFreeAJammedLoader() throws IOException {
+        assertEquals(0, demo(nets(), "--cylinders", "4"), () -> output);
+        assertTrue(verdict().matches("demo-cell: ok cylinders=4 kinds=\\S+ deadlocks=0 markings=\\d+ jams=1 recovered=1"
+            + " vacuum_lost=0 refills=0 ticks=\\d+ report=.*"), verdict());
+        String report = Files.readString(folder.resolve("demo/report.txt"));
+        for (String part : List.of("the loader will jam", "station 1: ", " firings, now {", "all_markings", "Cylinders",
+                "Statistics of driver 1998")) {
+            assertTrue(report.contains(part), report);
+        }
+        for (String net : List.of("station-1", "station-3", "station-4", "transport", "cell")) {
+            assertTrue(Files.readString(folder.resolve("demo/nets/" + net + ".dot")).contains("•"), net);
+            assertFalse(Files.readString(folder.resolve("demo/nets/" + net + ".firings")).isEmpty(), net);
+        }
+    }
+
+    @Test
+    void aProgramThatIsNotThereIsNamed() {
+        assertEquals(1, demo(folder.toString()), () -> output);
+        assertTrue(verdict().matches("demo-cell: failed reason=\"process \\d+ of the PLC ended by itself with exit code 1; .*"
+            + "tickbus.cell.CellControl.*"), verdict());
+    }
+
+    @Test
+    void aTimeLimitIsKept() throws IOException {
+        assertEquals(1, demo(nets(), "--time-limit", "200ms"), () -> output);
+        assertTrue(verdict().contains("the time limit of 200ms of simulation time is over with 0 of 12 cylinders"), verdict());
+        assertTrue(Files.readString(folder.resolve("demo/report.txt")).contains("the time limit"));
+    }
+
+    @Test
+    void aWrongCommandLineIsExplained() {
+        assertEquals(2, demo(nets(), "--cylinder", "3"));
+        assertTrue(verdict().contains("there is no option '--cylinder'; did you mean '--cylinders'?"), verdict());
+    }
+
+    @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be asked to end, only be killed")
+    void aSignalEndsTheNetsToo() throws Exception {
+        List<String> command = new ArrayList<>(List.of(Path.of(System.getProperty("java.home"), "bin", "java").toString(),
+            "--enable-native-access=ALL-UNNAMED", "-Dtickbus.native.dir=" + System.getProperty("tickbus.native.dir"),
+            "-cp", nets(), CellDemo.class.getName()));
+        command.addAll(arguments(nets()));
+        Process demo = new ProcessBuilder(command).redirectErrorStream(true).start();
+        try (BufferedReader out = demo.inputReader()) {
+            String line = out.readLine();
+            while (line != null && !line.contains("cylinder 1,")) {
+                line = out.readLine();
+            }
+            List<ProcessHandle> nets = demo.children().toList();
+            assertEquals(1, nets.size());
+            // Process.destroy() would close the stream from which the verdict is read.
+            demo.toHandle().destroy();
+            List<String> rest = out.lines().toList();
+            assertEquals("demo-cell: failed reason=interrupted", rest.get(rest.size() - 1));
+            assertTrue(demo.waitFor(30, TimeUnit.SECONDS));
+            assertTrue(demo.exitValue() != 0, "exit code " + demo.exitValue());
+            assertFalse(nets.get(0).isAlive());
+        } finally {
+            demo.destroyForcibly();
+        }
+    }
+}

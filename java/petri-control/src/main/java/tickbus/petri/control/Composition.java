@@ -1,0 +1,77 @@
+package tickbus.petri.control;
+
+import java.util.HashSet;
+import java.util.List;
+import java.util.Set;
+import tickbus.petri.Arc;
+import tickbus.petri.NetBuilder;
+import tickbus.petri.PetriNet;
+import tickbus.petri.Place;
+import tickbus.petri.Transition;
+
+/**
+ * Makes one net of several, for analysis: nodes are named {@code net.node}, and each {@link BoundNet#marked} and
+ * {@link BoundNet#unmarked} is a test or an inhibitor arc. What the composition cannot do, the nets of one controller
+ * cannot do together. Conditions on signals are left out, as analysis does.
+ */
+public final class Composition {
+    private Composition() {
+    }
+
+    /**
+     * The nets as one.
+     *
+     * @param name of the whole
+     * @param nets as they are given to a controller
+     * @throws BindingException if they refer to nets or nodes that are not there
+     */
+    public static PetriNet of(String name, BoundNet... nets) {
+        Check.nets(List.of(nets));
+        NetBuilder whole = PetriNet.named(name);
+        for (BoundNet one : nets) {
+            places(whole, one.net);
+        }
+        for (BoundNet one : nets) {
+            for (Transition transition : one.net.transitions()) {
+                whole.transition(in(one.net, transition.name())).priority(transition.priority()).delay(transition.delay());
+                one.net.arcs().stream().filter(arc -> arc.transition() == transition.index())
+                    .forEach(arc -> arc(whole, one.net, arc));
+                Set<String> seen = new HashSet<>();
+                for (Term term : one.conditions.getOrDefault(transition.name(), List.of())) {
+                    String place = term.name() + "." + term.place();
+                    if (term.kind().isOfPlace() && seen.add(term.kind() + place)) {
+                        if (term.kind() == Term.Kind.MARKED) {
+                            whole.test(place, 1);
+                        } else {
+                            whole.inhibitor(place, 1);
+                        }
+                    }
+                }
+            }
+        }
+        return whole.build();
+    }
+
+    private static String in(PetriNet net, String node) {
+        return net.name() + "." + node;
+    }
+
+    private static void places(NetBuilder whole, PetriNet net) {
+        for (Place place : net.places()) {
+            whole.place(in(net, place.name()), place.initial()).delay(place.delay());
+            if (place.isLimited()) {
+                whole.capacity(place.capacity());
+            }
+        }
+    }
+
+    private static void arc(NetBuilder whole, PetriNet net, Arc arc) {
+        String place = in(net, net.place(arc.place()).name());
+        switch (arc.kind()) {
+            case INPUT -> whole.input(place, arc.weight());
+            case OUTPUT -> whole.output(place, arc.weight());
+            case TEST -> whole.test(place, arc.weight());
+            case INHIBITOR -> whole.inhibitor(place, arc.weight());
+        }
+    }
+}

@@ -1,0 +1,31 @@
+package tickbus.petri.control;
+
+import java.util.List;
+import tickbus.Signal;
+import tickbus.Tickbus;
+
+/** The signals that this end reads, as they were in this scan and in the one before. */
+final class Latch {
+    final List<String> names;
+    final double[] now;
+    final double[] before;
+    private final Tickbus bus;
+    private boolean filled;
+
+    Latch(Tickbus bus) {
+        this.bus = bus;
+        names = bus.signals().stream().filter(signal -> !signal.isWritten()).map(Signal::name).toList();
+        now = new double[names.size()];
+        before = new double[names.size()];
+    }
+
+    /** Takes what came with the last receive. There is no edge in the first scan. */
+    void take() {
+        System.arraycopy(now, 0, before, 0, now.length);
+        bus.getAll(now);
+        if (!filled) {
+            filled = true;
+            System.arraycopy(now, 0, before, 0, now.length);
+        }
+    }
+}

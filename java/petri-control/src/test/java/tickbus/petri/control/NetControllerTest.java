@@ -1,0 +1,273 @@
+package tickbus.petri.control;
+
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertFalse;
+import static org.junit.jupiter.api.Assertions.assertThrows;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+import static org.junit.jupiter.api.Assumptions.assumeTrue;
+
+import com.sun.management.ThreadMXBean;
+import java.lang.management.ManagementFactory;
+import java.nio.file.Path;
+import java.util.List;
+import org.junit.jupiter.api.AfterEach;
+import org.junit.jupiter.api.BeforeEach;
+import org.junit.jupiter.api.Tag;
+import org.junit.jupiter.api.Test;
+import org.junit.jupiter.api.io.TempDir;
+import tickbus.Tickbus;
+import tickbus.petri.PetriNet;
+import tickbus.petri.Reachability;
+import tickbus.petri.Stop;
+import tickbus.petri.Verdict;
+
+/** Nets on a link in simulation time, so that each tick of the machine and each scan has its place. */
+@Tag("native")
+class NetControllerTest {
+    @TempDir
+    Path folder;
+
+    private Tickbus machine;
+    private Tickbus plc;
+    private NetController nets;
+    private long nanos;
+
+    @BeforeEach
+    void open() {
+        String[] ends = Line.steppedLink();
+        machine = Line.open(folder, 1, ends[0]);
+        plc = Line.open(folder, 2, ends[1]);
+    }
+
+    @AfterEach
+    void close() {
+        plc.close();
+        machine.close();
+    }
+
+    private static PetriNet gripper() {
+        return PetriNet.named("gripper").place("waiting", 1).place("gripping").place("holding")
+            .transition("grip").input("waiting").output("gripping")
+            .transition("held").input("gripping").output("holding")
+            .transition("release").input("holding").output("waiting").build();
+    }
+
+    private static BoundNet bound() {
+        return BoundNet.of(gripper())
+            .when("grip").on("Piece at stop").rising()
+            .when("held").on("Gripper closed").atLeast("Weight", 50).below("Weight", 100)
+            .when("release").off("Piece at stop").falling().is("Weight", 0)
+            .during("gripping").set("Gripper").during("holding").set("Gripper").set("Brake");
+    }
+
+    /** The machine sends, the nets are scanned, and the machine receives. */
+    private int scan() {
+        nanos += 1_000_000;
+        machine.send();
+        int fired = nets.scan(nanos);
+        machine.receive(nanos);
+        return fired;
+    }
+
+    private void bind(BoundNet... bound) {
+        nets = NetController.of(plc, bound);
+        // From its first tick an end is on the link.
+        machine.receive(0);
+        nets.scan(0);
+    }
+
+    private boolean out(String signal) {
+        return machine.signal(signal).getBoolean();
+    }
+
+    @Test
+    void aNetReadsSensorsAndSetsOutputsInOneExchange() {
+        bind(bound());
+        scan();
+        assertFalse(out("Gripper"));
+        assertFalse(out("Brake"), "on in driver.cfg only while nobody sends");
+        machine.signal("Piece at stop").setBoolean(true);
+        assertEquals(1, scan());
+        assertTrue(out("Gripper"));
+        machine.signal("Gripper closed").setBoolean(true);
+        for (int weight : new int[] {49, 100}) {
+            machine.signal("Weight").set(weight);
+            assertEquals(0, scan(), "held at " + weight);
+        }
+        machine.signal("Weight").set(50);
+        assertEquals(1, scan());
+        assertTrue(out("Gripper") && out("Brake"));
+        machine.signal("Piece at stop").setBoolean(false);
+        assertEquals(0, scan(), "weight");
+        machine.signal("Weight").set(0);
+        assertEquals(0, scan(), "the edge was in the scan before");
+        machine.signal("Piece at stop").setBoolean(true);
+        scan();
+        machine.signal("Piece at stop").setBoolean(false);
+        assertEquals(1, scan());
+        assertFalse(out("Gripper") || out("Brake"));
+        assertEquals(plc.statistics().get("ticks"), Long.toString(nets.scans()));
+    }
+
+    @Test
+    void anInputThatIsOnFromTheBeginningHasNoEdge() {
+        bind(bound());
+        machine.signal("Piece at stop").setBoolean(true);
+        assertEquals(0, scan());
+        assertEquals("{waiting}", nets.coordinator("gripper").marking().toString());
+    }
+
+    @Test
+    void aStaleLineFiresNothing() {
+        nets = NetController.of(plc, BoundNet.of(gripper()).when("grip").off("Piece at stop").when("held").on("Gripper closed"));
+        assertEquals(0, nets.scan(1));
+        assertEquals(1, nets.staleScans());
+        machine.receive(0);
+        assertEquals(1, scan(), "it fires as soon as the machine sends");
+    }
+
+    @Test
+    void entryExitAndFiringActionsKeepWhatTheySet() {
+        bind(BoundNet.of(gripper()).when("grip").on("Piece at stop").when("held").on("Gripper closed")
+            .when("release").off("Piece at stop")
+            .entry("gripping").set("Gripper").exit("holding").clear("Gripper")
+            .firing("held").set("Brake").run((in, out) -> out.set("Pieces", out.get("Pieces") + in.get("Weight")))
+            .entry("waiting").clear("Brake").writes("Pieces"));
+        machine.signal("Weight").set(7);
+        machine.signal("Piece at stop").setBoolean(true);
+        scan();
+        machine.signal("Gripper closed").setBoolean(true);
+        scan();
+        assertTrue(out("Gripper") && out("Brake"));
+        assertEquals(7, machine.signal("Pieces").get());
+        machine.signal("Piece at stop").setBoolean(false);
+        scan();
+        assertFalse(out("Gripper") || out("Brake"));
+        assertEquals(7, machine.signal("Pieces").get());
+    }
+
+    @Test
+    void whatThrowsStopsItsNetAloneWithFailSafeOutputs() {
+        PetriNet lamp = PetriNet.named("lamp").place("off", 1).place("on").transition("light").input("off").output("on").build();
+        bind(BoundNet.of(gripper()).when("held").that(in -> in.get("Waight") > 3).during("gripping").set("Gripper")
+                .during("holding").set("Brake"),
+            BoundNet.of(lamp).when("light").on("Gripper closed").during("on").set("Pieces", 3));
+        scan();
+        machine.signal("Gripper closed").setBoolean(true);
+        scan();
+        Stop stop = nets.stops().get(0);
+        assertEquals("condition of transition held", stop.element());
+        assertTrue(stop.message().contains("there is no input 'Waight'"), stop.message());
+        assertFalse(out("Gripper"));
+        assertTrue(out("Brake"), "its fail-safe value");
+        assertEquals(3, machine.signal("Pieces").get(), "the other net goes on");
+        assertEquals(1, nets.stops().size());
+    }
+
+    @Test
+    void anActionThatSetsWhatItDoesNotOwnStopsItsNet() {
+        bind(BoundNet.of(gripper()).entry("gripping").run((in, out) -> out.set("Brake", 1)).during("holding").set("Gripper"));
+        scan();
+        assertEquals("entry action of place gripping", nets.stops().get(0).element());
+    }
+
+    private BoundNet[] handshake() {
+        PetriNet asks = PetriNet.named("cell").place("rest", 1).place("asks")
+            .transition("ask").input("rest").output("asks").transition("thank").input("asks").output("rest").build();
+        PetriNet works = PetriNet.named("station").place("idle", 1).place("works").place("done")
+            .transition("begin").input("idle").output("works").transition("end").input("works").output("done")
+            .transition("again").input("done").output("idle").build();
+        return new BoundNet[] {
+            BoundNet.of(asks).when("ask").marked("station", "idle").when("thank").marked("station", "done"),
+            BoundNet.of(works).when("begin").marked("cell", "asks").when("end").on("Piece at stop")
+                .when("again").unmarked("cell", "asks")};
+    }
+
+    @Test
+    void netsWaitForEachOthersPlacesAndTheirCompositionSaysWhatTheyCanDo() {
+        BoundNet[] both = handshake();
+        PetriNet whole = Composition.of("whole", both);
+        Reachability graph = Reachability.explore(whole, 1000);
+        assertEquals(Verdict.YES, graph.isDeadlockFree());
+        assertEquals(5, graph.size());
+        bind(both);
+        machine.signal("Piece at stop").setBoolean(true);
+        int[] tokens = new int[5];
+        for (int i = 0; i < 20; i++) {
+            scan();
+            System.arraycopy(nets.coordinator("cell").marking().toArray(), 0, tokens, 0, 2);
+            System.arraycopy(nets.coordinator("station").marking().toArray(), 0, tokens, 2, 3);
+            assertTrue(graph.find(whole.marking(tokens)) >= 0, "the nets left the markings of their composition");
+        }
+        assertEquals(List.of(), nets.stops());
+    }
+
+    @Test
+    void aCompositionFindsTheDeadlockThatNoNetHasAlone() {
+        BoundNet[] both = handshake();
+        both[1] = BoundNet.of(both[1].net()).when("begin").marked("cell", "asks").when("again").unmarked("cell", "rest");
+        Reachability graph = Reachability.explore(Composition.of("whole", both), 1000);
+        assertEquals(List.of("cell.ask", "station.begin", "station.end", "cell.thank"), graph.deadlock().orElseThrow().firings());
+    }
+
+    @Test
+    void allMistakesAreNamedAtOnce() {
+        PetriNet other = PetriNet.named("other").place("p", 1).transition("t").input("p").build();
+        BindingException wrong = assertThrows(BindingException.class, () -> NetController.of(plc,
+            BoundNet.of(gripper()).when("grip").on("Piece at stopp").when("held").on("Brake").when("held").on("Weight")
+                .when("release").marked("othr", "p").when("lift").marked("other", "q")
+                .during("holding").set("Gripper").exit("holding").clear("Gripper").entry("standing").set("Weight")
+                .during("gripping").set("Pieces", Double.NaN),
+            BoundNet.of(other).rising().when("t").rising().marked("other", "p").firing("t").set("Gripper").writes("Wait")));
+        for (String expected : List.of(
+                "net gripper: transition held: its condition is bound twice; put all of it behind one when(...)",
+                "net gripper: transition grip: driver 'Gripper' has no signal 'Piece at stopp'; did you mean 'Piece at stop'?",
+                "net gripper: transition held: signal 'Brake' at %QX0.1 is an output; a condition looks at what this end reads",
+                "net gripper: transition release: there is no net 'othr'; there are [gripper, other]",
+                "net gripper: there is no transition 'lift'; there are [grip, held, release]",
+                "net other: there is no place 'q'; there are [p]",
+                "net gripper: there is no place 'standing'; there are [gripping, holding, waiting]",
+                "net gripper: entry of place standing: signal 'Weight' at %IW2 is an input; an action sets what this end writes",
+                "net gripper: output 'Gripper' is set during a place and also by an entry, an exit or a firing; do it in one way",
+                "net gripper: place gripping: output 'Pieces' is set to NaN; a finite number is needed",
+                "net other: rising() belongs to no signal; write it behind on(...)",
+                "net other: transition t: place p is of this net; draw a test or an inhibitor arc",
+                "output 'Gripper' is written by the nets gripper and other; let one write it, and the other tell that one by a place")) {
+            assertTrue(wrong.mistakes().contains(expected), expected + " in\n" + wrong.getMessage());
+        }
+        assertTrue(wrong.mistakes().stream().anyMatch(text -> text.startsWith("net other: writes: driver 'Gripper' has no signal 'Wait'")));
+        assertEquals(15, wrong.mistakes().size(), wrong.getMessage());
+    }
+
+    @Test
+    void theMachinesEndAndADriverThatHasTickedAreRefused() {
+        assertTrue(assertThrows(BindingException.class, () -> NetController.of(machine, BoundNet.of(gripper()))).getMessage()
+            .contains("nets need role = \"controller\" in [fieldbus]"));
+        plc.receive(0);
+        assertTrue(assertThrows(BindingException.class, () -> NetController.of(plc, BoundNet.of(gripper()))).getMessage()
+            .contains("has ticked already"));
+    }
+
+    @Test
+    void steadyScansMakeNoGarbage() {
+        assumeTrue(ManagementFactory.getThreadMXBean() instanceof ThreadMXBean, "this JVM counts no allocations");
+        ThreadMXBean threads = (ThreadMXBean) ManagementFactory.getThreadMXBean();
+        BoundNet[] both = handshake();
+        both[1].firing("end").run((in, out) -> out.set(0, in.get(2))).writes("Pieces").during("works").set("Gripper");
+        both[0].during("asks").set("Brake");
+        bind(both);
+        machine.signal("Piece at stop").setBoolean(true);
+        long allocated = Long.MAX_VALUE;
+        int fired = 0;
+        // The JVM itself allocates a little as it compiles; a scan that allocates would do so in every round.
+        for (int round = 0; round < 5; round++) {
+            long before = threads.getCurrentThreadAllocatedBytes();
+            for (int i = 0; i < 20_000; i++) {
+                fired += scan();
+            }
+            allocated = Math.min(allocated, threads.getCurrentThreadAllocatedBytes() - before);
+        }
+        assertEquals(0, allocated, fired + " firings");
+        assertTrue(fired > 100_000, fired + " firings");
+    }
+}

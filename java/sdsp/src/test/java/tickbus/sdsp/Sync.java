@@ -1,0 +1,61 @@
+package tickbus.sdsp;
+
+import java.io.BufferedReader;
+import java.io.File;
+import java.io.IOException;
+import java.net.InetSocketAddress;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.concurrent.CompletableFuture;
+import java.util.concurrent.CompletionException;
+
+/** {@code tickbus sync} on a port of its own. */
+final class Sync implements AutoCloseable {
+    private final Process process;
+    private final BufferedReader out;
+    private final InetSocketAddress address;
+
+    /** Starts it in a folder, with the text of its file; there it listens on port 20060. */
+    Sync(Path folder, String run) throws IOException {
+        Path file = Files.writeString(folder.resolve("run.toml"), run.replace(":20060", ":0"));
+        String command = File.separatorChar == '\\' ? "tickbus.exe" : "tickbus";
+        process = new ProcessBuilder(Path.of(System.getProperty("tickbus.native.dir"), command).toString(), "sync",
+            file.toString()).redirectError(ProcessBuilder.Redirect.INHERIT).start();
+        out = process.inputReader();
+        String line = await("sync: listening on ");
+        address = new InetSocketAddress("127.0.0.1", Integer.parseInt(line.substring(line.lastIndexOf(':') + 1)));
+    }
+
+    /** Where it listens. */
+    InetSocketAddress address() {
+        return address;
+    }
+
+    /** Waits for a line of its output that begins like this. */
+    String await(String begin) throws IOException {
+        StringBuilder all = new StringBuilder();
+        for (String line = out.readLine(); line != null; line = out.readLine()) {
+            if (line.startsWith(begin)) {
+                return line;
+            }
+            all.append(line).append('\n');
+        }
+        throw new AssertionError("no line that begins with \"" + begin + "\" in:\n" + all);
+    }
+
+    /** Takes part in a thread of its own. */
+    CompletableFuture<Outcome> join(Participant participant) {
+        return CompletableFuture.supplyAsync(() -> {
+            try {
+                return Client.join(address, participant);
+            } catch (EndedException e) {
+                throw new CompletionException(e);
+            }
+        }, task -> new Thread(task).start());
+    }
+
+    @Override
+    public void close() {
+        process.destroy();
+    }
+}

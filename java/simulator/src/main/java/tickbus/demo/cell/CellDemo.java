@@ -1,0 +1,262 @@
+package tickbus.demo.cell;
+
+import controlinterface.ControlInterfaceDeviceDriver;
+import java.io.IOException;
+import java.io.PrintStream;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.ArrayList;
+import java.util.List;
+import java.util.Map;
+import tickbus.demo.DemoFailure;
+import tickbus.demo.HtmlPage;
+import tickbus.demo.PlcCommand;
+import tickbus.demo.PlcProcess;
+import tickbus.demo.Stalls;
+import tickbus.demo.Timeline;
+import tickbus.demo.Verdict;
+import tickbus.simulator.Arguments;
+import tickbus.simulator.DeviceDriverFolder;
+import tickbus.simulator.ShutdownGuard;
+import tickbus.simulator.Simulator;
+import tickbus.simulator.TickMode;
+import tickbus.simulator.TimeSource;
+import tickbus.simulator.text.Durations;
+
+/**
+ * The demo's command line; see {@code --help} for what it takes.
+ *
+ * <p>Its last line on standard output is the verdict, {@code demo-cell: ok …} or {@code demo-cell: failed reason=…}.
+ * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
+ */
+public final class CellDemo {
+    private static final Verdict VERDICT = new Verdict("demo-cell");
+
+    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
+    private static final int ATTEMPTS = 3;
+
+    /** How often the nets' process reports. */
+    private static final long REPORT_NANOS = 100_000_000L;
+    private static final int TICKS_PER_LOOK_AT_NETS = 25;
+
+    private final CellOptions options;
+    private final Timeline timeline;
+    private final ManufacturingCell cell = new ManufacturingCell();
+    private final Stalls stalls;
+    private final CellOperator operator;
+    private Simulator simulator;
+    private Map<String, String> nets = Map.of();
+
+    private CellDemo(CellOptions options, PrintStream out, List<String> notes) {
+        this.options = options;
+        timeline = new Timeline(event -> out.println(event.line()));
+        stalls = new Stalls(TimeSource.system(), options.stepNanos());
+        operator = new CellOperator(cell, timeline, options.cylinders());
+        notes.forEach(note -> timeline.add(0, "note", note));
+    }
+
+    /**
+     * Runs the demo and ends the JVM with its exit code.
+     *
+     * @param args the command line
+     */
+    public static void main(String[] args) {
+        System.exit(run(args, System.out, System.err));
+    }
+
+    /**
+     * Runs the demo.
+     *
+     * @param args the command line
+     * @param out gets what happens and, last, the verdict
+     * @param err gets complaints about the command line, and what unexpected exceptions say
+     * @return the exit code
+     */
+    public static int run(String[] args, PrintStream out, PrintStream err) {
+        if (List.of(args).contains("--help")) {
+            out.print(CellOptions.USAGE);
+            return Verdict.OK;
+        }
+        CellOptions options;
+        try {
+            options = CellOptions.read(args);
+        } catch (Arguments.UsageException e) {
+            err.println(e.getMessage() + "\n");
+            err.print(CellOptions.USAGE);
+            out.println(VERDICT.failed(e.getMessage()));
+            return Verdict.USAGE;
+        }
+        // The guard is closed last, so that the verdict is printed even after Ctrl-C.
+        try (ShutdownGuard guard = new ShutdownGuard()) {
+            List<String> notes = new ArrayList<>();
+            String verdict;
+            while (true) {
+                CellDemo demo = new CellDemo(options, out, List.copyOf(notes));
+                verdict = demo.play(guard, err);
+                long stall = demo.stalls.longestNanos();
+                if (VERDICT.isOk(verdict) || guard.triggered() || stall == 0 || notes.size() == ATTEMPTS - 1) {
+                    break;
+                }
+                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
+                        + stall / 1_000_000 + " ms: " + verdict);
+            }
+            if (options.plc() != null && options.recording() != null && !guard.triggered()) {
+                Path page = options.report().resolveSibling("report.html");
+                String trouble = CellPage.make(options, page, statistics(options));
+                if (trouble == null) {
+                    out.println("demo-cell: page=" + page);
+                } else if (VERDICT.isOk(verdict)) {
+                    verdict = VERDICT.failed(trouble);
+                }
+            }
+            return VERDICT.end(verdict, guard, out);
+        }
+    }
+
+    /** Everything from opening the driver to writing the report. */
+    private String play(ShutdownGuard guard, PrintStream err) {
+        String verdict;
+        try (Simulator opened = new Simulator(DeviceDriverFolder.scan(options.drivers()).open(), cell, options.control(),
+                options.stepNanos(), TimeSource.system())) {
+            simulator = opened;
+            verdict = verdict(guard, err);
+            return report(verdict);
+        } catch (RuntimeException | Error e) {
+            // The driver or the control table did not open, or the driver did not close.
+            return report(VERDICT.failed(e, err));
+        }
+    }
+
+    private String verdict(ShutdownGuard guard, PrintStream err) {
+        try {
+            if (simulator.drivers().size() != 1) {
+                throw new DemoFailure("the driver folder has " + simulator.drivers().size()
+                        + " .cfg files; the demo takes exactly one");
+            }
+            ControlInterfaceDeviceDriver driver = simulator.drivers().get(0);
+            Files.createDirectories(CellPage.nets(options));
+            try (PlcProcess plc = new PlcProcess(() -> command(driver), REPORT_NANOS,
+                    options.report().toAbsolutePath().resolveSibling("nets.log"))) {
+                plc.start();
+                timeline.add(0, "nets", plc.name());
+                operate(plc, guard);
+            }
+            return check();
+        } catch (IOException e) {
+            return VERDICT.failed("the folder of the nets cannot be made: " + e);
+        } catch (RuntimeException | Error e) {
+            return VERDICT.failed(e, err);
+        }
+    }
+
+    private List<String> command(ControlInterfaceDeviceDriver driver) {
+        Path cfg = DeviceDriverFolder.scan(options.drivers()).configurations().get(driver.id());
+        String java = Path.of(System.getProperty("java.home"), "bin", "java").toString();
+        String client = "[fieldbus]\nkind = \"modbus-client\"\nrole = \"controller\"\nwrite_to = \"tickbus "
+                + driver.name() + "\"\naddress = \"" + PlcCommand.address(driver) + "\"\n[record]\nfile = \"none.vcd\"\nwhen = \"never\"\n";
+        List<String> command = new ArrayList<>(List.of(java, "--enable-native-access=ALL-UNNAMED", "-cp", options.nets()));
+        // Such as where the native library is.
+        System.getProperties().stringPropertyNames().stream().filter(name -> name.startsWith("tickbus."))
+                .forEach(name -> command.add("-D" + name + "=" + System.getProperty(name)));
+        command.addAll(List.of("tickbus.cell.CellControl", cfg.toString(), client, CellPage.nets(options).toString()));
+        return command;
+    }
+
+    private void operate(PlcProcess plc, ShutdownGuard guard) {
+        simulator.unconnected().forEach(name -> timeline.add(0, "note", "no row of the control table writes " + name));
+        simulator.run(TickMode.REAL_TIME, () -> {
+            if (guard.triggered()) {
+                throw new DemoFailure("interrupted");
+            }
+            if (simulator.ticks() > 0) {
+                stalls.look();
+            }
+            if (simulator.ticks() % TICKS_PER_LOOK_AT_NETS == 0) {
+                Verdict.unlessInterrupted(guard, plc::check);
+                nets = plc.statistics();
+                plc.news().forEach(line -> timeline.add(simulator.simulationNanos(), "nets", line));
+                if (nets.containsKey("stop")) {
+                    throw new DemoFailure("a net has stopped: " + nets.get("stop"));
+                }
+            }
+            operator.act(simulator.simulationNanos());
+            boolean over = operator.done() && !cell.showsRunning() && nets.containsKey("markings");
+            if (!over && simulator.simulationNanos() >= options.timeLimitNanos()) {
+                throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
+                        + " of simulation time is over with " + cell.delivered().size() + " of " + options.cylinders()
+                        + " cylinders");
+            }
+            return !over;
+        });
+        if (!operator.done()) {
+            throw new DemoFailure("interrupted");
+        }
+        nets = plc.statistics();
+    }
+
+    /** The verdict when all cylinders are out. */
+    private String check() {
+        Counters counters = cell.counters();
+        must(cell.delivered().size() == options.cylinders(), "there are " + cell.delivered().size() + " cylinders instead of "
+                + options.cylinders());
+        must(cell.delivered().stream().allMatch(Workpiece::isComplete), "a cylinder is not complete; the report has them all");
+        long kinds = cell.delivered().stream().map(PieceKind::of).distinct().count();
+        int all = PieceKind.values().length - 1;
+        must(kinds == Math.min(all, options.cylinders()) || options.cylinders() < all, "there are " + kinds
+                + " kinds of cylinders instead of " + all + ": " + CellReport.kinds(cell));
+        must(counters.fallen() == 0, counters.fallen() + " pieces fell");
+        must(counters.wasted() == 0, counters.wasted() + " parts were pressed into nothing");
+        must(counters.collisions() == 0, "an arm was moved to the side while it was down");
+        must(counters.loaderJams() + counters.palletJams() + counters.vacuumLosses() == operator.mishaps(),
+                "of " + operator.mishaps() + " mishaps " + counters.loaderJams() + " of the loader, " + counters.palletJams()
+                        + " of pallets and " + counters.vacuumLosses() + " of the vacuum happened and were recovered");
+        equal("loader_freed", counters.loaderJams());
+        equal("pallet_freed", counters.palletJams());
+        equal("vacuum_lost", counters.vacuumLosses());
+        equal("refilled", operator.refills());
+        equal("stops", 0);
+        must("true".equals(nets.get("all_markings")), "the analysis of the nets gave up at " + nets.get("markings") + " markings");
+        equal("deadlocks", 0);
+        return VERDICT.ok("cylinders=" + options.cylinders() + " kinds=" + CellReport.kinds(cell) + " deadlocks=0 markings="
+                + nets.get("markings") + " jams=" + (counters.loaderJams() + counters.palletJams()) + " recovered="
+                + (number("loader_freed") + number("pallet_freed")) + " vacuum_lost=" + counters.vacuumLosses() + " refills="
+                + operator.refills() + " ticks=" + simulator.ticks() + " report=" + options.report());
+    }
+
+    private long number(String key) {
+        try {
+            return Long.parseLong(nets.getOrDefault(key, ""));
+        } catch (NumberFormatException e) {
+            throw new DemoFailure("the nets' process says " + key + "=" + nets.get(key) + ", which is no count");
+        }
+    }
+
+    private void equal(String key, long here) {
+        must(number(key) == here, "the nets count " + key + "=" + number(key) + " instead of " + here);
+    }
+
+    private static void must(boolean fulfilled, String reason) {
+        if (!fulfilled) {
+            throw new DemoFailure(reason);
+        }
+    }
+
+    private static Path statistics(CellOptions options) {
+        return options.report().resolveSibling("statistics.txt");
+    }
+
+    private String report(String verdict) {
+        try {
+            Files.createDirectories(options.report().toAbsolutePath().getParent());
+            if (simulator != null) {
+                HtmlPage.keepStatistics(statistics(options), simulator.drivers().get(0).statistics());
+            }
+            Path markings = CellPage.nets(options).resolve("nets.txt");
+            Files.writeString(options.report(), CellReport.write(options, verdict, timeline, cell, nets,
+                    Files.exists(markings) ? Files.readString(markings) : "", simulator));
+            return verdict;
+        } catch (IOException | RuntimeException e) {
+            return VERDICT.isOk(verdict) ? VERDICT.failed("the report cannot be written: " + e) : verdict;
+        }
+    }
+}

@@ -1,0 +1,115 @@
+package tickbus.demo.cell;
+
+import java.util.ArrayList;
+import java.util.Collections;
+import java.util.List;
+import java.util.Locale;
+import java.util.Random;
+import tickbus.demo.Timeline;
+
+/** Fills magazines, turns the switch, provokes mishaps, and writes down what happens. */
+final class CellOperator {
+    /** So many cylinders are out when each mishap is provoked; at least one more is made after each. */
+    private static final int LOADER_JAMS_AFTER = 2;
+    private static final int PALLET_JAMS_AFTER = 4;
+    private static final int VACUUM_IS_LOST_AFTER = 6;
+    /** The first filling of station 3's magazine, which does not suffice, and how long the operator lets it wait. */
+    private static final int FIRST_PARTS = 7;
+    private static final long WALK_NANOS = 500_000_000;
+    private static final long SEED = 12;
+
+    private final ManufacturingCell cell;
+    private final Timeline timeline;
+    private final int cylinders;
+    private int delivered;
+    private int mishaps;
+    private int refills;
+    private long emptySince = -1;
+    private boolean begun;
+    private boolean jammed;
+
+    CellOperator(ManufacturingCell cell, Timeline timeline, int cylinders) {
+        this.cell = cell;
+        this.timeline = timeline;
+        this.cylinders = cylinders;
+    }
+
+    /** How many mishaps were provoked, with the empty magazine. */
+    int mishaps() {
+        return mishaps;
+    }
+
+    int refills() {
+        return refills;
+    }
+
+    boolean done() {
+        return cell.delivered().size() >= cylinders;
+    }
+
+    /** Before each tick. */
+    void act(long nanos) {
+        if (!begun) {
+            begun = true;
+            begin(nanos);
+        }
+        List<Workpiece> out = cell.delivered();
+        for (; delivered < out.size(); delivered++) {
+            Workpiece piece = out.get(delivered);
+            timeline.add(nanos, "exit", "cylinder " + piece.number() + ", " + PieceKind.of(piece).name().toLowerCase(Locale.ROOT)
+                    .replace('_', ' '));
+            mishapAfter(delivered + 1, nanos);
+        }
+        if (cell.isJammed() != jammed) {
+            jammed = !jammed;
+            timeline.add(nanos, "cell", jammed ? "something is stuck" : "it is free again");
+        }
+        refill(nanos);
+        if (done()) {
+            cell.start(false);
+        }
+    }
+
+    private void begin(long nanos) {
+        List<Colour> sleeves = new ArrayList<>();
+        for (int i = 0; i < cylinders; i++) {
+            sleeves.add(Colour.values()[i % Colour.values().length]);
+        }
+        Collections.shuffle(sleeves, new Random(SEED));
+        cell.fillSleeves(sleeves);
+        cell.fillParts(FIRST_PARTS);
+        cell.fillHeads(cylinders);
+        cell.fillCaps(cylinders);
+        cell.start(true);
+        timeline.add(nanos, "operator", cylinders + " sleeves are in the magazine, and the cell is started");
+    }
+
+    private void mishapAfter(int count, long nanos) {
+        if (count == LOADER_JAMS_AFTER && count + 1 < cylinders) {
+            mishap(nanos, "the loader will jam", cell::jamLoader);
+        } else if (count == PALLET_JAMS_AFTER && count + 1 < cylinders) {
+            mishap(nanos, "a pallet will get stuck", cell::jamPallet);
+        } else if (count == VACUUM_IS_LOST_AFTER && count + 1 < cylinders) {
+            mishap(nanos, "station 4 will lose its vacuum", cell::loseVacuum);
+        }
+    }
+
+    private void mishap(long nanos, String what, Runnable how) {
+        how.run();
+        mishaps++;
+        timeline.add(nanos, "mishap", what);
+    }
+
+    private void refill(long nanos) {
+        if (!cell.showsEmptyParts()) {
+            emptySince = -1;
+        } else if (emptySince < 0) {
+            emptySince = nanos;
+            timeline.add(nanos, "station 3", "its magazine is empty");
+        } else if (refills == 0 && nanos - emptySince >= WALK_NANOS) {
+            refills++;
+            cell.fillParts(cylinders);
+            timeline.add(nanos, "operator", "the magazine is filled");
+        }
+    }
+}

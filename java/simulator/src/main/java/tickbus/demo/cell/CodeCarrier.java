@@ -1,0 +1,48 @@
+package tickbus.demo.cell;
+
+/** The memory at the bottom of a pallet: bytes, read and written in blocks by the head below it. */
+public final class CodeCarrier {
+    /** How many bytes it has. */
+    public static final int BYTES = 32;
+
+    private final byte[] memory = new byte[BYTES];
+
+    /**
+     * Reads a block.
+     *
+     * @param address its first byte, from 0
+     * @param count how many bytes
+     * @return a copy
+     * @throws IndexOutOfBoundsException if the block reaches beyond the memory
+     */
+    public byte[] read(int address, int count) {
+        check(address, count);
+        byte[] block = new byte[count];
+        System.arraycopy(memory, address, block, 0, count);
+        return block;
+    }
+
+    /**
+     * Writes a block.
+     *
+     * @param address its first byte, from 0
+     * @param block the bytes
+     * @throws IndexOutOfBoundsException if the block reaches beyond the memory; nothing is written then
+     */
+    public void write(int address, byte[] block) {
+        check(address, block.length);
+        System.arraycopy(block, 0, memory, address, block.length);
+    }
+
+    /** One byte, 0 to 255. */
+    int at(int address) {
+        return memory[address] & 0xFF;
+    }
+
+    private static void check(int address, int count) {
+        if (address < 0 || count < 0 || address > BYTES - count) {
+            throw new IndexOutOfBoundsException("a block of " + count + " bytes from " + address
+                    + " in a code carrier of " + BYTES + " bytes");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+package tickbus.demo.cell;
+
+/** What has happened in the cell. */
+public final class Counters {
+    int begun;
+    int fallen;
+    int wasted;
+    int collisions;
+    int vacuumLosses;
+    int loaderJams;
+    int palletJams;
+
+    Counters() {
+    }
+
+    /** Sleeves that came out of the magazine. */
+    public int begun() {
+        return begun;
+    }
+
+    /** Pieces that fell where nothing holds them. */
+    public int fallen() {
+        return fallen;
+    }
+
+    /** Parts that were pressed into nothing. */
+    public int wasted() {
+        return wasted;
+    }
+
+    /** Steps in which an arm was moved to the side while it was not up. */
+    public int collisions() {
+        return collisions;
+    }
+
+    /** How often the vacuum was lost. */
+    public int vacuumLosses() {
+        return vacuumLosses;
+    }
+
+    /** How often the loader jammed and got free again. */
+    public int loaderJams() {
+        return loaderJams;
+    }
+
+    /** How often a pallet jammed and got free again. */
+    public int palletJams() {
+        return palletJams;
+    }
+}

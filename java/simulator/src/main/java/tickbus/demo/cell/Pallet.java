@@ -1,0 +1,30 @@
+package tickbus.demo.cell;
+
+/** A pallet on the transport: a code carrier, and perhaps a piece. */
+public final class Pallet {
+    private final int number;
+    private final CodeCarrier carrier = new CodeCarrier();
+    /** Where it is on the loop, in micrometres from stop 1. */
+    long micrometres;
+    Workpiece piece;
+
+    Pallet(int number, long micrometres) {
+        this.number = number;
+        this.micrometres = micrometres;
+    }
+
+    /** Its number, from 1. */
+    public int number() {
+        return number;
+    }
+
+    /** Its code carrier. */
+    public CodeCarrier carrier() {
+        return carrier;
+    }
+
+    /** The piece on it, or null. */
+    public Workpiece piece() {
+        return piece;
+    }
+}

@@ -1,0 +1,266 @@
+package tickbus.identification;
+
+import java.util.ArrayList;
+import java.util.Comparator;
+import java.util.List;
+import java.util.regex.Matcher;
+import java.util.regex.Pattern;
+import tickbus.Signal;
+import tickbus.Tickbus;
+
+/**
+ * A head of a reader of code carriers, as a controller sees it over the bus {@code ivi-client}.
+ *
+ * <p>A command is begun by {@link #read} or {@link #write}; it goes out with the next exchange, and is over when {@link
+ * #isDone} says so after one of the exchanges that follow. Then {@link #status} and {@link #data} tell what became of it.
+ *
+ * <pre>{@code
+ * head.readPallet();
+ * do {
+ *     bus.exchange();
+ * } while (!head.isDone());
+ * PalletRecord pallet = head.pallet();
+ * }</pre>
+ *
+ * <p>The head finds its signals by their addresses: {@code %QB0} is the command, {@code %QB1} a length, {@code %QW2} an
+ * address, and the data begin at {@code %QB4}; {@code %IB0} is the command's echo, {@code %IB1} the status, {@code
+ * %IX2.0} says whether a carrier is there, {@code %IB3} is a length, and the data begin at {@code %IB4}. Signals for data
+ * can be of any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Like all signals it
+ * belongs to the ticking thread.
+ */
+public final class IdentificationHead {
+    /** The command was executed. */
+    public static final int DONE = 0x00;
+    /** No carrier is before the head. */
+    public static final int NO_CARRIER = 0x03;
+    /** The command was executed, and the carrier's battery is low. */
+    public static final int BATTERY_LOW = 0x10;
+    /** The reader did not answer, and may have executed the command. */
+    public static final int NO_ANSWER = 0xFF;
+
+    private static final int TOGGLE = 0x80;
+    private static final int BEFORE_DATA = 4;
+    private static final Pattern ADDRESS = Pattern.compile("%([IQ])([BWDL])(\\d+)");
+    private static final List<String> UNSIGNED =
+        List.of("BYTE", "USINT", "WORD", "UINT", "DWORD", "UDINT", "LWORD", "ULINT");
+
+    private final String shown;
+    private final Signal command;
+    private final Signal length;
+    private final Signal address;
+    private final Signal echo;
+    private final Signal status;
+    private final Signal present;
+    private final Signal received;
+    private final List<Part> sentData;
+    private final List<Part> receivedData;
+
+    /** A signal that holds some octets of the data, the first one in its highest byte. */
+    private record Part(Signal signal, int at, int octets) {
+    }
+
+    /**
+     * The head of a driver without {@code [[station]]} tables.
+     *
+     * @param bus an open driver whose bus is an {@code ivi-client}
+     * @throws IllegalArgumentException if a signal is not there, with its address
+     */
+    public IdentificationHead(Tickbus bus) {
+        this(bus, "");
+    }
+
+    /**
+     * The head that is a station of a driver.
+     *
+     * @param bus an open driver whose bus is an {@code ivi-client}
+     * @param station the station's name
+     * @throws IllegalArgumentException if a signal is not there, with its address
+     */
+    public IdentificationHead(Tickbus bus, String station) {
+        this.shown = station.isEmpty() ? bus.toString() : "station \"" + station + "\" of " + bus;
+        List<Signal> own = bus.signals().stream().filter(signal -> signal.station().equals(station)).toList();
+        this.command = require(own, "%QB0");
+        this.length = require(own, "%QB1");
+        this.address = require(own, "%QW2");
+        this.echo = require(own, "%IB0");
+        this.status = require(own, "%IB1");
+        this.present = require(own, "%IX2.0");
+        this.received = require(own, "%IB3");
+        this.sentData = data(own, "Q");
+        this.receivedData = data(own, "I");
+    }
+
+    private Signal require(List<Signal> own, String place) {
+        return own.stream().filter(signal -> signal.address().equals(place)).findAny().orElseThrow(
+            () -> new IllegalArgumentException("the head needs a signal at " + place + " in " + shown
+                + "; write a [[signal]] with address = \"" + place + "\""));
+    }
+
+    /** The signals for data in this area, in the order of their addresses, up to the first gap. */
+    private List<Part> data(List<Signal> own, String area) {
+        List<Part> all = new ArrayList<>();
+        for (Signal signal : own) {
+            Matcher place = ADDRESS.matcher(signal.address());
+            if (place.matches() && place.group(1).equals(area) && Integer.parseInt(place.group(3)) >= BEFORE_DATA) {
+                if (!UNSIGNED.contains(signal.type())) {
+                    throw new IllegalArgumentException("signal '" + signal.name() + "' at " + signal.address() + " in "
+                        + shown + " is a " + signal.type() + "; octets need one of " + String.join(", ", UNSIGNED));
+                }
+                int octets = 1 << "BWDL".indexOf(place.group(2));
+                all.add(new Part(signal, Integer.parseInt(place.group(3)) - BEFORE_DATA, octets));
+            }
+        }
+        all.sort(Comparator.comparingInt(Part::at));
+        int end = 0;
+        List<Part> whole = new ArrayList<>();
+        for (Part part : all) {
+            if (part.at != end) {
+                break;
+            }
+            whole.add(part);
+            end += part.octets;
+        }
+        return List.copyOf(whole);
+    }
+
+    private static int room(List<Part> data) {
+        return data.stream().mapToInt(Part::octets).sum();
+    }
+
+    /**
+     * Begins to read octets.
+     *
+     * @param from the address of the first one
+     * @param count how many
+     * @throws IllegalStateException if another command is not {@link #isDone done}
+     * @throws IllegalArgumentException if there are no signals for so many
+     */
+    public void read(int from, int count) {
+        mustFit(count, receivedData, "%IB");
+        begin('w', from, count);
+    }
+
+    /**
+     * Begins to write octets.
+     *
+     * @param to the address of the first one
+     * @param octets what is to be written
+     * @throws IllegalStateException if another command is not {@link #isDone done}
+     * @throws IllegalArgumentException if there are no signals for so many
+     */
+    public void write(int to, byte[] octets) {
+        mustFit(octets.length, sentData, "%QB");
+        mustBeDone();
+        for (Part part : sentData) {
+            long value = 0;
+            for (int at = part.at; at < part.at + part.octets; at++) {
+                value = value << 8 | (at < octets.length ? octets[at] & 0xFF : 0);
+            }
+            part.signal.setLong(value);
+        }
+        begin('k', to, octets.length);
+    }
+
+    /**
+     * Begins to read the {@link PalletRecord} at address 0.
+     *
+     * @throws IllegalStateException if another command is not {@link #isDone done}
+     */
+    public void readPallet() {
+        read(0, PalletRecord.LENGTH);
+    }
+
+    /**
+     * Begins to write a record to address 0.
+     *
+     * @param pallet what is to be written
+     * @throws IllegalStateException if another command is not {@link #isDone done}
+     */
+    public void writePallet(PalletRecord pallet) {
+        write(0, pallet.toOctets());
+    }
+
+    private void begin(char character, int at, int count) {
+        mustBeDone();
+        if (at < 0 || at > 0xFFFF) {
+            throw new IllegalArgumentException("the address " + at + " is none of a carrier; write one from 0 to 65535");
+        }
+        address.setLong(at);
+        length.setLong(count);
+        command.setLong((command.getLong() ^ TOGGLE) & TOGGLE | character);
+    }
+
+    private void mustFit(int count, List<Part> data, String first) {
+        if (count < 1 || count > room(data)) {
+            throw new IllegalArgumentException(count + " octets do not fit into the data of " + shown + ", which has signals for "
+                + room(data) + " from " + first + BEFORE_DATA + " on");
+        }
+    }
+
+    private void mustBeDone() {
+        if (!isDone()) {
+            throw new IllegalStateException("the head in " + shown + " has not answered the command before; wait for isDone()");
+        }
+    }
+
+    /**
+     * Whether the last command has been answered, or none was given.
+     *
+     * @return false while the command is on its way, and while the line is not up
+     */
+    public boolean isDone() {
+        return echo.getLong() == command.getLong();
+    }
+
+    /**
+     * Whether a carrier is before the head.
+     *
+     * @return false also while the line is not up
+     */
+    public boolean isPresent() {
+        return present.getBoolean();
+    }
+
+    /**
+     * What became of the last command, as the reader's manual numbers it.
+     *
+     * @return {@link #DONE}, {@link #BATTERY_LOW}, or an error such as {@link #NO_CARRIER}
+     * @throws IllegalStateException if it is not {@link #isDone done}
+     */
+    public int status() {
+        mustBeDone();
+        return (int) status.getLong();
+    }
+
+    /**
+     * The octets that were read.
+     *
+     * @return the data of the last answer; none after a command that writes
+     * @throws IllegalStateException if it is not {@link #isDone done}, or failed
+     */
+    public byte[] data() {
+        int found = status();
+        if (found != DONE && found != BATTERY_LOW) {
+            throw new IllegalStateException(String.format("the command has failed with status %02X in %s; see status()", found, shown));
+        }
+        byte[] octets = new byte[(int) received.getLong()];
+        for (Part part : receivedData) {
+            long value = part.signal.getLong();
+            for (int at = Math.min(part.at + part.octets, octets.length) - 1; at >= part.at; at--) {
+                octets[at] = (byte) (value >>> 8 * (part.at + part.octets - 1 - at));
+            }
+        }
+        return octets;
+    }
+
+    /**
+     * The record that was read by {@link #readPallet}.
+     *
+     * @return the pallet's record
+     * @throws IllegalStateException if the command is not {@link #isDone done}, or failed
+     * @throws IllegalArgumentException if the carrier holds no record
+     */
+    public PalletRecord pallet() {
+        return PalletRecord.ofOctets(data());
+    }
+}

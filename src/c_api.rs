@@ -1,0 +1,456 @@
+//! The functions of `include/tickbus.h`: a simulator in C.
+//!
+//! As in [`jni`](super::jni), the tick and its halves take no lock, make no system call and allocate nothing. A function never
+//! unwinds into its caller.
+
+#![allow(
+    unsafe_code,
+    reason = "exported names and the pointers that a caller in C hands in"
+)]
+
+use std::cell::RefCell;
+use std::collections::HashSet;
+use std::ffi::{CStr, CString, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::ptr::{NonNull, null, null_mut};
+
+use once_cell::sync::Lazy;
+use std::sync::Mutex;
+
+use tickbus_base::statistics::entries;
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::nearest;
+use tickbus_binding::{
+    Device, EVENT_WORDS, EVENTS, Handles, Refusal, Shared, faults, is_written, open, panic_message,
+    read_fault,
+};
+use tickbus_driver::Code;
+
+/// Every driver that is open through this interface.
+static DRIVERS: Handles<Opened> = Handles::new();
+
+/// How long closing waits for the log to reach stderr.
+const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
+
+/// The buffers of closed drivers. Their memory is used again and never given back, so that a caller that moves values after
+/// closing moves them into memory that is there.
+static RETIRED: Mutex<Vec<&'static mut [u64]>> = Mutex::new(Vec::new());
+
+/// Texts that were handed out: their pointers stay valid.
+static TEXTS: Lazy<Mutex<HashSet<&'static CStr>>> = Lazy::new(Mutex::default);
+
+thread_local! {
+    static LAST: RefCell<Last> = const { RefCell::new(Last::None) };
+}
+
+/// Why this thread's last failed call failed.
+enum Last {
+    None,
+    /// A tick; its text is made when it is asked for.
+    Tick(i64, Code),
+    Told(CString),
+}
+
+/// `tb_signal` of the header.
+#[repr(C)]
+struct CSignal {
+    name: *const c_char,
+    address: *const c_char,
+    data_type: *const c_char,
+    unit: *const c_char,
+    station: *const c_char,
+    slot: i32,
+    edges: i32,
+    is_written: i32,
+    is_integer: i32,
+}
+
+/// An open driver; its buffer goes back to [`RETIRED`].
+struct Opened {
+    device: Device<()>,
+    words: NonNull<u64>,
+    length: usize,
+}
+
+// SAFETY: the buffer's memory is not bound to a thread; it is reached through `device` and the caller alone.
+unsafe impl Send for Opened {}
+
+impl Opened {
+    fn close(self) {
+        self.device.close();
+        // SAFETY: `memory_of` leaked this slice, and its one user has ended.
+        let words = unsafe { std::slice::from_raw_parts_mut(self.words.as_ptr(), self.length) };
+        retired().push(words);
+    }
+}
+
+fn retired() -> std::sync::MutexGuard<'static, Vec<&'static mut [u64]>> {
+    RETIRED
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// Memory for a buffer of this many bytes: one that is free, or a new one.
+fn memory_of(bytes: usize) -> &'static mut [u64] {
+    let words = bytes.div_ceil(size_of::<u64>());
+    let mut retired = retired();
+    let fitting = (0..retired.len()).filter(|&at| retired[at].len() >= words);
+    match fitting.min_by_key(|&at| retired[at].len()) {
+        Some(at) => retired.swap_remove(at),
+        None => vec![0; words].leak(),
+    }
+}
+
+/// The same text as a C string that stays; it ends where it has a zero.
+fn permanent(text: &str) -> *const c_char {
+    let bytes: Vec<u8> = text.bytes().take_while(|&byte| byte != 0).collect();
+    let text = CString::new(bytes).unwrap_or_default();
+    let mut texts = TEXTS
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    if let Some(known) = texts.get(&*text) {
+        return known.as_ptr();
+    }
+    let kept: &'static CStr = Box::leak(text.into_boxed_c_str());
+    texts.insert(kept);
+    kept.as_ptr()
+}
+
+/// Keeps why a call failed, and returns its code.
+fn failed(refusal: &Refusal) -> i32 {
+    let text = refusal.to_string().replace('\0', " ");
+    let text = CString::new(text).unwrap_or_default();
+    LAST.with(|last| last.replace(Last::Told(text)));
+    refusal.code.code()
+}
+
+/// Does what may fail, and returns a count or a status.
+fn answer(work: impl FnOnce() -> Result<i32, Refusal>) -> i32 {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(done)) => done,
+        Ok(Err(refusal)) => failed(&refusal),
+        Err(payload) => {
+            let text = format!("panic: {}", panic_message(payload));
+            failed(&Refusal::new(Code::Internal, text))
+        }
+    }
+}
+
+fn tick(driver: i64, work: impl FnOnce(&mut Device<()>) -> i32) -> i32 {
+    match DRIVERS.with(driver, |opened| work(&mut opened.device)) {
+        Ok(status) if status >= 0 => status,
+        Ok(status) => {
+            let code = Code::ALL.into_iter().find(|code| code.code() == status);
+            tick_failed(driver, code.unwrap_or(Code::Internal))
+        }
+        Err(code) => tick_failed(driver, code),
+    }
+}
+
+#[cold]
+fn tick_failed(driver: i64, code: Code) -> i32 {
+    LAST.with(|last| last.replace(Last::Tick(driver, code)));
+    code.code()
+}
+
+/// The text behind a pointer.
+///
+/// # Safety
+///
+/// `text` must be null or point to a C string that stays while it is used.
+unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<&'a str, Refusal> {
+    if text.is_null() {
+        return Err(Refusal::new(Code::BadArgument, format!("{what} is NULL")));
+    }
+    // SAFETY: the caller's promise.
+    let bytes = unsafe { CStr::from_ptr(text) };
+    let wrong = |why| Refusal::new(Code::BadArgument, format!("{what} is not UTF-8: {why}"));
+    bytes.to_str().map_err(wrong)
+}
+
+/// Writes as much of a text as there is room for, with a final 0, and returns the length of all of it.
+///
+/// # Safety
+///
+/// `into` must be null or have room for `room` bytes.
+unsafe fn hand_over(text: &str, into: *mut c_char, room: usize) -> i32 {
+    if !into.is_null() && room > 0 {
+        let count = text.len().min(room - 1);
+        // SAFETY: the caller's promise; `count` + 1 is at most `room`.
+        unsafe {
+            into.cast::<u8>()
+                .copy_from_nonoverlapping(text.as_ptr(), count);
+            into.add(count).write(0);
+        }
+    }
+    i32::try_from(text.len()).unwrap_or(i32::MAX)
+}
+
+/// Why a tick failed, with the line's own reason if it has one.
+fn why(driver: i64, code: Code) -> Refusal {
+    let snapshot = DRIVERS.with(driver, |opened| opened.device.snapshot());
+    let Ok(snapshot) = snapshot else {
+        return DRIVERS.reason(driver, code);
+    };
+    let statistics = snapshot.to_string();
+    let reason = entries(&statistics).find_map(|(key, text)| (key == "reason").then_some(text));
+    match reason.filter(|reason| !reason.is_empty()) {
+        Some(reason) => Refusal::new(code, format!("{}: {reason}", code.text())),
+        None => Refusal::plain(code),
+    }
+}
+
+/// # Safety
+///
+/// `path` must be a C string, `tables` one or null; `driver` must be null or point to an `int64_t`.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver: *mut i64) -> i32 {
+    answer(|| {
+        tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
+        if driver.is_null() {
+            return Err(Refusal::new(Code::BadArgument, "driver is NULL"));
+        }
+        // SAFETY: the caller's promises, here and below.
+        unsafe { driver.write(0) };
+        let place = DRIVERS.reserve()?;
+        // SAFETY: as above.
+        let path = unsafe { text(path, "path") }?;
+        let tables = if tables.is_null() {
+            ""
+        } else {
+            // SAFETY: as above.
+            unsafe { text(tables, "tables") }?
+        };
+        let opened = open(Path::new(path), tables)?;
+        let slots = opened.slots().count;
+        let memory = memory_of(Shared::<()>::bytes(slots));
+        let length = memory.len();
+        let words = NonNull::from(memory).cast::<u64>();
+        // SAFETY: memory that is never given back, of at least this size, initialised, and of nobody else until this driver
+        // is closed. The header demands of the caller that it leaves the slots alone during a call.
+        let shared = unsafe { Shared::new(words.cast(), slots, ()) };
+        let shared =
+            shared.ok_or_else(|| Refusal::new(Code::Internal, "the buffer is not aligned"))?;
+        let device = Device::new(opened, shared);
+        let handle = place.fill(Opened {
+            device,
+            words,
+            length,
+        });
+        // SAFETY: as above.
+        unsafe { driver.write(handle) };
+        Ok(Code::Fresh.code())
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_close(driver: i64) -> i32 {
+    answer(|| {
+        let closed = DRIVERS.close(driver, Opened::close);
+        // The process may end right after this, and the driver's messages must not be lost.
+        tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
+        closed.map_err(Refusal::plain)?;
+        Ok(Code::Fresh.code())
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_exchange(driver: i64) -> i32 {
+    tick(driver, Device::exchange)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_receive(driver: i64) -> i32 {
+    tick(driver, Device::receive)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_send(driver: i64) -> i32 {
+    tick(driver, Device::send)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_buffer_of(driver: i64) -> *mut u64 {
+    let mut words = null_mut();
+    answer(|| {
+        words = DRIVERS.with_reason(driver, |opened| opened.words.as_ptr())?;
+        Ok(0)
+    });
+    words
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_signal_count(driver: i64) -> i32 {
+    answer(|| {
+        let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+        Ok(i32::try_from(config.table.signals.len()).unwrap_or(i32::MAX))
+    })
+}
+
+/// # Safety
+///
+/// `signal` must be null or point to a `tb_signal`.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_signal_at(driver: i64, index: i32, signal: *mut CSignal) -> i32 {
+    // SAFETY: the caller's promise.
+    answer(|| unsafe {
+        describe(driver, signal, |count, _| {
+            usize::try_from(index)
+                .ok()
+                .filter(|&at| at < count)
+                .ok_or_else(|| {
+                    format!(
+                        "there is no signal {index}; expected 0 to {}",
+                        count.saturating_sub(1)
+                    )
+                })
+        })
+    })
+}
+
+/// # Safety
+///
+/// `name` must be a C string, `signal` null or point to a `tb_signal`.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSignal) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's promises.
+        let name = unsafe { text(name, "name") }?;
+        let find = |_: usize, names: &mut dyn Iterator<Item = &str>| {
+            let names: Vec<&str> = names.collect();
+            names
+                .iter()
+                .position(|known| *known == name)
+                .ok_or_else(|| match nearest(name, names) {
+                    Some(near) => {
+                        format!("there is no signal \"{name}\"; did you mean \"{near}\"?")
+                    }
+                    None => format!("there is no signal \"{name}\""),
+                })
+        };
+        // SAFETY: as above.
+        unsafe { describe(driver, signal, find) }
+    })
+}
+
+/// Describes the signal whose index `find` gives, from the number of signals and their names.
+///
+/// # Safety
+///
+/// `into` must be null or point to a `tb_signal`.
+unsafe fn describe(
+    driver: i64,
+    into: *mut CSignal,
+    find: impl FnOnce(usize, &mut dyn Iterator<Item = &str>) -> Result<usize, String>,
+) -> Result<i32, Refusal> {
+    if into.is_null() {
+        return Err(Refusal::new(Code::BadArgument, "signal is NULL"));
+    }
+    let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+    let signals = &config.table.signals;
+    let mut names = signals.iter().map(|signal| &*signal.name);
+    let index =
+        find(signals.len(), &mut names).map_err(|why| Refusal::new(Code::BadArgument, why))?;
+    let edges = DRIVERS.with_reason(driver, |opened| opened.device.edges_slot(index))?;
+    let signal = &signals[index];
+    let number = |slot| i32::try_from(slot).unwrap_or(i32::MAX);
+    let description = CSignal {
+        name: permanent(&signal.name),
+        address: permanent(&signal.address().to_string()),
+        data_type: permanent(signal.data_type.name()),
+        unit: permanent(signal.unit.as_deref().unwrap_or_default()),
+        station: permanent(&config.table.stations[signal.station].name),
+        slot: number(index),
+        edges: edges.map_or(-1, number),
+        is_written: is_written(signal, config.role).into(),
+        is_integer: signal.is_integer_slot().into(),
+    };
+    // SAFETY: the caller's promise.
+    unsafe { into.write(description) };
+    Ok(Code::Fresh.code())
+}
+
+/// # Safety
+///
+/// `into` must be null or have room for `room` bytes.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_statistics(driver: i64, into: *mut c_char, room: usize) -> i32 {
+    answer(|| {
+        let snapshot = DRIVERS.with_reason(driver, |opened| opened.device.snapshot())?;
+        // SAFETY: the caller's promise.
+        Ok(unsafe { hand_over(&snapshot.to_string(), into, room) })
+    })
+}
+
+/// # Safety
+///
+/// `into` must be null or have room for `room` events.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_events(driver: i64, into: *mut i64, room: usize) -> i32 {
+    answer(|| {
+        if into.is_null() {
+            return Err(Refusal::new(Code::BadArgument, "events is NULL"));
+        }
+        let mut words = [0; EVENTS * EVENT_WORDS];
+        let room = room.min(EVENTS) * EVENT_WORDS;
+        let count =
+            DRIVERS.with_reason(driver, |opened| opened.device.events(&mut words[..room]))?;
+        // SAFETY: the caller's promise; an event is three words.
+        unsafe { into.copy_from_nonoverlapping(words.as_ptr(), count * EVENT_WORDS) };
+        Ok(i32::try_from(count).unwrap_or(i32::MAX))
+    })
+}
+
+/// # Safety
+///
+/// `fault` must be a C string.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_inject(driver: i64, fault: *const c_char) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's promise.
+        let fault = unsafe { text(fault, "fault") }?;
+        let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+        let fault = read_fault(fault, &config)?;
+        let id = DRIVERS.with_reason(driver, |opened| opened.device.inject(&fault))??;
+        Ok(i32::try_from(id).unwrap_or(i32::MAX))
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_end_fault(driver: i64, fault: i32) -> i32 {
+    answer(|| {
+        let id = u32::try_from(fault).unwrap_or_default();
+        Ok(DRIVERS
+            .with_reason(driver, |opened| opened.device.end_fault(id))?
+            .into())
+    })
+}
+
+/// # Safety
+///
+/// `into` must be null or have room for `room` bytes.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_faults(driver: i64, into: *mut c_char, room: usize) -> i32 {
+    answer(|| {
+        let board = DRIVERS.with_reason(driver, |opened| opened.device.board())?;
+        // SAFETY: the caller's promise.
+        Ok(unsafe { hand_over(&faults(&board), into, room) })
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_last_error() -> *const c_char {
+    let last = LAST.with(|last| {
+        let mut last = last.borrow_mut();
+        if let Last::Tick(driver, code) = *last {
+            let text = why(driver, code).to_string();
+            *last = Last::Told(CString::new(text.replace('\0', " ")).unwrap_or_default());
+        }
+        match &*last {
+            Last::Told(text) => text.as_ptr(),
+            _ => null(),
+        }
+    });
+    if last.is_null() { c"".as_ptr() } else { last }
+}

@@ -1,0 +1,115 @@
+//! `tickbus bridge serial DEVICE`: an ASCII driver at a serial line as a client of the dispatcher.
+
+use std::path::PathBuf;
+
+use super::say;
+use crate::cli::Outcome;
+use tickbus_base::os::{Parity, SerialSettings};
+use tickbus_base::time::{Monotonic, Stop};
+use tickbus_bridge::serial::{Device, Hosting, VirtualPort, run as carry};
+use tickbus_bridge::{AsciiBridge, LineEnd};
+use tickbus_fieldbus::tcp::Address;
+
+/// Carry lines both ways between a serial line and the dispatcher, for the ASCII driver of a SCADA system.
+///
+/// The program at the serial line says what a client says; docs/dispatcher.md has that. When the dispatcher or the port
+/// goes away, the bridge goes on calling, and introduces the client again.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The system's name of the serial port.
+    #[arg(required_unless_present = "pty", conflicts_with = "pty")]
+    device: Option<String>,
+
+    /// Make a virtual serial port instead, for a driver on this machine: it opens this name.
+    #[arg(long, value_name = "LINK")]
+    pty: Option<PathBuf>,
+
+    /// Where the dispatcher listens.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:20070", value_parser = address)]
+    dispatcher: Address,
+
+    /// Bits per second.
+    #[arg(long, value_name = "NUMBER", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(1..))]
+    baud: u32,
+
+    /// The parity bit.
+    #[arg(long, value_enum, default_value_t = ParityBit::None)]
+    parity: ParityBit,
+
+    /// How lines to the serial side end; those from there may end in any of these ways.
+    #[arg(long, value_enum, default_value_t = End::Crlf)]
+    line_end: End,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum ParityBit {
+    None,
+    Even,
+    Odd,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum End {
+    Lf,
+    Crlf,
+    Cr,
+}
+
+fn address(text: &str) -> Result<Address, String> {
+    let address: Address = text.parse().map_err(|wrong| format!("{wrong}"))?;
+    address.check_dialled().map_err(|wrong| wrong.to_string())?;
+    Ok(address)
+}
+
+pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
+    let failed = |reason: String| {
+        say(&format!("failed reason={reason:?}"));
+        Outcome::BusFailed
+    };
+    let device = match (&arguments.pty, &arguments.device) {
+        (Some(link), _) => match VirtualPort::new(link) {
+            Ok(port) => Device::Virtual(port),
+            Err(error) => {
+                return failed(format!(
+                    "cannot make a virtual port {} ({error}); give --pty the name of a link that does not exist yet",
+                    link.display()
+                ));
+            }
+        },
+        (None, device) => {
+            let settings = SerialSettings {
+                baud: arguments.baud,
+                parity: match arguments.parity {
+                    ParityBit::None => Parity::None,
+                    ParityBit::Even => Parity::Even,
+                    ParityBit::Odd => Parity::Odd,
+                },
+                two_stop_bits: false,
+                rs485: false,
+            };
+            Device::Port(device.clone().unwrap_or_default(), settings)
+        }
+    };
+    if let Some(link) = &arguments.pty {
+        say(&format!("virtual port {}", link.display()));
+    }
+    let mut bridge = AsciiBridge::new(match arguments.line_end {
+        End::Lf => LineEnd::Lf,
+        End::Crlf => LineEnd::CrLf,
+        End::Cr => LineEnd::Cr,
+    });
+    let hosting = Hosting {
+        clock: &*Monotonic::shared(),
+        stop,
+        news: &mut say,
+    };
+    if let Err(reason) = carry(&mut bridge, device, &arguments.dispatcher, hosting) {
+        return failed(reason);
+    }
+    let traffic = bridge.traffic();
+    say(&format!(
+        "ok said={} heard={} overtaken={} dropped={}",
+        traffic.said, traffic.heard, traffic.overtaken, traffic.dropped
+    ));
+    Outcome::Done
+}

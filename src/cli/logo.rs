@@ -1,0 +1,151 @@
+//! `tickbus logo`: a small controller that takes part in a virtual laboratory.
+
+mod host;
+mod patch;
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use super::Outcome;
+use super::host::span;
+use tickbus_base::Mistake;
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
+use tickbus_base::toml_text::Mistakes;
+use tickbus_dispatcher::client::{Client, Profile};
+use tickbus_dispatcher::{Counts, Role};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_function_blocks::{Controller, Program, Terminals};
+
+/// Without news the dispatcher is asked whether it is there after this time.
+const KEEP_ALIVE: Nanos = Nanos::from_secs(5);
+
+/// Run a small controller, as the LOGO! is one, in a virtual laboratory: a program of function blocks.
+///
+/// It is a client of `tickbus dispatch`. docs/virtual-lab.md has a lesson, and all blocks.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The program.
+    file: PathBuf,
+
+    /// Where the dispatcher listens.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:20070", value_parser = address)]
+    dispatcher: Address,
+
+    /// The name by which others know this controller.
+    #[arg(long)]
+    name: String,
+
+    /// A text with the CONNECT lines of this controller; they are sent whenever the dispatcher has taken it.
+    #[arg(long, value_name = "FILE")]
+    patch: Option<PathBuf>,
+
+    /// The number of inputs, I1 and on.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(0..=256))]
+    inputs: u16,
+
+    /// The number of outputs, Q1 and on.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(0..=256))]
+    outputs: u16,
+
+    /// The number of analog inputs, AI1 and on.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(0..=256))]
+    analog_inputs: u16,
+
+    /// The number of analog outputs, AQ1 and on.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(0..=256))]
+    analog_outputs: u16,
+
+    /// The time from scan to scan.
+    #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = span)]
+    cycle: Nanos,
+
+    /// Stop after this time; without it, on Ctrl-C.
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    duration: Option<Nanos>,
+}
+
+fn address(text: &str) -> Result<Address, String> {
+    let address: Result<Address, Mistake> = text.parse();
+    let address = address.and_then(|address| address.check_dialled().map(|()| address));
+    address.map_err(|mistake| mistake.to_string())
+}
+
+/// Prints a line. If the reader of stdout is gone, the controller goes on.
+fn say(line: &str) {
+    let mut out = io::stdout().lock();
+    let _ = writeln!(out, "logo: {line}").and_then(|()| out.flush());
+}
+
+/// The program and the connections.
+fn read(arguments: &Arguments) -> Result<(Program, Client), Mistakes> {
+    let terminals = Terminals {
+        inputs: arguments.inputs.into(),
+        outputs: arguments.outputs.into(),
+        analog_inputs: arguments.analog_inputs.into(),
+        analog_outputs: arguments.analog_outputs.into(),
+    };
+    let program = Program::load(&arguments.file, terminals)?;
+    let counts = Counts::new(
+        arguments.outputs,
+        arguments.inputs,
+        arguments.analog_outputs,
+        arguments.analog_inputs,
+    );
+    let cables = match &arguments.patch {
+        Some(file) => patch::load(file, counts)?,
+        None => Vec::new(),
+    };
+    let profile = Profile {
+        role: Role::Controller,
+        name: arguments.name.clone(),
+        counts,
+        cables,
+    };
+    let client = Client::new(profile, KEEP_ALIVE);
+    let client = client.map_err(|mistake| Mistakes::of("--name", mistake))?;
+    Ok((program, client))
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    let (program, client) = match read(arguments) {
+        Ok(read) => read,
+        Err(mistakes) => {
+            eprintln!("{mistakes}\nlogo: failed mistakes={}", mistakes.len());
+            return Outcome::WrongInput;
+        }
+    };
+    let stop = Stop::new();
+    if let Err(error) = ctrlc::set_handler({
+        let stop = stop.clone();
+        move || stop.stop()
+    }) {
+        eprintln!("logo: Ctrl-C cannot be caught: {error}");
+        return Outcome::BusFailed;
+    }
+    let clock = Monotonic::shared();
+    let end = arguments
+        .duration
+        .map_or(Nanos::MAX, |span| clock.now() + span);
+    let hosting = host::Hosting {
+        address: &arguments.dispatcher,
+        cycle: arguments.cycle,
+        end,
+        clock: &*clock,
+        stop: &stop,
+    };
+    match host::run(Controller::new(program), client, &hosting) {
+        Ok(counts) => {
+            say(&format!(
+                "ok scans={} joined={}",
+                counts.scans, counts.joined
+            ));
+            Outcome::Done
+        }
+        Err(error) => {
+            say(&format!(
+                "failed reason=\"the system cannot wait for sockets: {error}\""
+            ));
+            Outcome::BusFailed
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The C interface: its example, and a program that uses it wrongly, compiled by the system's C compiler.
+#![cfg(not(no_cc))]
+#![cfg(unix)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tickbus::driver::Code;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+const TANK: &str = r#"
+[driver]
+id   = 1
+name = "Tank"
+
+[fieldbus]
+kind    = "loopback"
+program = "mirror"
+mode    = "stepped"
+scan    = "10ms"
+
+[[signal]]
+name    = "Valve"
+address = "%QX0.0"
+
+[[signal]]
+name    = "Level low"
+address = "%IX0.0"
+
+[[signal]]
+name    = "Level"
+address = "%IW2"
+type    = "INT"
+unit    = "mm"
+scale   = { raw = [0, 27648], value = [0.0, 500.0] }
+"#;
+
+/// The folder of the native library that this test is built with.
+fn library() -> PathBuf {
+    let here = std::env::current_exe().expect("a test has a file");
+    here.parent().expect("it is in a folder").to_owned()
+}
+
+/// Compiles one source file as what `compiler` says, without a single warning.
+fn compile(compiler: &[&str], source: &str, folder: &Path) -> PathBuf {
+    let program = folder.join("program");
+    let library = library();
+    let output = Command::new(compiler[0])
+        .args(&compiler[1..])
+        .args([
+            "-Wall",
+            "-Wextra",
+            "-Wpedantic",
+            "-Werror",
+            "-pthread",
+            "-I",
+        ])
+        .arg(Path::new(ROOT).join("include"))
+        .arg(Path::new(ROOT).join(source))
+        .args(["-x", "none", "-ltickbus", "-L"])
+        .arg(&library)
+        .arg(format!("-Wl,-rpath,{}", library.display()))
+        .arg("-o")
+        .arg(&program)
+        .output()
+        .expect("the compiler runs");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    program
+}
+
+fn folder_with_tank() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("there is room");
+    fs::write(folder.path().join("tank.cfg"), TANK).expect("there is room");
+    let wrong = TANK.replace("address =", "adress =");
+    fs::write(folder.path().join("wrong.cfg"), wrong).expect("there is room");
+    folder
+}
+
+fn run(program: &Path, folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(program);
+    command
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .expect("it runs")
+}
+
+#[test]
+fn the_example_runs_a_tank_by_the_mirror() {
+    for compiler in [&["cc", "-std=c99"][..], &["c++", "-std=c++17", "-x", "c++"]] {
+        let folder = folder_with_tank();
+        let program = compile(compiler, "examples/c/tank.c", folder.path());
+        let output = run(&program, folder.path(), &[]);
+        let printed = String::from_utf8_lossy(&output.stdout);
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let lines: Vec<&str> = printed.lines().collect();
+        assert_eq!(lines.len(), 10, "{printed}");
+        // The mirror opens the valve below 150 mm, a scan later: it stays there.
+        for line in &lines[2..] {
+            let mm: f64 = line[3..]
+                .split_whitespace()
+                .next()
+                .expect("mm")
+                .parse()
+                .expect("a number");
+            assert!((145.0..155.0).contains(&mm), "{printed}");
+        }
+    }
+}
+
+#[test]
+fn the_example_says_what_is_wrong_with_its_file() {
+    let folder = folder_with_tank();
+    let program = compile(&["cc"], "examples/c/tank.c", folder.path());
+    let output = run(&program, folder.path(), &["nothing.cfg"]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.starts_with("tank: BAD_CONFIG (-4): "), "{said}");
+    assert!(said.contains("nothing.cfg"), "{said}");
+}
+
+#[test]
+fn misuse_is_answered_and_nothing_goes_down() {
+    let folder = folder_with_tank();
+    let program = compile(
+        &["cc", "-std=c99", "-D_POSIX_C_SOURCE=200809L"],
+        "tests/c/misuse.c",
+        folder.path(),
+    );
+    let output = run(&program, folder.path(), &["tank.cfg", "wrong.cfg"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{:?} {said}", output.status);
+    assert!(output.stdout.starts_with(b"misuse: ok"), "{said}");
+}
+
+#[test]
+fn the_header_has_every_status() {
+    let header = fs::read_to_string(Path::new(ROOT).join("include/tickbus.h")).expect("the header");
+    for code in Code::ALL {
+        let entry = format!("TB_{} = {}", code.name(), code.code());
+        assert!(
+            header.contains(&entry),
+            "{entry} is not in include/tickbus.h"
+        );
+    }
+}

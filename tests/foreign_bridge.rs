@@ -1,0 +1,350 @@
+//! `tickbus bridge` with programs of others: Mosquitto as the broker, and its clients; pyserial at the serial line.
+#![allow(missing_docs, reason = "a test")]
+
+#[cfg(unix)]
+#[path = "peers/commands.rs"]
+mod commands;
+mod foreign;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    foreign::main(&[
+        #[cfg(unix)]
+        (
+            "mosquitto_and_the_dispatcher_exchange_values",
+            unix::exchange,
+        ),
+        #[cfg(unix)]
+        ("the_bridge_outlives_a_restart_of_mosquitto", unix::restart),
+        #[cfg(unix)]
+        ("mosquitto_says_when_the_bridge_is_gone", unix::gone),
+        #[cfg(unix)]
+        ("pyserial_takes_part_through_a_virtual_port", unix::pyserial),
+    ])
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::io::{BufRead as _, BufReader, Lines, Read, Write as _};
+    use std::net::{TcpListener, TcpStream};
+    use std::path::{Path, PathBuf};
+    use std::process::{Child, Command, Stdio};
+
+    use super::commands::{Running, bridge, dispatch};
+    use super::foreign::{self, Absent};
+
+    /// A program of others. It is killed at the end.
+    struct Peer {
+        child: Child,
+        lines: Lines<BufReader<Box<dyn Read>>>,
+    }
+
+    impl Peer {
+        fn start(mut command: Command) -> Self {
+            let mut child = command.stdout(Stdio::piped()).spawn().expect("it runs");
+            let stdout = child.stdout.take().expect("it is piped");
+            let lines = BufReader::new(Box::new(stdout) as Box<dyn Read>).lines();
+            Self { child, lines }
+        }
+
+        /// One that says on stderr what it does.
+        fn start_log(mut command: Command) -> Self {
+            let mut child = command.stderr(Stdio::piped()).spawn().expect("it runs");
+            let stderr = child.stderr.take().expect("it is piped");
+            let lines = BufReader::new(Box::new(stderr) as Box<dyn Read>).lines();
+            Self { child, lines }
+        }
+
+        /// Reads lines until one has `part`.
+        fn until(&mut self, part: &str) -> String {
+            let mut read = Vec::new();
+            for line in &mut self.lines {
+                let line = line.expect("text");
+                if line.contains(part) {
+                    return line;
+                }
+                read.push(line);
+            }
+            panic!("no \"{part}\" in {read:?}");
+        }
+    }
+
+    impl Drop for Peer {
+        fn drop(&mut self) {
+            // It may have ended.
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+
+    /// A laboratory: a dispatcher, a broker, and the folder of their files.
+    struct Lab {
+        folder: tempfile::TempDir,
+        dispatch: Running,
+        dispatcher: String,
+        port: u16,
+        broker: Peer,
+    }
+
+    const MAP: &str = "\
+[dispatcher]
+name = \"HALL\"
+role = \"VR\"
+address = \"DISPATCHER\"
+[mqtt]
+broker = \"127.0.0.1:PORT\"
+status = \"hall/bridge\"
+[[channel]]
+channel = \"AI1\"
+topic = \"hall/level\"
+retain = true
+[[channel]]
+channel = \"AQ1\"
+topic = \"hall/setpoint\"
+[[channel]]
+channel = \"Q1\"
+topic = \"hall/valve\"
+on = \"open\"
+off = \"shut\"
+";
+
+    impl Lab {
+        fn new() -> Result<Self, Absent> {
+            foreign::command("mosquitto_sub", "mosquitto-clients")?;
+            let folder = tempfile::tempdir().expect("a folder");
+            let mut dispatch = dispatch(&folder.path().join("lab.toml"), "127.0.0.1:0");
+            let dispatcher = dispatch.after("dispatch: listening on ");
+            // Mosquitto cannot say which port the system has chosen.
+            let free = TcpListener::bind("127.0.0.1:0").expect("a free port");
+            let port = free.local_addr().expect("it is bound").port();
+            drop(free);
+            let text = format!(
+                "listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\nlog_dest stderr\nuser root\n"
+            );
+            std::fs::write(folder.path().join("mosquitto.conf"), text).expect("a file");
+            let map = MAP.replace("DISPATCHER", &dispatcher);
+            let map = map.replace("PORT", &port.to_string());
+            std::fs::write(folder.path().join("map.toml"), map).expect("a file");
+            let broker = start_broker(folder.path())?;
+            Ok(Self {
+                folder,
+                dispatch,
+                dispatcher,
+                port,
+                broker,
+            })
+        }
+
+        fn map(&self) -> PathBuf {
+            self.folder.path().join("map.toml")
+        }
+
+        /// The bridge, when it is connected with both.
+        fn bridge(&self) -> Running {
+            let mut running = bridge(&["mqtt", self.map().to_str().expect("text")]);
+            running.after("bridge: connected with the broker at ");
+            running.after("bridge: connected with ");
+            running
+        }
+
+        fn command(&self, name: &str, arguments: &[&str]) -> Command {
+            let mut command = Command::new(name);
+            command.args(["-h", "127.0.0.1", "-p", &self.port.to_string()]);
+            command.args(arguments);
+            command
+        }
+
+        /// What the broker has from now on, retained or not, with its topic.
+        fn subscribe(&self) -> Peer {
+            Peer::start(self.command("mosquitto_sub", &["-t", "hall/#", "-F", "%t %r <%p>"]))
+        }
+
+        fn publish(&self, topic: &str, payload: &str) {
+            let status = self
+                .command("mosquitto_pub", &["-q", "1", "-t", topic, "-m", payload])
+                .status();
+            assert!(status.expect("it runs").success());
+        }
+
+        /// A tank, connected with the hall.
+        fn tank(&self) -> Tank {
+            let stream = TcpStream::connect(&*self.dispatcher).expect("it listens");
+            let mut tank = Tank(BufReader::new(stream));
+            tank.say("VP TANK AQ1 AI1 I1 V=2");
+            tank.until("END 2");
+            tank.say("CONNECT AQ1:HALL:AI1 AI1:HALL:AQ1 I1:HALL:Q1");
+            tank.until("OK CONNECT");
+            tank
+        }
+    }
+
+    fn start_broker(folder: &Path) -> Result<Peer, Absent> {
+        // Asked for its version, Mosquitto would start.
+        let mut command = foreign::command_with("mosquitto", "-h", "mosquitto")?;
+        command.arg("-c").arg(folder.join("mosquitto.conf"));
+        let mut broker = Peer::start_log(command);
+        broker.until(" running");
+        Ok(broker)
+    }
+
+    /// A client that is connected with the dispatcher directly.
+    struct Tank(BufReader<TcpStream>);
+
+    impl Tank {
+        fn say(&mut self, line: &str) {
+            let line = format!("{line}\n");
+            self.0
+                .get_mut()
+                .write_all(line.as_bytes())
+                .expect("it reads");
+        }
+
+        fn until(&mut self, begin: &str) -> String {
+            loop {
+                let mut line = String::new();
+                assert!(self.0.read_line(&mut line).expect("text") > 0, "no {begin}");
+                if line.starts_with(begin) {
+                    return line.trim_end().to_owned();
+                }
+            }
+        }
+    }
+
+    pub(super) fn exchange() -> Result<(), Absent> {
+        let lab = Lab::new()?;
+        let mut bridge = lab.bridge();
+        let mut topics = lab.subscribe();
+        topics.until("hall/bridge 1 <online>");
+        let mut tank = lab.tank();
+        tank.say("P AQ1=12.50");
+        topics.until("hall/level 0 <12.5>");
+        // Who subscribes later gets it, too.
+        lab.subscribe().until("hall/level 1 <12.5>");
+        lab.publish("hall/setpoint", "21.50");
+        assert_eq!(tank.until("P "), "P AI1=21.5");
+        lab.publish("hall/valve", "open");
+        assert_eq!(tank.until("P "), "P I1=24");
+        lab.publish("hall/setpoint", "a lot");
+        let told = bridge.after("bridge: \"a lot\" from the topic ");
+        assert!(
+            told.starts_with("\"hall/setpoint\" is no value of AQ1"),
+            "{told}"
+        );
+        lab.publish("hall/setpoint", "-3e-1");
+        assert_eq!(tank.until("P "), "P AI1=-0.3");
+        // The tank goes: there is no level.
+        tank.say("BYE");
+        topics.until("hall/level 0 <>");
+        let (last, code) = bridge.interrupt();
+        assert_eq!(
+            last,
+            "bridge: ok published=2 received=3 refused=1 overtaken=0"
+        );
+        assert_eq!(code, Some(0));
+        lab.dispatch.interrupt();
+        Ok(())
+    }
+
+    pub(super) fn restart() -> Result<(), Absent> {
+        let mut lab = Lab::new()?;
+        let mut bridge = lab.bridge();
+        let mut tank = lab.tank();
+        tank.say("P AQ1=1");
+        lab.subscribe().until("hall/level 1 <1>");
+        lab.publish("hall/setpoint", "5");
+        assert_eq!(tank.until("P "), "P AI1=5");
+        drop(lab.broker);
+        assert!(
+            bridge
+                .after("bridge: the broker at ")
+                .contains(" is lost (")
+        );
+        // Nobody sets it now.
+        assert_eq!(tank.until("P "), "P AI1=0");
+        tank.say("P AQ1=2");
+        lab.broker = start_broker(lab.folder.path())?;
+        bridge.after("bridge: connected with the broker at ");
+        bridge.after("bridge: connected with ");
+        lab.subscribe().until("hall/level 1 <2>");
+        lab.publish("hall/setpoint", "7");
+        assert_eq!(tank.until("P "), "P AI1=7");
+        // The dispatcher goes.
+        let mut topics = lab.subscribe();
+        topics.until("hall/bridge 1 <online>");
+        lab.dispatch.interrupt();
+        topics.until("hall/bridge 0 <offline>");
+        bridge.after("bridge: the dispatcher at ");
+        assert_eq!(bridge.interrupt().1, Some(0));
+        Ok(())
+    }
+
+    pub(super) fn gone() -> Result<(), Absent> {
+        let lab = Lab::new()?;
+        let mut bridge = lab.bridge();
+        let mut topics = lab.subscribe();
+        topics.until("hall/bridge 1 <online>");
+        bridge.kill();
+        topics.until("hall/bridge 0 <offline>");
+        // The dispatcher gives its name to the next one.
+        let bridge = lab.bridge();
+        topics.until("hall/bridge 0 <online>");
+        assert_eq!(bridge.interrupt().1, Some(0));
+        topics.until("hall/bridge 0 <offline>");
+        Ok(())
+    }
+
+    pub(super) fn pyserial() -> Result<(), Absent> {
+        const SCRIPT: &str = "\
+import serial, sys
+port = serial.Serial(sys.argv[1], 19200, timeout=60)
+def say(line, end):
+    port.write((line + '\\r').encode())
+    while True:
+        heard = port.read_until(b'\\r').decode().strip()
+        print(heard, flush=True)
+        if heard.startswith(end):
+            return
+say('VR SCADA Q1 I1 V=2', 'END')
+say('CONNECT I1:SCADA:Q1', 'OK CONNECT')
+say('P Q1=24', 'P I1=24')
+say('nonsense', 'ERR 400')
+say('PING', 'OK PING')
+";
+        let mut python = foreign::python_with("main", &["serial"])?;
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut dispatch = dispatch(&folder.path().join("lab.toml"), "127.0.0.1:0");
+        let dispatcher = dispatch.after("dispatch: listening on ");
+        let port = folder.path().join("com1");
+        let name = port.to_str().expect("text");
+        let mut bridge = bridge(&[
+            "serial",
+            "--pty",
+            name,
+            "--line-end",
+            "cr",
+            "--dispatcher",
+            &dispatcher,
+        ]);
+        bridge.after("bridge: connected with ");
+        python.args(["-c", SCRIPT, name]);
+        let output = python.output().expect("it runs");
+        let heard = String::from_utf8(output.stdout).expect("text");
+        assert!(
+            output.status.success(),
+            "{heard}{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        assert!(
+            heard.starts_with("OK VR\nVR:SCADA:Q01:I01:AQ00:AI00:"),
+            "{heard}"
+        );
+        assert!(
+            heard.contains("END 1\nOK CONNECT\nP I1=24\nERR 400 "),
+            "{heard}"
+        );
+        assert!(heard.ends_with("OK PING\n"), "{heard}");
+        assert_eq!(bridge.interrupt().1, Some(0));
+        Ok(())
+    }
+}

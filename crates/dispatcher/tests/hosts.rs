@@ -417,6 +417,7 @@ enum Step {
     Disconnect(usize, u16),
     Cut(usize, usize),
     Heal,
+    Mend,
     Lose(usize),
     Carry(usize),
     Wait(i64),
@@ -438,6 +439,7 @@ fn step() -> impl Strategy<Value = Step> {
         1 => (client, channel).prop_map(|(client, channel)| Step::Disconnect(client, channel)),
         2 => (0..3_usize, 1..3_usize).prop_map(|(one, by)| Step::Cut(one, (one + by) % 3)),
         1 => Just(Step::Heal),
+        1 => Just(Step::Mend),
         2 => (1..4_usize).prop_map(Step::Lose),
         6 => (1..20_usize).prop_map(Step::Carry),
         3 => (1..8_i64).prop_map(Step::Wait),
@@ -543,6 +545,7 @@ impl Clients {
             }
             Step::Cut(one, other) => hosts.cut(*one, *other),
             Step::Heal => hosts.heal(),
+            Step::Mend => hosts.mend(),
             Step::Lose(count) => hosts.to_lose = *count,
             Step::Carry(count) => drop((0..*count).all(|_| hosts.carry_one())),
             Step::Wait(seconds) => {
@@ -560,6 +563,7 @@ proptest! {
     #[test]
     fn after_healing_all_boards_agree_and_each_input_has_the_newest_value(
         holds: bool,
+        is_said: bool,
         steps in prop::collection::vec(step(), 1..60),
     ) {
         let mut hosts = Hosts::new(settings(if holds { OnLoss::Hold } else { OnLoss::FailSafe }));
@@ -568,7 +572,11 @@ proptest! {
             clients.take(&mut hosts, step);
             clients.listen(&mut hosts);
         }
-        hosts.heal();
+        if is_said {
+            hosts.heal();
+        } else {
+            hosts.mend();
+        }
         hosts.wait(2 * SILENCE);
         clients.listen(&mut hosts);
 

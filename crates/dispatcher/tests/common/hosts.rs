@@ -67,11 +67,16 @@ impl Hosts {
             .retain(|(from, to, _)| (*from, *to) != (one, other) && (*to, *from) != (one, other));
     }
 
-    /// Nothing is cut any more, and nothing gets lost.
+    /// Nothing is cut any more, and nothing gets lost; and the network says so.
     pub(crate) fn heal(&mut self) {
+        self.mend();
+        self.meet();
+    }
+
+    /// The same, but the network says nothing.
+    pub(crate) fn mend(&mut self) {
         self.cuts.clear();
         self.to_lose = 0;
-        self.meet();
     }
 
     /// Carries one letter; whether there was one.

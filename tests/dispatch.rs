@@ -117,6 +117,25 @@ fn mistakes_have_the_exit_codes_of_the_house() {
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("has no port"));
 
+    let output = run(&["--lab", "hall"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("--zenoh"));
+    let output = run(&[
+        "--listen",
+        "127.0.0.1:0",
+        "--zenoh",
+        "--zenoh-connect",
+        "there",
+    ]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    let expected = if cfg!(feature = "zenoh") {
+        "dispatch: \"there\" is no endpoint of Zenoh ("
+    } else {
+        "dispatch: this tickbus was built without Zenoh; build it with "
+    };
+    assert!(said.starts_with(expected), "{said}");
+
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = taken.local_addr().expect("it is bound").to_string();
     let output = run(&["--listen", &address]);

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use super::Outcome;
 use super::host::span;
 use tickbus_base::os::raise_open_files;
-use tickbus_base::time::{Monotonic, Nanos, Stop};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, Door, OnLoss, PatchFile, Settings};
+use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PatchFile, Post, Settings};
+use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
 use tickbus_fieldbus::tcp::Address;
 
 /// Serve a virtual laboratory: controllers and machines join over lines of text, and are patched together.
@@ -33,6 +34,22 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = span)]
     idle: Nanos,
 
+    /// Join the dispatchers of other hosts into one laboratory, over Zenoh: clients and patches span hosts by name.
+    #[arg(long)]
+    zenoh: bool,
+
+    /// Where a Zenoh router or another dispatcher listens, such as tcp/192.168.0.10:7447; may be given several times.
+    /// Others in the local network are found by multicast.
+    #[arg(long, value_name = "ENDPOINT", requires = "zenoh")]
+    zenoh_connect: Vec<String>,
+
+    /// Where Zenoh listens for other dispatchers, such as tcp/0.0.0.0:7447; without this, on a port that it chooses.
+    #[arg(long, value_name = "ENDPOINT", requires = "zenoh")]
+    zenoh_listen: Vec<String>,
+
+    /// The name of the laboratory; dispatchers of other laboratories on the same network are not seen.
+    #[arg(long, value_name = "NAME", requires = "zenoh", default_value = "lab")]
+    lab: String,
     /// Serve the patch bay, a page on which the laboratory is seen and patched, and print its address.
     #[cfg(feature = "page")]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:20080", value_parser = address)]
@@ -48,6 +65,40 @@ fn address(text: &str) -> Result<Address, String> {
 fn say(line: &str) {
     let mut out = io::stdout().lock();
     let _ = writeln!(out, "dispatch: {line}").and_then(|()| out.flush());
+}
+
+fn settings(arguments: &Arguments) -> Settings {
+    Settings {
+        idle: arguments.idle,
+        on_loss: if arguments.hold {
+            OnLoss::Hold
+        } else {
+            OnLoss::FailSafe
+        },
+        ..Settings::default()
+    }
+}
+
+/// Makes it a dispatcher of a laboratory of several; returns the way to the others.
+fn join(
+    arguments: &Arguments,
+    dispatcher: &mut Dispatcher,
+    door: &Door,
+) -> Result<Box<dyn Post>, Failure> {
+    let options = Options {
+        laboratory: arguments.lab.clone(),
+        connect: arguments.zenoh_connect.clone(),
+        listen: arguments.zenoh_listen.clone(),
+    };
+    let joined = tickbus_dispatcher_zenoh::join(&options, door)?;
+    let elapsed = u64::try_from(Monotonic::shared().now().0).unwrap_or_default();
+    let since = u64::try_from(system_time().as_nanos()).unwrap_or_default();
+    let since = since.saturating_sub(elapsed);
+    let identity = Identity::new(joined.host, &computer_name(), since);
+    let (lab, name) = (&arguments.lab, &identity.name);
+    say(&format!("in the laboratory {lab} as {name}"));
+    dispatcher.federate(identity);
+    Ok(joined.post)
 }
 
 /// Serves the patch bay, and prints its address.
@@ -81,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         say(&format!("failed reason=\"{reason}\""));
         Outcome::BusFailed
     };
-    let listener = match Listener::bind(&arguments.listen) {
+    let mut listener = match Listener::bind(&arguments.listen) {
         Ok(listener) => listener,
         Err(error) => {
             let address = &arguments.listen;
@@ -90,23 +141,24 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             ));
         }
     };
-    let connections = patch.len();
+    let mut dispatcher = Dispatcher::new(settings(arguments), patch);
+    let door = Door::new(&stop);
+    if arguments.zenoh {
+        match join(arguments, &mut dispatcher, &door) {
+            Ok(post) => listener = listener.with_post(post),
+            Err(Failure::Options(mistake)) => {
+                eprintln!("dispatch: {mistake}");
+                return Outcome::Usage;
+            }
+            Err(Failure::Network(reason)) => return failed(reason),
+        }
+    }
+    let connections = dispatcher.patch().len();
     say(&format!(
         "{connections} connections from {}",
         arguments.patch.display()
     ));
     say(&format!("listening on {}", listener.address()));
-    let settings = Settings {
-        idle: arguments.idle,
-        on_loss: if arguments.hold {
-            OnLoss::Hold
-        } else {
-            OnLoss::FailSafe
-        },
-        ..Settings::default()
-    };
-    let mut dispatcher = Dispatcher::new(settings, patch);
-    let door = Door::new(&stop);
     #[cfg(feature = "page")]
     let _serving = match &arguments.page {
         None => None,

@@ -1,12 +1,15 @@
 //! The board: who is plugged in, the patch, and the values that go through it.
 
 mod forces;
+mod remote;
 mod snapshot;
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Bound;
 
 use crate::channel::Channel;
 use crate::device::{Device, Role};
+use crate::host::{HostId, Rank};
 use crate::number::Number;
 use crate::outbox::{Label, Listing, Outbox};
 use crate::patch::{Patch, Pin};
@@ -24,10 +27,10 @@ pub enum OnLoss {
 }
 
 /// The place of a channel on the board: a seat, and one of its inputs or outputs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Place {
-    seat: usize,
-    channel: usize,
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Place {
+    pub(crate) seat: usize,
+    pub(crate) channel: usize,
 }
 
 #[derive(Debug)]
@@ -44,15 +47,27 @@ struct Input {
     is_waiting: bool,
 }
 
+impl Input {
+    fn new(label: Label) -> Self {
+        Self {
+            value: Number::UNKNOWN,
+            label,
+            is_waiting: false,
+        }
+    }
+}
+
 /// A client that is plugged in.
 #[derive(Debug)]
 struct Plugged {
     device: Device,
     /// Its line in the device list.
     line: Box<str>,
-    order: u64,
+    order: Rank,
+    /// The name of its host, if it is a client of another dispatcher. Then it has no inputs here: what goes to them is
+    /// routed there.
+    host: Option<Box<str>>,
     outputs: Box<[Output]>,
-    inputs: Box<[Input]>,
     /// Whether an input whose source is lost gets a sign for that, and not 0.
     hears_losses: bool,
 }
@@ -61,7 +76,22 @@ struct Plugged {
 #[derive(Debug, Default)]
 struct Seat {
     plugged: Option<Box<Plugged>>,
+    /// The inputs of its client; or, if another dispatcher sits here, a place for each value that it wants.
+    inputs: Vec<Input>,
     outbox: Outbox,
+}
+
+/// What other dispatchers may have to hear of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Change {
+    /// A client was plugged in on a seat.
+    Plugged(usize),
+    /// A client that was on a seat has gone.
+    Unplugged(usize, Rank),
+    /// An input, and its new source, if it has one.
+    Patched(Pin, Option<Pin>),
+    /// The first sink of an output of a client elsewhere has come, or its last one has gone.
+    Wanted(Place),
 }
 
 /// What went through the board.
@@ -83,8 +113,13 @@ pub(crate) struct Board {
     seats: Vec<Seat>,
     names: HashMap<String, usize>,
     /// The seats by the order of registration.
-    by_order: BTreeMap<u64, usize>,
+    by_order: BTreeMap<Rank, usize>,
+    /// Later than every client so far.
     next_order: u64,
+    /// What other dispatchers want: outputs, and the places on their seats. A forced output has these, too.
+    supplies: BTreeMap<Place, Vec<Place>>,
+    /// What has changed, if there are other dispatchers to be told.
+    changes: Option<Vec<Change>>,
     patch: Patch,
     /// Channels of clients that are here, and what an operator holds them at.
     forces: BTreeMap<Pin, Number>,
@@ -103,6 +138,8 @@ impl Board {
             names: HashMap::new(),
             by_order: BTreeMap::new(),
             next_order: 0,
+            supplies: BTreeMap::new(),
+            changes: None,
             patch,
             forces: BTreeMap::new(),
             on_loss,
@@ -169,11 +206,6 @@ impl Board {
             .map(|plugged| &plugged.device)
     }
 
-    /// Whether a client has this name.
-    pub(crate) fn is_taken(&self, name: &str) -> bool {
-        self.names.contains_key(name)
-    }
-
     /// Finds a client by its name.
     pub(crate) fn find_name(&self, name: &str) -> Option<usize> {
         self.names.get(name).copied()
@@ -195,33 +227,51 @@ impl Board {
         of_role.nth(number.checked_sub(1)?)
     }
 
+    /// The next place in the order of registration: after all others, and not before `now`.
+    pub(crate) fn next_order(&mut self, now: u64, host: HostId) -> Rank {
+        let since = self.next_order.max(now);
+        Rank { since, host }
+    }
+
     /// Plugs a client in whose name is free, and wakes its connections.
-    pub(crate) fn plug(&mut self, seat: usize, device: Device) {
+    pub(crate) fn plug(&mut self, seat: usize, device: Device, order: Rank) {
+        let inputs = device.counts.channels(false);
+        let inputs = inputs.map(|channel| Input::new(Label::new(channel)));
+        self.seats[seat].inputs = inputs.collect();
+        let name = device.name.clone();
+        self.place_device(seat, device, order, None);
+        self.give_name(seat, name);
+        self.changed(Change::Plugged(seat));
+    }
+
+    fn place_device(&mut self, seat: usize, device: Device, order: Rank, host: Option<Box<str>>) {
         let channels = device.counts.channels(true);
         let outputs = channels.map(|_| Output {
             value: Number::UNKNOWN,
             sinks: Vec::new(),
         });
         let outputs = outputs.collect();
-        let inputs = device.counts.channels(false).map(|channel| Input {
-            value: Number::UNKNOWN,
-            label: Label::new(channel),
-            is_waiting: false,
-        });
-        let inputs = inputs.collect();
-        let order = self.next_order;
-        self.next_order += 1;
-        self.names.insert(device.name.clone(), seat);
+        self.next_order = self.next_order.max(order.since + 1);
         self.by_order.insert(order, seat);
-        let connections = self.patch.of_client(&device.name);
         self.seats[seat].plugged = Some(Box::new(Plugged {
             line: device.to_string().into(),
             device,
             order,
+            host,
             outputs,
-            inputs,
             hears_losses: false,
         }));
+    }
+
+    /// Gives a client a free name, and wakes the connections of it.
+    fn give_name(&mut self, seat: usize, name: String) {
+        let Some(plugged) = &mut self.seats[seat].plugged else {
+            return;
+        };
+        plugged.device.name.clone_from(&name);
+        plugged.line = plugged.device.to_string().into();
+        let connections = self.patch.of_client(&name);
+        self.names.insert(name, seat);
         for (sink, source) in connections {
             self.join(&sink, &source);
         }
@@ -234,33 +284,40 @@ impl Board {
         }
     }
 
-    /// Frees a seat. The connections of its client sleep until it comes back.
-    pub(crate) fn unplug(&mut self, seat: usize) {
-        let plugged = self.seats[seat].plugged.take();
-        self.clear(seat);
-        let Some(plugged) = plugged else {
-            return;
-        };
-        self.names.remove(&plugged.device.name);
-        self.by_order.remove(&plugged.order);
-        self.forget_forces(&plugged.device.name);
+    /// Frees the name of a client. The connections of the name sleep.
+    fn take_name(&mut self, name: &str, is_leaving: bool) {
         self.begin_line();
-        for (sink, source) in self.patch.of_client(&plugged.device.name) {
-            if source.client != plugged.device.name
-                && let Some(from) = self.place(&source)
-                && let Some(output) = self.output(from)
-            {
-                output.sinks.retain(|sink| sink.seat != seat);
+        for (sink, source) in self.patch.of_client(name) {
+            let (Some(to), Some(from)) = (self.place(&sink), self.place(&source)) else {
+                continue;
+            };
+            // What the client had itself goes with it.
+            if !is_leaving || source.client != name {
+                self.part(to, from);
             }
-            if sink.client != plugged.device.name {
+            if !is_leaving || sink.client != name {
                 self.lose(&sink);
             }
         }
+        self.names.remove(name);
+    }
+
+    /// Frees a seat. The connections of its client sleep until it comes back.
+    pub(crate) fn unplug(&mut self, seat: usize) {
+        if let Some(plugged) = &self.seats[seat].plugged {
+            let (name, order) = (plugged.device.name.clone(), plugged.order);
+            self.forget_forces(&name);
+            self.take_name(&name, true);
+            self.by_order.remove(&order);
+            self.changed(Change::Unplugged(seat, order));
+        }
+        self.clear(seat);
     }
 
     /// Connects an input that has no source.
     pub(crate) fn connect(&mut self, sink: Pin, source: Pin) {
         self.join(&sink, &source);
+        self.changed(Change::Patched(sink.clone(), Some(source.clone())));
         self.patch.connect(sink, source);
     }
 
@@ -269,23 +326,45 @@ impl Board {
         let Some(source) = self.patch.disconnect(sink) else {
             return;
         };
+        self.changed(Change::Patched(sink.clone(), None));
         if let (Some(to), Some(from)) = (self.place(sink), self.place(&source)) {
-            if let Some(output) = self.output(from) {
-                output.sinks.retain(|other| *other != to);
-            }
+            self.part(to, from);
             self.lose(sink);
         }
     }
 
-    /// Joins two channels, if both are there and not forced.
+    /// Joins two channels, if both are there and not forced and the input is of a client of this dispatcher.
     fn join(&mut self, sink: &Pin, source: &Pin) {
         if self.forced(sink).is_some() || self.forced(source).is_some() {
             return;
         }
-        if let (Some(to), Some(from)) = (self.place(sink), self.place(source))
-            && let Some(output) = self.output(from)
-        {
+        let (Some(to), Some(from)) = (self.place(sink), self.place(source)) else {
+            return;
+        };
+        if self.host(to.seat).is_some() {
+            return;
+        }
+        if let Some(output) = self.output(from) {
             output.sinks.push(to);
+            if output.sinks.len() == 1 && self.host(from.seat).is_some() {
+                self.changed(Change::Wanted(from));
+            }
+        }
+    }
+
+    /// Undoes what [`join`](Self::join) does.
+    fn part(&mut self, to: Place, from: Place) {
+        if let Some(output) = self.output(from) {
+            output.sinks.retain(|other| *other != to);
+            if output.sinks.is_empty() && self.host(from.seat).is_some() {
+                self.changed(Change::Wanted(from));
+            }
+        }
+    }
+
+    fn changed(&mut self, change: Change) {
+        if let Some(changes) = &mut self.changes {
+            changes.push(change);
         }
     }
 
@@ -333,15 +412,14 @@ impl Board {
         let Some(to) = self.place(sink).filter(|_| self.forced(sink).is_none()) else {
             return;
         };
-        let Some(plugged) = &self.seats[to.seat].plugged else {
-            return;
-        };
-        let nothing = if plugged.hears_losses {
+        let seat = &self.seats[to.seat];
+        let hears_losses = seat.plugged.as_ref().is_some_and(|it| it.hears_losses);
+        let nothing = if hears_losses {
             Number::LOST
         } else {
             Number::ZERO
         };
-        let input = plugged.inputs.get(to.channel);
+        let input = seat.inputs.get(to.channel);
         // A client that was never sent a value assumes so itself.
         if self.on_loss == OnLoss::FailSafe && input.is_some_and(|input| input.value.is_known()) {
             self.deliver(to, nothing, false);
@@ -352,8 +430,7 @@ impl Board {
     #[inline]
     fn deliver(&mut self, to: Place, value: Number, is_forced: bool) {
         let seat = &mut self.seats[to.seat];
-        let input = seat.plugged.as_mut();
-        let Some(input) = input.and_then(|plugged| plugged.inputs.get_mut(to.channel)) else {
+        let Some(input) = seat.inputs.get_mut(to.channel) else {
             return;
         };
         if input.value == value && !is_forced {
@@ -378,8 +455,11 @@ impl Board {
     /// Asks for the device list of now.
     pub(crate) fn list(&mut self, seat: usize) {
         self.seats[seat].outbox.listing = Some(Listing {
-            next: 0,
-            end: self.next_order,
+            after: None,
+            end: Rank {
+                since: self.next_order,
+                host: HostId::default(),
+            },
             count: 0,
         });
         self.touch(seat);
@@ -390,7 +470,9 @@ impl Board {
     pub(crate) fn refill(&mut self, seat: usize, has_end: bool) {
         let outbox = &mut self.seats[seat].outbox;
         if let Some(mut listing) = outbox.listing.take() {
-            for (order, other) in self.by_order.range(listing.next..listing.end) {
+            let after = listing.after.map_or(Bound::Unbounded, Bound::Excluded);
+            let all = self.by_order.range((after, Bound::Excluded(listing.end)));
+            for (order, other) in all {
                 if self.seats[seat].outbox.is_full() {
                     self.seats[seat].outbox.listing = Some(listing);
                     return;
@@ -398,9 +480,13 @@ impl Board {
                 let Some(plugged) = self.seats[*other].plugged.take() else {
                     continue;
                 };
-                self.seats[seat].outbox.line(&plugged.line);
+                let line = match &plugged.host {
+                    Some(host) if has_end => &format!("{}@{host}", plugged.line),
+                    _ => &*plugged.line,
+                };
+                self.seats[seat].outbox.line(line);
                 self.seats[*other].plugged = Some(plugged);
-                listing.next = order + 1;
+                listing.after = Some(*order);
                 listing.count += 1;
             }
             self.seats[seat].outbox.is_swollen = true;
@@ -410,18 +496,15 @@ impl Board {
                     .line(&format!("END {}", listing.count));
             }
         }
-        let Seat { plugged, outbox } = &mut self.seats[seat];
+        let Seat { inputs, outbox, .. } = &mut self.seats[seat];
         if outbox.waiting.is_empty() || !outbox.has_room() {
             return;
         }
-        let Some(plugged) = plugged else {
-            return;
-        };
         self.line += 1;
         // There are few enough inputs for all of them to be taken at once.
         let mut waiting = std::mem::take(&mut outbox.waiting);
         for channel in waiting.drain(..) {
-            let input = &mut plugged.inputs[channel];
+            let input = &mut inputs[channel];
             input.is_waiting = false;
             self.traffic.values += 1;
             outbox.value(self.line, &input.label, &input.value);

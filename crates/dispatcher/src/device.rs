@@ -4,7 +4,7 @@ use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 
 use crate::channel::{Counts, Kind};
-use crate::name::is_name;
+use crate::name::is_shown_name;
 
 /// What a client is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ impl Device {
         let text: String = std::str::from_utf8(line).ok()?.split_whitespace().collect();
         let mut parts = text.splitn(7, ':');
         let role = Role::parse(parts.next()?.as_bytes())?;
-        let name = parts.next().filter(|name| is_name(name))?.to_owned();
+        let name = parts.next().filter(|name| is_shown_name(name))?.to_owned();
         let mut counts = Counts::default();
         for expected in Kind::ALL {
             let (kind, count) = Kind::with_number(parts.next()?.as_bytes())?;
@@ -59,7 +59,10 @@ impl Device {
             }
             counts.set(kind, count);
         }
-        let (ip, port) = parts.next()?.rsplit_once(':')?;
+        let address = parts.next()?;
+        // A client of another dispatcher has the name of its host behind its address.
+        let address = address.split_once('@').map_or(address, |(it, _)| it);
+        let (ip, port) = address.rsplit_once(':')?;
         let ip = ip
             .strip_prefix('[')
             .and_then(|ip| ip.strip_suffix(']'))

@@ -1,6 +1,8 @@
 //! The dispatcher without its sockets: lines in, lines out, and time handed in.
 
+mod laboratory;
 mod operator;
+mod requests;
 
 use std::net::SocketAddr;
 
@@ -9,12 +11,15 @@ use tickbus_base::time::Nanos;
 use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::Channel;
 use crate::device::{Device, Role};
+use crate::federation::{Federation, Request};
 use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, Values};
+use crate::host::HostId;
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
 
 pub use operator::{Order, Reply};
+use requests::Waiting;
 
 /// How a dispatcher serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +63,10 @@ pub struct Dispatcher {
     promised: Vec<Promised>,
     /// When the times of all clients are looked at next.
     next_look: Nanos,
+    /// The other dispatchers of the laboratory, if there can be any.
+    federation: Option<Box<Federation>>,
+    /// Who waits for answers of other dispatchers.
+    waiting: Vec<Waiting>,
 }
 
 #[derive(Debug)]
@@ -95,13 +104,21 @@ struct Promised {
 /// Who has changed the patch.
 #[derive(Debug)]
 enum Author {
-    Client { seat: usize, verb: &'static str },
+    Client {
+        seat: usize,
+        verb: &'static str,
+    },
     Operator(Reply),
+    /// Another dispatcher, by its request of this number.
+    Host {
+        host: HostId,
+        number: u32,
+    },
 }
 
-impl Promised {
-    fn is_to(&self, seat: usize) -> bool {
-        matches!(self.author, Author::Client { seat: it, .. } if it == seat)
+impl Author {
+    fn is(&self, seat: usize) -> bool {
+        matches!(self, Self::Client { seat: it, .. } if *it == seat)
     }
 }
 
@@ -118,6 +135,8 @@ impl Dispatcher {
             resumable: Vec::new(),
             promised: Vec::new(),
             next_look: Nanos::MAX,
+            federation: None,
+            waiting: Vec::new(),
         }
     }
 
@@ -148,12 +167,8 @@ impl Dispatcher {
                 "{most} clients are here, and no more are served"
             )));
         }
-        let seat = self.free.pop().unwrap_or_else(|| {
-            self.sessions.push(None);
-            self.sessions.len() - 1
-        });
+        let seat = self.take_seat();
         self.count += 1;
-        self.board.seat(seat);
         self.sessions[seat] = Some(Session {
             peer,
             heard: now,
@@ -166,13 +181,25 @@ impl Dispatcher {
         Ok(seat)
     }
 
+    /// A free seat on the board, for a connection or for another dispatcher and its clients.
+    fn take_seat(&mut self) -> usize {
+        let seat = self.free.pop().unwrap_or_else(|| {
+            self.sessions.push(None);
+            self.sessions.len() - 1
+        });
+        self.board.seat(seat);
+        seat
+    }
+
     /// The connection of a seat is gone, or was closed.
     pub fn gone(&mut self, seat: usize) {
         if self.sessions[seat].take().is_some() {
             self.count -= 1;
-            self.free.push(seat);
-            self.promised.retain(|promised| !promised.is_to(seat));
+            self.promised.retain(|promised| !promised.author.is(seat));
+            self.waiting.retain(|waiting| !waiting.author.is(seat));
             self.board.unplug(seat);
+            self.settle();
+            self.free.push(seat);
         }
     }
 
@@ -208,7 +235,8 @@ impl Dispatcher {
         if may_go_on
             && let Some(session) = &mut self.sessions[seat]
             && session.progress == Progress::Stuck
-            && !self.promised.iter().any(|promised| promised.is_to(seat))
+            && !self.promised.iter().any(|it| it.author.is(seat))
+            && !self.waiting.iter().any(|it| it.author.is(seat))
         {
             session.progress = Progress::Going;
             self.resumable.push(seat);
@@ -218,7 +246,7 @@ impl Dispatcher {
     /// When [`tick`](Self::tick) has something to do even if nothing arrives.
     pub fn deadline(&self) -> Nanos {
         if self.resumable.is_empty() {
-            self.next_look
+            self.next_look.min(self.next_beat())
         } else {
             Nanos::ZERO
         }
@@ -229,6 +257,7 @@ impl Dispatcher {
         for seat in std::mem::take(&mut self.resumable) {
             self.arrived(now, seat, &[]);
         }
+        self.beat(now);
         if now < self.next_look {
             return;
         }
@@ -266,37 +295,43 @@ impl Dispatcher {
 
     /// The patch was saved, or why not: who changed it is answered.
     pub fn saved(&mut self, outcome: &Result<(), String>) {
-        let outcome = outcome.as_ref().map_err(|why| {
+        let outcome = outcome.as_ref().map(drop).map_err(|why| {
             Code::Internal.because(format_args!(
                 "the patch could not be saved ({why}); it holds until the dispatcher ends"
             ))
         });
         for Promised { author, sinks } in std::mem::take(&mut self.promised) {
-            let client = match author {
-                Author::Client { seat, verb } => {
-                    match &outcome {
-                        Ok(()) => self.confirm(seat, verb),
-                        Err(refusal) => self.refuse(seat, refusal),
-                    }
-                    Some(seat)
-                }
-                Author::Operator(reply) => {
-                    reply.give(outcome.clone().copied());
-                    None
-                }
-            };
+            self.conclude(author, outcome.clone());
             self.board.begin_line();
             for sink in sinks {
                 self.board.refresh(&sink);
             }
-            if let Some(seat) = client
-                && let Some(session) = &mut self.sessions[seat]
-                && session.progress == Progress::Stuck
-            {
-                session.progress = Progress::Going;
-                if !session.begun.is_empty() {
-                    self.resumable.push(seat);
+        }
+    }
+
+    /// Answers who has changed the patch, or wanted to.
+    fn conclude(&mut self, author: Author, outcome: Result<(), Refusal>) {
+        match author {
+            Author::Client { seat, verb } => {
+                match outcome {
+                    Ok(()) => self.confirm(seat, verb),
+                    Err(refusal) => self.refuse(seat, &refusal),
                 }
+                self.go_on(seat);
+            }
+            Author::Operator(reply) => reply.give(outcome),
+            Author::Host { host, number } => self.answer(host, number, outcome),
+        }
+    }
+
+    /// A client that had to wait for its answer has got it.
+    fn go_on(&mut self, seat: usize) {
+        if let Some(session) = &mut self.sessions[seat]
+            && session.progress == Progress::Stuck
+        {
+            session.progress = Progress::Going;
+            if !session.begun.is_empty() {
+                self.resumable.push(seat);
             }
         }
     }
@@ -377,7 +412,7 @@ impl Dispatcher {
                 continue;
             }
             let line = &rest[..end];
-            if let Err(refusal) = self.obey(seat, line.strip_suffix(b"\r").unwrap_or(line)) {
+            if let Err(refusal) = self.obey(now, seat, line.strip_suffix(b"\r").unwrap_or(line)) {
                 self.refuse(seat, &refusal);
             }
             counts = self.board.device(seat).map(|device| device.counts);
@@ -386,7 +421,7 @@ impl Dispatcher {
     }
 
     /// Carries a line out.
-    fn obey(&mut self, seat: usize, line: &[u8]) -> Result<(), Refusal> {
+    fn obey(&mut self, now: Nanos, seat: usize, line: &[u8]) -> Result<(), Refusal> {
         let line = grammar::parse(line)?;
         let is_plugged = self.board.device(seat).is_some();
         let may_come_first = matches!(
@@ -400,7 +435,7 @@ impl Dispatcher {
         self.board.begin_line();
         match line {
             Line::Nothing => {}
-            Line::Identify(identification) => self.identify(seat, identification)?,
+            Line::Identify(identification) => self.identify(now, seat, identification)?,
             Line::Values(values) => self.values(seat, values)?,
             Line::Connect(joints) => self.connect(seat, joints)?,
             Line::Disconnect(channels) => self.disconnect(seat, channels)?,
@@ -421,7 +456,12 @@ impl Dispatcher {
         Ok(())
     }
 
-    fn identify(&mut self, seat: usize, identification: Identification<'_>) -> Result<(), Refusal> {
+    fn identify(
+        &mut self,
+        now: Nanos,
+        seat: usize,
+        identification: Identification<'_>,
+    ) -> Result<(), Refusal> {
         let Identification {
             role,
             name,
@@ -436,10 +476,13 @@ impl Dispatcher {
             );
             return Err(Code::Conflict.because(text));
         }
-        if self.board.is_taken(name) {
-            let text = format!("there is a client {name} already; take another name");
+        if let Some(other) = self.board.find_name(name) {
+            let host = self.board.host(other).map(|host| format!(" on {host}"));
+            let host = host.unwrap_or_default();
+            let text = format!("there is a client {name} already{host}; take another name");
             return Err(Code::Conflict.because(text));
         }
+        let order = self.next_order(now);
         let Some(session) = &mut self.sessions[seat] else {
             return Ok(());
         };
@@ -450,13 +493,14 @@ impl Dispatcher {
             counts,
             peer: session.peer,
         };
-        self.board.plug(seat, device);
+        self.board.plug(seat, device, order);
         if hears_losses {
             self.board.hear_losses(seat);
         }
         self.confirm(seat, Role::keyword(role));
         self.board.list(seat);
         self.board.refresh_all(seat);
+        self.settle();
         Ok(())
     }
 
@@ -509,39 +553,34 @@ impl Dispatcher {
             }
             let own = Pin::new(&own_name, joint.own);
             let peer = Pin::new(&peer, joint.channel);
-            let (sink, source) = self.joint(own, peer, &connections)?;
-            connections.push((sink, source));
+            connections.push(self.joint(own, peer, &connections)?);
         }
-        let mut sinks = Vec::with_capacity(connections.len());
-        for (sink, source) in connections {
-            if self.board.patch().source(&sink).is_none() {
-                self.board.connect(sink.clone(), source);
-            }
-            sinks.push(sink);
-        }
-        self.promise(seat, "CONNECT", sinks);
+        let request = Request {
+            connect: connections,
+            cut: Vec::new(),
+        };
+        let verb = "CONNECT";
+        self.change(Author::Client { seat, verb }, request);
         Ok(())
     }
 
     fn disconnect(&mut self, seat: usize, channels: Channels<'_>) -> Result<(), Refusal> {
         let own_name = self.name(seat);
-        let mut sinks = Vec::new();
+        let mut cut = Vec::new();
         for channel in channels {
             let channel = channel?;
             if !self.board.has(seat, channel) {
                 return Err(no_channel("you have", channel));
             }
-            let before = sinks.len();
-            sinks.extend(self.connected_inputs(&Pin::new(&own_name, channel)));
-            if sinks.len() == before {
+            let connected = self.joints_at(&Pin::new(&own_name, channel));
+            if connected.is_empty() {
                 let text = format!("{channel} is not connected");
                 return Err(Code::NotFound.because(text));
             }
+            cut.extend(connected);
         }
-        for sink in &sinks {
-            self.board.disconnect(sink);
-        }
-        self.promise(seat, "DISCONNECT", Vec::new());
+        let (connect, verb) = (Vec::new(), "DISCONNECT");
+        self.change(Author::Client { seat, verb }, Request { connect, cut });
         Ok(())
     }
 
@@ -550,10 +589,8 @@ impl Dispatcher {
         device.map(|device| device.name.clone()).unwrap_or_default()
     }
 
-    /// Answers when the patch is saved; until then no further line of the client is looked at.
-    fn promise(&mut self, seat: usize, verb: &'static str, sinks: Vec<Pin>) {
-        let author = Author::Client { seat, verb };
-        self.promised.push(Promised { author, sinks });
+    /// No further line of a client is looked at until it is answered.
+    fn stick(&mut self, seat: usize) {
         if let Some(session) = &mut self.sessions[seat] {
             session.progress = Progress::Stuck;
         }

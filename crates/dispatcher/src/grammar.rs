@@ -16,7 +16,7 @@
 
 use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
 use crate::device::Role;
-use crate::name::{LONGEST_NAME, is_name};
+use crate::name::{LONGEST_NAME, is_name, is_shown_name};
 use crate::number::Number;
 use crate::refusal::{Code, Refusal};
 
@@ -238,7 +238,7 @@ impl<'a> Iterator for Joints<'a> {
             }
             let word = words.word().unwrap_or_default();
             let peer = std::str::from_utf8(word).unwrap_or_default();
-            if !is_name(peer) {
+            if !is_shown_name(peer) {
                 let text = format!("\"{}\" cannot be the name of a client", shown(word));
                 return Err(Code::Syntax.because(text));
             }

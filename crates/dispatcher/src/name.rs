@@ -8,3 +8,9 @@ pub fn is_name(text: &str) -> bool {
     let letter = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte);
     (1..=LONGEST_NAME).contains(&text.len()) && text.bytes().all(letter)
 }
+
+/// Whether a client can be shown by this text: a name, or `NAME@HOST` while a client of another host has its name, and
+/// `NAME@HOST@2` for the second of two computers of one name.
+pub(crate) fn is_shown_name(text: &str) -> bool {
+    text.split('@').all(is_name)
+}

@@ -1,6 +1,8 @@
 //! What a client has not read yet.
 
-use crate::channel::Channel;
+use std::fmt;
+
+use crate::host::Rank;
 use crate::number::Number;
 
 /// The bytes of an outbox above which no further answers are made.
@@ -16,7 +18,7 @@ const ROOM: usize = 16 * 1024;
 /// The longest line of values that is made, in bytes, without its last value.
 const LONGEST: usize = 4000;
 
-/// An input's channel as it stands in a line of values: `I4=`.
+/// An input's channel as it stands in a line of values: `I4=`. For another dispatcher it is a number: `17=`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Label {
     text: [u8; 8],
@@ -24,8 +26,9 @@ pub(crate) struct Label {
 }
 
 impl Label {
-    pub(crate) fn new(channel: Channel) -> Self {
-        let label = format!("{channel}=");
+    /// Of a channel, or of a number below ten million.
+    pub(crate) fn new(name: impl fmt::Display) -> Self {
+        let label = format!("{name}=");
         let mut text = [0; 8];
         text[..label.len()].copy_from_slice(label.as_bytes());
         #[expect(clippy::cast_possible_truncation, reason = "at most 8")]
@@ -37,10 +40,10 @@ impl Label {
 /// A part of the device list that is still to be written.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Listing {
-    /// The next device, by the order of registration.
-    pub(crate) next: u64,
-    /// The first device that came after the list was asked for.
-    pub(crate) end: u64,
+    /// The last device written, by the order of registration.
+    pub(crate) after: Option<Rank>,
+    /// Before the first device that came after the list was asked for.
+    pub(crate) end: Rank,
     /// Devices written.
     pub(crate) count: usize,
 }

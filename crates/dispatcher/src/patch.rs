@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use crate::channel::{Channel, Kind};
-use crate::name::is_name;
+use crate::name::is_shown_name;
 
 /// One channel of one client, by its name.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -26,7 +26,7 @@ impl Pin {
     pub fn parse(text: &str) -> Option<Self> {
         let (client, channel) = text.split_once(':')?;
         let channel = Channel::parse(channel.as_bytes())?;
-        is_name(client).then(|| Self::new(client, channel))
+        is_shown_name(client).then(|| Self::new(client, channel))
     }
 
     /// The first pin that a client of this name can have, in their order.

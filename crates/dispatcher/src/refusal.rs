@@ -51,6 +51,23 @@ impl Code {
         }
     }
 
+    /// The code with this number on the wire; a number that is none is an internal mistake of who sent it.
+    pub(crate) fn of(number: u16) -> Self {
+        const ALL: [Code; 8] = [
+            Code::Syntax,
+            Code::IdentifyFirst,
+            Code::NotFound,
+            Code::TimeOut,
+            Code::Conflict,
+            Code::TooLong,
+            Code::Mismatch,
+            Code::Limit,
+        ];
+
+        let found = ALL.into_iter().find(|code| code.number() == number);
+        found.unwrap_or(Self::Internal)
+    }
+
     /// A refusal with this code.
     pub(crate) fn because(self, text: impl fmt::Display) -> Refusal {
         Refusal {

@@ -1,5 +1,6 @@
 //! The dispatcher on a TCP port: one thread for all connections.
 
+use std::fmt;
 use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 
@@ -12,6 +13,7 @@ use tickbus_fieldbus::tcp::{
 use crate::dispatcher::Dispatcher;
 use crate::door::Door;
 use crate::patch_file::PatchFile;
+use crate::post::Post;
 
 /// The key of the listener in the poll set; a client's key is its seat.
 const LISTENER: usize = usize::MAX - 1;
@@ -30,10 +32,18 @@ const PAUSE: Nanos = Nanos::from_secs(1);
 const PATIENCE: Nanos = Nanos::from_secs(3600);
 
 /// A port that is listened on.
-#[derive(Debug)]
 pub struct Listener {
-    listener: TcpListener,
+    socket: TcpListener,
     address: SocketAddr,
+    post: Option<Box<dyn Post>>,
+}
+
+impl fmt::Debug for Listener {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Listener")
+            .field("address", &self.address)
+            .finish_non_exhaustive()
+    }
 }
 
 /// What a dispatcher on a port works with.
@@ -57,8 +67,20 @@ impl Listener {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address) -> io::Result<Self> {
-        let (listener, address) = bind(address)?;
-        Ok(Self { listener, address })
+        let (socket, address) = bind(address)?;
+        let post = None;
+        Ok(Self {
+            socket,
+            address,
+            post,
+        })
+    }
+
+    /// Sends the letters of a dispatcher that is one of several to the others by this.
+    #[must_use]
+    pub fn with_post(mut self, post: Box<dyn Post>) -> Self {
+        self.post = Some(post);
+        self
     }
 
     /// The address that it listens on.
@@ -73,11 +95,12 @@ impl Listener {
     /// The system cannot wait for sockets.
     pub fn run(self, dispatcher: &mut Dispatcher, hosting: Hosting<'_>) -> io::Result<()> {
         let mut set = PollSet::new(hosting.stop)?;
-        set.add(LISTENER, &self.listener, Interest::Read)?;
+        set.add(LISTENER, &self.socket, Interest::Read)?;
         let mut host = Host {
             dispatcher,
             hosting,
-            listener: self.listener,
+            listener: self.socket,
+            post: self.post,
             set,
             connections: Vec::new(),
             buffer: vec![0; BUFFER].into(),
@@ -107,6 +130,7 @@ struct Host<'d, 'h> {
     dispatcher: &'d mut Dispatcher,
     hosting: Hosting<'h>,
     listener: TcpListener,
+    post: Option<Box<dyn Post>>,
     set: PollSet,
     /// By seats.
     connections: Vec<Option<Connection>>,
@@ -156,6 +180,16 @@ impl Host<'_, '_> {
         }
         while let Some(seat) = self.dispatcher.next_touched() {
             self.write(seat)?;
+        }
+        if let Some(post) = &mut self.post {
+            while post.has_room()
+                && let Some((to, letter)) = self.dispatcher.next_letter()
+            {
+                post.send(to, letter);
+            }
+        }
+        while let Some(news) = self.dispatcher.next_news() {
+            (self.hosting.news)(&news);
         }
         if self.accept_paused_until.is_some_and(|until| now >= until) {
             self.accept_paused_until = None;

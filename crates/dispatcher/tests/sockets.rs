@@ -7,13 +7,16 @@ use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
 
 use tickbus_base::time::{Manual, Monotonic, Nanos, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{
-    Dispatcher, Door, Order, Patch, PatchFile, Pin, Reply, Settings, Traffic,
+    Dispatcher, Door, HostId, Identity, Order, Patch, PatchFile, Pin, Post, Reply, Settings,
+    Traffic,
 };
 use tickbus_fieldbus::tcp::Address;
 
@@ -100,6 +103,88 @@ fn clients_are_patched_together_over_sockets() {
         (traffic.values, traffic.overtaken, traffic.refused),
         (3, 0, 0)
     );
+}
+
+/// A way of letters that takes one at a time, to another loop in this process.
+struct Pipe {
+    own: Door,
+    other: Door,
+    is_busy: Arc<AtomicBool>,
+}
+
+impl Post for Pipe {
+    fn has_room(&self) -> bool {
+        !self.is_busy.load(Ordering::Relaxed)
+    }
+
+    fn send(&mut self, _: HostId, letter: Vec<u8>) {
+        self.is_busy.store(true, Ordering::Relaxed);
+        let (own, is_busy) = (self.own.clone(), Arc::clone(&self.is_busy));
+        self.other.send(move |dispatcher, now| {
+            dispatcher.letter_arrived(now, &letter);
+            is_busy.store(false, Ordering::Relaxed);
+            own.send(|_, _| {});
+        });
+    }
+}
+
+#[test]
+fn two_loops_pass_letters_to_each_other_and_tell_their_news() {
+    let stops = [Stop::new(), Stop::new()];
+    let doors = [Door::new(&stops[0]), Door::new(&stops[1])];
+    let (news, told) = channel();
+    thread::scope(|scope| {
+        let mut addresses = Vec::new();
+        for (at, stop) in stops.iter().enumerate() {
+            let listener = Listener::bind(&Address::local(0)).expect("a free port");
+            addresses.push(listener.address());
+            let (own, other) = (doors[at].clone(), doors[1 - at].clone());
+            let door = &doors[at];
+            let news = news.clone();
+            scope.spawn(move || {
+                let mut dispatcher = Dispatcher::new(Settings::default(), Patch::new());
+                let id = |at: usize| HostId(at as u128 + 1);
+                dispatcher.federate(Identity::new(id(at), ["left", "right"][at], 0));
+                dispatcher.host_appeared(Nanos::ZERO, id(1 - at));
+                let is_busy = Arc::default();
+                let post = Box::new(Pipe {
+                    own,
+                    other,
+                    is_busy,
+                });
+                let hosting = Hosting {
+                    clock: &*Monotonic::shared(),
+                    stop,
+                    door: Some(door),
+                    patch_file: None,
+                    news: &mut |line| news.send(line.to_owned()).expect("it is heard"),
+                };
+                let listener = listener.with_post(post);
+                listener.run(&mut dispatcher, hosting).expect("it serves");
+            });
+        }
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let lines = [0, 1].map(|_| told.recv().expect("news"));
+            assert!(
+                lines
+                    .iter()
+                    .all(|line| line.contains("is here; its clients: 0"))
+            );
+            let mut pump = Client::join(addresses[0], "VP PUMP Q01");
+            let mut logo = Client::join(addresses[1], "VR LOGO I01");
+            pump.say("P Q1=0");
+            while !logo.ask("CONNECT I1:PUMP:Q1").starts_with("OK") {}
+            assert_eq!(logo.hear(), "P I1=0");
+            for value in 1..100 {
+                pump.say(&format!("P Q1={value}"));
+            }
+            for value in 1..100 {
+                assert_eq!(logo.hear(), format!("P I1={value}"));
+            }
+        }));
+        stops.iter().for_each(Stop::stop);
+        outcome.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! A forced channel is taken out of the routes, and put back when it is released. So a value on its way costs nothing more
 //! because channels can be forced.
 
-use super::Board;
+use super::{Board, Place};
 use crate::number::Number;
 use crate::patch::Pin;
 
@@ -28,9 +28,35 @@ impl Board {
         {
             output.sinks.retain(|sink| *sink != to);
         }
+        let from = self.place(&pin);
         self.forces.insert(pin, value);
         for sink in sinks {
             self.follow(&sink);
+        }
+        for (to, from) in self.supplied(from) {
+            self.supply_again(to, from);
+        }
+    }
+
+    /// The places on the seats of other dispatchers that want an output.
+    fn supplied(&self, from: Option<Place>) -> Vec<(Place, Place)> {
+        let places = from.and_then(|from| Some((from, self.supplies.get(&from)?)));
+        let places = places.into_iter();
+        places
+            .flat_map(|(from, places)| places.iter().map(move |to| (*to, from)))
+            .collect()
+    }
+
+    pub(super) fn has_forces(&self) -> bool {
+        !self.forces.is_empty()
+    }
+
+    /// Releases all channels of a client.
+    pub(super) fn release_all(&mut self, client: &str) {
+        let of_client = self.forces.keys().filter(|pin| pin.client == client);
+        let pins: Vec<Pin> = of_client.cloned().collect();
+        for pin in pins {
+            self.release(&pin);
         }
     }
 
@@ -43,6 +69,10 @@ impl Board {
                     self.join(&sink, &source);
                 }
                 self.follow(&sink);
+            }
+            let from = self.place(pin).filter(|_| pin.channel.kind.is_output());
+            for (to, from) in self.supplied(from) {
+                self.resume(to, from);
             }
         }
         was_forced

@@ -4,14 +4,14 @@ use super::{Board, Traffic};
 use crate::channel::Channel;
 use crate::device::Device;
 use crate::number::Number;
-use crate::patch::Pin;
+use crate::patch::{Patch, Pin};
 
 /// Everything on the board at one moment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Snapshot {
     /// The clients, in the order in which they came.
     pub clients: Vec<ClientState>,
-    /// All connections, in the order of their sinks.
+    /// All connections, those of each dispatcher in the order of their sinks.
     pub connections: Vec<Connection>,
     /// What went through so far.
     pub traffic: Traffic,
@@ -22,6 +22,9 @@ pub struct Snapshot {
 pub struct ClientState {
     /// Who it is.
     pub device: Device,
+    /// The name of its host, if it is a client of another dispatcher. Then its inputs have no values here, and of its
+    /// outputs those that are connected here.
+    pub host: Option<String>,
     /// Its outputs, then its inputs. Analog channels from 0 to N, as the dispatcher accepts them.
     pub channels: Vec<ChannelState>,
 }
@@ -49,17 +52,18 @@ pub struct Connection {
 }
 
 impl Board {
-    /// The board as it is now.
-    pub(crate) fn snapshot(&self) -> Snapshot {
-        let seats = self.by_order.values();
-        let plugged = seats.filter_map(|seat| self.seats[*seat].plugged.as_ref());
-        let clients = plugged.map(|plugged| {
+    /// The board as it is now, with the connections that belong to other dispatchers.
+    pub(crate) fn snapshot<'p>(&'p self, elsewhere: impl Iterator<Item = &'p Patch>) -> Snapshot {
+        let seats = self.by_order.values().map(|seat| &self.seats[*seat]);
+        let plugged = seats.filter_map(|seat| Some((seat.plugged.as_ref()?, &seat.inputs)));
+        let clients = plugged.map(|(plugged, inputs)| {
             let Device { counts, name, .. } = &plugged.device;
             let outputs = counts.channels(true).zip(&plugged.outputs);
             let outputs = outputs.map(|(channel, output)| (channel, output.value));
-            let inputs = counts.channels(false).zip(&plugged.inputs);
-            let inputs = inputs.map(|(channel, input)| (channel, input.value));
-            let has_forces = !self.forces.is_empty();
+            let values = inputs.iter().map(|input| input.value);
+            let values = values.chain(std::iter::repeat(Number::UNKNOWN));
+            let inputs = counts.channels(false).zip(values);
+            let has_forces = self.has_forces();
             let channels = outputs.chain(inputs).map(|(channel, value)| ChannelState {
                 channel,
                 value: value.is_known().then_some(value),
@@ -70,10 +74,12 @@ impl Board {
             });
             ClientState {
                 device: plugged.device.clone(),
+                host: plugged.host.as_deref().map(str::to_owned),
                 channels: channels.collect(),
             }
         });
-        let connections = self.patch.iter().map(|(sink, source)| Connection {
+        let all = std::iter::once(&self.patch).chain(elsewhere);
+        let connections = all.flat_map(Patch::iter).map(|(sink, source)| Connection {
             sink: sink.clone(),
             source: source.clone(),
             is_awake: self.place(sink).is_some() && self.place(source).is_some(),

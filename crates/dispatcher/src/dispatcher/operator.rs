@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use super::{Author, Dispatcher, Promised, no_channel};
+use super::{Author, Dispatcher, no_channel};
 use crate::board::Snapshot;
+use crate::federation::Request;
 use crate::number::Number;
 use crate::patch::Pin;
 use crate::refusal::{Code, Refusal};
@@ -46,11 +47,11 @@ impl Dispatcher {
     /// Carries out what an operator orders. What changes the patch is answered when that is saved, the rest at once.
     pub fn operate(&mut self, order: Order, reply: Reply) {
         self.board.begin_line();
-        let sinks = match order {
+        let request = match order {
             Order::Connect(one, other) => self.patch_in(one, other),
             Order::Disconnect(pin) => self.pull_out(&pin),
             Order::Force(pin, value) => {
-                let forced = self.check_here(&pin);
+                let forced = self.check_here(&pin).and_then(|seat| self.check_own(seat));
                 if forced.is_ok() {
                     self.board.force(pin, value);
                 }
@@ -62,43 +63,48 @@ impl Dispatcher {
                 return reply.give(is_released.then_some(()).ok_or_else(not_forced));
             }
         };
-        match sinks {
-            Ok(sinks) => self.promised.push(Promised {
-                author: Author::Operator(reply),
-                sinks,
-            }),
+        match request {
+            Ok(request) => self.change(Author::Operator(reply), request),
             Err(refusal) => reply.give(Err(refusal)),
         }
     }
 
-    /// All clients, their values and all connections. This copies them: ask no more often than somebody looks.
+    /// All clients, their values and all connections, of other dispatchers as well. This copies them: ask no more often
+    /// than somebody looks.
     pub fn snapshot(&self) -> Snapshot {
-        self.board.snapshot()
+        let federation = self.federation.iter();
+        let hosts = federation.flat_map(|federation| federation.hosts.values());
+        self.board.snapshot(hosts.map(|host| &host.patch))
     }
 
-    fn patch_in(&mut self, one: Pin, other: Pin) -> Result<Vec<Pin>, Refusal> {
+    fn patch_in(&self, one: Pin, other: Pin) -> Result<Request, Refusal> {
         self.check_here(&one)?;
         self.check_here(&other)?;
-        let (sink, source) = self.joint(one, other, &[])?;
-        if self.board.patch().source(&sink).is_none() {
-            self.board.connect(sink.clone(), source);
-        }
-        Ok(vec![sink])
+        let connect = vec![self.joint(one, other, &[])?];
+        let cut = Vec::new();
+        Ok(Request { connect, cut })
     }
 
-    fn pull_out(&mut self, pin: &Pin) -> Result<Vec<Pin>, Refusal> {
-        let sinks = self.connected_inputs(pin);
-        if sinks.is_empty() {
+    fn pull_out(&self, pin: &Pin) -> Result<Request, Refusal> {
+        let (connect, cut) = (Vec::new(), self.joints_at(pin));
+        if cut.is_empty() {
             let text = format!("{pin} is not connected");
             return Err(Code::NotFound.because(text));
         }
-        for sink in &sinks {
-            self.board.disconnect(sink);
-        }
-        Ok(Vec::new())
+        Ok(Request { connect, cut })
     }
 
-    fn check_here(&self, pin: &Pin) -> Result<(), Refusal> {
+    /// Refuses a client of another dispatcher.
+    fn check_own(&self, seat: usize) -> Result<(), Refusal> {
+        match self.board.host(seat) {
+            None => Ok(()),
+            Some(host) => Err(Code::NotFound.because(format_args!(
+                "this client is on {host}; do it at the dispatcher there"
+            ))),
+        }
+    }
+
+    fn check_here(&self, pin: &Pin) -> Result<usize, Refusal> {
         let name = &pin.client;
         let Some(seat) = self.board.find_name(name) else {
             return Err(Code::NotFound.because(format_args!("there is no client {name}")));
@@ -106,17 +112,7 @@ impl Dispatcher {
         if !self.board.has(seat, pin.channel) {
             return Err(no_channel(&format!("{name} has"), pin.channel));
         }
-        Ok(())
-    }
-
-    /// The inputs whose connections end at this channel.
-    pub(super) fn connected_inputs(&self, pin: &Pin) -> Vec<Pin> {
-        let patch = self.board.patch();
-        if pin.channel.kind.is_output() {
-            patch.sinks(pin).cloned().collect()
-        } else {
-            patch.source(pin).map(|_| pin.clone()).into_iter().collect()
-        }
+        Ok(seat)
     }
 
     /// The connection of two channels, as sink and source, if it fits the patch and `further` connections.
@@ -138,14 +134,8 @@ impl Dispatcher {
         } else {
             (own, peer)
         };
-        let mut in_line = further.iter().filter(|(other, _)| *other == sink);
-        let present = self.board.patch().source(&sink);
-        let present = present.or(in_line.next().map(|(_, source)| source));
-        if let Some(other) = present.filter(|other| **other != source) {
-            return Err(Code::Conflict.because(format_args!(
-                "{sink} is connected to {other} already; DISCONNECT it there first"
-            )));
-        }
-        Ok((sink, source))
+        let joint = (sink, source);
+        self.check_source(&joint, further)?;
+        Ok(joint)
     }
 }

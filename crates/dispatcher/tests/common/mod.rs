@@ -1,6 +1,8 @@
 //! A dispatcher without sockets, and clients that say and hear lines.
 #![allow(dead_code, reason = "each test file uses a part")]
 
+pub(crate) mod hosts;
+
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
@@ -10,7 +12,7 @@ use tickbus_dispatcher::{Dispatcher, Patch, Settings};
 pub(crate) struct Lab {
     pub(crate) dispatcher: Dispatcher,
     pub(crate) now: Nanos,
-    next_port: u16,
+    pub(crate) next_port: u16,
 }
 
 impl Lab {
@@ -60,7 +62,7 @@ impl Lab {
         self.settle();
     }
 
-    fn settle(&mut self) {
+    pub(crate) fn settle(&mut self) {
         loop {
             self.dispatcher.tick(self.now);
             if self.dispatcher.unsaved().is_some() {

@@ -1,0 +1,229 @@
+//! What a dispatcher knows of the other dispatchers of its laboratory. No I/O, and nothing of clients and lines.
+
+pub(crate) mod link;
+pub(crate) mod message;
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::ops::Bound;
+
+use tickbus_base::time::Nanos;
+
+use crate::board::Place;
+use crate::host::{HostId, Rank};
+use crate::name::{LONGEST_NAME, is_name};
+use crate::patch::Patch;
+
+use link::Link;
+use message::{Body, Joint, Letter, to_wire};
+
+/// Above all numbers of wants. They stand in lines of values.
+pub(crate) const MOST_WANTS: u32 = 10_000_000;
+
+/// Who a dispatcher is among the others of its laboratory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Its number, that no other process has.
+    pub host: HostId,
+    /// The name of its computer, for people.
+    pub name: String,
+    /// The time of day at the zero of the dispatcher's clock, in nanoseconds since 1970. It only has to be about right: of
+    /// two clients that have taken one name on two hosts while these were cut off, the earlier one keeps it.
+    pub since: u64,
+}
+
+impl Identity {
+    /// `name` may be any text: what cannot stand in a name is replaced by `-`.
+    pub fn new(host: HostId, name: &str, since: u64) -> Self {
+        let letters = name.chars().take(LONGEST_NAME);
+        let letters = letters.map(|letter| match letter {
+            'a'..='z' | 'A'..='Z' | '0'..='9' | '_' | '-' | '.' => letter,
+            _ => '-',
+        });
+        let name: String = letters.collect();
+        let name = if is_name(&name) {
+            name
+        } else {
+            "host".to_owned()
+        };
+        Self { host, name, since }
+    }
+}
+
+/// This dispatcher among the others.
+#[derive(Debug)]
+pub(crate) struct Federation {
+    pub(crate) identity: Identity,
+    pub(crate) hosts: BTreeMap<HostId, Host>,
+    /// Names that several clients have, with the seats of these. The first keeps the name.
+    pub(crate) rivals: BTreeMap<String, BTreeMap<Rank, usize>>,
+    pub(crate) news: VecDeque<String>,
+    pub(crate) next_beat: Nanos,
+    /// What was said last of letters that cannot be read; it would come again with each of them.
+    pub(crate) complaint: String,
+    streams: u64,
+    requests: u32,
+    /// The host that was served last.
+    served: HostId,
+}
+
+/// Another dispatcher.
+#[derive(Debug)]
+pub(crate) struct Host {
+    pub(crate) link: Link,
+    /// The name of its computer; empty until it has said so, and while it is cut off.
+    pub(crate) name: String,
+    /// Where it sits on the board, as the sink of what it wants.
+    pub(crate) seat: usize,
+    /// The seats of its clients, by the time of registration.
+    pub(crate) clients: BTreeMap<u64, usize>,
+    /// The connections of its clients' inputs.
+    pub(crate) patch: Patch,
+    /// The outputs here that it wants, and the places on its seat that they go through.
+    pub(crate) supplies: BTreeMap<Place, usize>,
+    /// Places on its seat that are free, and how many there are.
+    pub(crate) free: Vec<usize>,
+    pub(crate) places: usize,
+    /// The outputs of its clients that are wanted here, by number and back.
+    pub(crate) wants: BTreeMap<Place, u32>,
+    pub(crate) wanted: HashMap<u32, Place>,
+    next_want: u32,
+    /// What it was asked and has not answered.
+    pub(crate) asked: BTreeMap<u32, Request>,
+}
+
+/// Connections to be made and to be cut by another dispatcher.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Request {
+    pub(crate) connect: Vec<Joint>,
+    pub(crate) cut: Vec<Joint>,
+}
+
+impl Federation {
+    pub(crate) fn new(identity: Identity) -> Self {
+        Self {
+            identity,
+            hosts: BTreeMap::new(),
+            rivals: BTreeMap::new(),
+            news: VecDeque::new(),
+            next_beat: Nanos::ZERO,
+            complaint: String::new(),
+            streams: 0,
+            requests: 0,
+            served: HostId::default(),
+        }
+    }
+
+    /// Sends a letter to everyone.
+    pub(crate) fn tell_all(&mut self, mut body: impl FnMut() -> Body) {
+        for host in self.hosts.values_mut() {
+            host.link.send(body());
+        }
+    }
+
+    /// Begins a new stream of letters to a host; what was asked and not answered is asked again.
+    pub(crate) fn open(&mut self, now: Nanos, host: HostId, snapshot: Body) {
+        self.streams += 1;
+        let Some(host) = self.hosts.get_mut(&host) else {
+            return;
+        };
+        host.link.open(now, self.streams);
+        host.link.send(snapshot);
+        host.ask_again();
+    }
+
+    /// Asks a host for changes of its patch; returns the number of the request.
+    pub(crate) fn request(&mut self, id: HostId, request: Request) -> u32 {
+        self.requests = self.requests.wrapping_add(1);
+        let number = self.requests;
+        if let Some(host) = self.hosts.get_mut(&id) {
+            host.link.send(request.letter(number));
+            host.asked.insert(number, request);
+        }
+        number
+    }
+
+    /// The next letter for a host, and the host; `values` makes lines of values for the dispatcher on a seat.
+    pub(crate) fn next_letter(
+        &mut self,
+        mut values: impl FnMut(usize) -> Option<String>,
+    ) -> Option<(HostId, Letter)> {
+        for _ in 0..self.hosts.len() {
+            let behind = (Bound::Excluded(self.served), Bound::Unbounded);
+            let behind = self.hosts.range(behind).next();
+            let (id, _) = behind.or_else(|| self.hosts.first_key_value())?;
+            self.served = *id;
+            let host = self.hosts.get_mut(&self.served)?;
+            if let Some(letter) = host.link.take(self.identity.host) {
+                return Some((self.served, letter));
+            }
+            if host.link.is_open
+                && let Some(lines) = values(host.seat)
+            {
+                host.link.send(Body::Values(lines));
+                let letter = host.link.take(self.identity.host)?;
+                return Some((self.served, letter));
+            }
+        }
+        None
+    }
+}
+
+impl Host {
+    pub(crate) fn new(now: Nanos, seat: usize) -> Self {
+        Self {
+            link: Link::new(now),
+            name: String::new(),
+            seat,
+            clients: BTreeMap::new(),
+            patch: Patch::new(),
+            supplies: BTreeMap::new(),
+            free: Vec::new(),
+            places: 0,
+            wants: BTreeMap::new(),
+            wanted: HashMap::new(),
+            next_want: 0,
+            asked: BTreeMap::new(),
+        }
+    }
+
+    /// Notes that an output is wanted; returns the number of that.
+    pub(crate) fn want(&mut self, output: Place) -> u32 {
+        // A number that was used is long out of every letter when it comes again.
+        while self.wanted.contains_key(&self.next_want) {
+            self.next_want = (self.next_want + 1) % MOST_WANTS;
+        }
+        let number = self.next_want;
+        self.next_want = (self.next_want + 1) % MOST_WANTS;
+        self.wants.insert(output, number);
+        self.wanted.insert(number, output);
+        number
+    }
+
+    /// Notes that an output is not wanted any more; whether it was.
+    pub(crate) fn unwant(&mut self, output: Place) -> bool {
+        let number = self.wants.remove(&output);
+        number.is_some_and(|number| self.wanted.remove(&number).is_some())
+    }
+
+    pub(crate) fn ask_again(&mut self) {
+        for (number, request) in &self.asked {
+            self.link.send(request.letter(*number));
+        }
+    }
+}
+
+impl Request {
+    fn letter(&self, number: u32) -> Body {
+        Body::Request {
+            number,
+            connect: to_wire(&self.connect),
+            cut: to_wire(&self.cut),
+        }
+    }
+}
+
+/// All places on a seat.
+pub(crate) fn on_seat(seat: usize) -> std::ops::RangeInclusive<Place> {
+    let place = |channel| Place { seat, channel };
+    place(0)..=place(usize::MAX)
+}

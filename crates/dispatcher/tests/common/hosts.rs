@@ -1,0 +1,153 @@
+//! Several dispatchers, and a network between them that loses letters and is cut.
+
+use std::collections::{BTreeSet, VecDeque};
+
+use tickbus_base::time::Nanos;
+use tickbus_dispatcher::{HostId, Identity, Patch, Settings};
+
+use super::Lab;
+
+/// The names of the hosts.
+pub(crate) const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
+
+pub(crate) struct Hosts {
+    pub(crate) labs: Vec<Lab>,
+    /// Pairs of hosts, the smaller first, between which nothing goes.
+    cuts: BTreeSet<(usize, usize)>,
+    /// Letters on their way: from, to.
+    on_the_way: VecDeque<(usize, usize, Vec<u8>)>,
+    /// How many of the next letters get lost.
+    pub(crate) to_lose: usize,
+}
+
+pub(crate) fn id(host: usize) -> HostId {
+    HostId(host as u128 + 1)
+}
+
+impl Hosts {
+    pub(crate) fn new(settings: Settings) -> Self {
+        let names = NAMES.iter().enumerate();
+        let labs = names.map(|(at, name)| {
+            let mut lab = Lab::with(settings, Patch::new());
+            // Each client of all has its own port.
+            lab.next_port += 1000 * u16::try_from(at).expect("few");
+            lab.dispatcher.federate(Identity::new(id(at), name, 0));
+            lab
+        });
+        let mut hosts = Self {
+            labs: labs.collect(),
+            cuts: BTreeSet::new(),
+            on_the_way: VecDeque::new(),
+            to_lose: 0,
+        };
+        hosts.meet();
+        hosts.settle();
+        hosts
+    }
+
+    /// Every host appears to all others that it reaches.
+    fn meet(&mut self) {
+        for one in 0..self.labs.len() {
+            for other in 0..self.labs.len() {
+                if self.reaches(one, other) {
+                    let now = self.labs[one].now;
+                    self.labs[one].dispatcher.host_appeared(now, id(other));
+                }
+            }
+        }
+    }
+
+    fn reaches(&self, one: usize, other: usize) -> bool {
+        one != other && !self.cuts.contains(&(one.min(other), one.max(other)))
+    }
+
+    pub(crate) fn cut(&mut self, one: usize, other: usize) {
+        self.cuts.insert((one.min(other), one.max(other)));
+        self.on_the_way
+            .retain(|(from, to, _)| (*from, *to) != (one, other) && (*to, *from) != (one, other));
+    }
+
+    /// Nothing is cut any more, and nothing gets lost; and the network says so.
+    pub(crate) fn heal(&mut self) {
+        self.mend();
+        self.meet();
+    }
+
+    /// The same, but the network says nothing.
+    pub(crate) fn mend(&mut self) {
+        self.cuts.clear();
+        self.to_lose = 0;
+    }
+
+    /// Carries one letter; whether there was one.
+    pub(crate) fn carry_one(&mut self) -> bool {
+        for from in 0..self.labs.len() {
+            while let Some((to, letter)) = self.labs[from].dispatcher.next_letter() {
+                let to = usize::try_from(to.0).expect("few") - 1;
+                if !self.reaches(from, to) {
+                } else if self.to_lose > 0 {
+                    self.to_lose -= 1;
+                } else {
+                    self.on_the_way.push_back((from, to, letter));
+                }
+            }
+        }
+        let Some((_, to, letter)) = self.on_the_way.pop_front() else {
+            return false;
+        };
+        let lab = &mut self.labs[to];
+        lab.dispatcher.letter_arrived(lab.now, &letter);
+        lab.settle();
+        true
+    }
+
+    /// Carries all letters.
+    pub(crate) fn settle(&mut self) {
+        for _ in 0..100_000 {
+            if !self.carry_one() {
+                return;
+            }
+        }
+        panic!("letters beget letters");
+    }
+
+    pub(crate) fn wait(&mut self, seconds: i64) {
+        for _ in 0..seconds {
+            for lab in &mut self.labs {
+                lab.wait(Nanos::from_secs(1));
+            }
+            self.settle();
+        }
+    }
+
+    /// Sends a line, and returns what its client hears when all letters are carried.
+    pub(crate) fn ask(&mut self, host: usize, seat: usize, line: &str) -> Vec<String> {
+        self.labs[host].say(seat, line);
+        self.settle();
+        self.labs[host].hear(seat)
+    }
+
+    pub(crate) fn hear(&mut self, host: usize, seat: usize) -> Vec<String> {
+        self.settle();
+        self.labs[host].hear(seat)
+    }
+
+    pub(crate) fn join(&mut self, host: usize, identification: &str) -> usize {
+        let seat = self.labs[host].join(identification);
+        self.settle();
+        seat
+    }
+
+    /// The connections that a host keeps.
+    pub(crate) fn patch(&self, host: usize) -> Vec<String> {
+        let patch = self.labs[host].dispatcher.patch().iter();
+        patch
+            .map(|(sink, source)| format!("{sink} = {source}"))
+            .collect()
+    }
+
+    pub(crate) fn news(&mut self, host: usize) -> Vec<String> {
+        let dispatcher = &mut self.labs[host].dispatcher;
+        std::iter::from_fn(|| dispatcher.next_news()).collect()
+    }
+}

@@ -27,7 +27,9 @@
  *
  * THREADS. One thread at a time calls a driver's functions and moves its values; a second one is answered by TB_BUSY. Any
  * thread may read tb_buffer itself at any time. No function throws, exits, or touches the
- * process's signal handlers.
+ * process's signal handlers. Ask tb_last_error before tb_close: afterwards the line's reason is gone.
+ *
+ * FORK. A forked child has none of the driver's threads: it must not call a driver that its parent has opened.
  *
  * License: MIT OR Apache-2.0, at your choice.
  */
@@ -61,11 +63,15 @@ enum tb_status {
 /* An open driver. Never 0. */
 typedef int64_t tb_driver;
 
-/* A value: a double, or for a 64-bit integer without scale an integer. */
+/* A value: a double, or for a 64-bit integer without scale that integer. */
 typedef union tb_slot {
     double real;
     int64_t integer;
+    uint64_t natural;
 } tb_slot;
+
+/* Which of them. */
+enum tb_kind { TB_REAL = 0, TB_INTEGER = 1, TB_NATURAL = 2 };
 
 /* tb_buffer.simulation_time as long as the simulator has no time of its own. */
 #define TB_NO_TIME INT64_MIN
@@ -73,9 +79,9 @@ typedef union tb_slot {
 /* What simulator and driver share. All times are in nanoseconds. */
 typedef struct tb_buffer {
     uint64_t version;        /* of this layout: 1 */
-    int64_t status;          /* of the last tb_exchange, tb_receive or tb_send */
+    int64_t status;          /* of the last tb_exchange, tb_receive or tb_send that did not fail with TB_INTERNAL */
     uint64_t sequence;       /* bus cycles that have arrived */
-    int64_t age;             /* how old the values are that were read last */
+    int64_t age;             /* of the values read last */
     int64_t simulation_time; /* set it before each tb_exchange or tb_receive, if the simulation has a time of its own */
     int64_t granted;         /* on a stepped bus: how far the simulation may go before it has to exchange again */
     uint64_t ticks;          /* how many there were */
@@ -92,7 +98,7 @@ typedef struct tb_signal {
     int32_t slot;        /* where its value is among tb_slots */
     int32_t edges;       /* where the number of edges is that came with the last exchange; -1: none are counted */
     int32_t is_written;  /* 1 if the simulator writes it, 0 if it reads it */
-    int32_t is_integer;  /* 1 if its slot is an integer, 0 if it is a double */
+    int32_t kind;        /* what its slot holds: TB_REAL; TB_INTEGER for LINT, TB_NATURAL for ULINT and LWORD */
 } tb_signal;
 
 /* A change of a signal, for buses with `events = true`. */
@@ -160,21 +166,34 @@ static inline tb_slot *tb_slots(tb_buffer *values) { return (tb_slot *)(values +
 /* The value of a signal as a double. */
 static inline double tb_get(tb_buffer *values, const tb_signal *signal) {
     const tb_slot *slot = tb_slots(values) + signal->slot;
-    return signal->is_integer ? (double)slot->integer : slot->real;
+    return signal->kind == TB_REAL ? slot->real : signal->kind == TB_INTEGER ? (double)slot->integer : (double)slot->natural;
 }
 
 static inline int tb_get_bool(tb_buffer *values, const tb_signal *signal) { return tb_get(values, signal) != 0; }
 
-/* Sets a signal, to be sent with the next tb_exchange or tb_send. For a BOOL everything but 0 is true. A 64-bit integer
- * beyond 2^53 is set exactly by its slot. */
+/* The nearest whole number; halves away from zero. */
+static inline double tb_whole(double value) {
+    const double all_whole = 4503599627370496.0;
+    if (value <= -all_whole || value >= all_whole || value != value) return value;
+    double whole = (double)(int64_t)value;
+    return value - whole >= 0.5 ? whole + 1 : value - whole <= -0.5 ? whole - 1 : whole;
+}
+
+/* Sets a signal, to be sent with the next tb_exchange or tb_send. For a BOOL everything but 0 is true. What its slot cannot
+ * hold becomes the nearest value that it can; write integers beyond 2^53 into the slot itself. */
 static inline void tb_set(tb_buffer *values, const tb_signal *signal, double value) {
     tb_slot *slot = tb_slots(values) + signal->slot;
-    if (!signal->is_integer) {
+    if (signal->kind == TB_REAL) {
         slot->real = value;
-    } else if (value >= -9223372036854775808.0 && value < 9223372036854775808.0) {
-        slot->integer = (int64_t)value;
+        return;
+    }
+    double whole = tb_whole(value);
+    if (signal->kind == TB_NATURAL) {
+        slot->natural = whole >= 18446744073709551616.0 ? UINT64_MAX : whole > 0 ? (uint64_t)whole : 0;
+    } else if (whole >= -9223372036854775808.0 && whole < 9223372036854775808.0) {
+        slot->integer = (int64_t)whole;
     } else {
-        slot->integer = value > 0 ? INT64_MAX : value < 0 ? INT64_MIN : 0;
+        slot->integer = whole > 0 ? INT64_MAX : whole < 0 ? INT64_MIN : 0;
     }
 }
 

@@ -13,29 +13,25 @@ use std::collections::HashSet;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::ptr::{NonNull, null, null_mut};
+use std::ptr::{NonNull, null_mut};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use once_cell::sync::Lazy;
-use std::sync::Mutex;
-
 use tickbus_base::statistics::entries;
-use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::nearest;
 use tickbus_binding::{
-    Device, EVENT_WORDS, EVENTS, Handles, Refusal, Shared, faults, is_written, open, panic_message,
+    Device, EVENT_WORDS, EVENTS, Handles, Refusal, Shared, closing, faults, open, panic_message,
     read_fault,
 };
 use tickbus_driver::Code;
+use tickbus_image::signal::Signal;
 
 /// Every driver that is open through this interface.
 static DRIVERS: Handles<Opened> = Handles::new();
 
-/// How long closing waits for the log to reach stderr.
-const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
-
 /// The buffers of closed drivers. Their memory is used again and never given back, so that a caller that moves values after
 /// closing moves them into memory that is there.
-static RETIRED: Mutex<Vec<&'static mut [u64]>> = Mutex::new(Vec::new());
+static RETIRED: Mutex<Vec<Buffer>> = Mutex::new(Vec::new());
 
 /// Texts that were handed out: their pointers stay valid.
 static TEXTS: Lazy<Mutex<HashSet<&'static CStr>>> = Lazy::new(Mutex::default);
@@ -63,42 +59,46 @@ struct CSignal {
     slot: i32,
     edges: i32,
     is_written: i32,
-    is_integer: i32,
+    kind: i32,
 }
 
-/// An open driver; its buffer goes back to [`RETIRED`].
-struct Opened {
-    device: Device<()>,
+/// Memory of a buffer: a number of words that are never given back. Not a slice, since a caller may write there at any time.
+struct Buffer {
     words: NonNull<u64>,
     length: usize,
 }
 
-// SAFETY: the buffer's memory is not bound to a thread; it is reached through `device` and the caller alone.
-unsafe impl Send for Opened {}
+// SAFETY: the memory is not bound to a thread; it is reached through the device that has it, and by the caller.
+unsafe impl Send for Buffer {}
+
+/// An open driver; its buffer goes back to [`RETIRED`].
+struct Opened {
+    device: Device<()>,
+    buffer: Buffer,
+}
 
 impl Opened {
     fn close(self) {
         self.device.close();
-        // SAFETY: `memory_of` leaked this slice, and its one user has ended.
-        let words = unsafe { std::slice::from_raw_parts_mut(self.words.as_ptr(), self.length) };
-        retired().push(words);
+        retired().push(self.buffer);
     }
 }
 
-fn retired() -> std::sync::MutexGuard<'static, Vec<&'static mut [u64]>> {
-    RETIRED
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
+fn retired() -> MutexGuard<'static, Vec<Buffer>> {
+    RETIRED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Memory for a buffer of this many bytes: one that is free, or a new one.
-fn memory_of(bytes: usize) -> &'static mut [u64] {
-    let words = bytes.div_ceil(size_of::<u64>());
+/// A buffer of this many bytes: one that is free, or a new one.
+fn buffer_of(bytes: usize) -> Buffer {
+    let length = bytes.div_ceil(size_of::<u64>());
     let mut retired = retired();
-    let fitting = (0..retired.len()).filter(|&at| retired[at].len() >= words);
-    match fitting.min_by_key(|&at| retired[at].len()) {
+    let fitting = (0..retired.len()).filter(|&at| retired[at].length >= length);
+    match fitting.min_by_key(|&at| retired[at].length) {
         Some(at) => retired.swap_remove(at),
-        None => vec![0; words].leak(),
+        None => Buffer {
+            words: NonNull::from(vec![0_u64; length].leak()).cast(),
+            length,
+        },
     }
 }
 
@@ -106,9 +106,7 @@ fn memory_of(bytes: usize) -> &'static mut [u64] {
 fn permanent(text: &str) -> *const c_char {
     let bytes: Vec<u8> = text.bytes().take_while(|&byte| byte != 0).collect();
     let text = CString::new(bytes).unwrap_or_default();
-    let mut texts = TEXTS
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(known) = texts.get(&*text) {
         return known.as_ptr();
     }
@@ -117,11 +115,16 @@ fn permanent(text: &str) -> *const c_char {
     kept.as_ptr()
 }
 
+/// Keeps why this thread's last failed call failed. A thread that is ending, as in a handler of `atexit`, may have no place for it.
+fn remember(why: Last) {
+    let _ = LAST.try_with(|last| last.replace(why));
+}
+
 /// Keeps why a call failed, and returns its code.
 fn failed(refusal: &Refusal) -> i32 {
     let text = refusal.to_string().replace('\0', " ");
     let text = CString::new(text).unwrap_or_default();
-    LAST.with(|last| last.replace(Last::Told(text)));
+    remember(Last::Told(text));
     refusal.code.code()
 }
 
@@ -137,20 +140,12 @@ fn answer(work: impl FnOnce() -> Result<i32, Refusal>) -> i32 {
     }
 }
 
-fn tick(driver: i64, work: impl FnOnce(&mut Device<()>) -> i32) -> i32 {
-    match DRIVERS.with(driver, |opened| work(&mut opened.device)) {
-        Ok(status) if status >= 0 => status,
-        Ok(status) => {
-            let code = Code::ALL.into_iter().find(|code| code.code() == status);
-            tick_failed(driver, code.unwrap_or(Code::Internal))
-        }
-        Err(code) => tick_failed(driver, code),
+fn tick(driver: i64, work: impl FnOnce(&mut Device<()>) -> Code) -> i32 {
+    let code = DRIVERS.with(driver, |opened| work(&mut opened.device));
+    let code = code.unwrap_or_else(|refused| refused);
+    if code.code() < 0 {
+        remember(Last::Tick(driver, code));
     }
-}
-
-#[cold]
-fn tick_failed(driver: i64, code: Code) -> i32 {
-    LAST.with(|last| last.replace(Last::Tick(driver, code)));
     code.code()
 }
 
@@ -189,6 +184,10 @@ unsafe fn hand_over(text: &str, into: *mut c_char, room: usize) -> i32 {
 
 /// Why a tick failed, with the line's own reason if it has one.
 fn why(driver: i64, code: Code) -> Refusal {
+    // Nothing else depends on the line; and the thread that has the driver is left alone.
+    if code != Code::BusFailed {
+        return DRIVERS.reason(driver, code);
+    }
     let snapshot = DRIVERS.with(driver, |opened| opened.device.snapshot());
     let Ok(snapshot) = snapshot else {
         return DRIVERS.reason(driver, code);
@@ -224,20 +223,14 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
         };
         let opened = open(Path::new(path), tables)?;
         let slots = opened.slots().count;
-        let memory = memory_of(Shared::<()>::bytes(slots));
-        let length = memory.len();
-        let words = NonNull::from(memory).cast::<u64>();
+        let buffer = buffer_of(Shared::<()>::bytes(slots));
         // SAFETY: memory that is never given back, of at least this size, initialised, and of nobody else until this driver
         // is closed. The header demands of the caller that it leaves the slots alone during a call.
-        let shared = unsafe { Shared::new(words.cast(), slots, ()) };
+        let shared = unsafe { Shared::new(buffer.words.cast(), slots, ()) };
         let shared =
             shared.ok_or_else(|| Refusal::new(Code::Internal, "the buffer is not aligned"))?;
         let device = Device::new(opened, shared);
-        let handle = place.fill(Opened {
-            device,
-            words,
-            length,
-        });
+        let handle = place.fill(Opened { device, buffer });
         // SAFETY: as above.
         unsafe { driver.write(handle) };
         Ok(Code::Fresh.code())
@@ -247,10 +240,7 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
 #[unsafe(no_mangle)]
 extern "C" fn tb_close(driver: i64) -> i32 {
     answer(|| {
-        let closed = DRIVERS.close(driver, Opened::close);
-        // The process may end right after this, and the driver's messages must not be lost.
-        tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
-        closed.map_err(Refusal::plain)?;
+        closing(|| DRIVERS.close(driver, Opened::close)).map_err(Refusal::plain)?;
         Ok(Code::Fresh.code())
     })
 }
@@ -274,7 +264,7 @@ extern "C" fn tb_send(driver: i64) -> i32 {
 extern "C" fn tb_buffer_of(driver: i64) -> *mut u64 {
     let mut words = null_mut();
     answer(|| {
-        words = DRIVERS.with_reason(driver, |opened| opened.words.as_ptr())?;
+        words = DRIVERS.with_reason(driver, |opened| opened.buffer.words.as_ptr())?;
         Ok(0)
     });
     words
@@ -293,19 +283,14 @@ extern "C" fn tb_signal_count(driver: i64) -> i32 {
 /// `signal` must be null or point to a `tb_signal`.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tb_signal_at(driver: i64, index: i32, signal: *mut CSignal) -> i32 {
-    // SAFETY: the caller's promise.
-    answer(|| unsafe {
-        describe(driver, signal, |count, _| {
-            usize::try_from(index)
-                .ok()
-                .filter(|&at| at < count)
-                .ok_or_else(|| {
-                    format!(
-                        "there is no signal {index}; expected 0 to {}",
-                        count.saturating_sub(1)
-                    )
-                })
-        })
+    answer(|| {
+        let find = |signals: &[Signal]| {
+            let found = usize::try_from(index).ok().filter(|&at| at < signals.len());
+            let last = signals.len().saturating_sub(1);
+            found.ok_or_else(|| format!("there is no signal {index}; expected 0 to {last}"))
+        };
+        // SAFETY: the caller's promise.
+        unsafe { describe(driver, signal, find) }
     })
 }
 
@@ -317,24 +302,20 @@ unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSig
     answer(|| {
         // SAFETY: the caller's promises.
         let name = unsafe { text(name, "name") }?;
-        let find = |_: usize, names: &mut dyn Iterator<Item = &str>| {
-            let names: Vec<&str> = names.collect();
-            names
-                .iter()
-                .position(|known| *known == name)
-                .ok_or_else(|| match nearest(name, names) {
-                    Some(near) => {
-                        format!("there is no signal \"{name}\"; did you mean \"{near}\"?")
-                    }
-                    None => format!("there is no signal \"{name}\""),
-                })
+        let find = |signals: &[Signal]| {
+            let found = signals.iter().position(|signal| signal.name == name);
+            let names = signals.iter().map(|signal| &*signal.name);
+            found.ok_or_else(|| match nearest(name, names) {
+                Some(near) => format!("there is no signal \"{name}\"; did you mean \"{near}\"?"),
+                None => format!("there is no signal \"{name}\""),
+            })
         };
         // SAFETY: as above.
         unsafe { describe(driver, signal, find) }
     })
 }
 
-/// Describes the signal whose index `find` gives, from the number of signals and their names.
+/// Describes the signal whose index `find` gives.
 ///
 /// # Safety
 ///
@@ -342,30 +323,28 @@ unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSig
 unsafe fn describe(
     driver: i64,
     into: *mut CSignal,
-    find: impl FnOnce(usize, &mut dyn Iterator<Item = &str>) -> Result<usize, String>,
+    find: impl FnOnce(&[Signal]) -> Result<usize, String>,
 ) -> Result<i32, Refusal> {
     if into.is_null() {
         return Err(Refusal::new(Code::BadArgument, "signal is NULL"));
     }
     let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
-    let signals = &config.table.signals;
-    let mut names = signals.iter().map(|signal| &*signal.name);
-    let index =
-        find(signals.len(), &mut names).map_err(|why| Refusal::new(Code::BadArgument, why))?;
-    let edges = DRIVERS.with_reason(driver, |opened| opened.device.edges_slot(index))?;
-    let signal = &signals[index];
+    let index = find(&config.table.signals);
+    let index = index.map_err(|why| Refusal::new(Code::BadArgument, why))?;
     let number = |slot| i32::try_from(slot).unwrap_or(i32::MAX);
-    let description = CSignal {
-        name: permanent(&signal.name),
-        address: permanent(&signal.address().to_string()),
-        data_type: permanent(signal.data_type.name()),
-        unit: permanent(signal.unit.as_deref().unwrap_or_default()),
-        station: permanent(&config.table.stations[signal.station].name),
-        slot: number(index),
-        edges: edges.map_or(-1, number),
-        is_written: is_written(signal, config.role).into(),
-        is_integer: signal.is_integer_slot().into(),
-    };
+    let description = DRIVERS.with_reason(driver, |opened| {
+        opened.device.describe(index, |signal| CSignal {
+            name: permanent(signal.name),
+            address: permanent(&signal.address),
+            data_type: permanent(signal.data_type),
+            unit: permanent(signal.unit),
+            station: permanent(signal.station),
+            slot: number(signal.slot),
+            edges: signal.edges.map_or(-1, number),
+            is_written: signal.is_written.into(),
+            kind: signal.kind as i32,
+        })
+    })?;
     // SAFETY: the caller's promise.
     unsafe { into.write(description) };
     Ok(Code::Fresh.code())
@@ -441,7 +420,7 @@ unsafe extern "C" fn tb_faults(driver: i64, into: *mut c_char, room: usize) -> i
 
 #[unsafe(no_mangle)]
 extern "C" fn tb_last_error() -> *const c_char {
-    let last = LAST.with(|last| {
+    let told = |last: &RefCell<Last>| {
         let mut last = last.borrow_mut();
         if let Last::Tick(driver, code) = *last {
             let text = why(driver, code).to_string();
@@ -449,8 +428,9 @@ extern "C" fn tb_last_error() -> *const c_char {
         }
         match &*last {
             Last::Told(text) => text.as_ptr(),
-            _ => null(),
+            _ => c"".as_ptr(),
         }
-    });
-    if last.is_null() { c"".as_ptr() } else { last }
+    };
+    let text = catch_unwind(|| LAST.try_with(told).unwrap_or(c"".as_ptr()));
+    text.unwrap_or(c"a panic while the reason was looked for".as_ptr())
 }

@@ -21,8 +21,7 @@ use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jboolean, jclass, jint, jlong};
 use jni::vm::JavaVM;
 use jni::{Env, EnvUnowned};
 
-use tickbus_base::time::Nanos;
-use tickbus_binding::{Device, EVENT_WORDS, EVENTS, Handles, Refusal, faults, read_fault};
+use tickbus_binding::{Device, EVENT_WORDS, EVENTS, Handles, Refusal, closing, faults, read_fault};
 use tickbus_driver::Code;
 use tickbus_report::page_beside;
 
@@ -30,9 +29,6 @@ use failure::{Failure, ThrowFieldbusException};
 
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
-
-/// How long closing waits for the log to reach stderr.
-const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
 
 /// Called by the JVM when it loads the library.
 ///
@@ -76,7 +72,8 @@ extern "system" fn Java_tickbus_Tickbus_xChangeData(
     // The handle table catches a panic of the driver; nothing else here can panic.
     DRIVERS
         .with(handle, Device::exchange)
-        .unwrap_or_else(Code::code)
+        .unwrap_or_else(|refused| refused)
+        .code()
 }
 
 /// `static native int receiveNative(long handle)`
@@ -88,7 +85,8 @@ extern "system" fn Java_tickbus_Tickbus_receiveNative(
 ) -> jint {
     DRIVERS
         .with(handle, Device::receive)
-        .unwrap_or_else(Code::code)
+        .unwrap_or_else(|refused| refused)
+        .code()
 }
 
 /// `static native int sendNative(long handle)`
@@ -100,7 +98,8 @@ extern "system" fn Java_tickbus_Tickbus_sendNative(
 ) -> jint {
     DRIVERS
         .with(handle, Device::send)
-        .unwrap_or_else(Code::code)
+        .unwrap_or_else(|refused| refused)
+        .code()
 }
 
 /// `static native void finalizeNative(long handle)`
@@ -111,9 +110,7 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
     handle: jlong,
 ) {
     env.with_env(|_| {
-        let closed = DRIVERS.close(handle, Device::close);
-        // The process may end right after this, and the driver's messages must not be lost.
-        tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
+        let closed = closing(|| DRIVERS.close(handle, Device::close));
         Ok::<(), Failure>(closed.map_err(Refusal::plain)?)
     })
     .resolve::<ThrowFieldbusException>();

@@ -144,6 +144,46 @@ fn misuse_is_answered_and_nothing_goes_down() {
 }
 
 #[test]
+fn values_of_every_kind_go_as_in_java() {
+    let folder = folder_with_tank();
+    let config = r#"
+[driver]
+id   = 1
+name = "Values"
+
+[fieldbus]
+kind    = "loopback"
+program = "mirror"
+mode    = "stepped"
+scan    = "10ms"
+
+[[signal]]
+name    = "pulse"
+address = "%IX0.0"
+
+[[signal]]
+name    = "answer"
+address = "%QX0.0"
+latch   = "rising"
+
+[[signal]]
+name    = "whole"
+address = "%IL8"
+type    = "LINT"
+
+[[signal]]
+name    = "natural"
+address = "%IL16"
+type    = "ULINT"
+"#;
+    fs::write(folder.path().join("values.cfg"), config).expect("there is room");
+    let program = compile(&["cc", "-std=c11"], "tests/c/values.c", folder.path());
+    let output = run(&program, folder.path(), &["values.cfg"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{:?} {said}", output.status);
+}
+
+#[test]
 fn the_header_has_every_status() {
     let header = fs::read_to_string(Path::new(ROOT).join("include/tickbus.h")).expect("the header");
     for code in Code::ALL {

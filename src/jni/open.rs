@@ -10,9 +10,8 @@ use jni::objects::{JByteBuffer, JObject, JValue};
 use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
 
-use tickbus_binding::{Device, Shared};
+use tickbus_binding::{Device, Shared, SignalDescription, SlotKind};
 use tickbus_driver::{Code, Driver};
-use tickbus_image::signal::Signal;
 
 use super::failure::Failure;
 
@@ -77,14 +76,10 @@ fn describe(
         jni_sig!((id: jint, name: JString) -> void),
         &[JValue::Int(config.id), JValue::Object(&name)],
     )?;
-    for (slot, signal) in config.table.signals.iter().enumerate() {
-        let written = tickbus_binding::is_written(signal, config.role);
-        let station = &config.table.stations[signal.station].name;
-        let edges = driver.slots().edges[slot];
+    for index in 0..config.table.signals.len() {
+        let signal = SignalDescription::of(driver, index);
         // One frame per signal, because local references would accumulate otherwise.
-        env.with_local_frame(8, |env| {
-            describe_signal(env, layout, signal, station, written, slot, edges)
-        })?;
+        env.with_local_frame(8, |env| describe_signal(env, layout, &signal))?;
     }
     buffer(env, driver.slots().count, layout)
 }
@@ -92,17 +87,13 @@ fn describe(
 fn describe_signal(
     env: &mut Env<'_>,
     layout: &JObject<'_>,
-    signal: &Signal,
-    station: &str,
-    written: bool,
-    slot: usize,
-    edges: Option<usize>,
+    signal: &SignalDescription<'_>,
 ) -> Result<(), Failure> {
-    let name = env.new_string(&signal.name)?;
-    let address = env.new_string(signal.address().to_string())?;
-    let data_type = env.new_string(signal.data_type.name())?;
-    let unit = env.new_string(signal.unit.as_deref().unwrap_or_default())?;
-    let station = env.new_string(station)?;
+    let name = env.new_string(signal.name)?;
+    let address = env.new_string(&signal.address)?;
+    let data_type = env.new_string(signal.data_type)?;
+    let unit = env.new_string(signal.unit)?;
+    let station = env.new_string(signal.station)?;
     env.call_method(
         layout,
         jni_str!("signal"),
@@ -116,10 +107,10 @@ fn describe_signal(
             JValue::Object(&data_type),
             JValue::Object(&unit),
             JValue::Object(&station),
-            JValue::Bool(written),
-            JValue::Bool(signal.is_integer_slot()),
-            JValue::Int(index(slot)?),
-            JValue::Int(edges.map_or(Ok(-1), index)?),
+            JValue::Bool(signal.is_written),
+            JValue::Bool(signal.kind != SlotKind::Real),
+            JValue::Int(index(signal.slot)?),
+            JValue::Int(signal.edges.map_or(Ok(-1), index)?),
         ],
     )?;
     Ok(())

@@ -38,7 +38,14 @@ static void *ticks(void *counts) {
     return NULL;
 }
 
+/* When static objects and the thread's own are gone. */
+static void at_the_end(void) {
+    if (tb_exchange(shared) != TB_CLOSED || tb_close(shared) != TB_CLOSED) _Exit(3);
+    tb_last_error();
+}
+
 int main(int count, char **arguments) {
+    atexit(at_the_end);
     tb_driver driver = 77, other;
     tb_signal signal;
     char text[64];
@@ -71,7 +78,7 @@ int main(int count, char **arguments) {
     EXPECT(tb_signal_at(driver, 2, &signal), TB_FRESH, NULL);
     EXPECT(strcmp(signal.name, "Level") | strcmp(signal.address, "%IW2") | strcmp(signal.type, "INT"), 0, NULL);
     EXPECT(strcmp(signal.unit, "mm") | strcmp(signal.station, ""), 0, NULL);
-    EXPECT(signal.is_written == 1 && signal.is_integer == 0 && signal.edges == -1, 1, NULL);
+    EXPECT(signal.is_written == 1 && signal.kind == TB_REAL && signal.edges == -1, 1, NULL);
 
     /* A text that does not fit is cut, ends with 0, and its length is told. */
     int length = tb_statistics(driver, NULL, 0);
@@ -96,10 +103,11 @@ int main(int count, char **arguments) {
     if (pthread_create(&thread, NULL, ticks, counts[0]) != 0) return 2;
     ticks(counts[1]);
     pthread_join(thread, NULL);
-    EXPECT(counts[0][0] + counts[0][1] + counts[1][0] + counts[1][1], 40000, NULL);
+    tb_buffer *values = tb_buffer_of(driver);
+    EXPECT(values->ticks, counts[0][0] + counts[1][0], NULL);
+    EXPECT(values->ticks > 0, 1, NULL);
 
     /* After closing, the buffer is memory still. */
-    tb_buffer *values = tb_buffer_of(driver);
     EXPECT(tb_close(driver), TB_FRESH, NULL);
     tb_set(values, &signal, 1.0);
     EXPECT(tb_exchange(driver), TB_CLOSED, "CLOSED (-3)");

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
-use tickbus_driver::{Driver, Exchange, Snapshot};
+use tickbus_driver::{Code, Driver, Exchange, Snapshot};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
 
+use crate::description::SignalDescription;
 use crate::fault::not_injected;
 use crate::refusal::Refusal;
 use crate::shared::{NO_TIME, Shared, Word};
@@ -40,7 +41,7 @@ impl<K> Device<K> {
 
     /// One tick: sends the slots that the simulation wrote, fills those that it reads, and the header.
     #[inline]
-    pub fn exchange(&mut self) -> i32 {
+    pub fn exchange(&mut self) -> Code {
         self.ticks += 1;
         let done = self.driver.exchange(self.time(), self.shared.slots());
         self.tell(done)
@@ -48,7 +49,7 @@ impl<K> Device<K> {
 
     /// The first half of a tick: fills the slots that the simulation reads, and the header.
     #[inline]
-    pub fn receive(&mut self) -> i32 {
+    pub fn receive(&mut self) -> Code {
         self.ticks += 1;
         let done = self.driver.receive(self.time(), self.shared.slots());
         self.tell(done)
@@ -56,7 +57,7 @@ impl<K> Device<K> {
 
     /// The second half of a tick: sends the slots that the simulation wrote.
     #[inline]
-    pub fn send(&mut self) -> i32 {
+    pub fn send(&mut self) -> Code {
         let done = self.driver.send(self.shared.slots());
         self.tell(done)
     }
@@ -69,7 +70,7 @@ impl<K> Device<K> {
     }
 
     #[inline]
-    fn tell(&mut self, done: Exchange) -> i32 {
+    fn tell(&mut self, done: Exchange) -> Code {
         self.shared
             .write(Word::Status, i64::from(done.code.code()).cast_unsigned());
         self.shared.write(Word::Sequence, done.sequence);
@@ -77,7 +78,7 @@ impl<K> Device<K> {
         self.shared
             .write(Word::Granted, done.granted.0.cast_unsigned());
         self.shared.write(Word::Ticks, self.ticks);
-        done.code.code()
+        done.code
     }
 
     /// The data of the statistics; they are formatted after the driver is released.
@@ -85,9 +86,9 @@ impl<K> Device<K> {
         self.driver.snapshot()
     }
 
-    /// Where the edges of a signal are counted, if they are.
-    pub fn edges_slot(&self, signal: usize) -> Option<usize> {
-        self.driver.slots().edges[signal]
+    /// What a simulator has to know of a signal, by its index.
+    pub fn describe<R>(&self, signal: usize, tell: impl FnOnce(&SignalDescription<'_>) -> R) -> R {
+        tell(&SignalDescription::of(&self.driver, signal))
     }
 
     /// What the driver was opened with.

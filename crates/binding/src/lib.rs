@@ -3,6 +3,7 @@
 //! [`Handles`] is the table of open drivers: checked numbers instead of pointers. A [`Device`] is one of them, with the
 //! [`Shared`] buffer of slots through which its values go.
 
+mod description;
 mod device;
 mod fault;
 mod handles;
@@ -10,9 +11,10 @@ mod opening;
 mod refusal;
 mod shared;
 
+pub use description::{SignalDescription, SlotKind};
 pub use device::{Device, EVENT_WORDS, EVENTS};
 pub use fault::{faults, read_fault};
 pub use handles::{Handles, MAX_DRIVERS, Reservation, panic_message};
-pub use opening::{is_written, open};
+pub use opening::{closing, open};
 pub use refusal::Refusal;
 pub use shared::{NO_TIME, Shared, Word};

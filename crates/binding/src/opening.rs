@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
-use tickbus_base::time::Monotonic;
+use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::Role;
-use tickbus_image::signal::{Area, Signal};
 
 use crate::refusal::Refusal;
 
 /// The file name in mistakes in the tables handed in by the simulator.
 const TABLES: &str = "tables instead of driver.cfg's";
+
+/// How long closing waits for the log to reach stderr.
+const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
 
 /// Opens the driver that the file describes, with `tables` in place of its own; empty for none.
 ///
@@ -29,10 +30,9 @@ pub fn open(path: &Path, tables: &str) -> Result<Driver, Refusal> {
     Ok(Driver::open(config, Monotonic::shared())?)
 }
 
-/// Whether this end writes the signal.
-pub fn is_written(signal: &Signal, role: Role) -> bool {
-    match role {
-        Role::Device => signal.area == Area::Input,
-        Role::Controller => signal.area == Area::Output,
-    }
+/// Closes a driver by `close`, and lets its last messages reach stderr: the process may end right after this.
+pub fn closing<R>(close: impl FnOnce() -> R) -> R {
+    let closed = close();
+    tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
+    closed
 }

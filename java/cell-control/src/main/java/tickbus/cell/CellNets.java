@@ -8,7 +8,7 @@ import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.Composition;
 
 /** The nets of the transport and of the whole cell, and all nets together. */
-public final class CellNets {
+final class CellNets {
     /** Stops along the belt; at stop 2 no station is on the bus. */
     private static final int STOPS = 4;
     private static final long MS = 1_000_000;

@@ -65,7 +65,7 @@ final class StationHead {
         since = now;
     }
 
-    /** Forgets the answer. */
+    /** Forgets the answer, when the net leaves the place in which it waited. */
     void rest() {
         state = State.IDLE;
     }
@@ -114,8 +114,8 @@ final class StationHead {
 
     private String cause() {
         return switch (head.status()) {
-            case IdentificationHead.NO_CARRIER -> "the reader says that there is none (status 03): see whether the pallet stands at "
-                + "its stop, and has its carrier";
+            case IdentificationHead.NO_CARRIER -> "the reader says that there is none (status 03): see whether the "
+                + "pallet stands at its stop, and has its carrier";
             case IdentificationHead.NO_ANSWER -> "the reader did not answer (FF): see whether it is on, and its cable";
             default -> String.format("the reader's status is %02X, see docs/identification.md", head.status());
         };

@@ -43,8 +43,8 @@ final class StationNets {
         NetBuilder net = PetriNet.named("station 1")
             .place("supply", 1).place("loading").place("freeing").place("looking").delay(60 * MS).place("no sleeve")
             .place("advancing").place("fetching").place("closing").delay(70 * MS).place("lifting").place("sleeve ready")
-            .place("waiting", 1).place("reader out").place("reading").place("drawing back").place("pallet empty").place("swinging")
-            .place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
+            .place("waiting", 1).place("reader out").place("reading").place("drawing back").place("pallet empty")
+            .place("swinging").place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
             .place("done");
         step(net, "feed", "supply", "loading");
         // Before the time is over, even if a scan comes late.
@@ -124,8 +124,8 @@ final class StationNets {
     /** Presses piston and spring, then the head, into a sleeve. */
     static BoundNet three(StationHead head) {
         NetBuilder net = PetriNet.named("station 3")
-            .place("waiting", 1).place("reading").place("parts wanted").place("no parts").place("feeding parts").place("pressing parts")
-            .place("head wanted").place("no heads").place("feeding head").place("pressing head").place("raising")
+            .place("waiting", 1).place("reading").place("parts wanted").place("no parts").place("feeding parts")
+            .place("pressing parts").place("head wanted").place("no heads").place("feeding head").place("pressing head").place("raising")
             .place("writing").place("done");
         step(net, "begin", "waiting", "reading");
         step(net, "sleeve alone", "reading", "parts wanted");

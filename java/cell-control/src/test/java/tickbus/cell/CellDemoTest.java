@@ -95,8 +95,8 @@ class CellDemoTest {
             + " vacuum_lost=0 missed=1 refills=0 ticks=\\d+ report=.*"), verdict());
         assertFalse(output.contains("no row of the control table"), output);
         String report = Files.readString(folder.resolve("demo/report.txt"));
-        for (String part : List.of("the loader will jam", "head 1 will miss a carrier", "station 1: ", " firings, now {", "all_markings", "Cylinders",
-                "Statistics of driver 1998", "Statistics of driver 1999")) {
+        for (String part : List.of("the loader will jam", "head 1 will miss a carrier", "station 1: ", " firings, now {",
+                "all_markings", "Cylinders", "Statistics of driver 1998", "Statistics of driver 1999")) {
             assertTrue(report.contains(part), report);
         }
         for (String net : List.of("station-1", "station-3", "station-4", "transport", "cell")) {

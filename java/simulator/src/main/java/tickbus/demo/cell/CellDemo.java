@@ -228,7 +228,7 @@ public final class CellDemo {
         equal("loader_freed", counters.loaderJams());
         equal("pallet_freed", counters.palletJams());
         equal("vacuum_lost", counters.vacuumLosses());
-        // A busy computer can let a head see a carrier later than the pallet's sensor sees the pallet, and that is read again too.
+        // On a busy computer a head can see a carrier long after the sensor has seen the pallet; that is read again too.
         must(number("unread") >= counters.carriersMissed(), "the nets count unread=" + number("unread") + " instead of "
                 + counters.carriersMissed() + " or more");
         equal("refilled", operator.refills());

@@ -4,6 +4,7 @@ import java.io.IOException;
 import java.io.PrintStream;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.time.LocalDateTime;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.CompletableFuture;
@@ -18,9 +19,9 @@ import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
 
 /**
- * The cell's control as a process: {@code CellControl CONFIG TABLES FOLDER}, with the cell's driver.cfg, the tables that
- * make it the PLC's end ({@link Tickbus#open(Path, String)}), and a folder for what is left at the end: each net with
- * its marking, and its firings.
+ * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER}, with the cell's driver.cfg, the
+ * tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the reader of code
+ * carriers, and a folder for what is left at the end: each net with its marking, and its firings.
  *
  * <p>Until a signal ends it, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
  */
@@ -35,12 +36,16 @@ public final class CellControl {
     private final List<FiringLog> logs = new ArrayList<>();
     private final List<Coordinator> coordinators = new ArrayList<>();
     private final NetController nets;
+    private final Heads heads;
     /** How often each transition of each net fired. */
     private final long[][] fired;
+    /** The scan for which the heads have exchanged; none at first. */
+    private long exchanged = -1;
     private final CompletableFuture<Proof> proof = new CompletableFuture<>();
 
-    private CellControl(Tickbus bus) {
-        BoundNet[] all = CellNets.all();
+    private CellControl(Tickbus bus, Tickbus reader) {
+        heads = Heads.on(reader, LocalDateTime::now);
+        BoundNet[] all = CellNets.all(heads);
         fired = new long[all.length][];
         for (int i = 0; i < all.length; i++) {
             FiringLog log = new FiringLog(all[i].net(), LOGGED);
@@ -64,8 +69,8 @@ public final class CellControl {
      * @param args the command line
      */
     public static void main(String[] args) {
-        if (args.length != 3) {
-            System.err.println("usage: CellControl CONFIG TABLES FOLDER");
+        if (args.length != 4) {
+            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER");
             System.exit(USAGE);
         }
         CountDownLatch ending = new CountDownLatch(1);
@@ -79,11 +84,11 @@ public final class CellControl {
             }
         }, "end of the nets"));
         boolean failed = false;
-        try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1])) {
-            CellControl control = new CellControl(bus);
+        try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1]); Tickbus reader = Tickbus.open(Path.of(args[2]))) {
+            CellControl control = new CellControl(bus, reader);
             control.prove();
             control.run(ending, System.out);
-            control.leave(Path.of(args[2]));
+            control.leave(Path.of(args[3]));
         } catch (IOException | RuntimeException e) {
             System.err.println(e.getMessage() == null ? e.toString() : e.getMessage());
             failed = true;
@@ -110,10 +115,16 @@ public final class CellControl {
     }
 
     private void run(CountDownLatch ending, PrintStream out) {
+        long start = System.nanoTime();
         nets.run(SCAN_NANOS, () -> {
-            if (nets.scans() % SCANS_PER_REPORT == 0) {
-                out.print(report());
-                out.flush();
+            // Asked also while the next scan is not due yet.
+            if (nets.scans() != exchanged) {
+                exchanged = nets.scans();
+                heads.exchange(System.nanoTime() - start);
+                if (exchanged % SCANS_PER_REPORT == 0) {
+                    out.print(report());
+                    out.flush();
+                }
             }
             return ending.getCount() > 0;
         });
@@ -129,6 +140,7 @@ public final class CellControl {
         line(text, "pallet_freed", count(3, "free before 1") + count(3, "free before 2") + count(3, "free before 3")
             + count(3, "free before 4"));
         line(text, "vacuum_lost", count(2, "vacuum lost"));
+        line(text, "unread", heads.failures());
         line(text, "refilled", count(0, "magazine filled") + count(1, "parts filled") + count(1, "heads filled")
             + count(2, "caps filled"));
         List<Stop> stops = nets.stops();

@@ -8,7 +8,7 @@ import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.Composition;
 
 /** The nets of the transport and of the whole cell, and all nets together. */
-public final class CellNets {
+final class CellNets {
     /** Stops along the belt; at stop 2 no station is on the bus. */
     private static final int STOPS = 4;
     private static final long MS = 1_000_000;
@@ -17,15 +17,18 @@ public final class CellNets {
     }
 
     /** The nets of stations 1, 3 and 4, of the transport and of the cell, bound to the signals of plc/cell/cell.cfg. */
-    public static BoundNet[] all() {
-        return new BoundNet[] {StationNets.one(new Plan()), StationNets.three(), StationNets.four(), transport(1, 3, 4),
-            cell(1, 3, 4)};
+    static BoundNet[] all(Heads heads) {
+        return all(heads, 1, 3, 4);
+    }
+
+    private static BoundNet[] all(Heads heads, int... pallets) {
+        return new BoundNet[] {StationNets.one(new Plan(), heads.one()), StationNets.three(heads.three()),
+            StationNets.four(heads.four()), transport(pallets), cell(pallets)};
     }
 
     /** The composition of all nets, with pallets that come to these stops at first. */
     static PetriNet composition(int... pallets) {
-        return Composition.of("manufacturing cell", StationNets.one(new Plan()), StationNets.three(), StationNets.four(),
-            transport(pallets), cell(pallets));
+        return Composition.of("manufacturing cell", all(Heads.none(), pallets));
     }
 
     private static int after(int stop) {

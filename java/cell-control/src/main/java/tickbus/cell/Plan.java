@@ -1,5 +1,6 @@
 package tickbus.cell;
 
+import tickbus.identification.PalletRecord.Piece;
 import tickbus.petri.Inputs;
 
 /** What is made of a sleeve: of each colour, every second cylinder gets a cap. */
@@ -8,12 +9,18 @@ final class Plan {
     private static final int METALLIC = 2;
 
     private final boolean[] capNext = new boolean[3];
+    private Piece piece = Piece.UNDEFINED;
 
-    /** The code of the kind for the sleeve in front of station 1's sensors; the next of its colour is of the other kind. */
-    int next(Inputs in) {
+    /** Decides about the sleeve in front of station 1's sensors; the next of its colour is of the other kind. */
+    void decide(Inputs in) {
         int colour = in.isOn("S1 inductive") ? METALLIC : in.isOn("S1 optical") ? RED : 0;
         boolean cap = capNext[colour];
         capNext[colour] = !cap;
-        return 0x10 + 0x20 * colour + (cap ? 0x10 : 0);
+        piece = Piece.values()[Piece.BLACK.ordinal() + 2 * colour + (cap ? 1 : 0)];
+    }
+
+    /** What was decided last. */
+    Piece piece() {
+        return piece;
     }
 }

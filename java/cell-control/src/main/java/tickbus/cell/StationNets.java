@@ -1,5 +1,9 @@
 package tickbus.cell;
 
+import java.util.Set;
+import tickbus.identification.PalletRecord;
+import tickbus.identification.PalletRecord.Content;
+import tickbus.identification.PalletRecord.Piece;
 import tickbus.petri.Delay;
 import tickbus.petri.NetBuilder;
 import tickbus.petri.PetriNet;
@@ -8,9 +12,11 @@ import tickbus.petri.control.BoundNet;
 /** The nets of stations 1, 3 and 4. Each waits until the cell's net says "working", works, and is "done". */
 final class StationNets {
     private static final long MS = 1_000_000;
-    /** Contents of a pallet: sleeve and piece; these with piston, spring and head. */
-    private static final int SLEEVE = 0b100001;
-    private static final int CLOSED = 0b101111;
+    /** What is on a pallet after station 1, and after station 3. */
+    private static final Set<Content> SLEEVE = Set.of(Content.SLEEVE, Content.PIECE);
+    private static final Set<Content> CLOSED =
+        Set.of(Content.SLEEVE, Content.PISTON, Content.SPRING, Content.HEAD, Content.PIECE);
+    private static final Set<Piece> CAPPED = Set.of(Piece.BLACK_WITH_CAP, Piece.RED_WITH_CAP, Piece.METALLIC_WITH_CAP);
 
     private StationNets() {
     }
@@ -20,13 +26,25 @@ final class StationNets {
         net.transition(name).input(from).output(to);
     }
 
+    /** What has failed in a place is tried again there, after a moment. */
+    private static void retry(NetBuilder net, String name, String place) {
+        net.transition(name).delay(Delay.fixed(100 * MS)).input(place).output(place);
+    }
+
+    /** The head works while the place is marked, and again when {@code retry} fires. */
+    private static BoundNet works(BoundNet bound, StationHead head, String place, Runnable begin, String retry) {
+        // The answer is forgotten when the place is left: what waits for one is tested before the next entry.
+        return bound.entry(place).run((in, out) -> begin.run()).exit(place).run((in, out) -> head.rest())
+            .firing(retry).run((in, out) -> head.again());
+    }
+
     /** Prepares a sleeve, whether or not a pallet is there, and puts it on the pallet that comes. */
-    static BoundNet one(Plan plan) {
+    static BoundNet one(Plan plan, StationHead head) {
         NetBuilder net = PetriNet.named("station 1")
             .place("supply", 1).place("loading").place("freeing").place("looking").delay(60 * MS).place("no sleeve")
             .place("advancing").place("fetching").place("closing").delay(70 * MS).place("lifting").place("sleeve ready")
-            .place("waiting", 1).place("reader out").place("reading").place("pallet empty").place("swinging")
-            .place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
+            .place("waiting", 1).place("reader out").place("reading").place("drawing back").place("pallet empty")
+            .place("swinging").place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
             .place("done");
         step(net, "feed", "supply", "loading");
         // Before the time is over, even if a scan comes late.
@@ -44,6 +62,8 @@ final class StationNets {
         step(net, "pallet seen", "reader out", "reading");
         step(net, "pallet free", "reading", "pallet empty");
         step(net, "pallet occupied", "reading", "going back");
+        step(net, "carrier missed", "reading", "drawing back");
+        step(net, "reader is back", "drawing back", "reader out");
         net.transition("swing").input("pallet empty", "sleeve ready").output("swinging");
         // Pallets go on without a sleeve, or what is on the others would not come out.
         net.transition("pass, no sleeve").input("pallet empty").test("no sleeve", 1).output("going back");
@@ -53,6 +73,7 @@ final class StationNets {
         step(net, "let go", "opening", "raising");
         step(net, "raised", "raising", "writing");
         net.transition("written").input("writing").output("going back", "supply");
+        retry(net, "write again", "writing");
         step(net, "back", "going back", "done");
         step(net, "rest", "done", "waiting");
         BoundNet bound = BoundNet.of(net.build())
@@ -67,17 +88,20 @@ final class StationNets {
             .when("at the sleeve").on("S1 arm down")
             .when("lifted").on("S1 arm up")
             .when("begin").marked("cell", "working 1")
-            .when("pallet seen").on("S1 reader forward").on("S1 reader optical").on("Head 1 carrier")
-            .when("pallet free").is("Head 1 contents", 0)
-            .when("pallet occupied").atLeast("Head 1 contents", 1)
+            .when("pallet seen").on("S1 reader forward").on("S1 reader optical")
+            .when("pallet free").that(in -> head.isDone() && head.record().contents().isEmpty())
+            .when("pallet occupied").that(in -> head.isDone() && !head.record().contents().isEmpty())
+            .when("carrier missed").that(in -> head.hasFailed())
+            .when("reader is back").on("S1 reader back")
             .when("pass, stopped").unmarked("cell", "running")
             .when("over the pallet").on("S1 arm right")
             .when("on the pallet").on("S1 arm down")
             .when("raised").on("S1 arm up")
-            .when("written").on("Head 1 done")
+            .when("written").that(in -> head.isDone())
+            .when("write again").that(in -> head.hasFailed())
             .when("back").on("S1 reader back").on("S1 arm left")
             .when("rest").unmarked("cell", "working 1")
-            .firing("sleeve known").run((in, out) -> out.set("Head 1 new kind", plan.next(in))).writes("Head 1 new kind")
+            .firing("sleeve known").run((in, out) -> plan.decide(in))
             .during("loading").set("S1 loader")
             .during("advancing").set("S1 belt advance")
             .during("fetching").set("S1 arm lower")
@@ -87,23 +111,26 @@ final class StationNets {
             .during("swinging").set("S1 gripper").set("S1 arm out")
             .during("lowering").set("S1 gripper").set("S1 arm lower")
             .during("opening").set("S1 arm lower")
-            .during("writing").set("S1 arm in").set("Head 1 write").set("Head 1 new contents", SLEEVE)
+            .during("writing").set("S1 arm in")
             .during("going back").set("S1 arm in");
         for (String place : new String[] {"reader out", "reading", "pallet empty", "swinging", "lowering", "opening",
                 "raising", "writing"}) {
             bound.during(place).set("S1 reader");
         }
-        return bound;
+        works(bound, head, "reading", head::read, "carrier missed");
+        return works(bound, head, "writing", () -> head.write(new PalletRecord(null, plan.piece(), SLEEVE)), "write again");
     }
 
     /** Presses piston and spring, then the head, into a sleeve. */
-    static BoundNet three() {
+    static BoundNet three(StationHead head) {
         NetBuilder net = PetriNet.named("station 3")
-            .place("waiting", 1).place("parts wanted").place("no parts").place("feeding parts").place("pressing parts")
-            .place("head wanted").place("no heads").place("feeding head").place("pressing head").place("raising")
+            .place("waiting", 1).place("reading").place("parts wanted").place("no parts").place("feeding parts")
+            .place("pressing parts").place("head wanted").place("no heads").place("feeding head").place("pressing head").place("raising")
             .place("writing").place("done");
-        step(net, "begin", "waiting", "parts wanted");
-        step(net, "nothing to do", "waiting", "done");
+        step(net, "begin", "waiting", "reading");
+        step(net, "sleeve alone", "reading", "parts wanted");
+        step(net, "nothing to do", "reading", "done");
+        retry(net, "read again", "reading");
         step(net, "parts there", "parts wanted", "feeding parts");
         step(net, "parts run out", "parts wanted", "no parts");
         step(net, "parts filled", "no parts", "parts wanted");
@@ -116,11 +143,13 @@ final class StationNets {
         step(net, "head pressed", "pressing head", "raising");
         step(net, "raised", "raising", "writing");
         step(net, "written", "writing", "done");
+        retry(net, "write again", "writing");
         step(net, "rest", "done", "waiting");
-        return BoundNet.of(net.build())
-            .when("begin").marked("cell", "working 3").is("Head 3 contents", SLEEVE)
-            .when("nothing to do").marked("cell", "working 3").on("Head 3 carrier")
-            .that(in -> in.get("Head 3 contents") != SLEEVE)
+        BoundNet bound = BoundNet.of(net.build())
+            .when("begin").marked("cell", "working 3")
+            .when("sleeve alone").that(in -> head.isDone() && head.record().contents().equals(SLEEVE))
+            .when("nothing to do").that(in -> head.isDone() && !head.record().contents().equals(SLEEVE))
+            .when("read again").that(in -> head.hasFailed())
             .when("parts there").on("S3 parts there")
             .when("parts run out").off("S3 parts there")
             .when("parts filled").on("S3 parts there")
@@ -132,27 +161,31 @@ final class StationNets {
             .when("head fed").on("S3 head forward")
             .when("head pressed").on("S3 press down")
             .when("raised").on("S3 press up").on("S3 head back")
-            .when("written").on("Head 3 done")
+            .when("written").that(in -> head.isDone())
+            .when("write again").that(in -> head.hasFailed())
             .when("rest").unmarked("cell", "working 3")
-            .firing("begin").run((in, out) -> out.set("Head 3 new kind", in.get("Head 3 kind"))).writes("Head 3 new kind")
             .during("no parts").set("S3 empty lamp")
             .during("no heads").set("S3 empty lamp")
             .during("feeding parts").set("S3 parts feeder")
             .during("pressing parts").set("S3 parts feeder").set("S3 press")
             .during("feeding head").set("S3 head feeder")
-            .during("pressing head").set("S3 head feeder").set("S3 press")
-            .during("writing").set("Head 3 write").set("Head 3 new contents", CLOSED);
+            .during("pressing head").set("S3 head feeder").set("S3 press");
+        works(bound, head, "reading", head::read, "read again");
+        return works(bound, head, "writing", () -> head.write(new PalletRecord(null, head.record().piece(), CLOSED)),
+            "write again");
     }
 
     /** Presses the cap on, if the kind has one, and takes the cylinder to the exit. */
-    static BoundNet four() {
+    static BoundNet four(StationHead head) {
         NetBuilder net = PetriNet.named("station 4")
-            .place("waiting", 1).place("cap wanted").place("no caps").place("feeding cap").place("pressing cap")
+            .place("waiting", 1).place("reading").place("cap wanted").place("no caps").place("feeding cap").place("pressing cap")
             .place("press rising").place("lowering").place("sucking").place("lifting").place("swinging")
             .place("putting down").place("letting go").place("raising").place("returning").place("writing").place("done");
-        step(net, "begin with a cap", "waiting", "cap wanted");
-        step(net, "begin without", "waiting", "lowering");
-        step(net, "nothing to do", "waiting", "done");
+        step(net, "begin", "waiting", "reading");
+        step(net, "cap to be put on", "reading", "cap wanted");
+        step(net, "no cap", "reading", "lowering");
+        step(net, "nothing to do", "reading", "done");
+        retry(net, "read again", "reading");
         step(net, "cap there", "cap wanted", "feeding cap");
         step(net, "caps run out", "cap wanted", "no caps");
         step(net, "caps filled", "no caps", "cap wanted");
@@ -169,14 +202,14 @@ final class StationNets {
         step(net, "raised", "raising", "returning");
         step(net, "back", "returning", "writing");
         step(net, "written", "writing", "done");
+        retry(net, "write again", "writing");
         step(net, "rest", "done", "waiting");
-        return BoundNet.of(net.build())
-            .when("begin with a cap").marked("cell", "working 4").is("Head 4 contents", CLOSED)
-            .that(in -> hasCap(in.get("Head 4 kind")))
-            .when("begin without").marked("cell", "working 4").is("Head 4 contents", CLOSED)
-            .that(in -> !hasCap(in.get("Head 4 kind")))
-            .when("nothing to do").marked("cell", "working 4").on("Head 4 carrier")
-            .that(in -> in.get("Head 4 contents") != CLOSED)
+        BoundNet bound = BoundNet.of(net.build())
+            .when("begin").marked("cell", "working 4")
+            .when("cap to be put on").that(in -> isClosed(head) && CAPPED.contains(head.record().piece()))
+            .when("no cap").that(in -> isClosed(head) && !CAPPED.contains(head.record().piece()))
+            .when("nothing to do").that(in -> head.isDone() && !isClosed(head))
+            .when("read again").that(in -> head.hasFailed())
             .when("cap there").on("S4 caps there")
             .when("caps run out").off("S4 caps there")
             .when("caps filled").on("S4 caps there")
@@ -192,7 +225,8 @@ final class StationNets {
             .when("let go").off("S4 vacuum")
             .when("raised").on("S4 arm up")
             .when("back").on("S4 arm inside")
-            .when("written").on("Head 4 done")
+            .when("written").that(in -> head.isDone())
+            .when("write again").that(in -> head.hasFailed())
             .when("rest").unmarked("cell", "working 4")
             .during("no caps").set("S4 empty lamp")
             .during("feeding cap").set("S4 cap feeder")
@@ -203,12 +237,12 @@ final class StationNets {
             .during("swinging").set("S4 vacuum valve").set("S4 arm out")
             .during("putting down").set("S4 vacuum valve").set("S4 arm out").set("S4 arm lower")
             .during("letting go").set("S4 arm out").set("S4 arm lower")
-            .during("raising").set("S4 arm out")
-            .during("writing").set("Head 4 write").set("Head 4 new kind", 0).set("Head 4 new contents", 0);
+            .during("raising").set("S4 arm out");
+        works(bound, head, "reading", head::read, "read again");
+        return works(bound, head, "writing", () -> head.write(PalletRecord.BLANK), "write again");
     }
 
-    /** 20, 40 and 60 have one, 10, 30 and 50 have none (hexadecimal). */
-    private static boolean hasCap(double kind) {
-        return kind > 0 && (int) kind / 0x10 % 2 == 0;
+    private static boolean isClosed(StationHead head) {
+        return head.isDone() && head.record().contents().equals(CLOSED);
     }
 }

@@ -47,6 +47,15 @@ class CellDemoTest {
         }
         String cfg = Files.readString(root().resolve("plc/cell/cell.cfg"));
         Files.writeString(folder.resolve("drivers/cell.cfg"), cfg.replace("127.0.0.1:15020", "127.0.0.1:0"));
+        copy("reader.cfg", folder.resolve("drivers/reader.cfg"));
+        copy("identification.cfg", folder.resolve("identification.cfg"));
+    }
+
+    /** With a port in the test's own folder. */
+    private void copy(String cfg, Path to) throws IOException {
+        String text = Files.readString(root().resolve("plc/cell").resolve(cfg));
+        assertTrue(text.contains("/tmp/tickbus-cell-reader"), cfg);
+        Files.writeString(to, text.replace("/tmp/tickbus-cell-reader", folder.resolve("reader").toString()));
     }
 
     private static Path root() {
@@ -56,7 +65,7 @@ class CellDemoTest {
     private List<String> arguments(String nets, String... more) {
         List<String> arguments = new ArrayList<>(List.of("--drivers", folder.resolve("drivers").toString(), "--control",
             root().resolve("java/simulator/cell.table").toString(), "--report", folder.resolve("demo/report.txt").toString(),
-            "--nets", nets));
+            "--nets", nets, "--identification", folder.resolve("identification.cfg").toString()));
         arguments.addAll(List.of(more));
         return arguments;
     }
@@ -79,14 +88,15 @@ class CellDemoTest {
     }
 
     @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "there are no pseudo-terminals")
     void netsMakeFourCylindersOverModbusAndFreeAJammedLoader() throws IOException {
         assertEquals(0, demo(nets(), "--cylinders", "4"), () -> output);
         assertTrue(verdict().matches("demo-cell: ok cylinders=4 kinds=\\S+ deadlocks=0 markings=\\d+ jams=1 recovered=1"
-            + " vacuum_lost=0 refills=0 ticks=\\d+ report=.*"), verdict());
+            + " vacuum_lost=0 missed=1 refills=0 ticks=\\d+ report=.*"), verdict());
         assertFalse(output.contains("no row of the control table"), output);
         String report = Files.readString(folder.resolve("demo/report.txt"));
-        for (String part : List.of("the loader will jam", "station 1: ", " firings, now {", "all_markings", "Cylinders",
-                "Statistics of driver 1998")) {
+        for (String part : List.of("the loader will jam", "head 1 will miss a carrier", "station 1: ", " firings, now {",
+                "all_markings", "Cylinders", "Statistics of driver 1998", "Statistics of driver 1999")) {
             assertTrue(report.contains(part), report);
         }
         for (String net : List.of("station-1", "station-3", "station-4", "transport", "cell")) {
@@ -95,7 +105,25 @@ class CellDemoTest {
         }
     }
 
+    /** As on systems that have no pseudo-terminals. */
     @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "the path of the port begins with a slash")
+    void aReaderWithoutAPortIsExplained() throws IOException {
+        Path cfg = folder.resolve("drivers/reader.cfg");
+        Files.writeString(cfg, Files.readString(cfg).replace(folder.resolve("reader").toString(), folder + "/no/such/folder"));
+        assertEquals(1, demo(nets()), () -> output);
+        assertTrue(verdict().contains("the driver makes no serial port, so no PLC process can open it"), verdict());
+    }
+
+    @Test
+    void aFolderWithoutTheReadersDriverIsExplained() throws IOException {
+        Files.delete(folder.resolve("drivers/reader.cfg"));
+        assertEquals(1, demo(nets()), () -> output);
+        assertTrue(verdict().contains("1999"), verdict());
+    }
+
+    @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "there are no pseudo-terminals")
     void aProgramThatIsNotThereIsNamed() {
         assertEquals(1, demo(folder.toString()), () -> output);
         assertTrue(verdict().matches("demo-cell: failed reason=\"process \\d+ of the PLC ended by itself with exit code 1; .*"
@@ -103,6 +131,7 @@ class CellDemoTest {
     }
 
     @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "there are no pseudo-terminals")
     void aTimeLimitIsKept() throws IOException {
         assertEquals(1, demo(nets(), "--time-limit", "200ms"), () -> output);
         assertTrue(verdict().contains("the time limit of 200ms of simulation time is over with 0 of 12 cylinders"), verdict());

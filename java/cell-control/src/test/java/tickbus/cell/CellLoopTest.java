@@ -5,9 +5,11 @@ import static org.junit.jupiter.api.Assertions.assertFalse;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.nio.file.Path;
+import java.time.LocalDateTime;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
+import java.util.Set;
 import java.util.TreeMap;
 import java.util.concurrent.atomic.AtomicInteger;
 import java.util.function.BooleanSupplier;
@@ -19,8 +21,13 @@ import tickbus.Signal;
 import tickbus.Tickbus;
 import tickbus.demo.cell.Colour;
 import tickbus.demo.cell.ManufacturingCell;
+import tickbus.demo.cell.Pallet;
 import tickbus.demo.cell.PieceKind;
 import tickbus.demo.cell.Workpiece;
+import tickbus.identification.IdentificationHead;
+import tickbus.identification.PalletRecord;
+import tickbus.identification.PalletRecord.Content;
+import tickbus.identification.PalletRecord.Piece;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
 
@@ -34,6 +41,11 @@ class CellLoopTest {
     private final ManufacturingCell cell = new ManufacturingCell();
     private Tickbus machine;
     private Tickbus plc;
+    private Tickbus readerEnd;
+    private Tickbus headsEnd;
+    private LoopReader reader;
+    private Heads heads;
+    private int link;
     private NetController nets;
     private List<Signal> written;
     private List<Signal> read;
@@ -42,14 +54,22 @@ class CellLoopTest {
     private final Map<String, Integer> fired = new TreeMap<>();
     private long nanos;
 
+    private Tickbus link(String cfg, String role) {
+        return Tickbus.open(Path.of(System.getProperty("tickbus.root"), "plc/cell", cfg),
+            "[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nlink = \"" + cfg + " " + link + "\"\nrole = \"" + role
+            + "\"\n");
+    }
+
     @BeforeEach
     void open() {
-        Path cfg = Path.of(System.getProperty("tickbus.root"), "plc/cell/cell.cfg");
-        String link = "[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nlink = \"cell " + LINKS.incrementAndGet()
-            + "\"\nrole = ";
-        machine = Tickbus.open(cfg, link + "\"device\"\n");
-        plc = Tickbus.open(cfg, link + "\"controller\"\n");
-        BoundNet[] all = CellNets.all();
+        link = LINKS.incrementAndGet();
+        machine = link("cell.cfg", "device");
+        plc = link("cell.cfg", "controller");
+        readerEnd = link("identification.cfg", "device");
+        headsEnd = link("identification.cfg", "controller");
+        reader = new LoopReader(readerEnd, cell);
+        heads = Heads.on(headsEnd, () -> LocalDateTime.of(2004, 3, 9, 16, 5, 59));
+        BoundNet[] all = CellNets.all(heads);
         for (BoundNet one : all) {
             one.listener((scan, at, transition, choices) ->
                 fired.merge(one.net().name() + "." + one.net().transition(transition).name(), 1, Integer::sum));
@@ -69,8 +89,9 @@ class CellLoopTest {
 
     @AfterEach
     void close() {
-        plc.close();
-        machine.close();
+        for (Tickbus bus : List.of(headsEnd, readerEnd, plc, machine)) {
+            bus.close();
+        }
     }
 
     private void tick() {
@@ -83,6 +104,8 @@ class CellLoopTest {
             written.get(i).set(cell.output(writes[i]));
         }
         machine.send();
+        reader.tick(nanos);
+        heads.exchange(nanos);
         nets.scan(nanos);
         nanos += STEP;
     }
@@ -127,6 +150,91 @@ class CellLoopTest {
         assertEquals(0, cell.counters().collisions());
         assertEquals(0, times("station 1.loader jams"));
         assertEquals(0, times("transport.stuck before 1"));
+        assertEquals(0, heads.failures());
+    }
+
+    /** Through the machine's carriers, and not by what the nets believe. */
+    @Test
+    void theRecordGrowsFromStationToStation() {
+        List<PalletRecord> seen = new ArrayList<>();
+        until("a cylinder", () -> {
+            for (Pallet pallet : cell.transport().pallets()) {
+                PalletRecord now = PalletRecord.ofOctets(pallet.carrier().read(0, PalletRecord.LENGTH));
+                if (now.time() != null && !seen.contains(now)) {
+                    seen.add(now);
+                }
+            }
+            return cell.delivered().size() == 1 && seen.contains(blank());
+        });
+        Piece piece = seen.get(0).piece();
+        assertEquals(Piece.BLACK, piece, "the first sleeve is black, and gets no cap");
+        Set<Content> sleeve = Set.of(Content.SLEEVE, Content.PIECE);
+        Set<Content> closed = Set.of(Content.SLEEVE, Content.PISTON, Content.SPRING, Content.HEAD, Content.PIECE);
+        assertEquals(new PalletRecord(blank().time(), piece, sleeve), seen.get(0));
+        assertTrue(seen.contains(new PalletRecord(blank().time(), piece, closed)), seen::toString);
+    }
+
+    /** What station 4 leaves on a pallet. */
+    private static PalletRecord blank() {
+        return PalletRecord.BLANK.at(LocalDateTime.of(2004, 3, 9, 16, 5, 59));
+    }
+
+    @Test
+    void aMissedCarrierIsReadAfterTheHeadHasBeenBack() {
+        cell.missCarrier();
+        delivers(2);
+        assertEquals(1, times("station 1.carrier missed"));
+        assertEquals(1, times("station 1.reader is back"));
+        assertEquals(1, cell.counters().carriersMissed());
+        assertEquals(1, heads.failures());
+    }
+
+    @Test
+    void whatTheReaderDidNotDoIsTriedAgain() {
+        reader.fail(3, IdentificationHead.NO_ANSWER, 4);
+        reader.fail(4, IdentificationHead.NO_CARRIER, 2);
+        delivers(1);
+        assertEquals(4, times("station 3.read again"));
+        assertEquals(2, times("station 4.read again"));
+        reader.fail(1, 4, 1);
+        delivers(6);
+        assertEquals(7, heads.failures());
+    }
+
+    @Test
+    void aRecordThatWasNotWrittenIsWrittenAgain() {
+        until("pressed", () -> times("station 3.head pressed") == 1);
+        reader.fail(3, 4, 2);
+        delivers(1);
+        assertEquals(2, times("station 3.write again"));
+    }
+
+    @Test
+    void aCarrierThatIsNeverReadStopsItsStationAlone() {
+        reader.fail(3, IdentificationHead.NO_CARRIER, Integer.MAX_VALUE);
+        until("a stop", () -> !nets.stops().isEmpty());
+        assertEquals(StationHead.ATTEMPTS, times("station 3.read again"));
+        assertEquals(1, nets.stops().size());
+        String told = nets.stops().get(0).message();
+        assertTrue(told.contains("net station 3") && told.contains("Head 3 has not read its carrier in 5 attempts; the reader "
+            + "says that there is none (status 03): see whether the pallet stands at its stop"), told);
+        until("a sleeve on a pallet", () -> times("station 1.written") == 1);
+    }
+
+    @Test
+    void aReaderThatNeverAnswersStopsTheStations() {
+        reader.hang();
+        until("three stops", () -> nets.stops().size() == 3);
+        String told = nets.stops().get(0).message();
+        assertTrue(told.contains("Head 1 has had no answer for 10 s, and the line to the reader is down"), told);
+    }
+
+    @Test
+    void aCarrierWithoutARecordStopsItsStation() {
+        cell.transport().pallets().forEach(pallet -> pallet.carrier().write(PalletRecord.LENGTH - 1, new byte[] {7}));
+        until("a stop", () -> !nets.stops().isEmpty());
+        String told = nets.stops().get(0).message();
+        assertTrue(told.contains("octet 20 of a pallet's record is 07"), told);
     }
 
     @Test

@@ -12,7 +12,7 @@ import tickbus.petri.control.BoundNet;
 class ProofTest {
     @Test
     void eachNetAloneIsBoundedLiveAndWithoutDeadlock() {
-        for (BoundNet bound : CellNets.all()) {
+        for (BoundNet bound : CellNets.all(Heads.none())) {
             Reachability graph = Reachability.explore(bound.net(), 100_000);
             assertEquals(Verdict.YES, graph.isDeadlockFree(), graph::toString);
             assertEquals(Verdict.YES, graph.isBounded(), graph::toString);

@@ -71,16 +71,31 @@ public final class PlcCommand {
      * @return such as {@code 127.0.0.1:20030}
      */
     public static String address(ControlInterfaceDeviceDriver driver) {
+        return statistic(driver, "address", "the driver does not listen at any address, so no PLC process can connect to it; its"
+                + " driver.cfg needs a kind that listens, such as \"socket\"");
+    }
+
+    /**
+     * The serial port that a driver makes.
+     *
+     * @param driver open, of kind {@code ivi-reader}
+     * @return the port's name
+     */
+    public static String device(ControlInterfaceDeviceDriver driver) {
+        return statistic(driver, "device", "the driver makes no serial port, so no PLC process can open it; its driver.cfg needs"
+                + " kind = \"ivi-reader\" and device = \"pty:/…\", and a system with pseudo-terminals");
+    }
+
+    private static String statistic(ControlInterfaceDeviceDriver driver, String key, String complaint) {
         long limit = System.nanoTime() + LISTENING_NANOS;
         while (true) {
             var statistics = driver.statistics();
-            String address = statistics.get("address");
-            if (address != null) {
-                return address;
+            String value = statistics.get(key);
+            if (value != null) {
+                return value;
             }
             if (System.nanoTime() - limit > 0 || statistics.getOrDefault("state", "").equals("failed")) {
-                throw new DemoFailure("the driver does not listen at any address, so no PLC process can connect to it;"
-                        + " its driver.cfg needs a kind that listens, such as \"socket\". The driver says: "
+                throw new DemoFailure(complaint + ". The driver says: "
                         + statistics.getOrDefault("reason", "nothing"));
             }
             LockSupport.parkNanos(5_000_000);

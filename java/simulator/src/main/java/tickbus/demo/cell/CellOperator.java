@@ -10,6 +10,7 @@ import tickbus.demo.Timeline;
 /** Fills magazines, turns the switch, provokes mishaps, and writes down what happens. */
 final class CellOperator {
     /** The number of cylinders that are out when each mishap is provoked; at least one more is made after it. */
+    private static final int CARRIER_IS_MISSED_AFTER = 1;
     private static final int LOADER_JAMS_AFTER = 2;
     private static final int PALLET_JAMS_AFTER = 4;
     private static final int VACUUM_IS_LOST_AFTER = 6;
@@ -85,7 +86,9 @@ final class CellOperator {
     }
 
     private void mishapAfter(int count, long nanos) {
-        if (count == LOADER_JAMS_AFTER && count + 1 < cylinders) {
+        if (count == CARRIER_IS_MISSED_AFTER && count + 1 < cylinders) {
+            mishap(nanos, "head 1 will miss a carrier", cell::missCarrier);
+        } else if (count == LOADER_JAMS_AFTER && count + 1 < cylinders) {
             mishap(nanos, "the loader will jam", cell::jamLoader);
         } else if (count == PALLET_JAMS_AFTER && count + 1 < cylinders) {
             mishap(nanos, "a pallet will get stuck", cell::jamPallet);

@@ -89,6 +89,7 @@ final class CellReport {
         table.row("loader jams that were freed", counters.loaderJams());
         table.row("stuck pallets that were freed", counters.palletJams());
         table.row("vacuum lost", counters.vacuumLosses());
+        table.row("carriers missed, and read after all", counters.carriersMissed());
         table.row("pieces fallen", counters.fallen());
         table.row("parts pressed into nothing", counters.wasted());
         table.row("steps in which an arm collided", counters.collisions());

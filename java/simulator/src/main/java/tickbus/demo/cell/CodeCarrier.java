@@ -5,6 +5,9 @@ public final class CodeCarrier {
     /** How many bytes it has. */
     public static final int BYTES = 32;
 
+    /** How many words of four bytes. */
+    static final int WORDS = BYTES / 4;
+
     private final byte[] memory = new byte[BYTES];
 
     /**
@@ -34,9 +37,19 @@ public final class CodeCarrier {
         System.arraycopy(block, 0, memory, address, block.length);
     }
 
-    /** One byte, 0 to 255. */
-    int at(int address) {
-        return memory[address] & 0xFF;
+    /** A word, with its first byte as the highest: 0 to 2^32 - 1. */
+    long word(int index) {
+        long word = 0;
+        for (int i = 4 * index; i < 4 * index + 4; i++) {
+            word = word << 8 | memory[i] & 0xFF;
+        }
+        return word;
+    }
+
+    void word(int index, long value) {
+        for (int i = 0; i < 4; i++) {
+            memory[4 * index + i] = (byte) (value >> 24 - 8 * i);
+        }
     }
 
     private static void check(int address, int count) {

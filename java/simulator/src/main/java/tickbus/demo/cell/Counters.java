@@ -9,6 +9,7 @@ public final class Counters {
     int vacuumLosses;
     int loaderJams;
     int palletJams;
+    int carriersMissed;
 
     Counters() {
     }
@@ -46,5 +47,10 @@ public final class Counters {
     /** How often a pallet jammed and got free again. */
     public int palletJams() {
         return palletJams;
+    }
+
+    /** How often head 1 missed a carrier and was drawn back. */
+    public int carriersMissed() {
+        return carriersMissed;
     }
 }

@@ -8,8 +8,8 @@ import java.util.function.DoubleSupplier;
 import tickbus.simulator.Machine;
 
 /**
- * The whole cell as a machine. Its variables have the names of the signals in plc/cell/cell.cfg; those of station 1 are
- * those of the cell at Zaragoza, in English.
+ * The whole cell as a machine. Its variables have the names of the signals in plc/cell/cell.cfg and plc/cell/reader.cfg;
+ * those of station 1 are those of the cell at Zaragoza, in English.
  *
  * <p>The switches of the panel, what is in the magazines, and mishaps are the operator's: methods, not variables.
  */
@@ -124,17 +124,15 @@ public final class ManufacturingCell implements Machine {
 
     private void head(int number, ReadWriteHead head) {
         String name = "Head " + number;
-        out(name + " carrier", head::seesCarrier);
-        out(name + " done", head::isDone);
-        outputs.add(name + " kind");
-        sources.add(head::kind);
-        outputs.add(name + " contents");
-        sources.add(head::contents);
-        in(name + " write", on -> head.write = on);
-        inputs.add(name + " new kind");
-        sinks.add(value -> head.newKind = (int) value);
-        inputs.add(name + " new contents");
-        sinks.add(value -> head.newContents = (int) value);
+        out(name + " carrier", head::showsCarrier);
+        in(name + " taken", on -> head.taken = on);
+        for (int i = 0; i < CodeCarrier.WORDS; i++) {
+            int word = i;
+            outputs.add(name + " brings " + 4 * i);
+            sources.add(() -> head.brings(word));
+            inputs.add(name + " holds " + 4 * i);
+            sinks.add(value -> head.holds[word] = (long) value);
+        }
     }
 
     private void in(String name, Switch sink) {
@@ -249,6 +247,11 @@ public final class ManufacturingCell implements Machine {
     /** The next pallet that passes the middle between two stops gets stuck, until the belt has run back for 0.1 s. */
     public void jamPallet() {
         transport.jam();
+    }
+
+    /** Head 1 misses the carrier the next time that it comes forward, until it has been back. */
+    public void missCarrier() {
+        one.missCarrier();
     }
 
     /** The next piece that station 4 lifts falls. */

@@ -3,60 +3,46 @@ package tickbus.demo.cell;
 import java.util.Optional;
 
 /**
- * A read/write head for code carriers, with its reader's process data: the record of the carrier in front of it, and a
- * command that writes another one.
+ * A read/write head for code carriers: lends the carrier in front of it to the reader, and takes over what the reader says
+ * that it holds.
+ *
+ * <p>The reader has a carrier from when it says so until it says that it has none; what was written in between belongs to
+ * that carrier, even if its pallet has left meanwhile. The next one is shown only then.
  */
 public final class ReadWriteHead {
-    private static final long WRITING_NANOS = 40_000_000;
-
-    private CodeCarrier carrier;
-    private long writingNanos;
-    private long clockNanos;
-    private boolean done;
-    boolean write;
-    int newKind;
-    int newContents;
+    private CodeCarrier inFront;
+    private CodeCarrier lent;
+    /** The reader's: it has a carrier, and what that holds. */
+    boolean taken;
+    final long[] holds = new long[CodeCarrier.WORDS];
 
     ReadWriteHead() {
     }
 
     /** The carrier in front of it; empty without one. */
     public Optional<CodeCarrier> carrier() {
-        return Optional.ofNullable(carrier);
+        return Optional.ofNullable(inFront);
     }
 
-    void step(CodeCarrier inFront, long nanos) {
-        clockNanos += nanos;
-        carrier = inFront;
-        writingNanos = write && inFront != null ? writingNanos + nanos : 0;
-        if (!write) {
-            done = false;
-        } else if (!done && writingNanos >= WRITING_NANOS) {
-            carrier.write(0, new PalletRecord(clockNanos / 1_000_000_000, newKind, newContents).toBytes());
-            done = true;
+    void step(CodeCarrier now) {
+        inFront = now;
+        if (lent != null && taken) {
+            for (int i = 0; i < holds.length; i++) {
+                lent.word(i, holds[i]);
+            }
+        }
+        if (!taken) {
+            lent = now;
         }
     }
 
-    boolean seesCarrier() {
-        return carrier != null;
+    /** Whether a carrier is there for the reader. */
+    boolean showsCarrier() {
+        return lent != null && lent == inFront;
     }
 
-    /** The command is executed; until it is taken away. */
-    boolean isDone() {
-        return done;
-    }
-
-    /** The code of the kind; 0 without a carrier. */
-    int kind() {
-        return carrier == null ? 0 : carrier.at(PalletRecord.KIND);
-    }
-
-    /** The bits of the parts; 0 without a carrier. */
-    int contents() {
-        int contents = 0;
-        for (int i = 0; carrier != null && i < PalletRecord.BYTES - PalletRecord.KIND - 1; i++) {
-            contents |= carrier.at(PalletRecord.KIND + 1 + i) << i;
-        }
-        return contents;
+    /** Four octets of the carrier in front, the first one in the highest byte; 0 without a carrier. */
+    long brings(int word) {
+        return lent == null ? 0 : lent.word(word);
     }
 }

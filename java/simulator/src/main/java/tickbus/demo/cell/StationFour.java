@@ -59,7 +59,7 @@ final class StationFour {
         lift.step(armLower, nanos);
         suck(pallet, nanos);
         exitNanos = Math.max(0, exitNanos - nanos);
-        head.step(pallet == null ? null : pallet.carrier(), nanos);
+        head.step(pallet == null ? null : pallet.carrier());
     }
 
     private void suck(Pallet pallet, long nanos) {

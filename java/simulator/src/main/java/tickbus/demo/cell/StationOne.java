@@ -23,6 +23,8 @@ final class StationOne {
     private Workpiece held;
     private boolean loaded;
     private boolean optical;
+    private boolean willMiss;
+    private boolean askew;
     boolean beltForward;
     boolean beltBackward;
     boolean armOut;
@@ -75,7 +77,13 @@ final class StationOne {
         }
         reader.step(readerValve, nanos);
         optical = pallet != null;
-        head.step(pallet != null && reader.isForward() ? pallet.carrier() : null, nanos);
+        askew |= willMiss && reader.isForward();
+        willMiss &= !askew;
+        if (askew && reader.isBack()) {
+            askew = false;
+            counters.carriersMissed++;
+        }
+        head.step(pallet != null && reader.isForward() && !askew ? pallet.carrier() : null);
     }
 
     boolean isAtBack() {
@@ -89,6 +97,11 @@ final class StationOne {
     /** Whether a sleeve at the belt's back end is one of those that a sensor sees. */
     boolean sees(Colour least) {
         return isAtBack() && onBelt.colour().compareTo(least) >= 0;
+    }
+
+    /** The next time that its cylinder comes forward, the head misses the carrier, until it has been back. */
+    void missCarrier() {
+        willMiss = true;
     }
 
     boolean seesPallet() {

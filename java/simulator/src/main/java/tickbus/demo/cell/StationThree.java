@@ -32,6 +32,6 @@ final class StationThree {
             partsReady = false;
             headReady = false;
         }
-        head.step(pallet == null ? null : pallet.carrier(), nanos);
+        head.step(pallet == null ? null : pallet.carrier());
     }
 }

@@ -7,7 +7,6 @@ import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.io.IOException;
-import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.Arrays;
@@ -138,25 +137,71 @@ class ManufacturingCellTest {
         assertEquals(1, cell.counters().wasted());
     }
 
+    private byte[] memory(int pallet) {
+        return cell.transport().pallets().get(pallet - 1).carrier().read(0, CodeCarrier.BYTES);
+    }
+
     @Test
-    void aHeadWritesARecordOf21BytesAndShowsIt() {
-        sleeveOnThePallet(Colour.BLACK);
+    void aHeadLendsItsCarrierToTheReaderAndTakesOverWhatThatWrites() {
+        on("Belt");
+        cell.transport().pallets().get(1).carrier().write(4, new byte[] {(byte) 0xFE, 1, 2, 3});
+        until("Pallet at stop 3");
+        steps(1);
+        assertEquals(1, get("Head 3 carrier"));
+        assertEquals(0xFE010203L, get("Head 3 brings 4"));
+        set("Head 3 holds 0", 0xAAAAAAAAL);
+        steps(1);
+        assertEquals(0, memory(2)[0], "the reader has not taken it yet");
+        on("Head 3 taken");
+        set("Head 3 holds 0", 0x05060708L);
+        set("Head 3 holds 4", 0xFE010203L);
+        set("Head 3 holds 28", 0xFFFFFFFFL);
+        steps(1);
+        assertArrayEquals(new byte[] {5, 6, 7, 8, (byte) 0xFE, 1, 2, 3}, Arrays.copyOf(memory(2), 8));
+        assertEquals(-1, memory(2)[31]);
+        assertEquals(0x05060708L, get("Head 3 brings 0"));
+    }
+
+    @Test
+    void whatTheReaderHasWrittenBelongsToThePalletThatLeft() {
+        on("Belt");
+        until("Head 3 carrier");
+        on("Head 3 taken");
+        steps(1);
+        on("Open stop 3");
+        for (int i = 0; get("Pallet at stop 3") == 1; i++) {
+            assertTrue(i < PATIENCE);
+            steps(1);
+        }
+        assertEquals(0, get("Head 3 carrier"));
+        set("Head 3 holds 0", 0x01000000);
+        steps(1);
+        assertEquals(1, memory(2)[0]);
+        off("Open stop 3");
+        on("Open stop 1", "Open stop 2");
+        until("Pallet at stop 3");
+        steps(1);
+        assertEquals(0, get("Head 3 carrier"), "while the reader still has the one before");
+        off("Head 3 taken");
+        steps(1);
+        assertEquals(1, get("Head 3 carrier"));
+        assertEquals(0, get("Head 3 brings 0"));
+    }
+
+    @Test
+    void aMissedCarrierIsSeenAfterTheHeadHasBeenBack() {
+        on("Belt");
+        cell.missCarrier();
+        until("Pallet at stop 1");
+        on("S1 reader");
+        steps(100);
+        assertEquals(1, get("S1 reader forward"));
+        assertEquals(0, get("Head 1 carrier"));
+        off("S1 reader");
+        until("S1 reader back");
         on("S1 reader");
         until("Head 1 carrier");
-        assertEquals(0, get("Head 1 contents"));
-        set("Head 1 new kind", PieceKind.BLACK_CAPPED.code());
-        set("Head 1 new contents", Part.SLEEVE.bit() | Part.PIECE.bit());
-        on("Head 1 write");
-        until("Head 1 done");
-        assertEquals(0x20, get("Head 1 kind"));
-        assertEquals(0b100001, get("Head 1 contents"));
-        byte[] record = cell.head(1).carrier().orElseThrow().read(0, PalletRecord.BYTES);
-        assertEquals("0", new String(record, 0, 1, StandardCharsets.US_ASCII));
-        assertEquals("000001012004", new String(record, 2, 12, StandardCharsets.US_ASCII));
-        assertArrayEquals(new byte[] {0x20, 1, 0, 0, 0, 0, 1}, Arrays.copyOfRange(record, 14, 21));
-        off("Head 1 write");
-        steps(1);
-        assertEquals(0, get("Head 1 done"));
+        assertEquals(1, cell.counters().carriersMissed());
     }
 
     @Test

@@ -1,0 +1,161 @@
+package tickbus.cell;
+
+import java.time.LocalDateTime;
+import java.util.function.Supplier;
+import tickbus.identification.IdentificationHead;
+import tickbus.identification.PalletRecord;
+
+/**
+ * The head of a station, as its net uses it: the net begins to read or to write, and waits in a place until the answer is
+ * there. What failed is tried again by the net, which says so by {@link #again}; that throws when it was often enough.
+ */
+final class StationHead {
+    /** How often one thing is tried. */
+    static final int ATTEMPTS = 5;
+
+    /** A carrier that is not seen yet gets this time: the sensor of its pallet is on another line, which may be faster. */
+    private static final long ARRIVAL_NANOS = 100_000_000;
+
+    /** Without an answer for this time, the line to the reader is down. The reader's own time-out is much shorter. */
+    static final long PATIENCE_NANOS = 10_000_000_000L;
+
+    private enum State { IDLE, WANTED, ASKED, DONE, FAILED }
+
+    private final String name;
+    private final IdentificationHead head;
+    private final Supplier<LocalDateTime> clock;
+    private State state = State.IDLE;
+    private boolean writing;
+    private PalletRecord toWrite;
+    private PalletRecord record = PalletRecord.BLANK;
+    private RuntimeException trouble;
+    private long now;
+    private long since;
+    private int failures;
+    private int allFailures;
+
+    /**
+     * A head.
+     *
+     * @param name of the station, for messages
+     * @param head null for a net that is analysed, and does not run
+     * @param clock gives the time that is written into records
+     */
+    StationHead(String name, IdentificationHead head, Supplier<LocalDateTime> clock) {
+        this.name = name;
+        this.head = head;
+        this.clock = clock;
+    }
+
+    /** Begins to read the record of the pallet. */
+    void read() {
+        writing = false;
+        begin();
+    }
+
+    /** Begins to write a record, with the time of now. */
+    void write(PalletRecord wanted) {
+        writing = true;
+        toWrite = wanted.at(clock.get());
+        begin();
+    }
+
+    private void begin() {
+        state = State.WANTED;
+        since = now;
+    }
+
+    /** Forgets the answer, when the net leaves the place in which it waited. */
+    void rest() {
+        state = State.IDLE;
+    }
+
+    /** Whether what was begun is done; what was read is in {@link #record} then. */
+    boolean isDone() {
+        complain();
+        return state == State.DONE;
+    }
+
+    /** Whether what was begun has failed. */
+    boolean hasFailed() {
+        complain();
+        return state == State.FAILED;
+    }
+
+    private void complain() {
+        if (trouble != null) {
+            throw trouble;
+        }
+    }
+
+    /** What was read last. */
+    PalletRecord record() {
+        return record;
+    }
+
+    /** How often something failed. */
+    int failures() {
+        return allFailures;
+    }
+
+    /**
+     * What has failed is going to be tried again. To write twice does no harm: the net holds the pallet at its stop.
+     *
+     * @throws IllegalStateException if it has been tried often enough
+     */
+    void again() {
+        failures++;
+        allFailures++;
+        if (failures == ATTEMPTS) {
+            throw new IllegalStateException(name + " has not " + (writing ? "written" : "read") + " its carrier in " + ATTEMPTS
+                + " attempts; " + cause());
+        }
+    }
+
+    private String cause() {
+        return switch (head.status()) {
+            case IdentificationHead.NO_CARRIER -> "the reader says that there is none (status 03): see whether the "
+                + "pallet stands at its stop, and has its carrier";
+            case IdentificationHead.NO_ANSWER -> "the reader did not answer (FF): see whether it is on, and its cable";
+            default -> String.format("the reader's status is %02X, see docs/identification.md", head.status());
+        };
+    }
+
+    /** Before the exchange of the line: begins what the net wants. */
+    void ask(long nanos) {
+        now = nanos;
+        if (state == State.WANTED && head.isDone() && (head.isPresent() || nanos - since >= ARRIVAL_NANOS)) {
+            state = State.ASKED;
+            if (writing) {
+                head.writePallet(toWrite);
+            } else {
+                head.readPallet();
+            }
+        }
+    }
+
+    /** After the exchange: takes the answer. */
+    void take() {
+        if (state == State.ASKED && head.isDone()) {
+            int status = head.status();
+            state = status == IdentificationHead.DONE || status == IdentificationHead.BATTERY_LOW ? State.DONE : State.FAILED;
+            if (state == State.DONE) {
+                failures = 0;
+                takeRecord();
+            }
+        } else if ((state == State.ASKED || state == State.WANTED) && now - since >= PATIENCE_NANOS) {
+            trouble = new IllegalStateException(name + " has had no answer for " + PATIENCE_NANOS / 1_000_000_000
+                + " s, and the line to the reader is down; see whether the reader is on, and its cable");
+        }
+    }
+
+    private void takeRecord() {
+        if (!writing) {
+            try {
+                record = head.pallet();
+            } catch (IllegalArgumentException e) {
+                trouble = new IllegalStateException(name + ": " + e.getMessage(), e);
+            }
+        }
+    }
+}

@@ -200,6 +200,7 @@ impl Reader {
                     Command::parse(&frame, self.carriers)
                 {
                     self.access(frame[0], heads, &access);
+                    heard.commands += 1;
                 }
                 self.auto = Some((frame, now + REPEAT));
             }

@@ -238,7 +238,8 @@ impl Caller for Serving<'_> {
         }
         if port.is_up(now) {
             let heard = self.reader.turn(now);
-            Self::count(heard, port);
+            self.is_heard |= Self::count(heard, port);
+            self.tell(now, port);
         }
         Ok(())
     }

@@ -41,3 +41,36 @@ fn the_machine_sees_what_a_repeated_command_does_though_the_client_only_listens(
     });
     assert_eq!(machine.link().state, LinkState::Running);
 }
+
+#[test]
+fn a_controller_that_pauses_beyond_its_watchdog_gives_no_command_twice() {
+    const WATCHDOG: Nanos = Nanos::from_millis(10);
+    let mut pair = Pair::with(&[1], "watchdog = \"10ms\"");
+    pair.put(&[1]);
+    assert_eq!(pair.ask(b'k', 0, 1, &[7]), (0, vec![]));
+    let last = pair.controller.get("echo");
+    assert_eq!(last, f64::from(b'k' | 0x80), "unlike the fail-safe 0");
+    let cycles = |pair: &Pair| {
+        let cycles = pair.controller.statistic("bus_cycles");
+        cycles.parse::<u64>().expect("a number")
+    };
+    let clock = Monotonic::shared();
+    let begin = clock.now();
+    await_that("the controller has paused", || {
+        pair.machine.tick();
+        clock.now() - begin > WATCHDOG
+    });
+    let paused = cycles(&pair);
+    await_that("its fail-safe values are looked at", || {
+        pair.machine.tick();
+        cycles(&pair) > paused + 2
+    });
+    let resumed = cycles(&pair);
+    pair.until("it has gone on", |pair| cycles(pair) > resumed + 2);
+    assert_eq!(pair.controller.get("echo"), last);
+    assert_eq!(pair.ask(b'w', 0, 1, &[]), (0, vec![7]));
+    pair.until("the machine is shown it", |pair| {
+        pair.machine.get("out 0") == 7.0
+    });
+    assert_eq!(pair.machine.get("writes"), 1.0);
+}

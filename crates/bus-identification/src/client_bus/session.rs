@@ -203,13 +203,23 @@ impl<'a> Session<'a> {
             if !port.is_station_up(index, now) {
                 continue;
             }
+            let is_paused = port
+                .watchdog()
+                .is_some_and(|limit| port.tick_age(index, now) > limit);
             let Some(mut frames) = port.look(index..index + 1, now) else {
                 return;
             };
             let frame = frames.frame(index);
             let station = &mut self.stations[index];
             let given = frame.first().copied().unwrap_or(0);
-            let (asked, access) = match station.new_command(frame, self.options.line.carriers) {
+            // The fail-safe 0 of a controller that pauses is no command: if the echo followed it, the last command would
+            // be a new one when the controller goes on.
+            let command = if is_paused && given & !TOGGLE == 0 {
+                None
+            } else {
+                station.new_command(frame, self.options.line.carriers)
+            };
+            let (asked, access) = match command {
                 Some(Ok(access)) => {
                     station.sent = Some(given);
                     (Asked::Command(index), access)

@@ -136,6 +136,7 @@ impl IviReader {
             reader: Reader::new(heads, timing),
             pace: Pace::new(port.clock().now(), self.cycle),
             is_heard: false,
+            is_up: true,
         };
         call.run(&mut serving, port, stop)
     }
@@ -149,6 +150,8 @@ struct Serving<'a> {
     pace: Pace,
     /// A command has come since the machine was told the last time.
     is_heard: bool,
+    /// The line is not down by an injected fault.
+    is_up: bool,
 }
 
 impl Serving<'_> {
@@ -236,7 +239,8 @@ impl Caller for Serving<'_> {
         if self.pace.take(now) {
             self.take(now, port);
         }
-        if port.is_up(now) {
+        self.is_up = port.is_up(now);
+        if self.is_up {
             let heard = self.reader.turn(now);
             self.is_heard |= Self::count(heard, port);
             self.tell(now, port);
@@ -254,7 +258,12 @@ impl Caller for Serving<'_> {
 
     fn deadline(&self, port: &Port) -> Nanos {
         let stale = port.stale_at(port.clock().now());
-        self.reader.deadline().min(self.pace.due()).min(stale)
+        let due = if self.is_up {
+            self.reader.deadline()
+        } else {
+            Nanos::MAX
+        };
+        due.min(self.pace.due()).min(stale)
     }
 
     fn left(&mut self) -> BusError {

@@ -74,3 +74,22 @@ fn a_controller_that_pauses_beyond_its_watchdog_gives_no_command_twice() {
     });
     assert_eq!(pair.machine.get("writes"), 1.0);
 }
+
+#[test]
+fn while_the_line_is_down_by_a_fault_a_repeated_command_rests() {
+    let line = Line::new();
+    let clock = Manual::new();
+    let mut machine = line.reader_by("pty:", &[1], &clock);
+    let mut port = line.open_port(&mut machine);
+    port.write_all(&command(true, READ)).expect("room");
+    await_that("it is answered", || {
+        machine.tick();
+        port.read(&mut [0; 16]).is_ok()
+    });
+    let fault = machine.driver.inject_text("kind = \"link-down\"");
+    fault.expect("a fault");
+    machine.tick();
+    // The next repetition is due by now.
+    clock.advance(Nanos::from_millis(100));
+    await_that("the bus waits", || clock.is_settled(1));
+}

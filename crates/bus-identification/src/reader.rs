@@ -136,6 +136,14 @@ impl Reader {
         }
     }
 
+    /// Its line was unplugged: what was on its way is lost. Heads, the type of carriers and a repeated command stay.
+    pub fn unplug(&mut self) {
+        self.inbox.clear();
+        self.broken = None;
+        self.outbox.clear();
+        self.written = 0;
+    }
+
     /// Bytes arrived.
     pub fn hear(&mut self, now: Nanos, bytes: &[u8]) -> Heard {
         let mut heard = self.turn(now);

@@ -64,6 +64,8 @@ pub(crate) struct IviReader {
     options: ReaderOptions,
     cycle: Nanos,
     stations: Vec<Station>,
+    /// Kept when the line breaks: its carriers hold what was written.
+    reader: Reader,
 }
 
 /// A station, which is a head.
@@ -81,10 +83,17 @@ impl IviReader {
             head: options.heads.of(index),
             frame: vec![0; station.output_bytes],
         });
+        let stations: Vec<Station> = stations.collect();
+        let mut heads: [Head; HEADS] = Default::default();
+        for station in &stations {
+            heads[usize::from(station.head) - 1].is_connected = true;
+        }
         Self {
             options: options.clone(),
             cycle,
-            stations: stations.collect(),
+            stations,
+            // A reader has no time-out.
+            reader: Reader::new(heads, options.line.timing(Nanos::ZERO)),
         }
     }
 }
@@ -93,6 +102,9 @@ impl Free for IviReader {
     #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = self.options.line.clone();
+        // A carrier may have left while there was no port.
+        let now = port.clock().now();
+        take(&mut self.reader, &self.stations, line.carriers, now, port);
         if let Some(link) = line.made() {
             let terminal = tickbus_base::os::LinkedTerminal::open(link).map_err(|error| {
                 BusError::Link(format!(
@@ -124,16 +136,11 @@ impl IviReader {
         let device = self.options.line.port();
         port.tell("device", device);
         port.opening(&format!("listening on {device}"));
-        let mut heads: [Head; HEADS] = Default::default();
-        for station in &self.stations {
-            heads[usize::from(station.head) - 1].is_connected = true;
-        }
-        // A reader has no time-out.
-        let timing = self.options.line.timing(Nanos::ZERO);
+        self.reader.unplug();
         let mut serving = Serving {
             line: &self.options.line,
             stations: &mut self.stations,
-            reader: Reader::new(heads, timing),
+            reader: &mut self.reader,
             pace: Pace::new(port.clock().now(), self.cycle),
             is_heard: false,
             is_up: true,
@@ -146,7 +153,7 @@ impl IviReader {
 struct Serving<'a> {
     line: &'a LineOptions,
     stations: &'a mut [Station],
-    reader: Reader,
+    reader: &'a mut Reader,
     pace: Pace,
     /// A command has come since the machine was told the last time.
     is_heard: bool,
@@ -155,17 +162,8 @@ struct Serving<'a> {
 }
 
 impl Serving<'_> {
-    /// Takes over what the machine says of its heads and carriers.
     fn take(&mut self, now: Nanos, port: &mut Port) {
-        let Some(mut frames) = port.look(0..self.stations.len(), now) else {
-            return;
-        };
-        for (index, station) in self.stations.iter().enumerate() {
-            let head = self.reader.head_mut(station.head);
-            place(head, frames.frame(index), self.line.carriers);
-        }
-        let receipt = frames.receipt();
-        port.sent(&receipt);
+        take(self.reader, self.stations, self.line.carriers, now, port);
     }
 
     /// Tells the machine what its carriers hold now.
@@ -186,6 +184,18 @@ impl Serving<'_> {
         }
         heard.commands > 0
     }
+}
+
+/// Takes over what the machine says of its heads and carriers.
+fn take(reader: &mut Reader, stations: &[Station], kind: CarrierType, now: Nanos, port: &mut Port) {
+    let Some(mut frames) = port.look(0..stations.len(), now) else {
+        return;
+    };
+    for (index, station) in stations.iter().enumerate() {
+        place(reader.head_mut(station.head), frames.frame(index), kind);
+    }
+    let receipt = frames.receipt();
+    port.sent(&receipt);
 }
 
 /// Lets a head be as the machine writes it. A carrier that was there keeps its octets.

@@ -93,3 +93,40 @@ fn while_the_line_is_down_by_a_fault_a_repeated_command_rests() {
     clock.advance(Nanos::from_millis(100));
     await_that("the bus waits", || clock.is_settled(1));
 }
+
+#[test]
+fn a_carrier_keeps_what_was_written_when_the_adapter_is_plugged_in_again() {
+    let line = Line::new();
+    let mut machine = line.reader_by("", &[1], &Monotonic::shared());
+    machine.set("present", 1.0);
+    machine.set("in 0", 5.0);
+    let mut ask = |access: Access<'_>, length: usize| {
+        let mut far = LinkedTerminal::open(&line.name()).expect("a terminal");
+        await_that("the machine listens", || {
+            machine.tick();
+            machine.link().reason.starts_with("listening")
+        });
+        far.write_all(&command(false, access)).expect("room");
+        let mut heard = Vec::new();
+        await_that("the answer comes", || {
+            machine.tick();
+            let mut some = [0; 64];
+            if let Ok(count) = far.read(&mut some) {
+                heard.extend_from_slice(&some[..count]);
+            }
+            heard.len() >= length
+        });
+        drop(far);
+        await_that("the line has failed", || {
+            machine.tick();
+            machine.link().state == LinkState::Failed
+        });
+        heard
+    };
+    let write = Access::Write {
+        address: 0,
+        data: &[9],
+    };
+    assert!(ask(write, 5).starts_with(b"k00"));
+    assert!(ask(READ, 6).starts_with(b"w00\x09"));
+}

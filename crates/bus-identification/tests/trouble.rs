@@ -130,3 +130,26 @@ fn a_carrier_keeps_what_was_written_when_the_adapter_is_plugged_in_again() {
     assert!(ask(write, 5).starts_with(b"k00"));
     assert!(ask(READ, 6).starts_with(b"w00\x09"));
 }
+
+#[test]
+fn a_status_that_says_nothing_of_a_carrier_shows_none_that_is_not_there() {
+    let mut pair = Pair::new();
+    pair.machine.set("fault", 6.0);
+    let seen = |pair: &Pair| {
+        (
+            pair.controller.get("present"),
+            pair.controller.get("connected"),
+        )
+    };
+    await_that("the fault is taken over", || {
+        pair.ask(b'w', 0, 1, &[]).0 == 6
+    });
+    assert_eq!(seen(&pair), (0.0, 1.0));
+    pair.machine.set("fault", 0.0);
+    pair.put(&[1]);
+    pair.machine.set("fault", 6.0);
+    await_that("the fault is taken over", || {
+        pair.ask(b'w', 0, 1, &[]).0 == 6
+    });
+    assert_eq!(seen(&pair), (1.0, 1.0), "it was there before");
+}

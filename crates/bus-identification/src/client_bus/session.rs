@@ -56,7 +56,9 @@ impl Station {
         self.frame[2] = match status {
             _ if status.is_of_the_head() => 0,
             Status::NO_CARRIER => CONNECTED,
-            _ => CONNECTED | PRESENT,
+            _ if status.is_of_a_carrier() => CONNECTED | PRESENT,
+            // It says nothing of a carrier.
+            _ => CONNECTED | self.frame[2] & PRESENT,
         };
     }
 

@@ -40,6 +40,12 @@ impl Timing {
     pub fn silence(&self) -> Nanos {
         self.characters(5).max(Nanos::from_millis(100))
     }
+
+    /// The time-out, or the silence if that is longer: a reader that has heard noise does not understand a client that
+    /// asks anew before it.
+    pub fn patience(&self) -> Nanos {
+        self.timeout.max(self.silence())
+    }
 }
 
 /// The command that was sent last.
@@ -108,7 +114,7 @@ impl Client {
         command.append(self.carriers.family(), &mut self.request);
         let characters =
             self.request.len() + shape.longest() * if shape.has_many() { 4 } else { 1 };
-        let limit = now + self.timing.timeout + self.timing.characters(characters);
+        let limit = now + self.timing.patience() + self.timing.characters(characters);
         self.asked = Some(Asked {
             shape,
             limit,

@@ -153,3 +153,18 @@ fn a_status_that_says_nothing_of_a_carrier_shows_none_that_is_not_there() {
     });
     assert_eq!(seen(&pair), (1.0, 1.0), "it was there before");
 }
+
+#[test]
+fn after_noise_a_client_of_little_patience_leaves_the_reader_the_silence_that_it_needs() {
+    let mut pair = Pair::with(&[1], "timeout = \"50ms\"");
+    pair.put(&[1]);
+    let mut other = std::fs::OpenOptions::new();
+    let mut other = other.write(true).open(pair.line.name()).expect("a port");
+    other.write_all(b"?").expect("room");
+    pair.until("the reader has given it up", |pair| {
+        statistic(&pair.machine.driver, "ivi-reader.damaged").is_some_and(|count| count != "0")
+    });
+    pair.until("they meet again", |pair| {
+        pair.controller.get("present") == 1.0 && pair.controller.link().state == LinkState::Running
+    });
+}

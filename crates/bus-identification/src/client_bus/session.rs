@@ -318,7 +318,7 @@ impl<'a> Session<'a> {
             "the reader on {} did not answer within {}; check that it is on, in read/write mode and at {} baud, and the \
              cable",
             self.device(),
-            self.options.timeout,
+            self.options.line.timing(self.options.timeout).patience(),
             self.options.line.baud
         ));
         port.lost(&error, "it is asked again");

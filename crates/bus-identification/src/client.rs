@@ -1,4 +1,4 @@
-//! The one who asks: one command at a time, without I/O.
+//! The client: one command at a time, without I/O.
 
 use tickbus_base::time::Nanos;
 
@@ -144,7 +144,7 @@ impl Client {
         self.skip(old);
     }
 
-    /// What has come about by `now`; to be called until it is `None`.
+    /// The next outcome at `now`, if any; to be called until it is `None`.
     pub fn poll(&mut self, now: Nanos) -> Option<Outcome> {
         let is_silent = now - self.heard >= self.timing.silence();
         if let Some(answer) = self.find(is_silent) {

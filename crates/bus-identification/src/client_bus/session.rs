@@ -237,9 +237,9 @@ impl<'a> Session<'a> {
                     (Asked::Presence(index), one)
                 }
             };
-            self.client.ask(now, &Command::once(station.head, access));
-            self.asked = Some(asked);
-            station.receipt = Some(frames.receipt());
+            let head = station.head;
+            self.ask(now, asked, &Command::once(head, access));
+            self.stations[index].receipt = Some(frames.receipt());
             return;
         }
     }

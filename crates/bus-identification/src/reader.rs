@@ -264,7 +264,7 @@ impl Reader {
 
     fn access(&mut self, first: u8, heads: Heads, access: &Access<'_>) {
         match heads {
-            // A head that is off answers nothing; the next command switches it on.
+            // No head executes it, and the reader itself answers. The next command switches the heads on.
             Heads::Off => self.answer(first, Status::DONE, None, &[]),
             Heads::One(number) => {
                 self.access_one(first, number, false, access);

@@ -15,6 +15,7 @@ use tickbus_base::os::LinkedTerminal;
 use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos};
 use tickbus_bus_identification::Access;
 use tickbus_conformance::rig::{await_that, statistic};
+use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkState;
 
 use ends::{Line, Pair, command};
@@ -167,4 +168,33 @@ fn after_noise_a_client_of_little_patience_leaves_the_reader_the_silence_that_it
     pair.until("they meet again", |pair| {
         pair.controller.get("present") == 1.0 && pair.controller.link().state == LinkState::Running
     });
+}
+
+#[test]
+fn at_a_low_rate_the_default_age_outlasts_a_round_of_questions() {
+    let timing = |kind: &str, extra: &str| {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"slow\"\n[fieldbus]\nkind = \"{kind}\"\ndevice = \"/dev/ttyS0\"\n\
+             input_bytes = 8\noutput_bytes = 8\n{extra}\n"
+        );
+        Config::parse("driver.cfg", &text).map(|config| config.timing.max_age)
+    };
+    let client = "role = \"controller\"\nbaud = 300";
+    // A question takes about half a second.
+    for found in [
+        timing("ivi-client", client),
+        timing("ivi-reader", "baud = 300"),
+    ] {
+        let found = found.expect("a configuration");
+        assert!(found > Nanos::from_secs(1), "{found}");
+    }
+    let usual = timing("ivi-reader", "").expect("a configuration");
+    assert_eq!(usual, Nanos::from_millis(250));
+    let refused = timing("ivi-client", &format!("{client}\nmax_age = \"100ms\""));
+    assert!(
+        refused
+            .expect_err("too short")
+            .to_string()
+            .contains("max_age")
+    );
 }

@@ -51,23 +51,19 @@ fn a_controller_that_pauses_beyond_its_watchdog_gives_no_command_twice() {
     assert_eq!(pair.ask(b'k', 0, 1, &[7]), (0, vec![]));
     let last = pair.controller.get("echo");
     assert_eq!(last, f64::from(b'k' | 0x80), "unlike the fail-safe 0");
-    let cycles = |pair: &Pair| {
-        let cycles = pair.controller.statistic("bus_cycles");
-        cycles.parse::<u64>().expect("a number")
-    };
     let clock = Monotonic::shared();
     let begin = clock.now();
     await_that("the controller has paused", || {
         pair.machine.tick();
         clock.now() - begin > WATCHDOG
     });
-    let paused = cycles(&pair);
+    let paused = pair.cycles();
     await_that("its fail-safe values are looked at", || {
         pair.machine.tick();
-        cycles(&pair) > paused + 2
+        pair.cycles() > paused + 2
     });
-    let resumed = cycles(&pair);
-    pair.until("it has gone on", |pair| cycles(pair) > resumed + 2);
+    let resumed = pair.cycles();
+    pair.until("it has gone on", |pair| pair.cycles() > resumed + 2);
     assert_eq!(pair.controller.get("echo"), last);
     assert_eq!(pair.ask(b'w', 0, 1, &[]), (0, vec![7]));
     pair.until("the machine is shown it", |pair| {
@@ -197,4 +193,44 @@ fn at_a_low_rate_the_default_age_outlasts_a_round_of_questions() {
             .to_string()
             .contains("max_age")
     );
+}
+
+#[test]
+fn a_command_that_was_not_sent_yet_is_taken_back() {
+    let mut pair = Pair::new();
+    pair.put(&[1]);
+    assert_eq!(pair.ask(b'w', 0, 1, &[]), (0, vec![1]));
+    // What was done already stays so.
+    let done = pair.controller.get("echo");
+    pair.controller.set("command", f64::from(b'q' | 0x80));
+    let seen = pair.cycles();
+    pair.until("it is looked at", |pair| pair.cycles() > seen + 2);
+    assert_eq!(pair.controller.get("echo"), done);
+    let Pair {
+        line,
+        machine,
+        mut controller,
+        toggle,
+    } = pair;
+    drop(machine);
+    await_that("the line has failed", || {
+        controller.tick();
+        controller.link().state == LinkState::Failed
+    });
+    controller.set("count", 1.0);
+    controller.set("command", f64::from(b'k'));
+    controller.tick();
+    controller.set("command", f64::from(b'q'));
+    controller.tick();
+    let machine = line.reader(&[1]);
+    let mut pair = Pair {
+        line,
+        machine,
+        controller,
+        toggle: toggle ^ 0x80,
+    };
+    pair.put(&[6]);
+    assert_eq!(pair.answer(b'q'), (0, vec![]));
+    assert_eq!(pair.ask(b'w', 0, 1, &[]), (0, vec![6]));
+    assert_eq!(pair.machine.get("writes"), 0.0);
 }

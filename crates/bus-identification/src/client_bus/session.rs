@@ -80,7 +80,7 @@ impl Station {
         let out_of_range = Err(Status::OUT_OF_RANGE.0);
         let (access, answer) = match command & !TOGGLE {
             // No command: the echo follows the toggle bit.
-            0 => return Some(Err(Status::DONE.0)),
+            0 | b'q' => return Some(Err(Status::DONE.0)),
             b'a' => (Access::ReadStart, 32),
             b'w' => (
                 Access::Read {

@@ -175,6 +175,13 @@ impl Pair {
         });
     }
 
+    /// Bus cycles of the controller.
+    #[track_caller]
+    pub fn cycles(&self) -> u64 {
+        let cycles = self.controller.statistic("bus_cycles");
+        cycles.parse().expect("a number")
+    }
+
     /// The machine puts a carrier before the head.
     #[track_caller]
     pub fn put(&mut self, octets: &[u8]) {

@@ -92,7 +92,7 @@ impl Shape {
         }
     }
 
-    /// Whether silence says more about an answer than that it is late.
+    /// Whether only silence ends an answer.
     pub(crate) const fn ends_by_silence(&self) -> bool {
         matches!(self.data, Data::UntilSilence)
     }

@@ -1,4 +1,4 @@
-//! The one who asks: one command at a time, without I/O.
+//! The client: one command at a time, without I/O.
 
 use tickbus_base::time::Nanos;
 
@@ -39,6 +39,12 @@ impl Timing {
     /// characters, and at least 100 ms, for which a busy computer may hold bytes back.
     pub fn silence(&self) -> Nanos {
         self.characters(5).max(Nanos::from_millis(100))
+    }
+
+    /// The time-out, or the silence if that is longer: a reader that has heard noise does not understand a client that
+    /// asks anew before it.
+    pub fn patience(&self) -> Nanos {
+        self.timeout.max(self.silence())
     }
 }
 
@@ -108,7 +114,7 @@ impl Client {
         command.append(self.carriers.family(), &mut self.request);
         let characters =
             self.request.len() + shape.longest() * if shape.has_many() { 4 } else { 1 };
-        let limit = now + self.timing.timeout + self.timing.characters(characters);
+        let limit = now + self.timing.patience() + self.timing.characters(characters);
         self.asked = Some(Asked {
             shape,
             limit,
@@ -138,7 +144,7 @@ impl Client {
         self.skip(old);
     }
 
-    /// What has come about by `now`; to be called until it is `None`.
+    /// The next outcome at `now`, if any; to be called until it is `None`.
     pub fn poll(&mut self, now: Nanos) -> Option<Outcome> {
         let is_silent = now - self.heard >= self.timing.silence();
         if let Some(answer) = self.find(is_silent) {

@@ -53,6 +53,11 @@ impl HeadNumbers {
         self.own.push((number, value.line()));
     }
 
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.own.len().max(1)
+    }
+
     /// The head of a station.
     pub(crate) fn of(&self, station: usize) -> u8 {
         let own = self.own.get(station).and_then(|(number, _)| *number);

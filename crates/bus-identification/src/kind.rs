@@ -33,12 +33,13 @@ impl BusOptions for ClientOptions {
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let bus = client_bus::IviClient::new(self, setup.table, setup.cycle.unwrap_or(CYCLE));
+        let cycle = setup.cycle.or(self.cycle()).unwrap_or(CYCLE);
+        let bus = client_bus::IviClient::new(self, setup.table, cycle);
         Ok(Bus::Free(Box::new(bus)))
     }
 
     fn cycle(&self) -> Option<Nanos> {
-        Some(CYCLE)
+        Some(self.line.cycle(self.heads.count()))
     }
 
     fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
@@ -84,12 +85,13 @@ impl BusOptions for ReaderOptions {
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let bus = reader_bus::IviReader::new(self, setup.table, setup.cycle.unwrap_or(CYCLE));
+        let cycle = setup.cycle.or(self.cycle()).unwrap_or(CYCLE);
+        let bus = reader_bus::IviReader::new(self, setup.table, cycle);
         Ok(Bus::Free(Box::new(bus)))
     }
 
     fn cycle(&self) -> Option<Nanos> {
-        Some(CYCLE)
+        Some(self.line.cycle(self.heads.count()))
     }
 
     fn read_station(&mut self, count: usize, table: &mut Table<'_>) {

@@ -4,15 +4,19 @@ use std::fmt;
 use std::path::Path;
 
 use tickbus_base::os::{Parity, SerialSettings};
+use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 #[cfg(not(unix))]
 use tickbus_fieldbus::BusError;
-use tickbus_fieldbus::serial;
+use tickbus_fieldbus::{CYCLE, serial};
 
 use crate::{CarrierType, Timing};
 
 /// The rates of the readers' switches, in bits per second.
 const RATES: [u32; 6] = [300, 600, 1200, 2400, 4800, 9600];
+
+/// The characters of a question and its answer, for the carriers with the longest addresses.
+const QUESTION: usize = 16;
 
 /// What a device begins with that is made, and not found.
 const PSEUDO: &str = "pty:";
@@ -60,11 +64,17 @@ impl LineOptions {
     }
 
     /// With this time-out.
-    pub(crate) const fn timing(&self, timeout: tickbus_base::time::Nanos) -> Timing {
+    pub(crate) const fn timing(&self, timeout: Nanos) -> Timing {
         Timing {
             baud: self.baud,
             timeout,
         }
+    }
+
+    /// The default bus cycle, for this many heads. Ten of them have to outlast two rounds of questions.
+    pub(crate) fn cycle(&self, heads: usize) -> Nanos {
+        let round = self.timing(Nanos::ZERO).characters(QUESTION * heads);
+        CYCLE.max(Nanos(round.0 / 4))
     }
 
     /// The name of a port that this end makes.

@@ -136,6 +136,14 @@ impl Reader {
         }
     }
 
+    /// Its line was unplugged: what was on its way is lost. Heads, the type of carriers and a repeated command stay.
+    pub fn unplug(&mut self) {
+        self.inbox.clear();
+        self.broken = None;
+        self.outbox.clear();
+        self.written = 0;
+    }
+
     /// Bytes arrived.
     pub fn hear(&mut self, now: Nanos, bytes: &[u8]) -> Heard {
         let mut heard = self.turn(now);
@@ -200,6 +208,7 @@ impl Reader {
                     Command::parse(&frame, self.carriers)
                 {
                     self.access(frame[0], heads, &access);
+                    heard.commands += 1;
                 }
                 self.auto = Some((frame, now + REPEAT));
             }
@@ -255,7 +264,7 @@ impl Reader {
 
     fn access(&mut self, first: u8, heads: Heads, access: &Access<'_>) {
         match heads {
-            // A head that is off answers nothing; the next command switches it on.
+            // No head executes it, and the reader itself answers. The next command switches the heads on.
             Heads::Off => self.answer(first, Status::DONE, None, &[]),
             Heads::One(number) => {
                 self.access_one(first, number, false, access);

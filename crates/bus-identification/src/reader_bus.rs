@@ -64,6 +64,8 @@ pub(crate) struct IviReader {
     options: ReaderOptions,
     cycle: Nanos,
     stations: Vec<Station>,
+    /// Kept when the line breaks: its carriers hold what was written.
+    reader: Reader,
 }
 
 /// A station, which is a head.
@@ -81,10 +83,17 @@ impl IviReader {
             head: options.heads.of(index),
             frame: vec![0; station.output_bytes],
         });
+        let stations: Vec<Station> = stations.collect();
+        let mut heads: [Head; HEADS] = Default::default();
+        for station in &stations {
+            heads[usize::from(station.head) - 1].is_connected = true;
+        }
         Self {
             options: options.clone(),
             cycle,
-            stations: stations.collect(),
+            stations,
+            // A reader has no time-out.
+            reader: Reader::new(heads, options.line.timing(Nanos::ZERO)),
         }
     }
 }
@@ -93,6 +102,9 @@ impl Free for IviReader {
     #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = self.options.line.clone();
+        // A carrier may have left while there was no port.
+        let now = port.clock().now();
+        take(&mut self.reader, &self.stations, line.carriers, now, port);
         if let Some(link) = line.made() {
             let terminal = tickbus_base::os::LinkedTerminal::open(link).map_err(|error| {
                 BusError::Link(format!(
@@ -124,18 +136,14 @@ impl IviReader {
         let device = self.options.line.port();
         port.tell("device", device);
         port.opening(&format!("listening on {device}"));
-        let mut heads: [Head; HEADS] = Default::default();
-        for station in &self.stations {
-            heads[usize::from(station.head) - 1].is_connected = true;
-        }
-        // A reader has no time-out.
-        let timing = self.options.line.timing(Nanos::ZERO);
+        self.reader.unplug();
         let mut serving = Serving {
             line: &self.options.line,
             stations: &mut self.stations,
-            reader: Reader::new(heads, timing),
+            reader: &mut self.reader,
             pace: Pace::new(port.clock().now(), self.cycle),
             is_heard: false,
+            is_up: true,
         };
         call.run(&mut serving, port, stop)
     }
@@ -145,24 +153,17 @@ impl IviReader {
 struct Serving<'a> {
     line: &'a LineOptions,
     stations: &'a mut [Station],
-    reader: Reader,
+    reader: &'a mut Reader,
     pace: Pace,
     /// A command has come since the machine was told the last time.
     is_heard: bool,
+    /// The line is not down by an injected fault.
+    is_up: bool,
 }
 
 impl Serving<'_> {
-    /// Takes over what the machine says of its heads and carriers.
     fn take(&mut self, now: Nanos, port: &mut Port) {
-        let Some(mut frames) = port.look(0..self.stations.len(), now) else {
-            return;
-        };
-        for (index, station) in self.stations.iter().enumerate() {
-            let head = self.reader.head_mut(station.head);
-            place(head, frames.frame(index), self.line.carriers);
-        }
-        let receipt = frames.receipt();
-        port.sent(&receipt);
+        take(self.reader, self.stations, self.line.carriers, now, port);
     }
 
     /// Tells the machine what its carriers hold now.
@@ -183,6 +184,18 @@ impl Serving<'_> {
         }
         heard.commands > 0
     }
+}
+
+/// Takes over what the machine says of its heads and carriers.
+fn take(reader: &mut Reader, stations: &[Station], kind: CarrierType, now: Nanos, port: &mut Port) {
+    let Some(mut frames) = port.look(0..stations.len(), now) else {
+        return;
+    };
+    for (index, station) in stations.iter().enumerate() {
+        place(reader.head_mut(station.head), frames.frame(index), kind);
+    }
+    let receipt = frames.receipt();
+    port.sent(&receipt);
 }
 
 /// Lets a head be as the machine writes it. A carrier that was there keeps its octets.
@@ -236,9 +249,11 @@ impl Caller for Serving<'_> {
         if self.pace.take(now) {
             self.take(now, port);
         }
-        if port.is_up(now) {
+        self.is_up = port.is_up(now);
+        if self.is_up {
             let heard = self.reader.turn(now);
-            Self::count(heard, port);
+            self.is_heard |= Self::count(heard, port);
+            self.tell(now, port);
         }
         Ok(())
     }
@@ -253,7 +268,12 @@ impl Caller for Serving<'_> {
 
     fn deadline(&self, port: &Port) -> Nanos {
         let stale = port.stale_at(port.clock().now());
-        self.reader.deadline().min(self.pace.due()).min(stale)
+        let due = if self.is_up {
+            self.reader.deadline()
+        } else {
+            Nanos::MAX
+        };
+        due.min(self.pace.due()).min(stale)
     }
 
     fn left(&mut self) -> BusError {

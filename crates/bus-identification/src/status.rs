@@ -43,6 +43,11 @@ impl Status {
         )
     }
 
+    /// Whether it tells of a carrier that is before the head.
+    pub const fn is_of_a_carrier(self) -> bool {
+        matches!(self.0, 0x00 | 0x04 | 0x08 | 0x0C | 0x0D | 0x10 | 0x11)
+    }
+
     /// What it means, and what to do; of a code that is not in the manual, that.
     pub const fn sentence(self) -> &'static str {
         match self.0 {

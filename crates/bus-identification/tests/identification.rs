@@ -7,202 +7,21 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-use std::io::{Read as _, Write as _};
-use std::path::PathBuf;
+mod ends;
 
-use tempfile::TempDir;
-use tickbus_base::os::{LinkedTerminal, Parity, SerialPort, SerialSettings};
+use std::io::{Read as _, Write as _};
+
+use tickbus_base::os::LinkedTerminal;
 use tickbus_base::time::Monotonic;
 use tickbus_base::time::{Clock as _, Nanos};
 use tickbus_bus_identification::{
     Access, Carrier, CarrierType, Client, Command, Head, NO_ANSWER, Outcome, Reader, Timing,
 };
-use tickbus_conformance::rig::{End, await_that};
+use tickbus_conformance::rig::await_that;
 use tickbus_driver::Code;
 use tickbus_fieldbus::{Cause, LinkState};
 
-/// Octets of data at both ends.
-const DATA: usize = 24;
-
-/// Both ends of a line, which has a folder of its own.
-struct Line {
-    folder: TempDir,
-}
-
-impl Line {
-    fn new() -> Self {
-        Self {
-            folder: tempfile::tempdir().expect("a folder"),
-        }
-    }
-
-    fn name(&self) -> PathBuf {
-        self.folder.path().join("reader")
-    }
-
-    fn open(
-        &self,
-        kind: &str,
-        device: &str,
-        heads: &[u8],
-        extra: &str,
-        signals: &[(&str, &str)],
-    ) -> End {
-        let mut text = format!(
-            "[driver]\nid = 1\nname = \"{kind}\"\n[fieldbus]\nkind = \"{kind}\"\ndevice = \"{device}{}\"\n\
-             reconnect = [\"10ms\"]\n{extra}\n",
-            self.name().display()
-        );
-        if let [head] = heads {
-            text += &format!("head = {head}\n");
-        } else {
-            for head in heads {
-                text += &format!("[[station]]\nname = \"{head}\"\nhead = {head}\n");
-            }
-        }
-        for head in heads {
-            let (at, of) = if heads.len() > 1 {
-                (format!("station = \"{head}\"\n"), format!("{head} "))
-            } else {
-                Default::default()
-            };
-            for (name, address) in signals {
-                text +=
-                    &format!("[[signal]]\n{at}name = \"{of}{name}\"\naddress = \"{address}\"\n");
-            }
-            for (area, first, name) in [('I', 4, "in"), ('Q', 4, "out")] {
-                let first = if kind == "ivi-reader" { 8 } else { first };
-                for octet in 0..DATA {
-                    text += &format!(
-                        "[[signal]]\n{at}name = \"{of}{name} {octet}\"\naddress = \"%{area}B{}\"\n",
-                        first + octet
-                    );
-                }
-            }
-        }
-        End::open(&text, &Monotonic::shared())
-    }
-
-    fn reader(&self, heads: &[u8]) -> End {
-        self.open(
-            "ivi-reader",
-            "pty:",
-            heads,
-            "",
-            &[
-                ("present", "%IX0.0"),
-                ("unplugged", "%IX0.1"),
-                ("protected", "%IX0.2"),
-                ("fault", "%IB1"),
-                ("number", "%ID4"),
-                ("taken", "%QX0.0"),
-                ("writes", "%QB1"),
-            ],
-        )
-    }
-
-    fn client(&self, heads: &[u8], extra: &str) -> End {
-        let role = format!("role = \"controller\"\n{extra}");
-        self.open(
-            "ivi-client",
-            "",
-            heads,
-            &role,
-            &[
-                ("echo", "%IB0"),
-                ("status", "%IB1"),
-                ("present", "%IX2.0"),
-                ("connected", "%IX2.1"),
-                ("length", "%IB3"),
-                ("command", "%QB0"),
-                ("count", "%QB1"),
-                ("address", "%QW2"),
-            ],
-        )
-    }
-}
-
-/// Machine and controller.
-struct Pair {
-    line: Line,
-    machine: End,
-    controller: End,
-    toggle: u8,
-}
-
-impl Pair {
-    fn new() -> Self {
-        Self::with(&[1], "")
-    }
-
-    fn with(heads: &[u8], extra: &str) -> Self {
-        let line = Line::new();
-        let machine = line.reader(heads);
-        let controller = line.client(heads, extra);
-        Self {
-            line,
-            machine,
-            controller,
-            toggle: 0,
-        }
-    }
-
-    #[track_caller]
-    fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
-        await_that(what, || {
-            self.machine.tick();
-            self.controller.tick();
-            done(self)
-        });
-    }
-
-    /// The machine puts a carrier before the head.
-    #[track_caller]
-    fn put(&mut self, octets: &[u8]) {
-        for (index, octet) in octets.iter().enumerate() {
-            self.machine.set(&format!("in {index}"), f64::from(*octet));
-        }
-        self.machine.set("present", 1.0);
-        self.until("the carrier is seen", |pair| {
-            pair.machine.get("taken") == 1.0 && pair.controller.get("present") == 1.0
-        });
-    }
-
-    fn command(&mut self, command: u8, address: u16, count: u8, data: &[u8]) {
-        self.toggle ^= 0x80;
-        for (index, octet) in data.iter().enumerate() {
-            self.controller
-                .set(&format!("out {index}"), f64::from(*octet));
-        }
-        self.controller.set("address", f64::from(address));
-        self.controller.set("count", f64::from(count));
-        self.controller
-            .set("command", f64::from(command | self.toggle));
-    }
-
-    /// Gives a command and waits for its answer: the status, and the data.
-    #[track_caller]
-    fn ask(&mut self, command: u8, address: u16, count: u8, data: &[u8]) -> (u8, Vec<u8>) {
-        self.command(command, address, count, data);
-        self.answer(command)
-    }
-
-    #[track_caller]
-    fn answer(&mut self, command: u8) -> (u8, Vec<u8>) {
-        let echo = f64::from(command | self.toggle);
-        self.until("the answer comes", |pair| {
-            pair.controller.get("echo") == echo
-        });
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "octets"
-        )]
-        let octet = |name: &str| self.controller.get(name) as u8;
-        let data = (0..octet("length")).map(|index| octet(&format!("in {index}")));
-        (octet("status"), data.collect())
-    }
-}
+use ends::{Line, Pair};
 
 #[test]
 fn a_carrier_is_read_changed_and_written_and_leaves_with_what_was_written() {
@@ -254,12 +73,12 @@ fn each_command_of_a_head_is_answered_with_its_status() {
     assert_eq!(pair.ask(0, 0, 0, &[]), (0, vec![]), "no command at all");
     for (signal, value, command, status) in [("protected", 1.0, b'k', 4), ("fault", 8.0, b'w', 8)] {
         pair.machine.set(signal, value);
-        let mut found = 0;
         // The reader takes it over within a cycle.
-        while found != status {
-            found = pair.ask(command, 0, 1, &[5]).0;
+        await_that("the reader takes it over", || {
+            let found = pair.ask(command, 0, 1, &[5]).0;
             assert!([0, status].contains(&found));
-        }
+            found == status
+        });
         pair.machine.set(signal, 0.0);
     }
 }
@@ -438,19 +257,7 @@ fn another_program_speaks_with_the_reader_as_with_a_serial_port() {
     let mut machine = line.reader(&[1]);
     machine.set("present", 1.0);
     machine.set("in 0", 3.0);
-    let settings = SerialSettings {
-        baud: 9600,
-        parity: Parity::None,
-        two_stop_bits: false,
-        rs485: false,
-    };
-    let mut port = None;
-    await_that("the port is there", || {
-        machine.tick();
-        port = SerialPort::open(&line.name(), settings).ok();
-        port.is_some()
-    });
-    let mut port = port.expect("it is there");
+    let mut port = line.open_port(&mut machine);
     let clock = Monotonic::shared();
     let timing = Timing {
         baud: 9600,

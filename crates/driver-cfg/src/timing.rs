@@ -93,7 +93,7 @@ impl<'a> TimingKeys<'a> {
                 "write some cycles, or all data are stale",
             );
         }
-        let ten_cycles = stated_cycle.unwrap_or_default().times(10);
+        let ten_cycles = stated_cycle.or(of_bus).unwrap_or_default().times(10);
         let max_age = stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE));
         Some(Timing {
             cycle: stated_cycle,

@@ -9,6 +9,7 @@ use rustix::fd::{AsFd, BorrowedFd};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 
 use super::PseudoTerminal;
+use super::pseudo_terminal::names_pseudo_terminal;
 
 /// The far end of a pseudo-terminal whose near end has a stable name: a symbolic link, which goes with it. Reading and
 /// writing never block; a [`PollSet`](super::PollSet) can wait for it.
@@ -20,23 +21,24 @@ pub struct LinkedTerminal {
 }
 
 impl LinkedTerminal {
-    /// A new one, to be opened as the serial port `link`. A link to another terminal is replaced.
+    /// A new one, to be opened as the serial port `link`. A link to another pseudo-terminal is replaced, even if that is
+    /// in use.
     ///
     /// # Errors
     ///
     /// There is something else in its place, its folder cannot be written, or the system has no more pseudo-terminals.
     pub fn open(link: &Path) -> io::Result<Self> {
+        let (terminal, near) = PseudoTerminal::open()?;
+        let far = terminal.far();
+        fcntl_setfl(far, fcntl_getfl(far)? | OFlags::NONBLOCK)?;
         match link.symlink_metadata() {
             // Another program may have ended without a chance to remove it.
-            Ok(_) if std::fs::read_link(link).is_ok_and(|old| old.starts_with("/dev")) => {
+            Ok(_) if std::fs::read_link(link).is_ok_and(|old| names_pseudo_terminal(&old)) => {
                 std::fs::remove_file(link)?;
             }
             Ok(_) => return Err(io::ErrorKind::AlreadyExists.into()),
             Err(_) => {}
         }
-        let (terminal, near) = PseudoTerminal::open()?;
-        let far = terminal.far();
-        fcntl_setfl(far, fcntl_getfl(far)? | OFlags::NONBLOCK)?;
         symlink(&near, link)?;
         Ok(Self {
             terminal,
@@ -104,6 +106,12 @@ mod tests {
         let refused = LinkedTerminal::open(&link).expect_err("a file is there");
         assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
         std::fs::remove_file(&link).expect("it is there");
+        for other in ["/dev/null", "/dev/shm/reader"] {
+            symlink(other, &link).expect("a link");
+            LinkedTerminal::open(&link).expect_err("it is no link to a pseudo-terminal");
+            assert_eq!(std::fs::read_link(&link).ok(), Some(other.into()));
+            std::fs::remove_file(&link).expect("it is there");
+        }
         let first = LinkedTerminal::open(&link).expect("a terminal");
         let mut second = LinkedTerminal::open(&link).expect("it takes the other one's place");
         drop(first);

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, Read as _, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -68,6 +68,18 @@ impl PseudoTerminal {
             return Ok(0);
         }
         self.far.read(bytes)
+    }
+}
+
+/// Whether the system calls a pseudo-terminal so.
+pub(super) fn names_pseudo_terminal(path: &Path) -> bool {
+    if cfg!(target_os = "macos") {
+        let name = path
+            .to_str()
+            .and_then(|path| path.strip_prefix("/dev/ttys"));
+        name.is_some_and(|number| number.bytes().all(|digit| digit.is_ascii_digit()))
+    } else {
+        path.starts_with("/dev/pts")
     }
 }
 

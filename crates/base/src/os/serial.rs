@@ -49,13 +49,15 @@ mod unix {
     use std::path::Path;
 
     use rustix::fd::{AsFd, BorrowedFd};
-    use rustix::fs::{Mode, OFlags, open};
+    use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
+    use rustix::io::Errno;
     use rustix::termios::{
         ControlModes, InputModes, LocalModes, OptionalActions, OutputModes, QueueSelector,
         SpecialCodeIndex, Termios, ioctl_tiocexcl, ioctl_tiocnxcl, tcflush, tcgetattr, tcsetattr,
     };
 
     use super::{Parity, SerialSettings};
+    use crate::os::pseudo_terminal::names_pseudo_terminal;
 
     /// An open serial port. Reading and writing never block; a [`PollSet`](crate::os::PollSet) can wait for it.
     #[derive(Debug)]
@@ -71,6 +73,17 @@ mod unix {
         pub fn open(device: &Path, settings: SerialSettings) -> io::Result<Self> {
             let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
             let port = open(device, flags, Mode::empty())?;
+            let is_pseudo = is_pseudo_terminal(device);
+            if is_pseudo {
+                // The flag of exclusive use would outlive a program that is killed, since the far end keeps the near one
+                // open; a lock goes with its program.
+                flock(&port, FlockOperation::NonBlockingLockExclusive).map_err(
+                    |error| match error {
+                        Errno::WOULDBLOCK => Errno::BUSY,
+                        other => other,
+                    },
+                )?;
+            }
             let mut attributes = tcgetattr(&port)?;
             attributes.make_raw();
             attributes.input_modes |= InputModes::IGNBRK;
@@ -100,12 +113,14 @@ mod unix {
             attributes.special_codes[SpecialCodeIndex::VTIME] = 0;
             attributes.set_speed(settings.baud)?;
             tcsetattr(&port, OptionalActions::Now, &attributes)?;
-            check(&tcgetattr(&port)?, settings, is_pseudo_terminal(device))?;
+            check(&tcgetattr(&port)?, settings, is_pseudo)?;
             if settings.rs485 {
                 switch_direction(&port)?;
             }
             ask_for_low_latency(&port);
-            ioctl_tiocexcl(&port)?;
+            if !is_pseudo {
+                ioctl_tiocexcl(&port)?;
+            }
             tcflush(&port, QueueSelector::IOFlush)?;
             Ok(Self(File::from(port)))
         }
@@ -137,7 +152,7 @@ mod unix {
     fn is_pseudo_terminal(device: &Path) -> bool {
         device
             .canonicalize()
-            .is_ok_and(|path| path.starts_with("/dev/pts"))
+            .is_ok_and(|path| names_pseudo_terminal(&path))
     }
 
     /// Asks the port's driver to hand bytes over as they come: those of some USB adapters collect them for 16 ms otherwise.
@@ -266,6 +281,27 @@ mod unix {
     #[cfg(test)]
     mod tests {
         use super::*;
+        use crate::os::PseudoTerminal;
+
+        const SETTINGS: SerialSettings = SerialSettings {
+            baud: 9600,
+            parity: Parity::None,
+            two_stop_bits: false,
+            rs485: false,
+        };
+
+        #[test]
+        fn a_pseudo_terminal_is_for_one_port_at_a_time_and_keeps_no_mark_of_it() {
+            let (_far, near) = PseudoTerminal::open().expect("a pseudo-terminal");
+            let port = SerialPort::open(&near, SETTINGS).expect("a port");
+            let refused = SerialPort::open(&near, SETTINGS).expect_err("another one has it");
+            assert_eq!(refused.kind(), io::ErrorKind::ResourceBusy);
+            // A mark of exclusive use would keep out everybody but root, also when the program that set it was killed.
+            let opened = File::open(&near);
+            assert!(opened.is_ok(), "{opened:?}");
+            drop(port);
+            SerialPort::open(&near, SETTINGS).expect("it is free again");
+        }
 
         #[test]
         fn a_port_that_was_not_set_as_wanted_is_refused() {

@@ -56,7 +56,9 @@ impl Station {
         self.frame[2] = match status {
             _ if status.is_of_the_head() => 0,
             Status::NO_CARRIER => CONNECTED,
-            _ => CONNECTED | PRESENT,
+            _ if status.is_of_a_carrier() => CONNECTED | PRESENT,
+            // It says nothing of a carrier.
+            _ => CONNECTED | self.frame[2] & PRESENT,
         };
     }
 
@@ -78,7 +80,7 @@ impl Station {
         let out_of_range = Err(Status::OUT_OF_RANGE.0);
         let (access, answer) = match command & !TOGGLE {
             // No command: the echo follows the toggle bit.
-            0 => return Some(Err(Status::DONE.0)),
+            0 | b'q' => return Some(Err(Status::DONE.0)),
             b'a' => (Access::ReadStart, 32),
             b'w' => (
                 Access::Read {
@@ -203,13 +205,23 @@ impl<'a> Session<'a> {
             if !port.is_station_up(index, now) {
                 continue;
             }
+            let is_paused = port
+                .watchdog()
+                .is_some_and(|limit| port.tick_age(index, now) > limit);
             let Some(mut frames) = port.look(index..index + 1, now) else {
                 return;
             };
             let frame = frames.frame(index);
             let station = &mut self.stations[index];
             let given = frame.first().copied().unwrap_or(0);
-            let (asked, access) = match station.new_command(frame, self.options.line.carriers) {
+            // The fail-safe 0 of a controller that pauses is no command: if the echo followed it, the last command would
+            // be a new one when the controller goes on.
+            let command = if is_paused && given & !TOGGLE == 0 {
+                None
+            } else {
+                station.new_command(frame, self.options.line.carriers)
+            };
+            let (asked, access) = match command {
                 Some(Ok(access)) => {
                     station.sent = Some(given);
                     (Asked::Command(index), access)
@@ -225,9 +237,9 @@ impl<'a> Session<'a> {
                     (Asked::Presence(index), one)
                 }
             };
-            self.client.ask(now, &Command::once(station.head, access));
-            self.asked = Some(asked);
-            station.receipt = Some(frames.receipt());
+            let head = station.head;
+            self.ask(now, asked, &Command::once(head, access));
+            self.stations[index].receipt = Some(frames.receipt());
             return;
         }
     }
@@ -306,7 +318,7 @@ impl<'a> Session<'a> {
             "the reader on {} did not answer within {}; check that it is on, in read/write mode and at {} baud, and the \
              cable",
             self.device(),
-            self.options.timeout,
+            self.options.line.timing(self.options.timeout).patience(),
             self.options.line.baud
         ));
         port.lost(&error, "it is asked again");

@@ -279,6 +279,18 @@ fn after_garbage_the_next_command_is_understood() {
     }
 }
 
+#[test]
+fn a_line_that_is_plugged_in_again_begins_with_a_whole_command() {
+    for before in [b"?".as_slice(), b"w1", b"c\x63\x03"] {
+        let mut line = Line::new(CarrierType::Imc64K);
+        line.reader.hear(line.now, before);
+        line.reader.unplug();
+        assert!(line.reader.to_write().is_empty());
+        assert_eq!(line.reader.deadline(), Nanos::MAX);
+        assert_eq!(line.access(1, read(0, 1)), (0, vec![3]), "{before:?}");
+    }
+}
+
 proptest! {
     #[test]
     fn any_bytes_are_survived_and_the_next_command_is_understood(

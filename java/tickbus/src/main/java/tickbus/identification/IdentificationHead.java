@@ -3,6 +3,7 @@ package tickbus.identification;
 import java.util.ArrayList;
 import java.util.Comparator;
 import java.util.List;
+import java.util.Map;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 import tickbus.Signal;
@@ -26,8 +27,13 @@ import tickbus.Tickbus;
  * <p>The head finds its signals by their addresses: {@code %QB0} is the command, {@code %QB1} a length, {@code %QW2} an
  * address, and the data begin at {@code %QB4}; {@code %IB0} is the command's echo, {@code %IB1} the status, {@code
  * %IX2.0} says whether a carrier is there, {@code %IB3} is a length, and the data begin at {@code %IB4}. Signals for
- * data can be of any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Like all
- * signals it belongs to the ticking thread.
+ * data can be of any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Their
+ * {@code order} must be the default: with {@code order = "DCBA"} the octets come in another sequence than on the
+ * carrier. Like all signals it belongs to the ticking thread.
+ *
+ * <p>While the line is not up, the fail-safe values are read, so that nothing is known of the last command, not even of
+ * one that was done before. It is known again when the line is back. A command that was begun meanwhile goes out then,
+ * unless {@link #cancel} takes it back.
  */
 public final class IdentificationHead {
     /** The command was executed. */
@@ -38,13 +44,17 @@ public final class IdentificationHead {
     public static final int BATTERY_LOW = 0x10;
     /** The reader did not answer, and may have executed the command. */
     public static final int NO_ANSWER = 0xFF;
+    /** The command was taken back by {@link #cancel} before it went out. */
+    public static final int CANCELLED = -1;
 
     private static final int TOGGLE = 0x80;
+    private static final int TAKE_BACK = 'q';
     private static final int BEFORE_DATA = 4;
     private static final Pattern ADDRESS = Pattern.compile("%([IQ])([BWDL])(\\d+)");
     private static final List<String> UNSIGNED =
         List.of("BYTE", "USINT", "WORD", "UINT", "DWORD", "UDINT", "LWORD", "ULINT");
 
+    private final Tickbus bus;
     private final String shown;
     private final Signal command;
     private final Signal length;
@@ -78,6 +88,7 @@ public final class IdentificationHead {
      * @throws IllegalArgumentException if a signal is not there, with its address
      */
     public IdentificationHead(Tickbus bus, String station) {
+        this.bus = bus;
         this.shown = station.isEmpty() ? bus.toString() : "station \"" + station + "\" of " + bus;
         List<Signal> own = bus.signals().stream().filter(signal -> signal.station().equals(station)).toList();
         this.command = require(own, "%QB0");
@@ -201,18 +212,37 @@ public final class IdentificationHead {
 
     private void mustBeDone() {
         if (!isDone()) {
-            throw new IllegalStateException(
-                "the head in " + shown + " has not answered the command before; wait for isDone()");
+            Map<String, String> now = bus.statistics();
+            String line = now.get("state").equals("running") ? ""
+                : "; the line is " + now.get("state") + ": " + now.get("reason");
+            throw new IllegalStateException("the head in " + shown
+                + " has not answered the command before; wait for isDone(), or cancel() the command" + line);
         }
     }
 
     /**
-     * Whether the last command has been answered, or none was given.
+     * Takes the last command back, unless it has gone out already; does nothing if it is {@link #isDone done}.
+     *
+     * <p>Which of both is known when {@link #isDone} says so, when the line is up: {@link #status} is {@link #CANCELLED}
+     * then, or that of the command.
+     */
+    public void cancel() {
+        if (!isDone()) {
+            command.setLong(command.getLong() & TOGGLE | TAKE_BACK);
+        }
+    }
+
+    /**
+     * Whether the last command has been answered or taken back, or none was given.
      *
      * @return false while the command is on its way, and while the line is not up
      */
     public boolean isDone() {
-        return echo.getLong() == command.getLong();
+        long given = command.getLong();
+        long found = echo.getLong();
+        // The echo of the command itself, which was not taken back in time, has the same toggle bit. A fail-safe 0 is none.
+        boolean wasSent = (given & ~TOGGLE) == TAKE_BACK && found != 0 && ((found ^ given) & TOGGLE) == 0;
+        return found == given || wasSent;
     }
 
     /**
@@ -227,12 +257,13 @@ public final class IdentificationHead {
     /**
      * What became of the last command, as the reader's manual numbers it.
      *
-     * @return {@link #DONE}, {@link #BATTERY_LOW}, or an error such as {@link #NO_CARRIER}
+     * @return {@link #DONE}, {@link #BATTERY_LOW}, or an error such as {@link #NO_CARRIER}; {@link #CANCELLED} of one that
+     *     was taken back
      * @throws IllegalStateException if it is not {@link #isDone done}
      */
     public int status() {
         mustBeDone();
-        return (int) status.getLong();
+        return (echo.getLong() & ~TOGGLE) == TAKE_BACK ? CANCELLED : (int) status.getLong();
     }
 
     /**
@@ -243,6 +274,9 @@ public final class IdentificationHead {
      */
     public byte[] data() {
         int found = status();
+        if (found == CANCELLED) {
+            throw new IllegalStateException("the command was taken back in " + shown + ", and has read nothing");
+        }
         if (found != DONE && found != BATTERY_LOW) {
             throw new IllegalStateException(
                 String.format("the command has failed with status %02X in %s; see status()", found, shown));

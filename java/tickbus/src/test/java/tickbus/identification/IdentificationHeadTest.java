@@ -20,6 +20,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.condition.DisabledOnOs;
 import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
+import tickbus.InjectedFault;
 import tickbus.Tickbus;
 import tickbus.identification.PalletRecord.Content;
 import tickbus.identification.PalletRecord.Piece;
@@ -151,6 +152,54 @@ class IdentificationHeadTest {
             .contains("8 octets do not fit"));
         assertThrows(IllegalArgumentException.class, () -> head.write(0, new byte[6]));
         assertThrows(IllegalArgumentException.class, () -> head.read(0x10000, 1));
+    }
+
+    @Test
+    void whileTheLineIsDownItIsNamedAndWhatWasDoneIsKnownAgainAfterwards() throws IOException {
+        openBoth();
+        IdentificationHead head = new IdentificationHead(controller);
+        arrive(new byte[] {5});
+        until(head::isPresent);
+        head.read(0, 1);
+        until(head::isDone);
+        InjectedFault fault = machine.inject("kind = \"link-down\"");
+        until(() -> controller.statistics().get("state").equals("opening"));
+        String named = assertThrows(IllegalStateException.class, head::data).getMessage();
+        assertTrue(named.contains("the line is opening: ") && named.contains("did not answer within"), named);
+        // What was done cannot be taken back.
+        head.cancel();
+        assertFalse(head.isDone());
+        fault.end();
+        until(head::isDone);
+        assertEquals(IdentificationHead.DONE, head.status());
+        assertArrayEquals(new byte[] {5}, head.data());
+    }
+
+    @Test
+    void aCommandThatHasNotGoneOutIsTakenBack() throws IOException {
+        openBoth();
+        controller.close();
+        String patient = Files.readString(directory.resolve("controller.cfg"));
+        controller = Tickbus.open(Files.writeString(directory.resolve("controller.cfg"),
+            patient.replace("[fieldbus]", "[fieldbus]\nmax_age = \"60s\"")));
+        IdentificationHead head = new IdentificationHead(controller);
+        arrive(new byte[] {5});
+        until(head::isPresent);
+        InjectedFault fault = controller.inject("kind = \"link-down\"");
+        until(fault::isActive);
+        head.write(0, new byte[] {7});
+        controller.exchange();
+        head.cancel();
+        assertFalse(head.isDone());
+        controller.exchange();
+        fault.end();
+        until(head::isDone);
+        assertEquals(IdentificationHead.CANCELLED, head.status());
+        assertTrue(assertThrows(IllegalStateException.class, head::data).getMessage().contains("was taken back"));
+        head.read(0, 1);
+        until(head::isDone);
+        assertArrayEquals(new byte[] {5}, head.data());
+        assertEquals(0, machine.signal("writes").get());
     }
 
     @Test

@@ -197,6 +197,8 @@ fn mistakes_have_the_exit_codes_of_the_house() {
         &["serial", "/dev/x", "--dispatcher", "127.0.0.1:0"],
         &["serial", "/dev/x", "--baud", "0"],
         &["serial", "/dev/x", "--line-end", "crcr"],
+        &["serial", "--pty", "y", "--baud", "9600"],
+        &["serial", "--pty", "y", "--parity", "none"],
     ] {
         assert_eq!(end(arguments).1, Some(2), "{arguments:?}");
     }

@@ -182,7 +182,11 @@ fn no_edge_is_lost_that_comes_between_two_scans() {
     );
     logo.line("logo: Q2:HOUSE:I1: connected");
     // All of them in one packet, so that they arrive within one cycle.
-    house.say("P Q1=24\r\nP Q1=0\r\n".repeat(200).trim_end());
+    house.say(
+        "P Q1=24\r\nP Q1=0\r\nP Q1=24 Q1=0\r\n"
+            .repeat(100)
+            .trim_end(),
+    );
     let mut pulses = 0;
     loop {
         let line = house.hear("P ");

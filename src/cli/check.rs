@@ -13,7 +13,9 @@ use tickbus_base::toml_text::short_number;
 use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::{Events, Role};
-use tickbus_image::signal::{Area, ByteOrder, DataType, Latch, Scale, Signal, Station, Width};
+use tickbus_image::signal::{
+    Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width,
+};
 use tickbus_record as record;
 
 /// Read a driver.cfg; print its signal table, or every mistake in it.
@@ -60,7 +62,7 @@ fn report(config: &Config) -> String {
     for (written, read) in config.bus.both_ways(&config.table) {
         let [written, read] = [written, read].map(|index| {
             let signal = &config.table.signals[index];
-            let place = config.bus.place(signal, &stations[signal.station]);
+            let place = config.bus.place(signal, &config.table);
             format!("\"{}\" at {place}", signal.name)
         });
         line(
@@ -122,7 +124,7 @@ fn report(config: &Config) -> String {
             .table
             .signals
             .iter()
-            .map(|signal| row(signal, stations, &taken, &config.bus)),
+            .map(|signal| row(signal, &config.table, &taken, &config.bus)),
     ));
     let total = |area| {
         stations
@@ -242,10 +244,11 @@ const HEADINGS: [&str; 13] = [
 
 fn row(
     signal: &Signal,
-    stations: &[Station],
+    table: &SignalTable,
     taken: &HashSet<WordKey>,
     bus: &Options,
 ) -> [String; HEADINGS.len()] {
+    let stations = &table.stations;
     let station = &stations[signal.station];
     [
         if stations.len() > 1 {
@@ -255,7 +258,7 @@ fn row(
         },
         signal.address().to_string(),
         bit_of_word(signal, station, taken),
-        bus.place(signal, station),
+        bus.place(signal, table),
         signal.data_type.to_string(),
         if signal.order == ByteOrder::Abcd {
             String::new()

@@ -1,14 +1,16 @@
 //! `tickbus dispatch`: the dispatcher of a virtual laboratory.
 
-use std::io::{self, Write as _};
+#[cfg(feature = "page")]
+use std::io;
 use std::path::PathBuf;
 
 use super::Outcome;
 use super::host::span;
+use super::lab::{self, address};
 use tickbus_base::os::raise_open_files;
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PatchFile, Post, Settings};
+use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PORT, PatchFile, Post, Settings};
 use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
 use tickbus_fieldbus::tcp::Address;
 
@@ -19,7 +21,7 @@ use tickbus_fieldbus::tcp::Address;
 pub(super) struct Arguments {
     /// Where clients connect; port 0 lets the system choose one. 127.0.0.1 is this machine alone, 0.0.0.0 all of its
     /// networks.
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:20070", value_parser = address)]
+    #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = address)]
     listen: Address,
 
     /// The file in which connections survive a restart; it is made with the first one.
@@ -56,15 +58,8 @@ pub(super) struct Arguments {
     page: Option<Address>,
 }
 
-fn address(text: &str) -> Result<Address, String> {
-    text.parse()
-        .map_err(|mistake: tickbus_base::Mistake| mistake.to_string())
-}
-
-/// Prints a line. If the reader of stdout is gone, the laboratory goes on.
 fn say(line: &str) {
-    let mut out = io::stdout().lock();
-    let _ = writeln!(out, "dispatch: {line}").and_then(|()| out.flush());
+    lab::say("dispatch", line);
 }
 
 fn settings(arguments: &Arguments) -> Settings {
@@ -119,14 +114,10 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             return Outcome::WrongInput;
         }
     };
-    let stop = Stop::new();
-    if let Err(error) = ctrlc::set_handler({
-        let stop = stop.clone();
-        move || stop.stop()
-    }) {
-        eprintln!("dispatch: Ctrl-C cannot be caught: {error}");
-        return Outcome::BusFailed;
-    }
+    let stop = match lab::until_ctrl_c("dispatch") {
+        Ok(stop) => stop,
+        Err(outcome) => return outcome,
+    };
     raise_open_files();
     let failed = |reason: String| {
         say(&format!("failed reason=\"{reason}\""));

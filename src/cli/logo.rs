@@ -3,23 +3,22 @@
 mod host;
 mod patch;
 
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use super::Outcome;
 use super::host::span;
-use tickbus_base::Mistake;
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
+use super::lab::{self, dialled};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::client::{Client, Profile};
-use tickbus_dispatcher::{Counts, Role};
+use tickbus_dispatcher::{Counts, PORT, Role};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_function_blocks::{Controller, Program, Terminals};
 
 /// Without news the dispatcher is asked whether it is there after this time.
 const KEEP_ALIVE: Nanos = Nanos::from_secs(5);
 
-/// Run a small controller, as the LOGO! is one, in a virtual laboratory: a program of function blocks.
+/// Run a small controller, like a LOGO!, in a virtual laboratory: a program of function blocks.
 ///
 /// It is a client of `tickbus dispatch`. docs/virtual-lab.md has a lesson, and all blocks.
 #[derive(Debug, clap::Args)]
@@ -28,7 +27,7 @@ pub(super) struct Arguments {
     file: PathBuf,
 
     /// Where the dispatcher listens.
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:20070", value_parser = address)]
+    #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = dialled)]
     dispatcher: Address,
 
     /// The name by which others know this controller.
@@ -64,16 +63,8 @@ pub(super) struct Arguments {
     duration: Option<Nanos>,
 }
 
-fn address(text: &str) -> Result<Address, String> {
-    let address: Result<Address, Mistake> = text.parse();
-    let address = address.and_then(|address| address.check_dialled().map(|()| address));
-    address.map_err(|mistake| mistake.to_string())
-}
-
-/// Prints a line. If the reader of stdout is gone, the controller goes on.
 fn say(line: &str) {
-    let mut out = io::stdout().lock();
-    let _ = writeln!(out, "logo: {line}").and_then(|()| out.flush());
+    lab::say("logo", line);
 }
 
 /// The program and the connections.
@@ -114,14 +105,10 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             return Outcome::WrongInput;
         }
     };
-    let stop = Stop::new();
-    if let Err(error) = ctrlc::set_handler({
-        let stop = stop.clone();
-        move || stop.stop()
-    }) {
-        eprintln!("logo: Ctrl-C cannot be caught: {error}");
-        return Outcome::BusFailed;
-    }
+    let stop = match lab::until_ctrl_c("logo") {
+        Ok(stop) => stop,
+        Err(outcome) => return outcome,
+    };
     let clock = Monotonic::shared();
     let end = arguments
         .duration

@@ -10,6 +10,7 @@ mod export;
 mod gsd;
 mod host;
 mod import;
+mod lab;
 mod logo;
 mod mirror;
 mod plc;

@@ -65,6 +65,8 @@ pub struct AsciiBridge {
     from_dispatcher: Lines,
     to_serial: Outbox,
     to_dispatcher: Outbox,
+    /// What came from the serial line, and waits for room in `requests`.
+    unread: Vec<u8>,
     state: State,
     client: Option<Client>,
     /// CONNECT, DISCONNECT and LIST lines that may not have been carried out yet.
@@ -88,6 +90,12 @@ struct Client {
     is_waiting: bool,
     /// The newest values of its outputs.
     outputs: Vec<(Channel, Number)>,
+    /// It hears `P I1=?` of an input whose source is lost: version 3.
+    hears_losses: bool,
+    /// The newest values that it has heard of its inputs.
+    inputs: Vec<(Channel, Number)>,
+    /// Inputs that have a value from before the connection, and none from this one.
+    stale: Vec<Channel>,
 }
 
 /// How far the connection with the dispatcher is.
@@ -95,6 +103,8 @@ struct Client {
 enum State {
     /// There is no connection.
     Away,
+    /// There is none: the dispatcher does not take the client now, and is asked again after a pause.
+    Refused,
     /// The dispatcher does not know who this is.
     Stranger,
     /// The identification was sent, and is not answered.
@@ -116,6 +126,8 @@ enum Asker {
     Bridge,
     /// The bridge, to learn that a request was carried out.
     Request,
+    /// The bridge, to learn that the inputs have the values that they get at first.
+    Settled,
 }
 
 impl AsciiBridge {
@@ -126,6 +138,7 @@ impl AsciiBridge {
             from_dispatcher: Lines::default(),
             to_serial: Outbox::new(end.bytes()),
             to_dispatcher: Outbox::new(b"\r\n"),
+            unread: Vec::new(),
             state: State::Away,
             client: None,
             requests: VecDeque::new(),
@@ -155,6 +168,7 @@ impl AsciiBridge {
     pub fn unplugged(&mut self) {
         self.state = State::Away;
         self.from_serial = Lines::default();
+        self.unread.clear();
         self.to_serial.clear();
         self.requests.clear();
         if let Some(client) = &mut self.client {
@@ -174,9 +188,35 @@ impl AsciiBridge {
         self.to_serial.wrote(count);
     }
 
+    /// Whether bytes from the serial port are wanted now; if not, the dispatcher has to answer first.
+    pub fn wants_serial(&self) -> bool {
+        self.unread.is_empty() && !self.must_wait()
+    }
+
     /// Bytes have arrived from the serial port, in any pieces.
     pub fn from_serial(&mut self, now: Nanos, mut bytes: &[u8]) {
-        while let Some(cut) = self.from_serial.next(&mut bytes) {
+        if self.unread.is_empty() {
+            self.read(now, &mut bytes);
+        }
+        self.unread.extend_from_slice(bytes);
+        self.resume(now);
+    }
+
+    /// Reads what has waited.
+    fn resume(&mut self, now: Nanos) {
+        if self.unread.is_empty() || self.must_wait() {
+            return;
+        }
+        let unread = std::mem::take(&mut self.unread);
+        let mut bytes = &unread[..];
+        self.read(now, &mut bytes);
+        self.unread = bytes.to_vec();
+    }
+
+    fn read(&mut self, now: Nanos, bytes: &mut &[u8]) {
+        while !self.must_wait()
+            && let Some(cut) = self.from_serial.next(bytes)
+        {
             self.traffic.said += 1;
             match cut {
                 Cut::Line(line) => self.said(now, line),
@@ -185,6 +225,18 @@ impl AsciiBridge {
                 )),
             }
         }
+    }
+
+    /// Whether a line of the client could overtake a request, or be one too many. Without a dispatcher all are read, since
+    /// their answers say so.
+    fn must_wait(&self) -> bool {
+        let is_full = self.requests.len() >= REQUESTS;
+        !self.is_apart() && (is_full || self.state == State::Here && self.has_unsent())
+    }
+
+    /// There is no connection with the dispatcher.
+    const fn is_apart(&self) -> bool {
+        matches!(self.state, State::Away | State::Refused)
     }
 
     /// The client has said a line.
@@ -196,14 +248,17 @@ impl AsciiBridge {
                 let identification = *identification;
                 self.identify(&line, identification);
             }
-            (Ok(Line::Bye), State::Away) => self.client = None,
+            (Ok(Line::Bye), State::Away | State::Refused) => self.client = None,
             (Ok(Line::Bye), _) => {
                 self.client = None;
                 self.requests.clear();
                 self.leave(true);
             }
-            (_, State::Leaving { .. }) => self.traffic.dropped += 1,
-            (Ok(Line::Ping), State::Away) => self.refuse_away(),
+            (_, State::Leaving { .. }) if self.client.is_none() => self.traffic.dropped += 1,
+            (Ok(Line::Ping), State::Away | State::Refused | State::Leaving { .. }) => {
+                self.traffic.dropped += 1;
+                self.say(AWAY);
+            }
             (Ok(Line::Ping), _) => self.ping(now, Asker::Client),
             (Ok(Line::Values(values)), _) if self.keep(values.clone()) => {
                 if self.state == State::Here {
@@ -238,6 +293,9 @@ impl AsciiBridge {
             counts: identification.counts,
             is_waiting: true,
             outputs: Vec::new(),
+            hears_losses: identification.hears_losses,
+            inputs: Vec::new(),
+            stale: Vec::new(),
         });
         match self.state {
             State::Away => self.say(AWAY),
@@ -247,7 +305,8 @@ impl AsciiBridge {
             }
             // A program that connects itself would come with a new connection.
             State::Introduced | State::Here => self.leave(false),
-            State::Leaving { .. } => {}
+            // It is introduced with the next connection.
+            State::Refused | State::Leaving { .. } => {}
         }
     }
 
@@ -280,11 +339,32 @@ impl AsciiBridge {
             self.refuse("503 the dispatcher does not answer, and 64 lines wait for it already; send it again later");
             return;
         }
-        if self.state == State::Here {
-            self.to_dispatcher.line(&line);
-            self.ping(now, Asker::Request);
-        }
         self.requests.push_back(line);
+        self.send_requests(now);
+    }
+
+    /// How many requests were sent in this connection and are not carried out yet: the first ones.
+    fn under_way(&self) -> usize {
+        let asked = self.pings.iter();
+        asked.filter(|(asker, _)| *asker == Asker::Request).count()
+    }
+
+    fn has_unsent(&self) -> bool {
+        self.under_way() < self.requests.len()
+    }
+
+    /// Sends the requests that the dispatcher has room for.
+    fn send_requests(&mut self, now: Nanos) {
+        if self.state != State::Here {
+            return;
+        }
+        for at in self.under_way()..self.requests.len() {
+            if self.to_dispatcher.is_full() {
+                break;
+            }
+            self.to_dispatcher.line(&self.requests[at]);
+            self.ask(now, Asker::Request);
+        }
     }
 
     fn ping(&mut self, now: Nanos, asker: Asker) {
@@ -292,6 +372,10 @@ impl AsciiBridge {
             self.traffic.dropped += u64::from(asker == Asker::Client);
             return;
         }
+        self.ask(now, asker);
+    }
+
+    fn ask(&mut self, now: Nanos, asker: Asker) {
         self.to_dispatcher.line(b"PING");
         self.sent = now;
         self.pings.push_back((asker, now));
@@ -300,15 +384,21 @@ impl AsciiBridge {
     /// The dispatcher has said a line.
     fn obey(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
         if line == b"OK PING" {
-            match self.pings.pop_front() {
-                Some((Asker::Client, _)) => self.pass(line),
-                Some((Asker::Request, _)) => drop(self.requests.pop_front()),
-                Some((Asker::Bridge, _)) | None => {}
+            let asker = self.pings.pop_front().map(|(asker, _)| asker);
+            match (asker, self.state) {
+                (Some(Asker::Client), _) => self.pass(line),
+                // While it leaves, the requests are those for the next connection.
+                (Some(Asker::Request), State::Here) => {
+                    self.requests.pop_front();
+                    self.send_requests(now);
+                }
+                (Some(Asker::Settled), State::Here) => self.pass_losses(),
+                _ => {}
             }
             return Ok(());
         }
         match self.state {
-            State::Away | State::Leaving { by_client: false } => {}
+            State::Away | State::Refused | State::Leaving { by_client: false } => {}
             State::Introduced => self.introduced(now, line)?,
             State::Leaving { by_client: true } | State::Stranger | State::Here => self.pass(line),
         }
@@ -327,21 +417,38 @@ impl AsciiBridge {
             }
             // The name is taken, as it is for a while when a cable was pulled; or there are too many clients.
             if line.starts_with(b"ERR 409") || line.starts_with(b"ERR 429") {
+                self.state = State::Refused;
                 let text = String::from_utf8_lossy(line);
                 return Err(format!("it answers {text}"));
             }
             self.client = None;
+            self.requests.clear();
             self.state = State::Stranger;
             return Ok(());
         }
         self.to_dispatcher.newest(&client.outputs);
         self.state = State::Here;
         self.pass(line);
-        for at in 0..self.requests.len() {
-            self.to_dispatcher.line(&self.requests[at]);
-            self.ping(now, Asker::Request);
-        }
+        self.ask(now, Asker::Settled);
+        self.send_requests(now);
         Ok(())
+    }
+
+    /// Lets the client know of the inputs that have had no value since its dispatcher was away: their sources are gone.
+    fn pass_losses(&mut self) {
+        if let Some(client) = &mut self.client {
+            let none = if client.hears_losses {
+                Number::LOST
+            } else {
+                Number::ZERO
+            };
+            let stale = std::mem::take(&mut client.stale);
+            let losses: Vec<_> = stale.into_iter().map(|channel| (channel, none)).collect();
+            for loss in &losses {
+                put(&mut client.inputs, *loss);
+            }
+            self.to_serial.newest(&losses);
+        }
     }
 
     /// Passes a line of the dispatcher on.
@@ -350,15 +457,16 @@ impl AsciiBridge {
         if let Some(values) = line.strip_prefix(b"P ")
             && let Ok(items) = Values::delivered(values).collect::<Result<Vec<_>, _>>()
         {
+            if let Some(client) = &mut self.client {
+                for item in items.iter().filter(|item| client.counts.has(item.0)) {
+                    put(&mut client.inputs, *item);
+                    client.stale.retain(|channel| *channel != item.0);
+                }
+            }
             self.to_serial.values(line, &items);
         } else {
             self.to_serial.line(line);
         }
-    }
-
-    fn refuse_away(&mut self) {
-        self.traffic.dropped += 1;
-        self.say(AWAY);
     }
 
     fn refuse(&mut self, why: &str) {
@@ -382,8 +490,11 @@ impl Speaker for AsciiBridge {
         self.pings.clear();
         self.sent = now;
         self.heard = now;
-        self.state = match &self.client {
+        self.state = match &mut self.client {
             Some(client) => {
+                let values = client.inputs.iter();
+                let values = values.filter(|item| ![Number::ZERO, Number::LOST].contains(&item.1));
+                client.stale = values.map(|item| item.0).collect();
                 self.to_dispatcher.line(&client.line);
                 State::Introduced
             }
@@ -392,6 +503,9 @@ impl Speaker for AsciiBridge {
     }
 
     fn disconnected(&mut self) -> bool {
+        if self.state == State::Refused {
+            return false;
+        }
         let state = std::mem::replace(&mut self.state, State::Away);
         if state == State::Here {
             self.say(AWAY);
@@ -404,8 +518,11 @@ impl Speaker for AsciiBridge {
     }
 
     fn deadline(&self) -> Nanos {
-        if self.state == State::Away {
+        if self.is_apart() {
             return Nanos::MAX;
+        }
+        if !self.unread.is_empty() && !self.must_wait() {
+            return Nanos::ZERO;
         }
         if self.wants_to_hear() {
             self.sent.min(self.waits_since().unwrap_or(self.heard)) + ALIVE
@@ -415,7 +532,8 @@ impl Speaker for AsciiBridge {
     }
 
     fn tick(&mut self, now: Nanos) -> Result<(), String> {
-        if self.state == State::Away {
+        self.resume(now);
+        if self.is_apart() {
             return Ok(());
         }
         let is_due = |since: Nanos| now - since >= ALIVE;
@@ -441,6 +559,7 @@ impl Speaker for AsciiBridge {
     fn wrote(&mut self, now: Nanos, count: usize) {
         self.sent = now;
         self.to_dispatcher.wrote(count);
+        self.send_requests(now);
     }
 
     fn hear(&mut self, now: Nanos, mut bytes: &[u8]) -> Result<(), String> {
@@ -450,6 +569,7 @@ impl Speaker for AsciiBridge {
                 self.obey(now, &line)?;
             }
         }
+        self.resume(now);
         Ok(())
     }
 }

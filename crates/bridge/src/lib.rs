@@ -5,7 +5,6 @@
 //! docs/dispatcher.md has a section for users.
 
 mod ascii;
-#[cfg(any(unix, feature = "mqtt"))]
 mod lines;
 #[cfg(any(unix, feature = "mqtt"))]
 mod link;

@@ -218,6 +218,6 @@ impl Host<'_, '_> {
             return Ok(());
         }
         let is_blocked = !self.bridge.to_serial().is_empty();
-        port.watch(&mut self.set, true, is_blocked)
+        port.watch(&mut self.set, self.bridge.wants_serial(), is_blocked)
     }
 }

@@ -85,6 +85,7 @@ impl Lab {
             let heard = self.dispatcher.to_write(seat).to_vec();
             if !heard.is_empty() && self.bridge.wants_to_hear() {
                 self.dispatcher.wrote(seat, heard.len());
+                self.dispatcher.tick(self.now);
                 if let Err(why) = self.bridge.hear(self.now, &heard) {
                     self.cut();
                     return Some(why);
@@ -407,6 +408,111 @@ fn a_slow_line_gets_the_newest_values_and_nobody_waits() {
     assert_eq!(heard.last().map(String::as_str), Some("P I1=4999"));
     let overtaken = lab.bridge.traffic().overtaken;
     assert_eq!(overtaken + heard.len() as u64, 5000);
+}
+
+#[test]
+fn what_a_driver_says_right_after_it_begins_anew_is_kept() {
+    let (mut lab, pump) = patched();
+    let heard = lab.serial("VR SCADA Q2 I2\rP Q1=24\rCONNECT I2:PUMP:Q2\r");
+    assert_eq!(heard, [PUMP, SCADA]);
+    assert_eq!(lab.hear(pump), ["P I1=24"]);
+    lab.say(pump, "P Q2=2");
+    assert_eq!(lab.told(), ["P I2=2"]);
+    // Answers to what was asked before belong to the old requests.
+    let heard = lab.serial("LIST\rVR SCADA Q2 I2\rCONNECT I1:PUMP:Q1\rPING\r");
+    assert_eq!(heard, [AWAY, PUMP, SCADA, "P I2=2"]);
+    assert_eq!(lab.dispatcher.patch().len(), 3);
+    assert_eq!(lab.serial("PING\r"), ["OK PING"]);
+}
+
+#[test]
+fn a_driver_that_takes_another_name_hears_the_answer_and_no_outage() {
+    let (mut lab, _) = patched();
+    let heard = lab.serial("VR PUMP Q2 I2\r");
+    assert!(heard[0].starts_with("ERR 409 "), "{heard:?}");
+    assert!(
+        lab.serial("VR SCADA Q2 I2\r").is_empty(),
+        "it is called after a pause"
+    );
+    lab.connect();
+    lab.settle();
+    assert_eq!(lab.told(), [PUMP, SCADA]);
+}
+
+#[test]
+fn an_input_whose_source_does_not_come_back_is_off_after_a_restart() {
+    for (version, lost) in [("", "P I1=0"), (" V=3", "P I1=?")] {
+        let (mut lab, pump) = patched();
+        lab.serial(&format!("VR SCADA Q2 I2{version}\r"));
+        let tank = lab.client();
+        lab.say(tank, "VP TANK Q1");
+        lab.serial("CONNECT I2:TANK:Q1\r");
+        lab.say(pump, "P Q1=24");
+        lab.say(tank, "P Q1=24");
+        assert_eq!(lab.told()[..], ["P I1=24", "P I2=24"]);
+        lab.restart();
+        assert_eq!(lab.told(), [AWAY]);
+        // The tank comes back, and the pump does not.
+        let tank = lab.client();
+        lab.say(tank, "VP TANK Q1");
+        lab.say(tank, "P Q1=24");
+        lab.connect();
+        lab.settle();
+        let heard = lab.told();
+        assert!(
+            heard.ends_with(&["P I2=24".to_owned(), lost.to_owned()]),
+            "{heard:?}"
+        );
+        // That is not said twice.
+        lab.cut();
+        lab.connect();
+        lab.settle();
+        assert!(!lab.told().contains(&lost.to_owned()));
+    }
+}
+
+#[test]
+fn many_requests_at_once_wait_for_their_turn() {
+    let mut lab = Lab::new();
+    let pump = lab.client();
+    lab.say(pump, "VP PUMP Q200");
+    lab.serial("VR SCADA I200\r");
+    let all = (1..=200).map(|at| format!("CONNECT I{at}:PUMP:Q{at}\r"));
+    let heard = lab.serial(&(all.collect::<String>() + "PING\r"));
+    assert_eq!(heard, ["OK PING"]);
+    assert_eq!(lab.dispatcher.patch().len(), 200);
+    // While the dispatcher is there, and does not answer.
+    let seat = lab.seat.take();
+    lab.serial(&"LIST\r".repeat(70));
+    assert!(lab.told().is_empty());
+    assert!(!lab.bridge.wants_serial());
+    lab.seat = seat;
+    lab.cut();
+    lab.bridge.tick(lab.now).expect("it is away");
+    assert!(lab.bridge.wants_serial());
+    assert_eq!(lab.told().len(), 7, "the outage, and 6 that are too many");
+}
+
+#[test]
+fn requests_of_any_length_are_carried_out_once() {
+    let mut lab = Lab::new();
+    lab.cut();
+    lab.serial("VR SCADA Q2 I2\r");
+    // More than may wait for the dispatcher at once.
+    let long = format!("CONNECT{}\r", " I1:PUMP:Q1".repeat(360));
+    let heard = lab.serial(&long.repeat(64));
+    assert!(heard.is_empty(), "{heard:?}");
+    pump_again(&mut lab);
+    lab.connect();
+    lab.settle();
+    assert_eq!(lab.told(), [PUMP, SCADA]);
+    assert_eq!(lab.dispatcher.patch().len(), 1);
+    lab.restart();
+    pump_again(&mut lab);
+    lab.connect();
+    lab.settle();
+    let lines = lab.dispatcher.traffic().lines;
+    assert!(lines < 10, "{lines}");
 }
 
 proptest::proptest! {

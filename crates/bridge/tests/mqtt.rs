@@ -85,6 +85,12 @@ impl Lab {
         lab.settle();
         assert!(lab.mapping.is_here());
         lab.hear();
+        let nothing = [
+            "hall/level  (retained)",
+            "hall/level/percent ",
+            "hall/pump ",
+        ];
+        assert_eq!(lab.published(""), nothing, "no source has said anything");
         lab
     }
 
@@ -186,6 +192,11 @@ fn messages_become_outputs_and_what_is_none_is_named_and_counted() {
         ("hall/setpoint/percent", "3", "P AI2=0.3;"),
         ("hall/switch", "ON", "P I1=24;"),
         ("hall/switch", "OFF", "P I1=0;"),
+        // No value, as the bridge publishes it itself.
+        ("hall/switch", "ON", "P I1=24;"),
+        ("hall/switch", "", "P I1=0;"),
+        ("hall/setpoint", "", "P AI1=0;"),
+        ("hall/setpoint/percent", "", "P AI2=0;"),
         // What is published, and what nobody asked for.
         ("hall/level", "1", ""),
         ("hall/other", "1", ""),
@@ -195,7 +206,7 @@ fn messages_become_outputs_and_what_is_none_is_named_and_counted() {
     assert_eq!(lab.mapping.news(), [""; 0]);
     let long = "9".repeat(400);
     let wrong = [
-        "",
+        " ",
         "abc",
         "nan",
         "inf",
@@ -222,7 +233,7 @@ fn messages_become_outputs_and_what_is_none_is_named_and_counted() {
     );
     assert!(news[4].ends_with("is no value of Q3, and was left out (1 so far); send ON or OFF"));
     let traffic = lab.mapping.traffic();
-    assert_eq!((traffic.received, traffic.refused), (7, 13));
+    assert_eq!((traffic.received, traffic.refused), (11, 13));
 }
 
 #[test]
@@ -259,7 +270,54 @@ fn after_the_broker_was_lost_no_old_value_is_said() {
     lab.mapping.connected(lab.now);
     lab.settle();
     assert_eq!(lab.hear(), "");
-    assert_eq!(lab.published(""), ["hall/level 1 (retained)"]);
+    assert_eq!(
+        lab.published(""),
+        [
+            "hall/level 1 (retained)",
+            "hall/level/percent ",
+            "hall/pump "
+        ]
+    );
+}
+
+#[test]
+fn the_value_of_a_source_that_left_unseen_is_taken_away() {
+    let mut lab = Lab::new();
+    assert_eq!(lab.published("P AQ1=21.5"), ["hall/level 21.5 (retained)"]);
+    lab.mapping.disconnected();
+    lab.dispatcher.gone(lab.seat);
+    lab.dispatcher.gone(lab.tank);
+    let peer = SocketAddr::from(([127, 0, 0, 1], 3334));
+    lab.seat = lab.dispatcher.connected(lab.now, peer).expect("room");
+    lab.mapping.connected(lab.now);
+    lab.settle();
+    assert_eq!(
+        lab.published(""),
+        [
+            "hall/level  (retained)",
+            "hall/level/percent ",
+            "hall/pump "
+        ]
+    );
+}
+
+#[test]
+fn a_value_that_is_too_large_for_its_message_is_named_and_none_is_left() {
+    let mut lab = Lab::new();
+    let large = "9".repeat(23);
+    assert_eq!(
+        lab.published(&format!("P AQ2={large}")),
+        ["hall/level/percent "]
+    );
+    let news = lab.mapping.news();
+    assert_eq!(news.len(), 1, "{news:?}");
+    assert!(
+        news[0].starts_with(&format!(
+            "{large} of AI2 is too large for the topic \"hall/level/percent\""
+        )),
+        "{news:?}"
+    );
+    assert_eq!(lab.mapping.traffic().refused, 1);
 }
 
 #[test]
@@ -316,6 +374,9 @@ channel = \"AQ1\"
 topic = \"h\"
 on = \"x\"
 off = \"x\"
+[[channel]]
+channel = \"I2\"
+topic = \"f\"
 ";
     let told = Map::parse("map.toml", text)
         .expect_err("it is wrong")
@@ -335,9 +396,14 @@ off = \"x\"
         "map.toml:32:1: the topic of Q1 is that of I1 as well",
         "map.toml:38:6: AQ1 is analog",
         "map.toml:39:7: on and off are the same word",
+        "map.toml:40:1: the topic of I2 is that of I1 as well",
     ] {
         assert!(told.contains(part), "{part} in\n{told}");
     }
+    let text = MAP.replace("hall/bridge", "hall/setpoint");
+    let told = Map::parse("map.toml", &text).expect_err("the status is a setpoint");
+    let part = "map.toml:3:10: \"hall/setpoint\" is the topic of AQ1 as well";
+    assert!(told.to_string().contains(part), "{told}");
     let told = Map::parse("map.toml", "")
         .expect_err("it is empty")
         .to_string();

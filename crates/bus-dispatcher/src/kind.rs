@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_dispatcher::Kind;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
-use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{DispatcherBus, Options};
 
@@ -63,10 +63,9 @@ impl BusOptions for Options {
         self.fit(table, collector);
     }
 
-    fn place(&self, signal: &Signal, _station: &Station) -> String {
-        self.at
-            .get(&signal.name)
-            .map(ToString::to_string)
-            .unwrap_or_default()
+    fn place(&self, signal: &Signal, table: &SignalTable) -> String {
+        let mut channels = table.signals.iter().zip(self.channels(table).list);
+        let own = channels.find(|(other, _)| other.name == signal.name);
+        own.map_or_else(String::new, |(_, channel)| channel.to_string())
     }
 }

@@ -6,16 +6,13 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_dispatcher::client::Profile;
 use tickbus_dispatcher::{
-    Cable, Channel, Kind, LONGEST_NAME, MOST_CHANNELS, Role as Part, is_name,
+    Cable, Channel, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role as Part, is_name,
 };
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, BusSetup, Role};
 use tickbus_image::signal::SignalTable;
 
 use super::channels::{Channels, kind_of};
-
-/// The port of `tickbus dispatch`.
-const PORT: u16 = 20_070;
 
 /// The options of the bus `dispatcher`.
 #[derive(Clone, Debug, PartialEq, Eq)]

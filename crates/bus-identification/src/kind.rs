@@ -4,7 +4,7 @@ use tickbus_axis::Axis;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
-use tickbus_image::signal::{Area, Signal, SignalTable, Station};
+use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::heads::meaning;
 use crate::{ClientOptions, ReaderOptions, client_bus, reader_bus};
@@ -50,7 +50,7 @@ impl BusOptions for ClientOptions {
         self.heads.fit(table, client_bus::BEFORE_DATA, collector);
     }
 
-    fn place(&self, signal: &Signal, _station: &Station) -> String {
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         meaning(
             signal.byte,
             match signal.area {
@@ -102,7 +102,7 @@ impl BusOptions for ReaderOptions {
         self.heads.fit(table, reader_bus::BEFORE_DATA, collector);
     }
 
-    fn place(&self, signal: &Signal, _station: &Station) -> String {
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         meaning(
             signal.byte,
             match signal.area {

@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
-use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions};
 
@@ -41,7 +41,7 @@ impl BusOptions for ServerOptions {
         self.fit(table, collector);
     }
 
-    fn place(&self, signal: &Signal, _station: &Station) -> String {
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         self.place(signal)
     }
 }
@@ -88,7 +88,8 @@ impl BusOptions for ClientOptions {
         self.fit(table, collector);
     }
 
-    fn place(&self, signal: &Signal, station: &Station) -> String {
+    fn place(&self, signal: &Signal, table: &SignalTable) -> String {
+        let station = &table.stations[signal.station];
         self.place(signal, station.bytes(signal.area))
     }
 

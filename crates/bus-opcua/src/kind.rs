@@ -4,7 +4,7 @@ use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
-use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, ServerOptions};
 
@@ -48,8 +48,8 @@ impl BusOptions for ClientOptions {
         self.fit(table, collector);
     }
 
-    fn place(&self, signal: &Signal, station: &Station) -> String {
-        self.place(signal, station)
+    fn place(&self, signal: &Signal, table: &SignalTable) -> String {
+        self.place(signal, &table.stations[signal.station])
     }
 }
 

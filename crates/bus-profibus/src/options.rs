@@ -12,7 +12,7 @@ use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial};
-use tickbus_image::signal::{self, Area, Signal, SignalTable};
+use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};
 use crate::layout::{Layout, Place};
@@ -156,7 +156,7 @@ impl BusOptions for Options {
         }
     }
 
-    fn place(&self, signal: &Signal, _station: &signal::Station) -> String {
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         let place = self.places.get(&signal.name);
         place.map_or_else(String::new, |(place, _)| {
             format!("slot {} {}", place.slot, place.address)

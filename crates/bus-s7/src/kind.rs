@@ -5,7 +5,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, shown};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
-use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, S7Client, S7Server, ServerOptions};
 
@@ -108,7 +108,7 @@ impl BusOptions for ClientOptions {
         self.fit(table, collector);
     }
 
-    fn place(&self, signal: &Signal, _station: &Station) -> String {
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         let variable = self.variable(signal);
         variable.map_or_else(String::new, |variable| variable.to_string())
     }

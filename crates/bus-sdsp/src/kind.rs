@@ -3,7 +3,7 @@
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
-use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{Every, Options, Sdsp};
 
@@ -48,7 +48,7 @@ impl BusOptions for Options {
         self.place_signals(lines, table);
     }
 
-    fn place(&self, signal: &Signal, _station: &Station) -> String {
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         self.at.get(&signal.name).cloned().unwrap_or_default()
     }
 }

@@ -388,12 +388,16 @@ impl Dispatcher {
                 }
             }
             let Some(end) = rest.iter().position(|byte| *byte == b'\n') else {
-                if session.is_skipping || rest.len() >= LONGEST_LINE {
-                    let is_new = !std::mem::replace(&mut session.is_skipping, true);
-                    if is_new {
-                        self.refuse_length(seat);
-                    }
+                if session.is_skipping {
                     return bytes.len();
+                }
+                if rest.len() >= LONGEST_LINE {
+                    if may_answer(&mut self.board, seat) {
+                        session.is_skipping = true;
+                        self.refuse_length(seat);
+                        return bytes.len();
+                    }
+                    session.progress = Progress::Stuck;
                 }
                 break;
             };
@@ -443,7 +447,7 @@ impl Dispatcher {
                 self.confirm(seat, "LIST");
                 self.board.list(seat);
             }
-            // Nobody sends it who does not want to hear it.
+            // Whoever sends PING wants the answer, version 1 too.
             Line::Ping => self.board.say(seat, "OK PING"),
             Line::Bye => {
                 self.confirm(seat, "BYE");

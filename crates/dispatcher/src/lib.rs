@@ -26,6 +26,9 @@ mod refusal;
 pub mod tcp;
 mod volts;
 
+/// The TCP port on which a dispatcher listens, unless it is started with another one.
+pub const PORT: u16 = 20_070;
+
 pub use board::{ChannelState, ClientState, Connection, OnLoss, Snapshot, Traffic};
 pub use cable::Cable;
 pub use channel::{Channel, Counts, Kind, MOST_CHANNELS};

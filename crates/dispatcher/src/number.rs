@@ -30,7 +30,7 @@ impl Number {
     };
 
     /// What stands for a value when the source of an input is lost: `?`.
-    pub(crate) const LOST: Self = {
+    pub const LOST: Self = {
         let mut bytes = [0; LONGEST_NUMBER + 1];
         bytes[0] = b'?';
         bytes[LONGEST_NUMBER] = 1;

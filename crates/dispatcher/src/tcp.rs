@@ -238,7 +238,7 @@ impl Host<'_, '_> {
             }
         }
         if self.dispatcher.is_closing(seat) {
-            // Who does not read misses the last words.
+            // A client that does not read misses the last lines.
             self.close(seat);
             return Ok(());
         }

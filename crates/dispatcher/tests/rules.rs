@@ -447,6 +447,26 @@ fn a_client_that_asks_and_does_not_read_has_to_wait_itself() {
 }
 
 #[test]
+fn a_client_that_sends_lines_too_long_and_does_not_read_has_to_wait_itself() {
+    let mut lab = Lab::new();
+    let seat = lab.connect();
+    let begun = format!("\n{}", "x".repeat(4096));
+    let mut sent = 0;
+    while sent < 10_000 && lab.dispatcher.wants_bytes(seat) {
+        lab.send(seat, begun.as_bytes());
+        sent += 1;
+    }
+    assert!(!lab.dispatcher.wants_bytes(seat));
+    assert!(lab.dispatcher.to_write(seat).len() < 100_000);
+    // When it reads, each of them is answered, and it goes on.
+    let heard = lab.hear(seat);
+    assert_eq!(heard.len(), sent);
+    assert!(lab.dispatcher.wants_bytes(seat));
+    lab.send(seat, b"\nPING\n");
+    assert_eq!(lab.hear(seat), ["OK PING"]);
+}
+
+#[test]
 fn more_clients_than_served_are_told_so() {
     let settings = Settings {
         clients: 2,

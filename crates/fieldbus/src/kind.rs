@@ -7,7 +7,7 @@ use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_base::toml_text::{Collector, Table};
-use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{At, Bus, Events, Role};
 
@@ -123,9 +123,9 @@ pub trait BusOptions {
         Vec::new()
     }
 
-    /// The place of a signal of `station` in the bus's own notation; empty where it is its address.
-    fn place(&self, signal: &Signal, station: &Station) -> String {
-        let _ = (signal, station);
+    /// The place of a signal of `table` in the bus's own notation; empty where it is its address.
+    fn place(&self, signal: &Signal, table: &SignalTable) -> String {
+        let _ = (signal, table);
         String::new()
     }
 

@@ -15,14 +15,20 @@ pub struct Controller {
     program: Program,
     blocks: Vec<Block>,
     signals: Signals,
+    /// The outputs of the scan that runs: outputs that read outputs read those of the last one.
+    next_outputs: Vec<bool>,
+    next_analog_outputs: Vec<f64>,
 }
 
 impl Controller {
     /// A controller at power-up: counters at 0, relays off.
     pub fn new(program: Program) -> Self {
+        let signals = Signals::new(program.terminals, program.blocks.len());
         Self {
             blocks: program.blocks.clone(),
-            signals: Signals::new(program.terminals, program.blocks.len()),
+            next_outputs: signals.outputs.clone(),
+            next_analog_outputs: signals.analog_outputs.clone(),
+            signals,
             program,
         }
     }
@@ -60,16 +66,16 @@ impl Controller {
         for (place, block) in self.blocks.iter_mut().enumerate() {
             due = due.min(block.evaluate(place, &mut self.signals, now, wall));
         }
-        for place in 0..self.signals.outputs.len() {
-            if let Some(wire) = self.program.outputs[place] {
-                self.signals.outputs[place] = self.signals.is_on(wire);
-            }
+        let signals = &mut self.signals;
+        for (next, wire) in self.next_outputs.iter_mut().zip(&self.program.outputs) {
+            *next = wire.is_some_and(|wire| signals.is_on(wire));
         }
-        for place in 0..self.signals.analog_outputs.len() {
-            if let Some(quantity) = self.program.analog_outputs[place] {
-                self.signals.analog_outputs[place] = self.signals.number(quantity);
-            }
+        let quantities = &self.program.analog_outputs;
+        for (next, quantity) in self.next_analog_outputs.iter_mut().zip(quantities) {
+            *next = quantity.map_or(0.0, |quantity| signals.number(quantity));
         }
+        std::mem::swap(&mut signals.outputs, &mut self.next_outputs);
+        std::mem::swap(&mut signals.analog_outputs, &mut self.next_analog_outputs);
         due
     }
 

@@ -274,3 +274,27 @@ fn a_damaged_program_is_refused_or_runs() {
     }
     assert!(ran > 100, "{ran}");
 }
+
+#[test]
+fn an_output_that_reads_an_output_reads_its_last_scan() {
+    let mut controller = controller(
+        "[outputs]\nQ1 = \"I1\"\nQ2 = \"Q1\"\nQ3 = \"Q2\"\nAQ1 = \"AI1\"\nAQ2 = \"AQ1\"\n",
+    );
+    controller.set_input(1, true);
+    controller.set_analog_input(1, 7.0);
+    let seen: Vec<_> = (1..=3)
+        .map(|scan| {
+            controller.scan(ms(scan), WallTime::default());
+            (
+                controller.outputs()[..3].to_vec(),
+                controller.analog_outputs().to_vec(),
+            )
+        })
+        .collect();
+    let expected = [
+        (vec![true, false, false], vec![7.0, 0.0]),
+        (vec![true, true, false], vec![7.0, 7.0]),
+        (vec![true, true, true], vec![7.0, 7.0]),
+    ];
+    assert_eq!(seen, expected);
+}

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 
 use super::say;
 use crate::cli::Outcome;
+use crate::cli::lab::dialled;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_bridge::serial::{Device, Hosting, VirtualPort, run as carry};
 use tickbus_bridge::{AsciiBridge, LineEnd};
+use tickbus_dispatcher::PORT;
 use tickbus_fieldbus::tcp::Address;
 
 /// Carry lines both ways between a serial line and the dispatcher, for the ASCII driver of a SCADA system.
@@ -25,15 +27,15 @@ pub(super) struct Arguments {
     pty: Option<PathBuf>,
 
     /// Where the dispatcher listens.
-    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:20070", value_parser = address)]
+    #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = dialled)]
     dispatcher: Address,
 
     /// Bits per second.
-    #[arg(long, value_name = "NUMBER", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "NUMBER", conflicts_with = "pty", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(1..))]
     baud: u32,
 
     /// The parity bit.
-    #[arg(long, value_enum, default_value_t = ParityBit::None)]
+    #[arg(long, value_enum, conflicts_with = "pty", default_value_t = ParityBit::None)]
     parity: ParityBit,
 
     /// How lines to the serial side end; those from there may end in any of these ways.
@@ -53,12 +55,6 @@ enum End {
     Lf,
     Crlf,
     Cr,
-}
-
-fn address(text: &str) -> Result<Address, String> {
-    let address: Address = text.parse().map_err(|wrong| format!("{wrong}"))?;
-    address.check_dialled().map_err(|wrong| wrong.to_string())?;
-    Ok(address)
 }
 
 pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {

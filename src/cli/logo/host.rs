@@ -177,6 +177,11 @@ impl Host<'_> {
                 self.write(now)?;
             }
             for (channel, value) in values() {
+                // A line may have an input more than once.
+                if self.terminal.would_lose_an_edge(*channel, value) {
+                    self.scan(now);
+                    self.write(now)?;
+                }
                 self.terminal.set(*channel, value);
             }
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
-use tickbus_dispatcher::{Channel, Counts, Kind, LONGEST_NAME, MOST_CHANNELS, Role, is_name};
+use tickbus_dispatcher::{Channel, Counts, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role, is_name};
 use tickbus_fieldbus::tcp::Address;
 
 /// What a bridge between MQTT and the dispatcher does.
@@ -31,7 +31,7 @@ pub struct Entry {
     pub channel: Channel,
     /// The topic.
     pub topic: String,
-    /// The broker keeps what is published for those who subscribe later.
+    /// The broker keeps what is published for later subscribers.
     pub retain: bool,
     /// How a value is written in a message.
     pub format: Format,
@@ -115,6 +115,13 @@ fn read(mut root: Table<'_>) -> Option<Map> {
     });
     let channels = read_channels(&list?);
     let ((broker, status), (dispatcher, role, name)) = (mqtt?, lab?);
+    let status = status.map(|(value, topic)| {
+        if let Some(entry) = channels.iter().find(|entry| entry.topic == topic) {
+            let what = format!("\"{topic}\" is the topic of {} as well", entry.channel);
+            value.wrong(what, "take another topic for the status");
+        }
+        topic
+    });
     Some(Map {
         broker,
         status,
@@ -125,15 +132,16 @@ fn read(mut root: Table<'_>) -> Option<Map> {
     })
 }
 
-fn read_mqtt(mut table: Table<'_>) -> Option<(Address, Option<String>)> {
+/// The broker's address, and the topic of the status with its place.
+fn read_mqtt(mut table: Table<'_>) -> Option<(Address, Option<(Value<'_>, String)>)> {
     let broker = table.require(
         "broker",
         "write where the broker listens, such as \"127.0.0.1:1883\"",
     );
     let status = table.take("status");
     table.finish();
-    let status = status.and_then(|value| topic(&value));
-    Some((dialled(&broker?)?, status))
+    let status = status.and_then(|value| topic(&value).map(|topic| (value, topic)));
+    Some((Address::read_dialled(&broker?)?, status))
 }
 
 fn read_dispatcher(mut table: Table<'_>) -> Option<(Address, Role, String)> {
@@ -145,8 +153,8 @@ fn read_dispatcher(mut table: Table<'_>) -> Option<(Address, Role, String)> {
     let name = table.require("name", "write the name of this client, such as \"HALL\"");
     table.finish();
     let address = match address {
-        Some(value) => dialled(&value),
-        None => Some(Address::local(20070)),
+        Some(value) => Address::read_dialled(&value),
+        None => Some(Address::local(PORT)),
     };
     let roles = [("VR", Role::Controller), ("VP", Role::Process)];
     let role = role.and_then(|value| value.choice("roles", &roles));
@@ -163,17 +171,6 @@ fn read_dispatcher(mut table: Table<'_>) -> Option<(Address, Role, String)> {
         Some(text.to_owned())
     });
     Some((address?, role?, name?))
-}
-
-fn dialled(value: &Value<'_>) -> Option<Address> {
-    let address = Address::read(value)?;
-    match address.check_dialled() {
-        Ok(()) => Some(address),
-        Err(mistake) => {
-            value.refuse(mistake);
-            None
-        }
-    }
 }
 
 /// A topic of one's own, and no filter for several.
@@ -201,19 +198,23 @@ fn read_channels(list: &Value<'_>) -> Vec<Entry> {
             let what = format!("{channel} stands in line {line} already");
             collector.report(at, what, "a channel has one topic");
         }
-        let opposite = |other: &&Entry| {
-            other.topic == entry.topic && other.channel.kind.is_output() != channel.kind.is_output()
+        // Several outputs may listen to one topic.
+        let collides = |other: &&Entry| {
+            let hears_both = other.channel.kind.is_output() && channel.kind.is_output();
+            other.topic == entry.topic && !hears_both && other.channel != channel
         };
-        if let Some(other) = entries.iter().find(opposite) {
+        if let Some(other) = entries.iter().find(collides) {
             let what = format!(
                 "the topic of {channel} is that of {} as well",
                 other.channel
             );
-            collector.report(
-                at,
-                what,
-                "the bridge would hear itself; take another topic for one of them",
-            );
+            let is_echo = other.channel.kind.is_output() != channel.kind.is_output();
+            let why = if is_echo {
+                "the bridge would hear itself; take another topic for one of them"
+            } else {
+                "their values would overwrite each other; take another topic for one of them"
+            };
+            collector.report(at, what, why);
         }
         entries.push(entry);
     }

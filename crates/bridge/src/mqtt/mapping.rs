@@ -6,7 +6,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::shown;
 use tickbus_dispatcher::client::{Client, Event, KEEP_ALIVE, Profile};
-use tickbus_dispatcher::{Channel, Number, level};
+use tickbus_dispatcher::{Number, level};
 
 use super::map_file::{Entry, Format, Map};
 use crate::speaker::Speaker;
@@ -21,7 +21,7 @@ pub struct Traffic {
     pub published: u64,
     /// Messages that were passed on as values.
     pub received: u64,
-    /// Messages that were no value of their channel, and left out.
+    /// Messages that were no value of their channel, and left out; and values that no message can say.
     pub refused: u64,
     /// Values that a newer one has replaced, because a side was slow.
     pub overtaken: u64,
@@ -38,7 +38,9 @@ pub struct Mapping {
     is_connected: bool,
     /// Messages to be published, with their entries.
     waiting: VecDeque<(usize, String)>,
-    /// By entries: how many messages were no value.
+    /// By entries: whether the input has had a value in this connection with the dispatcher.
+    has_value: Vec<bool>,
+    /// By entries: how many messages were no value, or values no message.
     refused: Vec<u64>,
     /// What an operator should know.
     news: Vec<String>,
@@ -56,6 +58,7 @@ impl Mapping {
             client: client(&map)?,
             is_connected: false,
             waiting: VecDeque::new(),
+            has_value: vec![false; map.channels.len()],
             refused: vec![0; map.channels.len()],
             news: Vec::new(),
             traffic: Traffic::default(),
@@ -81,7 +84,7 @@ impl Mapping {
     /// The broker is gone. Close the connection with the dispatcher: to the others this client has left. Its values are
     /// forgotten, since they may have changed when the broker is back.
     pub fn broker_lost(&mut self) {
-        // One like this was made before.
+        // Cannot fail: the same map made the first client.
         if let Ok(client) = client(&self.map) {
             self.client = client;
         }
@@ -141,6 +144,7 @@ impl Speaker for Mapping {
     fn connected(&mut self, now: Nanos) {
         self.client.connected(now);
         self.is_connected = true;
+        self.has_value.fill(false);
     }
 
     fn disconnected(&mut self) -> bool {
@@ -159,34 +163,62 @@ impl Speaker for Mapping {
     fn hear(&mut self, now: Nanos, bytes: &[u8]) -> Result<(), String> {
         let (map, waiting) = (&self.map, &mut self.waiting);
         let (traffic, news) = (&mut self.traffic, &mut self.news);
-        let mut put = |channel: Channel, number: Option<Number>| {
-            for (at, entry) in map.channels.iter().enumerate() {
-                if entry.channel == channel
-                    && let Some(payload) =
-                        number.map_or(Some(String::new()), |it| entry.format.payload(&it))
-                {
-                    let is_full = waiting.len() >= QUEUE;
-                    let older = waiting
-                        .iter_mut()
-                        .rev()
-                        .find(|older| is_full && older.0 == at);
-                    if let Some(older) = older {
-                        older.1 = payload;
-                        traffic.overtaken += 1;
-                    } else {
-                        waiting.push_back((at, payload));
+        let (has_value, refused) = (&mut self.has_value, &mut self.refused);
+        let mut put = |at: usize, payload: String| {
+            let is_full = waiting.len() >= QUEUE;
+            let older = waiting
+                .iter_mut()
+                .rev()
+                .find(|older| is_full && older.0 == at);
+            if let Some(older) = older {
+                older.1 = payload;
+                traffic.overtaken += 1;
+            } else {
+                waiting.push_back((at, payload));
+            }
+        };
+        let entries = || map.channels.iter().enumerate();
+        let heard = self.client.hear(now, bytes, &mut |event| match event {
+            Event::Value(channel, number) => {
+                for (at, entry) in entries().filter(|(_, entry)| entry.channel == channel) {
+                    has_value[at] = true;
+                    match entry.format.payload(&number) {
+                        Payload::Text(text) => put(at, text),
+                        Payload::Between => {}
+                        Payload::TooLarge => {
+                            put(at, String::new());
+                            refused[at] += 1;
+                            if refused[at].is_power_of_two() {
+                                let (topic, count) = (&entry.topic, refused[at]);
+                                news.push(format!(
+                                    "{number} of {channel} is too large for the topic \"{topic}\" with its factor and offset, \
+                                     and an empty message was sent ({count} so far); correct the factor"
+                                ));
+                            }
+                        }
                     }
                 }
             }
-        };
-        let heard = self.client.hear(now, bytes, &mut |event| match event {
-            Event::Value(channel, number) => put(channel, Some(number)),
-            Event::Lost(channel) => put(channel, None),
+            Event::Lost(channel) => {
+                for (at, _) in entries().filter(|(_, entry)| entry.channel == channel) {
+                    put(at, String::new());
+                }
+            }
+            // The source of an old value may have left while nobody here could hear it.
+            Event::Settled => {
+                for (at, entry) in entries() {
+                    if !has_value[at] && !entry.channel.kind.is_output() {
+                        put(at, String::new());
+                    }
+                }
+            }
             Event::Refused { code, text, .. } => {
                 news.push(format!("the dispatcher answers ERR {code} {text}"));
             }
             _ => {}
         });
+        let refused: u64 = self.refused.iter().sum();
+        self.traffic.refused = refused;
         heard.map_err(|error| error.to_string())
     }
 
@@ -211,25 +243,38 @@ impl Speaker for Mapping {
     }
 }
 
+/// What is published of a value.
+enum Payload {
+    Text(String),
+    /// Nothing: it is between off and on.
+    Between,
+    /// It has more digits than a number of the dispatcher.
+    TooLarge,
+}
+
 impl Format {
-    /// A value as a message; `None` between off and on, and for what no number can say.
-    fn payload(&self, number: &Number) -> Option<String> {
+    /// A value as a message.
+    fn payload(&self, number: &Number) -> Payload {
         let value = || number.to_f64();
         match self {
-            Self::Plain => Some(number.as_str().to_owned()),
-            Self::Scaled { factor, offset } => {
-                let scaled = decimal(value() * factor + offset)?;
-                Some(scaled.as_str().to_owned())
-            }
-            Self::Words { on, off } => {
-                let word = if level(value())? { on } else { off };
-                Some(word.clone())
-            }
+            Self::Plain => Payload::Text(number.as_str().to_owned()),
+            Self::Scaled { factor, offset } => decimal(value() * factor + offset)
+                .map_or(Payload::TooLarge, |scaled| {
+                    Payload::Text(scaled.as_str().to_owned())
+                }),
+            Self::Words { on, off } => match level(value()) {
+                Some(true) => Payload::Text(on.clone()),
+                Some(false) => Payload::Text(off.clone()),
+                None => Payload::Between,
+            },
         }
     }
 
-    /// A message as a value.
+    /// A message as a value. An empty one, as it is published for an input without a source, is 0.
     fn value(&self, payload: &[u8]) -> Option<Number> {
+        if payload.is_empty() {
+            return Some(Number::ZERO);
+        }
         let text = std::str::from_utf8(payload).ok()?.trim();
         let number = || text.parse::<f64>().ok();
         match self {

@@ -66,7 +66,7 @@ pub fn run(mapping: &mut Mapping, hosting: Hosting<'_>) -> io::Result<()> {
         mapping,
         set,
         is_connected: false,
-        is_online: false,
+        is_online: None,
         told: String::new(),
         broker,
         hosting,
@@ -89,8 +89,8 @@ struct Between<'b, 'h> {
     link: Link,
     broker: Broker,
     is_connected: bool,
-    /// What was published as the state.
-    is_online: bool,
+    /// What was published as the state in this connection with the broker, which may have an old one.
+    is_online: Option<bool>,
     /// Why the broker is not there, as it was reported last.
     told: String,
 }
@@ -134,7 +134,7 @@ impl Between<'_, '_> {
                 (self.hosting.news)(&line);
                 self.told.clear();
                 self.is_connected = true;
-                self.is_online = false;
+                self.is_online = None;
                 self.broker.subscribe(self.mapping);
             }
             Heard::Lost(why) => {
@@ -148,7 +148,7 @@ impl Between<'_, '_> {
                 );
                 if self.is_connected {
                     self.is_connected = false;
-                    self.is_online = false;
+                    self.is_online = None;
                     self.mapping.broker_lost();
                     self.link.close(&mut self.set);
                 }
@@ -173,7 +173,7 @@ impl Between<'_, '_> {
 
     /// Publishes whether values go through.
     fn set_online(&mut self, is_online: bool) {
-        if is_online == self.is_online || !self.is_connected {
+        if self.is_online == Some(is_online) || !self.is_connected {
             return;
         }
         if let Some(status) = &self.mapping.map().status {
@@ -186,7 +186,7 @@ impl Between<'_, '_> {
                 return;
             }
         }
-        self.is_online = is_online;
+        self.is_online = Some(is_online);
     }
 }
 
@@ -257,7 +257,7 @@ impl Broker {
         self.stop.stop();
         if self.client.try_disconnect().is_ok() {
             drop(self.client);
-            // What still comes is not wanted; the thread ends when the last words are written, or cannot be.
+            // Discard what still arrives; the thread ends once the DISCONNECT is written or fails.
             while self.receiver.recv().is_ok() {}
             let _ = self.thread.join();
         }

@@ -131,6 +131,8 @@ pub struct Client {
     is_settled: bool,
     /// When it has last made bytes, or all of them were written.
     said: Nanos,
+    /// When it has last asked for an answer.
+    asked: Nanos,
     /// When the last complete line came, or the connection.
     heard: Nanos,
 }
@@ -182,6 +184,7 @@ impl Client {
             wants_list: false,
             is_settled: false,
             said: Nanos::ZERO,
+            asked: Nanos::ZERO,
             heard: Nanos::ZERO,
             profile,
         })
@@ -418,6 +421,7 @@ impl Client {
         self.out.extend_from_slice(b"\r\n");
         self.progress = Progress::Asking(request);
         self.said = now;
+        self.asked = now;
     }
 
     fn next_ping(&self) -> Nanos {
@@ -472,11 +476,11 @@ impl Client {
     }
 
     fn given_up(&self) -> Nanos {
-        if matches!(self.progress, Progress::Asking(_)) || !self.to_write().is_empty() {
-            self.said.max(self.heard) + PATIENCE
-        } else {
-            Nanos::MAX
-        }
+        // Values that it says meanwhile are no answer.
+        let asked = matches!(self.progress, Progress::Asking(_)).then_some(self.asked);
+        let unwritten = (!self.to_write().is_empty()).then_some(self.said);
+        let since = asked.into_iter().chain(unwritten).min();
+        since.map_or(Nanos::MAX, |since| since.max(self.heard) + PATIENCE)
     }
 
     /// When [`turn`](Self::turn) or [`check`](Self::check) has something to do although nothing arrives and nothing

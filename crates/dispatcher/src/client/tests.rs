@@ -333,6 +333,30 @@ fn a_quiet_client_says_ping_and_notices_that_nobody_answers() {
 }
 
 #[test]
+fn a_dispatcher_that_does_not_answer_is_given_up_although_there_are_values_to_say() {
+    let mut bench = Bench::taken(&[]);
+    bench.now = KEEP_ALIVE;
+    assert_eq!(bench.says(), "PING\r\n");
+    let end = KEEP_ALIVE + PATIENCE;
+    while bench.now < end {
+        assert_eq!(bench.client.check(bench.now), Ok(()));
+        assert_eq!(bench.client.deadline(), end);
+        bench.wait(1);
+        let value = bench.now.0.to_string();
+        bench.set("Q1", &value);
+        assert_eq!(bench.says(), format!("P Q1={value}\r\n"));
+    }
+    let error = bench
+        .client
+        .check(bench.now)
+        .expect_err("it has been silent");
+    assert!(
+        error.to_string().contains("has not answered for 10s"),
+        "{error}"
+    );
+}
+
+#[test]
 fn the_list_is_asked_for_between_other_requests() {
     let mut bench = Bench::taken(&["I1:LOGO:Q1"]);
     bench.client.ask_list();

@@ -226,10 +226,9 @@ impl Dispatcher {
             let number = host.want(output);
             host.link.send(want(since, place, number));
         } else if !is_wanted && host.unwant(output) {
-            let output_ = place;
             host.link.send(Body::Unwant {
                 since,
-                output: output_,
+                output: place,
             });
             // What it is worth will not be heard any more.
             self.board.forget(output);

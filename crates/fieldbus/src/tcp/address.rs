@@ -43,6 +43,14 @@ impl Address {
         text.parse().map_err(|mistake| value.refuse(mistake)).ok()
     }
 
+    /// Reads one to connect to.
+    pub fn read_dialled(value: &Value<'_>) -> Option<Self> {
+        let address = Self::read(value)?;
+        let checked = address.check_dialled();
+        checked.map_err(|mistake| value.refuse(mistake)).ok()?;
+        Some(address)
+    }
+
     /// Checks that it can be connected to.
     ///
     /// # Errors

@@ -82,6 +82,8 @@ impl Stream for TcpStream {
     }
 }
 
+// A box of a trait object is no socket on Windows; it is needed for serial ports alone.
+#[cfg(unix)]
 impl<S: Stream + ?Sized> Stream for Box<S> {
     fn close(&mut self) {
         (**self).close();

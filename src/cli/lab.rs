@@ -1,0 +1,41 @@
+//! Shared by the commands of a virtual laboratory.
+
+use std::io::{self, Write as _};
+
+use super::Outcome;
+use tickbus_base::Mistake;
+use tickbus_base::time::Stop;
+use tickbus_fieldbus::tcp::Address;
+
+/// Parses an address to listen on.
+pub(super) fn address(text: &str) -> Result<Address, String> {
+    text.parse().map_err(|mistake: Mistake| mistake.to_string())
+}
+
+/// Parses an address to connect to.
+pub(super) fn dialled(text: &str) -> Result<Address, String> {
+    let address = address(text)?;
+    let checked = address.check_dialled();
+    checked.map_err(|mistake| mistake.to_string())?;
+    Ok(address)
+}
+
+/// Prints a line of the command `title`. If the reader of stdout is gone, the command goes on.
+pub(super) fn say(title: &str, line: &str) {
+    let mut out = io::stdout().lock();
+    let _ = writeln!(out, "{title}: {line}").and_then(|()| out.flush());
+}
+
+/// What Ctrl-C stops; if it cannot be caught, that is reported.
+pub(super) fn until_ctrl_c(title: &str) -> Result<Stop, Outcome> {
+    let stop = Stop::new();
+    let handler = {
+        let stop = stop.clone();
+        move || stop.stop()
+    };
+    ctrlc::set_handler(handler).map_err(|error| {
+        eprintln!("{title}: Ctrl-C cannot be caught: {error}");
+        Outcome::BusFailed
+    })?;
+    Ok(stop)
+}

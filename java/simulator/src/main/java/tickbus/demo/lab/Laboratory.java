@@ -14,7 +14,7 @@ import tickbus.demo.Timeline;
 
 /** The processes of the laboratory: the dispatcher and the two controllers. */
 final class Laboratory implements AutoCloseable {
-    /** After this time a controller ends on its own, in case nothing is left to end it. */
+    /** After this time a process ends on its own, in case nothing is left to end it. */
     private static final String LONGEST = "30min";
 
     private static final long LISTENING_NANOS = 10_000_000_000L;
@@ -51,7 +51,7 @@ final class Laboratory implements AutoCloseable {
         try {
             Files.deleteIfExists(patch);
             dispatcher.start(List.of(options.tickbus().toString(), "dispatch", "--listen", "127.0.0.1:0", "--patch",
-                    patch.toString()));
+                    patch.toString(), "--duration", LONGEST));
             long limit = System.nanoTime() + LISTENING_NANOS;
             while (address == null) {
                 dispatcher.check();

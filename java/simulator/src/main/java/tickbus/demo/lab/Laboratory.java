@@ -31,9 +31,9 @@ final class Laboratory implements AutoCloseable {
     Laboratory(LabOptions options, Timeline timeline) {
         this.options = options;
         this.timeline = timeline;
-        dispatcher = new Member("dispatcher", log("dispatcher.log"));
-        tanks = new Member("TANKS", log("tanks.log"));
-        panel = new Member("PANEL", log("panel.log"));
+        dispatcher = new Member("dispatcher", "the dispatcher", log("dispatcher.log"));
+        tanks = new Member("TANKS", "TANKS", log("tanks.log"));
+        panel = new Member("PANEL", "PANEL", log("panel.log"));
     }
 
     private Path log(String name) {

@@ -104,6 +104,20 @@ fn a_laboratory_is_served_interrupted_and_found_again() {
 }
 
 #[test]
+fn it_stops_after_its_duration() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let patch = folder.path().join("lab.toml");
+    let mut dispatch = Dispatch::start(&patch, &["--duration", "50ms"]);
+    let last = dispatch
+        .lines
+        .by_ref()
+        .map(|line| line.expect("text"))
+        .last();
+    assert!(last.is_some_and(|line| line.starts_with("dispatch: ok lines=0 ")));
+    assert_eq!(dispatch.child.wait().expect("it ends").code(), Some(0));
+}
+
+#[test]
 fn mistakes_have_the_exit_codes_of_the_house() {
     let folder = tempfile::tempdir().expect("a folder");
     let patch = folder.path().join("lab.toml");

@@ -3,6 +3,7 @@
 #[cfg(feature = "page")]
 use std::io;
 use std::path::PathBuf;
+use std::thread;
 
 use super::Outcome;
 use super::host::span;
@@ -35,6 +36,10 @@ pub(super) struct Arguments {
     /// Disconnect a client after this time without a line from it.
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = span)]
     idle: Nanos,
+
+    /// Stop after this time; without it, on Ctrl-C.
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    duration: Option<Nanos>,
 
     /// Join the dispatchers of other hosts into one laboratory, over Zenoh: clients and patches span hosts by name.
     #[arg(long)]
@@ -105,6 +110,19 @@ fn serve_page(address: &Address, door: &Door) -> io::Result<tickbus_web::Serving
     room.serve(std::sync::Arc::new(site), Monotonic::shared())
 }
 
+/// Stops it after a time, unless the process has ended before.
+fn stop_after(span: Nanos, stop: &Stop) -> io::Result<()> {
+    let stop = stop.clone();
+    let clock = Monotonic::shared();
+    let end = clock.now() + span;
+    let timer = thread::Builder::new().name("tickbus-duration".to_owned());
+    timer.spawn(move || {
+        clock.wait_until(end, &Stop::new());
+        stop.stop();
+    })?;
+    Ok(())
+}
+
 pub(super) fn run(arguments: &Arguments) -> Outcome {
     let file = PatchFile::new(&arguments.patch);
     let patch = match file.load() {
@@ -118,6 +136,12 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         Ok(stop) => stop,
         Err(outcome) => return outcome,
     };
+    if let Some(span) = arguments.duration
+        && let Err(error) = stop_after(span, &stop)
+    {
+        eprintln!("dispatch: --duration cannot be kept: {error}");
+        return Outcome::BusFailed;
+    }
     raise_open_files();
     let failed = |reason: String| {
         say(&format!("failed reason=\"{reason}\""));

@@ -21,9 +21,9 @@ import tickbus.petri.control.NetController;
 /**
  * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER}, with the cell's driver.cfg, the
  * tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the reader of code
- * carriers, and a folder for what is left at the end: each net with its marking, and its firings.
+ * carriers, and a folder for the results: each net with its marking, and its firings.
  *
- * <p>Until a signal ends it, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
+ * <p>Until a signal ends it, or nobody reads its output any more, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
  */
 public final class CellControl {
     private static final long SCAN_NANOS = 5_000_000;
@@ -39,8 +39,6 @@ public final class CellControl {
     private final Heads heads;
     /** How often each transition of each net fired. */
     private final long[][] fired;
-    /** The scan for which the heads have exchanged; none at first. */
-    private long exchanged = -1;
     private final CompletableFuture<Proof> proof = new CompletableFuture<>();
 
     private CellControl(Tickbus bus, Tickbus reader) {
@@ -117,19 +115,16 @@ public final class CellControl {
     private void run(CountDownLatch ending, PrintStream out) {
         long start = System.nanoTime();
         nets.run(SCAN_NANOS, () -> {
-            // Asked also while the next scan is not due yet.
-            if (nets.scans() != exchanged) {
-                exchanged = nets.scans();
-                heads.exchange(System.nanoTime() - start);
-                if (exchanged % SCANS_PER_REPORT == 0) {
-                    out.print(report());
-                    out.flush();
-                }
-            }
-            return ending.getCount() > 0;
+            heads.exchange(System.nanoTime() - start);
+            return (nets.scans() % SCANS_PER_REPORT != 0 || print(out)) && ending.getCount() > 0;
         });
+        print(out);
+    }
+
+    /** Prints the counts; false if their reader is gone, because it was killed. */
+    private boolean print(PrintStream out) {
         out.print(report());
-        out.flush();
+        return !out.checkError();
     }
 
     private String report() {
@@ -148,7 +143,9 @@ public final class CellControl {
         if (!stops.isEmpty()) {
             line(text, "stop", stops.get(0).message().replace('\n', ' '));
         }
-        if (proof.isDone() && !proof.isCompletedExceptionally()) {
+        if (proof.isCompletedExceptionally()) {
+            line(text, "proof", proof.handle((none, thrown) -> thrown.toString().replace('\n', ' ')).join());
+        } else if (proof.isDone()) {
             Proof known = proof.join();
             line(text, "markings", known.markings());
             line(text, "deadlocks", known.deadlocks());

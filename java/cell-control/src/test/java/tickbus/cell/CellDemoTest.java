@@ -124,9 +124,13 @@ class CellDemoTest {
 
     @Test
     @DisabledOnOs(value = OS.WINDOWS, disabledReason = "there are no pseudo-terminals")
-    void aProgramThatIsNotThereIsNamed() {
+    void aProgramThatIsNotThereIsNamed() throws IOException {
+        Path earlier = folder.resolve("demo/nets/cell.svg");
+        Files.createDirectories(earlier.getParent());
+        Files.writeString(earlier, "of an earlier attempt");
         assertEquals(1, demo(folder.toString()), () -> output);
-        assertTrue(verdict().matches("demo-cell: failed reason=\"process \\d+ of the PLC ended by itself with exit code 1; .*"
+        assertFalse(Files.exists(earlier));
+        assertTrue(verdict().matches("demo-cell: failed reason=\"process \\d+ of the nets ended by itself with exit code 1; .*"
             + "tickbus.cell.CellControl.*"), verdict());
     }
 
@@ -134,7 +138,8 @@ class CellDemoTest {
     @DisabledOnOs(value = OS.WINDOWS, disabledReason = "there are no pseudo-terminals")
     void aTimeLimitIsKept() throws IOException {
         assertEquals(1, demo(nets(), "--time-limit", "200ms"), () -> output);
-        assertTrue(verdict().contains("the time limit of 200ms of simulation time is over with 0 of 12 cylinders"), verdict());
+        assertTrue(verdict().contains("the time limit of 200ms of simulation time is over with 0 of 12 cylinders; the analysis of the "
+            + "nets is not done"), verdict());
         assertTrue(Files.readString(folder.resolve("demo/report.txt")).contains("the time limit"));
     }
 
@@ -144,21 +149,47 @@ class CellDemoTest {
         assertTrue(verdict().contains("there is no option '--cylinder'; did you mean '--cylinders'?"), verdict());
     }
 
-    @Test
-    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be asked to end, only be killed")
-    void aSignalEndsTheNetsToo() throws Exception {
+    private Process start() throws IOException {
         List<String> command = new ArrayList<>(List.of(Path.of(System.getProperty("java.home"), "bin", "java").toString(),
             "--enable-native-access=ALL-UNNAMED", "-Dtickbus.native.dir=" + System.getProperty("tickbus.native.dir"),
             "-cp", nets(), CellDemo.class.getName()));
         command.addAll(arguments(nets()));
-        Process demo = new ProcessBuilder(command).redirectErrorStream(true).start();
+        return new ProcessBuilder(command).redirectErrorStream(true).start();
+    }
+
+    private static List<ProcessHandle> netsAfterACylinder(Process demo, BufferedReader out) throws IOException {
+        String line = out.readLine();
+        while (line != null && !line.contains("cylinder 1,")) {
+            line = out.readLine();
+        }
+        List<ProcessHandle> nets = demo.children().toList();
+        assertEquals(1, nets.size());
+        return nets;
+    }
+
+    @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "there are no pseudo-terminals")
+    void theNetsEndWhenTheDemoIsKilled() throws Exception {
+        Process demo = start();
+        ProcessHandle nets = null;
         try (BufferedReader out = demo.inputReader()) {
-            String line = out.readLine();
-            while (line != null && !line.contains("cylinder 1,")) {
-                line = out.readLine();
+            nets = netsAfterACylinder(demo, out).get(0);
+            demo.toHandle().destroyForcibly();
+            nets.onExit().get(30, TimeUnit.SECONDS);
+        } finally {
+            demo.destroyForcibly();
+            if (nets != null) {
+                nets.destroyForcibly();
             }
-            List<ProcessHandle> nets = demo.children().toList();
-            assertEquals(1, nets.size());
+        }
+    }
+
+    @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be asked to end, only be killed")
+    void aSignalEndsTheNetsToo() throws Exception {
+        Process demo = start();
+        try (BufferedReader out = demo.inputReader()) {
+            List<ProcessHandle> nets = netsAfterACylinder(demo, out);
             // Process.destroy() would close the stream from which the verdict is read.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();

@@ -296,6 +296,12 @@ class CellLoopTest {
         delivers(12);
         until("an empty magazine", () -> nets.coordinator("station 1").marking().get("no sleeve") == 1);
         cell.fillSleeves(List.of(Colour.RED));
+        int begun = cell.counters().begun();
+        for (int i = 0; i < 400; i++) {
+            tick();
+        }
+        assertEquals(1, nets.coordinator("station 1").marking().get("no sleeve"));
+        assertEquals(begun, cell.counters().begun());
         cell.rearm(true);
         delivers(13);
         assertEquals(PieceKind.RED, PieceKind.of(cell.delivered().get(12)));

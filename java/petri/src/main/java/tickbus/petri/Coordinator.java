@@ -98,9 +98,9 @@ public final class Coordinator {
         return net;
     }
 
-    /** The marking now, as a copy. */
+    /** The marking now, as a copy; before the first scan, the initial one. */
     public Marking marking() {
-        return new Marking(net, enabling.tokens.clone());
+        return scans == 0 ? net.initialMarking() : new Marking(net, enabling.tokens.clone());
     }
 
     /** The tokens in the place with this index now; before the first scan, those of the initial marking. */
@@ -272,6 +272,9 @@ public final class Coordinator {
         if (timed[t] && enabling.enabled.contains(t)) {
             arm(t);
         }
+        // The conditions of what has become enabled came in between.
+        step = Step.FIRING;
+        at = t;
         bound.listener.fired(scans, now, t, choices);
         for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
             mark(effects.changePlace[i]);
@@ -322,7 +325,7 @@ public final class Coordinator {
         stop = new Stop(cause, element, "net " + net.name() + ", scan " + scans + ": " + message, thrown, scans, marking());
         try {
             bound.writer.write(outputs.signals.values);
-        } catch (RuntimeException again) {
+        } catch (Throwable again) {
             stop = new Stop(cause, element, stop.message() + "; the fail-safe values could not be written either: " + again,
                 thrown, scans, stop.marking());
         }

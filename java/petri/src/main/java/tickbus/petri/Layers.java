@@ -9,7 +9,7 @@ import java.util.List;
 import java.util.stream.IntStream;
 
 /**
- * Draws a net in layers from above to below (after Sugiyama, Tagawa and Toda), each connected part on its own. The marked
+ * Draws a net in layers from top to bottom (after Sugiyama, Tagawa and Toda), each connected part on its own. The marked
  * places begin: arcs back to them run upwards. An arc over several layers gets a bend in each, which is laid out like a
  * node. No chance, so the same net always looks the same.
  */
@@ -53,6 +53,8 @@ final class Layers {
     }
 
     void draw() {
+        // A drawing of the file that was not used may have left one.
+        layout.width = 0;
         direct();
         assignLayers();
         int[] part = parts();
@@ -255,16 +257,23 @@ final class Layers {
                 layer[next] = layer[above[a]] + i;
                 chain[i] = next++;
             }
-            for (int i = 1; i < length; i++) {
+            // Without bends, a long arc does not take part in the order of the rows.
+            for (int i = 1; i < length && layer[chain[i]] - layer[chain[i - 1]] == 1; i++) {
                 down.get(chain[i - 1]).add(chain[i]);
                 up.get(chain[i]).add(chain[i - 1]);
             }
             chains[a] = chain;
         }
+        int[] tops = new int[nodes];
+        int[] bottoms = new int[nodes];
+        for (int a = 0; a < chains.length; a++) {
+            bottoms[above[a]]++;
+            tops[below[a]]++;
+        }
         for (int v = 0; v < nodes; v++) {
             double half = Layout.RADIUS;
             if (v >= places) {
-                half = Math.max(Layout.HALF_BAR, 5.0 * Math.max(up.get(v).size(), down.get(v).size()));
+                half = Math.max(Layout.HALF_BAR, 5.0 * Math.max(tops[v], bottoms[v]));
                 layout.halfWidth[v - places] = half;
                 layout.halfHeight[v - places] = Layout.HALF_HEIGHT;
             }
@@ -333,7 +342,7 @@ final class Layers {
         }
     }
 
-    /** Puts all bends of an arc upon each other where their rows leave the room. */
+    /** Puts all bends of an arc on top of each other where their rows leave the room. */
     private void straighten(List<List<Integer>> rows) {
         double[] low = new double[layer.length];
         double[] high = new double[layer.length];

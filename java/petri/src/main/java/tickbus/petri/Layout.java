@@ -100,7 +100,7 @@ final class Layout {
         return text.codePoints().mapToDouble(c -> c > 0x2E7F ? 13 : Character.isUpperCase(c) ? 8.4 : 6.8).sum();
     }
 
-    /** Whether the file's positions give a drawing: nodes upon each other, or lost far away, do not. */
+    /** Whether the file's positions give a drawing: nodes on top of each other, or lost far away, do not. */
     private boolean asInFile() {
         double[][] nodes = net.positions.nodes();
         double nearest = Double.MAX_VALUE;
@@ -162,7 +162,7 @@ final class Layout {
             && other.transition() == arc.transition());
     }
 
-    /** A route with a bend to the right of its direction, so that there and back do not lie upon each other. */
+    /** A route with a bend to the right of its direction, so that there and back do not lie on top of each other. */
     private double[] aside(Arc arc) {
         int from = source(arc);
         int to = target(arc);

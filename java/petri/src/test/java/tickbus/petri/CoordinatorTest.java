@@ -157,6 +157,11 @@ class CoordinatorTest {
         stopsAt("exit action of place p", Coordinator.of(choice()).onExit("p", badly));
         stopsAt("continuous action of place q", Coordinator.of(choice()).when("back", in -> false).during("q", badly));
         stopsAt("reader of the inputs", Coordinator.of(choice()).reader(values -> values[0] = 1));
+        // The next transition's condition has been tested already when the listener hears of the firing.
+        stopsAt("firing of transition a", Coordinator.of(choice()).when("a", in -> true).when("back", in -> false)
+            .listener((scan, nanos, transition, choices) -> {
+                throw new IllegalStateException("log");
+            }));
     }
 
     private static void stopsAt(String element, CoordinatorBuilder builder) {
@@ -175,13 +180,27 @@ class CoordinatorTest {
 
     @Test
     void aWriterThatThrowsStopsTheControllerToo() {
-        Coordinator coordinator = Coordinator.of(choice()).when("back", in -> false).writer(values -> {
-            throw new IllegalStateException("bus");
-        }).build();
-        coordinator.scan(0);
-        Stop stop = coordinator.stop().orElseThrow();
-        assertEquals("writer of the outputs", stop.element());
-        assertTrue(stop.message().contains("could not be written either"), stop.message());
+        for (Throwable thrown : List.of(new IllegalStateException("bus"), new AssertionError("bus"))) {
+            Coordinator coordinator = Coordinator.of(choice()).when("back", in -> false).writer(values -> {
+                CoordinatorTest.<RuntimeException>raise(thrown);
+            }).build();
+            coordinator.scan(0);
+            Stop stop = coordinator.stop().orElseThrow();
+            assertEquals("writer of the outputs", stop.element());
+            assertTrue(stop.message().contains("could not be written either"), stop.message());
+        }
+    }
+
+    @SuppressWarnings("unchecked")
+    private static <T extends Throwable> void raise(Throwable thrown) throws T {
+        throw (T) thrown;
+    }
+
+    @Test
+    void beforeTheFirstScanTheMarkingIsTheInitialOne() {
+        Coordinator coordinator = Coordinator.of(choice()).build();
+        assertEquals("{p}", coordinator.marking().toString());
+        assertEquals(1, coordinator.tokens(0));
     }
 
     @Test

@@ -9,6 +9,7 @@ import static org.junit.jupiter.api.Assertions.assertTrue;
 import java.io.StringReader;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.stream.IntStream;
 import javax.xml.parsers.DocumentBuilderFactory;
 import org.junit.jupiter.api.Test;
 import org.w3c.dom.Element;
@@ -102,8 +103,12 @@ class NetSvgTest {
 
     @Test
     void positionsThatMakeNoDrawingAreNotUsed() {
-        assertTrue(Layout.of(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"10\""))).curved, "two nodes upon each other");
-        assertTrue(Layout.of(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"1e9\""))).curved, "a node far away");
+        double width = Layout.of(Pnml.parse("n", PLACED.replaceAll("<graphics>.*?</graphics>", ""))).width;
+        for (String at : List.of("10", "1e9", "NaN", "1e308")) {
+            Layout layout = Layout.of(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"" + at + "\"")));
+            assertTrue(layout.curved, "a node on top of another, or far away: " + at);
+            assertEquals(width, layout.width, at);
+        }
         assertNull(Pnml.parse("n", PLACED.replace("x=\"50\"", "x=\"right\"")).positions, "no figure");
         assertNull(Pnml.parse("n", PLACED.replace("<position x=\"50\" y=\"20\"/>", "")).positions, "a node without");
         String pages = PLACED.replace("<transition", "</page><page id=\"h\"><transition");
@@ -147,5 +152,32 @@ class NetSvgTest {
     void aNetWithNothingAndARingOfThousandsAreDrawn() throws Exception {
         assertTrue(NetSvg.write(PetriNet.named("empty").build()).endsWith("</svg>\n"));
         assertEquals(2000, all(NetSvg.write(CoordinatorTest.ring(2000)), "net-place").size());
+    }
+
+    @Test
+    void aNetWithTooManyBendsToDrawIsDrawnWithoutThem() throws Exception {
+        int length = 300;
+        String[] high = IntStream.range(0, 80).mapToObj(i -> "high " + i).toArray(String[]::new);
+        String[] low = IntStream.range(0, high.length).mapToObj(i -> "low " + i).toArray(String[]::new);
+        NetBuilder builder = PetriNet.named("long").place("0", 1);
+        for (String place : high) {
+            builder.place(place);
+        }
+        for (String place : low) {
+            builder.place(place);
+        }
+        builder.transition("begin").input("0").output(high).output("1").place("1");
+        for (int i = 1; i < length; i++) {
+            builder.place("" + (i + 1)).transition("step " + i).input("" + i).output("" + (i + 1));
+        }
+        builder.transition("end").input("" + length).output(low);
+        for (int i = 0; i < high.length; i++) {
+            // Over about 600 rows, most of which are narrow, and the last of which is wide.
+            builder.transition("join " + i).input(high[i], low[i]);
+        }
+        PetriNet net = builder.build();
+        assertEquals(net.arcs().size(), all(NetSvg.write(net), "net-arc").size());
+        Layout layout = Layout.of(net);
+        assertEquals(5.0 * (high.length + 1), layout.halfWidth[net.transition("begin").index()], "room for its arcs");
     }
 }

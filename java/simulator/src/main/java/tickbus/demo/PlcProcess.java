@@ -34,6 +34,8 @@ public final class PlcProcess implements Plc {
     /** How lines for people begin: with the name of the command. */
     private static final Pattern WORDS = Pattern.compile("[a-z]+: ");
 
+    private final String what;
+    private final String hint;
     private final Supplier<List<String>> command;
     private final Path log;
     private final Thread hook = new Thread(this::destroy, "end of the PLC process");
@@ -89,7 +91,7 @@ public final class PlcProcess implements Plc {
         void await(String complaint) {
             try {
                 if (!process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {
-                    throw new DemoFailure(name() + " of the PLC " + complaint);
+                    throw new DemoFailure(name() + " of " + what + " " + complaint);
                 }
                 reader.join(TimeUnit.SECONDS.toMillis(SECONDS_TO_DIE));
             } catch (InterruptedException e) {
@@ -100,13 +102,28 @@ public final class PlcProcess implements Plc {
     }
 
     /**
-     * A process that is not started yet.
+     * The process of a PLC, {@code tickbus plc}, that is not started yet.
      *
      * @param command gives the executable and its arguments for the next life
      * @param intervalNanos how often it prints its statistics
      * @param log gets its standard error; truncated now, appended to by each life
      */
     public PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
+        this("the PLC", "build it (make build), or name the tickbus executable by --plc", command, intervalNanos, log);
+    }
+
+    /**
+     * A process that is not started yet.
+     *
+     * @param what it is, for messages, such as {@code the PLC}
+     * @param hint what to do if it cannot be started
+     * @param command gives the executable and its arguments for the next life
+     * @param intervalNanos how often it prints its statistics
+     * @param log gets its standard error; truncated now, appended to by each life
+     */
+    public PlcProcess(String what, String hint, Supplier<List<String>> command, long intervalNanos, Path log) {
+        this.what = what;
+        this.hint = hint;
         this.command = command;
         this.intervalNanos = intervalNanos;
         this.log = log;
@@ -114,7 +131,7 @@ public final class PlcProcess implements Plc {
             Files.createDirectories(log.toAbsolutePath().getParent());
             Files.writeString(log, "");
         } catch (IOException e) {
-            throw new DemoFailure("the PLC's log cannot be written: " + e);
+            throw new DemoFailure("the log of " + what + " cannot be written: " + e);
         }
         Runtime.getRuntime().addShutdownHook(hook);
     }
@@ -135,8 +152,7 @@ public final class PlcProcess implements Plc {
         try {
             process = builder.start();
         } catch (IOException e) {
-            throw new DemoFailure("the PLC cannot be started: " + e.getMessage()
-                    + "; build it (make build), or name the tickbus executable by --plc");
+            throw new DemoFailure(what + " cannot be started: " + e.getMessage() + "; " + hint);
         }
         life = new Life(process);
     }
@@ -200,7 +216,7 @@ public final class PlcProcess implements Plc {
             return;
         }
         now.await("hangs at its end");
-        throw new DemoFailure(name() + " of the PLC ended by itself with exit code " + now.process.exitValue()
+        throw new DemoFailure(name() + " of " + what + " ended by itself with exit code " + now.process.exitValue()
                 + lastWords());
     }
 

@@ -113,6 +113,11 @@ class PlcProcessTest {
             String reason = assertThrows(DemoFailure.class, plc::start).getMessage();
             assertTrue(reason.startsWith("the PLC cannot be started: ") && reason.contains("--plc"), reason);
         }
+        try (PlcProcess nets = new PlcProcess("the nets", "call for help", () -> List.of(folder.resolve("java").toString()), 1,
+                folder.resolve("nets.log"))) {
+            String reason = assertThrows(DemoFailure.class, nets::start).getMessage();
+            assertTrue(reason.startsWith("the nets cannot be started: ") && reason.endsWith("; call for help"), reason);
+        }
     }
 
     @Test

@@ -109,10 +109,10 @@ final class Check {
         one.declared.forEach(name -> signal(bus, one, "writes", name, true));
         one.steps.stream().filter(step -> step.output() != null && step.moment() == Step.Moment.DURING)
             .filter(step -> one.steps.stream().anyMatch(other -> other.moment() != Step.Moment.DURING
-                && step.output().equals(other.output())))
+                && step.output().equals(other.output())) || one.declared.contains(step.output()))
             .map(Step::output).distinct()
-            .forEach(output -> add(one, "output '" + output + "' is set during a place and also by an entry, an exit or a "
-                + "firing; do it in one way"));
+            .forEach(output -> add(one, "output '" + output + "' is set during a place and also by an entry, an exit, "
+                + "a firing or code of your own; do it in one way"));
         one.steps.stream().filter(step -> !Double.isFinite(step.value()))
             .forEach(step -> add(one, step.where() + ": output '" + step.output() + "' is set to " + step.value()
                 + "; a finite number is needed"));

@@ -32,6 +32,7 @@ public final class NetController {
     private final Latch latch;
     private final Map<String, Coordinator> coordinators = new LinkedHashMap<>();
     private final Coordinator[] order;
+    private long lastNanos;
     private long scans;
     private long staleScans;
 
@@ -175,30 +176,40 @@ public final class NetController {
             }
         }
         bus.send();
+        lastNanos = nanos;
         return fired;
     }
 
     /**
-     * Scans in real time, until {@code more} says no or the thread is interrupted.
+     * Scans in real time, until {@code more} says no or the thread is interrupted. The time goes on from the last scan, or
+     * begins at 0; what passed since that scan does not count.
      *
      * @param periodNanos from one scan to the next, above 0; a scan that is late shifts those after it
-     * @param more asked before each scan
+     * @param more asked once before each scan, when it is due
      */
     public void run(long periodNanos, BooleanSupplier more) {
         if (periodNanos <= 0) {
             throw new IllegalArgumentException("a period of " + periodNanos + " ns; expected more than 0");
         }
-        long start = System.nanoTime();
-        long due = 0;
-        while (!Thread.currentThread().isInterrupted() && more.getAsBoolean()) {
+        long start = System.nanoTime() - lastNanos;
+        long due = lastNanos;
+        while (waitUntil(start + due) && more.getAsBoolean()) {
             long now = System.nanoTime() - start;
-            if (now < due) {
-                LockSupport.parkNanos(due - now);
-            } else {
-                scan(now);
-                due = Math.max(due + periodNanos, now);
-            }
+            scan(now);
+            due = Math.max(due + periodNanos, now);
         }
+    }
+
+    /** Whether the time has come; otherwise the thread was interrupted. */
+    private static boolean waitUntil(long nanoTime) {
+        while (!Thread.currentThread().isInterrupted()) {
+            long wait = nanoTime - System.nanoTime();
+            if (wait <= 0) {
+                return true;
+            }
+            LockSupport.parkNanos(wait);
+        }
+        return false;
     }
 
     /** The coordinator of a net, for its marking; an {@link IllegalArgumentException} if there is no such net. */
@@ -213,6 +224,16 @@ public final class NetController {
     /** Why nets stopped, in the order of the nets; empty while all run. */
     public List<Stop> stops() {
         return coordinators.values().stream().flatMap(one -> one.stop().stream()).toList();
+    }
+
+    /** Whether a net has stopped; allocates nothing. */
+    public boolean stopped() {
+        for (Coordinator coordinator : order) {
+            if (coordinator.stop().isPresent()) {
+                return true;
+            }
+        }
+        return false;
     }
 
     /** Scans so far, with the stale ones. */

@@ -9,7 +9,7 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
 import tickbus.petri.PetriNet;
 
-/** One net over each bus that has the role and whose other end is of this house. */
+/** One net over each bus that has the role and whose other end tickbus has, too. */
 @Tag("native")
 class BusesTest {
     /** Nothing is written to a server that the client's driver.cfg does not name. */

@@ -71,7 +71,7 @@ class DocumentationTest {
         machine.signal("Piece at stop").setBoolean(!seen.isEmpty() && !lamp && !seen.contains("{holding}"));
         machine.signal("Gripper closed").setBoolean(machine.signal("Gripper").getBoolean());
         machine.send();
-        return gripper.stops().isEmpty() && !(seen.contains("{holding}") && marking.equals("{waiting}"));
+        return !gripper.stopped() && !(seen.contains("{holding}") && marking.equals("{waiting}"));
     }
 
     private static String source() throws IOException {
@@ -79,6 +79,6 @@ class DocumentationTest {
             ROOT.resolve("java/petri-control/src/test/java/tickbus/petri/control/DocumentationTest.java"));
         return source.substring(source.indexOf("// example\n") + 11, source.indexOf("        // end\n"))
             .replaceAll("(?m)^ {8}", "").replace("Tickbus.open(cfg)", "Tickbus.open(Path.of(\"gripper.cfg\"))")
-            .replace("() -> play(gripper));", "() -> gripper.stops().isEmpty());");
+            .replace("() -> play(gripper));", "() -> !gripper.stopped());");
     }
 }

@@ -10,6 +10,7 @@ import com.sun.management.ThreadMXBean;
 import java.lang.management.ManagementFactory;
 import java.nio.file.Path;
 import java.util.List;
+import java.util.function.BooleanSupplier;
 import org.junit.jupiter.api.AfterEach;
 import org.junit.jupiter.api.BeforeEach;
 import org.junit.jupiter.api.Tag;
@@ -160,6 +161,7 @@ class NetControllerTest {
         assertTrue(stop.message().contains("there is no input 'Waight'"), stop.message());
         assertFalse(out("Gripper"));
         assertTrue(out("Brake"), "its fail-safe value");
+        assertTrue(nets.stopped());
         assertEquals(3, machine.signal("Pieces").get(), "the other net goes on");
         assertEquals(1, nets.stops().size());
     }
@@ -228,7 +230,8 @@ class NetControllerTest {
                 "net other: there is no place 'q'; there are [p]",
                 "net gripper: there is no place 'standing'; there are [gripping, holding, waiting]",
                 "net gripper: entry of place standing: signal 'Weight' at %IW2 is an input; an action sets what this end writes",
-                "net gripper: output 'Gripper' is set during a place and also by an entry, an exit or a firing; do it in one way",
+                "net gripper: output 'Gripper' is set during a place and also by an entry, an exit, a firing or code of your own; "
+                    + "do it in one way",
                 "net gripper: place gripping: output 'Pieces' is set to NaN; a finite number is needed",
                 "net other: rising() belongs to no signal; write it behind on(...)",
                 "net other: transition t: place p is of this net; draw a test or an inhibitor arc",
@@ -237,6 +240,30 @@ class NetControllerTest {
         }
         assertTrue(wrong.mistakes().stream().anyMatch(text -> text.startsWith("net other: writes: driver 'Gripper' has no signal 'Wait'")));
         assertEquals(15, wrong.mistakes().size(), wrong.getMessage());
+    }
+
+    @Test
+    void anOutputThatAPlaceHoldsAndCodeSetsIsRefused() {
+        BindingException wrong = assertThrows(BindingException.class, () -> NetController.of(plc,
+            BoundNet.of(gripper()).during("holding").set("Gripper").firing("grip").run((in, out) -> { }).writes("Gripper")));
+        assertEquals(List.of("net gripper: output 'Gripper' is set during a place and also by an entry, an exit, a firing or code "
+            + "of your own; do it in one way"), wrong.mistakes());
+    }
+
+    @Test
+    void inRealTimeItAsksOnceBeforeEachScanAndItsTimeGoesOnWithTheNextRun() {
+        nets = NetController.of(plc, bound());
+        int[] asked = new int[1];
+        for (int run = 1; run <= 2; run++) {
+            long end = 5L * run;
+            nets.run(2_000_000, () -> {
+                asked[0]++;
+                machine.exchange(asked[0]);
+                return nets.scans() < end;
+            });
+            assertEquals(end, nets.scans());
+            assertEquals(end + run, asked[0], "once for each scan, and once for the end of each run");
+        }
     }
 
     @Test
@@ -269,5 +296,24 @@ class NetControllerTest {
         }
         assertEquals(0, allocated, fired + " firings");
         assertTrue(fired > 100_000, fired + " firings");
+        assertEquals(0, allocatedByRun(threads));
+    }
+
+    private long allocatedByRun(ThreadMXBean threads) {
+        long[] end = new long[1];
+        BooleanSupplier more = () -> {
+            machine.send();
+            nanos += 1_000_000;
+            machine.receive(nanos);
+            return !nets.stopped() && nets.scans() < end[0];
+        };
+        long allocated = Long.MAX_VALUE;
+        for (int round = 0; round < 5; round++) {
+            end[0] = nets.scans() + 20_000;
+            long before = threads.getCurrentThreadAllocatedBytes();
+            nets.run(1, more);
+            allocated = Math.min(allocated, threads.getCurrentThreadAllocatedBytes() - before);
+        }
+        return allocated;
     }
 }

@@ -9,6 +9,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 import java.util.TreeMap;
+import java.util.stream.Stream;
 import tickbus.demo.DemoFailure;
 import tickbus.demo.HtmlPage;
 import tickbus.demo.PlcCommand;
@@ -136,8 +137,8 @@ public final class CellDemo {
         try {
             String port = PlcCommand.device(driver(READER));
             List<String> command = command(driver(CELL));
-            Files.createDirectories(CellPage.nets(options));
-            try (PlcProcess plc = new PlcProcess(() -> command, REPORT_NANOS,
+            empty(CellPage.nets(options));
+            try (PlcProcess plc = new PlcProcess("the nets", "they run with the java of this demo", () -> command, REPORT_NANOS,
                     options.report().toAbsolutePath().resolveSibling("nets.log"))) {
                 plc.start();
                 timeline.add(0, "nets", plc.name());
@@ -146,9 +147,19 @@ public final class CellDemo {
             }
             return check();
         } catch (IOException e) {
-            return VERDICT.failed("the folder of the nets cannot be made: " + e);
+            return VERDICT.failed("the folder of the nets cannot be made, or emptied: " + e);
         } catch (RuntimeException | Error e) {
             return VERDICT.failed(e, err);
+        }
+    }
+
+    /** An earlier attempt may have left its nets. */
+    private static void empty(Path folder) throws IOException {
+        Files.createDirectories(folder);
+        try (Stream<Path> files = Files.list(folder)) {
+            for (Path file : files.toList()) {
+                Files.delete(file);
+            }
         }
     }
 
@@ -191,13 +202,16 @@ public final class CellDemo {
                 if (nets.containsKey("stop")) {
                     throw new DemoFailure("a net has stopped: " + nets.get("stop"));
                 }
+                if (nets.containsKey("proof")) {
+                    throw new DemoFailure("the analysis of the nets failed: " + nets.get("proof"));
+                }
             }
             operator.act(simulator.simulationNanos());
             boolean over = operator.done() && !cell.showsRunning() && nets.containsKey("markings");
             if (!over && simulator.simulationNanos() >= options.timeLimitNanos()) {
                 throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
                         + " of simulation time is over with " + cell.delivered().size() + " of " + options.cylinders()
-                        + " cylinders");
+                        + " cylinders" + (nets.containsKey("markings") ? "" : "; the analysis of the nets is not done"));
             }
             return !over;
         });

@@ -20,9 +20,10 @@ final class PneumaticCylinder {
     /** With a valve for each direction: with neither, or with both, it stays where it is. */
     void step(boolean forward, boolean backward, long nanos) {
         if (forward && !backward) {
-            long most = willJam ? strokeNanos / 2 : strokeNanos;
+            boolean halts = willJam && at <= strokeNanos / 2;
+            long most = halts ? strokeNanos / 2 : strokeNanos;
             at = Math.min(at + nanos, most);
-            jammed = willJam && at == most;
+            jammed = halts && at == most;
         } else if (backward && !forward) {
             at = Math.max(at - nanos, 0);
             if (jammed && at == 0) {
@@ -40,7 +41,7 @@ final class PneumaticCylinder {
         return at == 0;
     }
 
-    /** Its next stroke stops half-way, until it has been back. */
+    /** Its next stroke stops half-way, until it has been back; one that is past the middle is finished before. */
     void jam() {
         willJam = true;
     }

@@ -69,7 +69,7 @@ final class StationFour {
             held = pallet.piece;
             pallet.piece = null;
         }
-        boolean loses = willLose && held != null && !lift.isForward() && !lift.isBack();
+        boolean loses = willLose && held != null && arm.isBack() && !lift.isForward() && !lift.isBack();
         if (held != null && (!vacuumValve || loses)) {
             if (loses) {
                 willLose = false;

@@ -51,7 +51,7 @@ public final class Transport {
         return null;
     }
 
-    /** The next pallet that passes the middle between two stops gets stuck, until the belt has run back a little. */
+    /** The next pallet that passes the middle between two stops gets stuck, until the belt has run back a little; only one at a time. */
     void jam() {
         willJam = true;
     }
@@ -101,7 +101,7 @@ public final class Transport {
         }
         pallet.micrometres = (pallet.micrometres + most) % LOOP;
         long middle = SECTION / 2;
-        if (willJam && inSection < middle && inSection + most >= middle) {
+        if (willJam && jammed == null && inSection < middle && inSection + most >= middle) {
             willJam = false;
             jammed = pallet;
         }
@@ -112,10 +112,13 @@ public final class Transport {
         return (to - from + LOOP) % LOOP;
     }
 
-    private static void goBack(Pallet pallet, long way) {
-        long inSection = pallet.micrometres % SECTION;
-        if (inSection > SENSOR) {
-            pallet.micrometres -= Math.min(way, inSection - SENSOR);
+    private void goBack(Pallet pallet, long way) {
+        long most = Math.min(way, pallet.micrometres % SECTION - SENSOR);
+        for (int i = 0; i < pallets.size(); i++) {
+            if (pallets.get(i) != pallet) {
+                most = Math.min(most, between(pallets.get(i).micrometres, pallet.micrometres) - PALLET);
+            }
         }
+        pallet.micrometres -= Math.max(0, most);
     }
 }

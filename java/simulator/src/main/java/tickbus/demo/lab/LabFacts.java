@@ -2,7 +2,7 @@ package tickbus.demo.lab;
 
 import java.util.Locale;
 
-/** What was measured; a fact that did not hold has ended the demo before. */
+/** What was measured; a value out of bounds has already ended the demo. */
 final class LabFacts {
     /** How far a level may leave the band between the thresholds of plc/lab/tanks.toml, in percent. */
     static final double MARGIN = 8;

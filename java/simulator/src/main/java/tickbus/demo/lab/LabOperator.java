@@ -17,6 +17,7 @@ final class LabOperator {
     private static final long LATE = 10_000 * MS;
     private static final long PULSE = 50 * MS;
     private static final long PAUSE = 150 * MS;
+    private static final long SETTLING = 200 * MS;
     private static final long HOLD = 2_000 * MS;
 
     /** To which level, in percent, tank 2 falls while TANKS is dead. */
@@ -129,10 +130,15 @@ final class LabOperator {
             after(PULSE, () -> board.set(4, false));
         }
         then("the gauge shows " + PULSES + " pulses, and lamp 4 is lit", () -> { },
-                () -> board.gauge() == PULSES && board.isLit(4), SOON, nanos -> {
-                    tell("PANEL has counted " + PULSES);
-                    facts.counted(board.gauge());
-                });
+                () -> board.gauge() == PULSES && board.isLit(4), SOON);
+        // An edge that is counted twice may come after the others.
+        then("", () -> { }, () -> now - begun >= SETTLING, Long.MAX_VALUE, nanos -> {
+            facts.counted(board.gauge());
+            if (board.gauge() != PULSES) {
+                throw new DemoFailure("PANEL has counted " + (int) board.gauge() + " pulses of " + PULSES);
+            }
+            tell("PANEL has counted " + PULSES);
+        });
         after(HOLD, () -> { });
     }
 

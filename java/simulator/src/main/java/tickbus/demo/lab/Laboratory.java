@@ -14,7 +14,7 @@ import tickbus.demo.Timeline;
 
 /** The processes of the laboratory: the dispatcher and the two controllers. */
 final class Laboratory implements AutoCloseable {
-    /** After this time a controller ends on its own, in case nothing is left to end it. */
+    /** After this time a process ends on its own, in case nothing is left to end it. */
     private static final String LONGEST = "30min";
 
     private static final long LISTENING_NANOS = 10_000_000_000L;
@@ -31,9 +31,9 @@ final class Laboratory implements AutoCloseable {
     Laboratory(LabOptions options, Timeline timeline) {
         this.options = options;
         this.timeline = timeline;
-        dispatcher = new Member("dispatcher", log("dispatcher.log"));
-        tanks = new Member("TANKS", log("tanks.log"));
-        panel = new Member("PANEL", log("panel.log"));
+        dispatcher = new Member("dispatcher", "the dispatcher", log("dispatcher.log"));
+        tanks = new Member("TANKS", "TANKS", log("tanks.log"));
+        panel = new Member("PANEL", "PANEL", log("panel.log"));
     }
 
     private Path log(String name) {
@@ -51,7 +51,7 @@ final class Laboratory implements AutoCloseable {
         try {
             Files.deleteIfExists(patch);
             dispatcher.start(List.of(options.tickbus().toString(), "dispatch", "--listen", "127.0.0.1:0", "--patch",
-                    patch.toString()));
+                    patch.toString(), "--duration", LONGEST));
             long limit = System.nanoTime() + LISTENING_NANOS;
             while (address == null) {
                 dispatcher.check();

@@ -3,7 +3,6 @@ package tickbus.demo.lab;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
-import tickbus.demo.DemoFailure;
 import tickbus.demo.PlcProcess;
 
 /** A process of the laboratory, and all that it has said in its current life. */
@@ -16,9 +15,10 @@ final class Member implements AutoCloseable {
     private final List<String> said = new ArrayList<>();
     private List<String> command = List.of();
 
-    Member(String name, Path log) {
+    /** One that is not started yet; {@code what} it is stands in messages. */
+    Member(String name, String what, Path log) {
         this.name = name;
-        process = new PlcProcess(() -> command, NEVER, log);
+        process = new PlcProcess(what, "build it (make build), or name the tickbus executable by --tickbus", () -> command, NEVER, log);
     }
 
     String name() {
@@ -51,14 +51,10 @@ final class Member implements AutoCloseable {
     /**
      * Fails if it has ended.
      *
-     * @throws DemoFailure with its name and last output
+     * @throws tickbus.demo.DemoFailure with its name and last output
      */
     void check() {
-        try {
-            process.check();
-        } catch (DemoFailure e) {
-            throw new DemoFailure(name + ": " + e.getMessage());
-        }
+        process.check();
     }
 
     /** Ends it, and hears its last words. */

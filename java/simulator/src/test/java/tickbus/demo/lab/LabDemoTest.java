@@ -78,7 +78,7 @@ class LabDemoTest {
     }
 
     @Test
-    void aConnectionThatLacksIsTold() throws IOException {
+    void aMissingConnectionIsReported() throws IOException {
         change("tanks.patch", " Q3:BOARD:I3", "");
         assertEquals(1, demo(DriverFolder.tickbus()), () -> output);
         assertEquals("demo-lab: failed reason=\"it was expected within 2000 ms that lamp 3 follows switch 3\"", verdict());
@@ -88,7 +88,7 @@ class LabDemoTest {
     void aProgramWithAMistakeIsTold() throws IOException {
         change("panel.toml", "\"I2\"", "\"I9\"");
         assertEquals(1, demo(DriverFolder.tickbus()), () -> output);
-        assertTrue(verdict().matches("demo-lab: failed reason=\"PANEL: process \\d+ of the PLC ended by itself with exit code 1;"
+        assertTrue(verdict().matches("demo-lab: failed reason=\"process \\d+ of PANEL ended by itself with exit code 1;"
                 + " its last words: .*panel\\.toml:\\d+:\\d+: there is no input I9; write I1 to I8; logo: failed mistakes=1\""),
                 verdict());
     }
@@ -100,7 +100,7 @@ class LabDemoTest {
         Files.writeString(dying, "#!/bin/sh\necho 'out of ideas' >&2; exit 3\n");
         assertTrue(dying.toFile().setExecutable(true));
         assertEquals(1, demo(dying), () -> output);
-        assertTrue(verdict().matches("demo-lab: failed reason=\"dispatcher: process \\d+ of the PLC ended by itself with exit"
+        assertTrue(verdict().matches("demo-lab: failed reason=\"process \\d+ of the dispatcher ended by itself with exit"
                 + " code 3; its last words: out of ideas\""), verdict());
     }
 

@@ -137,17 +137,21 @@ fn jack(name: &str) -> String {
 }
 
 fn drag(browser: &Browser, kind: &str, from: &str, to: &str) {
-    // The second is asked last: it may have scrolled the first, which is asked once more then.
-    middle(browser, &jack(from));
-    let (x2, y2) = middle(browser, &jack(to));
-    let place = browser.run(&format!(
-        "const box = document.querySelector(`{}`).getBoundingClientRect(); \
-         return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)];",
-        jack(from)
+    // Both are brought into view, around the middle of what the tray leaves free.
+    let places = browser.run(&format!(
+        "const at = () => [`{}`, `{}`].flatMap((it) => {{ \
+           const box = document.querySelector(it).getBoundingClientRect(); \
+           return [Math.round(box.left + box.width / 2), Math.round(box.top + box.height / 2)]; }}); \
+         const [, y1, , y2] = at(); \
+         const free = document.getElementById('tray').getBoundingClientRect().top; \
+         scrollBy({{ top: (y1 + y2 - free) / 2, behavior: 'instant' }}); \
+         return at();",
+        jack(from),
+        jack(to)
     ));
     browser.act(&json!([{"type": "pointer", "id": kind, "parameters": {"pointerType": kind}, "actions": [
-        {"type": "pointerMove", "x": place[0], "y": place[1], "duration": 0}, {"type": "pointerDown", "button": 0},
-        {"type": "pointerMove", "x": x2, "y": y2, "duration": 60}, {"type": "pointerUp", "button": 0},
+        {"type": "pointerMove", "x": places[0], "y": places[1], "duration": 0}, {"type": "pointerDown", "button": 0},
+        {"type": "pointerMove", "x": places[2], "y": places[3], "duration": 60}, {"type": "pointerUp", "button": 0},
     ]}]));
 }
 
@@ -290,7 +294,7 @@ fn everything_is_done_from_the_keyboard_and_announced() {
     browser.wait("document.activeElement.id === 'force-value'");
     browser.keys("x");
     browser.keys(ENTER);
-    wait_said(&browser, "ERR 400 the body is no number");
+    wait_said(&browser, "is not a number");
     browser.run("document.getElementById('force-value').select()");
     browser.keys("7.5");
     browser.keys(ENTER);
@@ -317,6 +321,47 @@ fn everything_is_done_from_the_keyboard_and_announced() {
 }
 
 #[test]
+fn a_channel_that_was_forced_is_not_the_end_of_a_cable() {
+    let lab = Lab::new();
+    let (pump, mut logo) = (lab.join("VP PUMP Q01"), lab.join("VR LOGO I01"));
+    let browser = open(&lab, 1200, 800);
+    click(&browser, &pin("PUMP:Q1"));
+    browser.run("document.getElementById('force-value').select()");
+    browser.keys("7,5\u{e007}");
+    wait_value(&browser, "PUMP:Q1", "7.5 forced");
+    click(&browser, &pin("LOGO:I1"));
+    wait_said(&browser, "LOGO:I1 is chosen.");
+    wait_cables(&browser, 0);
+    // Now it is.
+    click(&browser, &pin("PUMP:Q1"));
+    wait_cables(&browser, 1);
+    assert_eq!(logo.hear(), "P I1=7.5");
+    // The button that can no longer be pressed hands the focus on.
+    click(&browser, &pin("PUMP:Q1"));
+    browser.wait("!document.getElementById('release').disabled");
+    browser.run("document.getElementById('release').focus()");
+    browser.keys("\u{e007}");
+    browser.wait("document.activeElement.dataset.pin === 'PUMP:Q1'");
+    // A cable that is cut leaves the focus to its input.
+    browser.run("document.querySelector('g.cable').focus()");
+    browser.keys(" ");
+    browser.wait("document.activeElement.dataset.pin === 'LOGO:I1'");
+    wait_cables(&browser, 0);
+    // A drag ends with its client, and what was chosen is not chosen any more.
+    let (x, y) = middle(&browser, &jack("PUMP:Q1"));
+    browser.act(
+        &json!([{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": [
+            {"type": "pointerMove", "x": x, "y": y, "duration": 0}, {"type": "pointerDown", "button": 0},
+            {"type": "pointerMove", "x": x + 40, "y": y + 40, "duration": 60},
+        ]}]),
+    );
+    browser.wait("document.querySelector('.pending')");
+    drop(pump);
+    browser.wait("!document.querySelector('.pending')");
+    wait_said(&browser, "PUMP:Q1 has gone.");
+}
+
+#[test]
 fn without_the_token_the_page_only_shows() {
     let lab = Lab::new();
     let (mut pump, mut logo) = (lab.join("VP PUMP Q01"), lab.join("VR LOGO I01"));
@@ -338,9 +383,11 @@ fn without_the_token_the_page_only_shows() {
     );
     wait_cables(&browser, 1);
     assert_quiet(&browser);
-    browser.go("about:blank");
     browser.go(&format!("{}#token=00", lab.plain()));
     wait_said(&browser, "Read-only: the token is not this room's");
+    browser.go(&lab.url);
+    browser.wait("document.getElementById('access').textContent === 'may change'");
+    assert_eq!(browser.run("return location.hash"), "");
 }
 
 #[test]

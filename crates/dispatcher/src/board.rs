@@ -43,6 +43,8 @@ struct Output {
 struct Input {
     /// What its client has been sent, or will be next.
     value: Number,
+    /// While its value comes from an operator: the last one that did not, which may be unknown.
+    unforced: Option<Number>,
     label: Label,
     is_waiting: bool,
 }
@@ -51,6 +53,7 @@ impl Input {
     fn new(label: Label) -> Self {
         Self {
             value: Number::UNKNOWN,
+            unforced: None,
             label,
             is_waiting: false,
         }
@@ -306,6 +309,10 @@ impl Board {
     pub(crate) fn unplug(&mut self, seat: usize) {
         if let Some(plugged) = &self.seats[seat].plugged {
             let (name, order) = (plugged.device.name.clone(), plugged.order);
+            if self.on_loss == OnLoss::Hold {
+                // What is held is what the client said last, and not what an operator put in its place.
+                self.release_all(&name);
+            }
             self.forget_forces(&name);
             self.take_name(&name, true);
             self.by_order.remove(&order);
@@ -370,9 +377,7 @@ impl Board {
 
     /// Sends an input the value that it is to have once more, as far as that is known.
     pub(crate) fn refresh(&mut self, sink: &Pin) {
-        if let (Some(to), Some(value)) = (self.place(sink), self.wanted(sink)) {
-            self.deliver(to, value, true);
-        }
+        self.deliver_wanted(sink, true);
     }
 
     /// Sends the inputs of a client the values of their sources.
@@ -419,10 +424,17 @@ impl Board {
         } else {
             Number::ZERO
         };
-        let input = seat.inputs.get(to.channel);
-        // A client that was never sent a value assumes so itself.
-        if self.on_loss == OnLoss::FailSafe && input.is_some_and(|input| input.value.is_known()) {
-            self.deliver(to, nothing, false);
+        let Some(input) = self.seats[to.seat].inputs.get_mut(to.channel) else {
+            return;
+        };
+        let unforced = input.unforced.take();
+        let value = match self.on_loss {
+            // A client that was never sent a value assumes so itself.
+            OnLoss::FailSafe => input.value.is_known().then_some(nothing),
+            OnLoss::Hold => unforced.map(|it| if it.is_known() { it } else { nothing }),
+        };
+        if let Some(value) = value {
+            self.deliver(to, value, false);
         }
     }
 

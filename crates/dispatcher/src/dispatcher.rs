@@ -114,6 +114,8 @@ enum Author {
         host: HostId,
         number: u32,
     },
+    /// A client that has left since. What it has changed is saved all the same.
+    Nobody,
 }
 
 impl Author {
@@ -195,8 +197,11 @@ impl Dispatcher {
     pub fn gone(&mut self, seat: usize) {
         if self.sessions[seat].take().is_some() {
             self.count -= 1;
-            self.promised.retain(|promised| !promised.author.is(seat));
-            self.waiting.retain(|waiting| !waiting.author.is(seat));
+            let promised = self.promised.iter_mut().map(|it| &mut it.author);
+            let waiting = self.waiting.iter_mut().map(|it| &mut it.author);
+            for author in promised.chain(waiting).filter(|author| author.is(seat)) {
+                *author = Author::Nobody;
+            }
             self.board.unplug(seat);
             self.settle();
             self.free.push(seat);
@@ -321,6 +326,7 @@ impl Dispatcher {
             }
             Author::Operator(reply) => reply.give(outcome),
             Author::Host { host, number } => self.answer(host, number, outcome),
+            Author::Nobody => {}
         }
     }
 

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// Why a line was refused, as the answer `ERR <code> <text>` says it. A line that is refused has changed nothing.
+/// Why a line was refused, as the answer `ERR <code> <text>` says it. A line that is refused has changed nothing, except
+/// with [`Code::Internal`]: then its change holds, but was not saved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("ERR {} {text}", code.number())]
 pub struct Refusal {
@@ -51,7 +52,7 @@ impl Code {
         }
     }
 
-    /// The code with this number on the wire; a number that is none is an internal mistake of who sent it.
+    /// The code with this number on the wire; an unknown number is an internal mistake of its sender.
     pub(crate) fn of(number: u16) -> Self {
         const ALL: [Code; 8] = [
             Code::Syntax,

@@ -149,6 +149,19 @@ fn when_one_host_refuses_the_others_undo_what_they_did() {
 }
 
 #[test]
+fn a_client_that_leaves_before_all_hosts_have_answered_is_connected_wholly() {
+    let mut hosts = hosts();
+    hosts.join(1, "VR LOGO Q01 I01");
+    let pump = hosts.join(0, "VP PUMP Q01 I01");
+    hosts.labs[0].say(pump, "CONNECT I1:LOGO:Q1 Q1:LOGO:I1");
+    hosts.labs[0].dispatcher.gone(pump);
+    hosts.settle();
+    hosts.labs[0].settle();
+    assert_eq!(hosts.patch(1), ["LOGO:I1 = PUMP:Q1"]);
+    assert_eq!(hosts.patch(0), ["PUMP:I1 = LOGO:Q1"]);
+}
+
+#[test]
 fn a_client_that_waits_for_a_host_that_is_cut_off_is_answered() {
     let mut hosts = hosts();
     hosts.join(1, "VR LOGO I01");

@@ -218,8 +218,80 @@ fn what_is_forced_ends_with_its_client() {
     order(&mut lab, connect("PUMP:Q1", "LOGO:I1")).expect("it fits");
     order(&mut lab, force("PUMP:Q1", "9")).expect("it is here");
     lab.dispatcher.gone(pump);
-    assert_eq!(lab.hear(logo), ["P I1=9"], "held");
+    assert_eq!(
+        lab.hear(logo),
+        ["P I1=9", "P I1=0"],
+        "an operator's value is not held, and there is no other"
+    );
     let pump = lab.join("VP PUMP Q1");
     lab.say(pump, "P Q1=20");
     assert_eq!(lab.hear(logo), ["P I1=20"]);
+    order(&mut lab, force("PUMP:Q1", "9")).expect("it is here");
+    lab.say(pump, "P Q1=21");
+    lab.dispatcher.gone(pump);
+    assert_eq!(
+        lab.hear(logo),
+        ["P I1=9", "P I1=21"],
+        "what it said last is held"
+    );
+}
+
+#[test]
+fn a_forced_value_that_is_released_is_not_held() {
+    let settings = Settings {
+        on_loss: OnLoss::Hold,
+        ..Settings::default()
+    };
+    for first in ["PUMP:Q1", "LOGO:I1"] {
+        let mut lab = Lab::with(settings, Patch::new());
+        let pump = lab.join("VP PUMP Q1");
+        let logo = lab.join("VR LOGO I1 V=3");
+        order(&mut lab, connect("PUMP:Q1", "LOGO:I1")).expect("it fits");
+        order(&mut lab, force(first, "9")).expect("it is here");
+        order(&mut lab, release(first)).expect("it is forced");
+        assert_eq!(lab.hear(logo), ["P I1=9", "P I1=?"], "nothing was said");
+        lab.say(pump, "P Q1=20");
+        order(&mut lab, force("LOGO:I1", "9")).expect("it is here");
+        order(&mut lab, force("LOGO:I1", "10")).expect("it is here");
+        lab.dispatcher.gone(pump);
+        order(&mut lab, release("LOGO:I1")).expect("it is forced");
+        assert_eq!(
+            lab.hear(logo),
+            ["P I1=20", "P I1=9", "P I1=10", "P I1=20"],
+            "as before"
+        );
+        let pump = lab.join("VP PUMP Q1");
+        lab.say(pump, "P Q1=21");
+        order(&mut lab, force("PUMP:Q1", "9")).expect("it is here");
+        order(&mut lab, Order::Disconnect(pin("LOGO:I1"))).expect("it is connected");
+        assert_eq!(lab.hear(logo), ["P I1=21", "P I1=9", "P I1=21"]);
+    }
+}
+
+#[test]
+fn an_input_whose_source_is_lost_has_no_value() {
+    let mut lab = Lab::new();
+    let pump = lab.join("VP PUMP Q1");
+    lab.join("VR LOGO I1 V=3");
+    order(&mut lab, connect("PUMP:Q1", "LOGO:I1")).expect("it fits");
+    lab.say(pump, "P Q1=20");
+    lab.dispatcher.gone(pump);
+    assert_eq!(lab.dispatcher.snapshot().clients[0].channels[0].value, None);
+}
+
+#[test]
+fn what_a_client_has_changed_is_saved_when_it_has_left() {
+    let mut lab = Lab::new();
+    lab.join("VP PUMP Q1");
+    let logo = lab.join("VR LOGO I1");
+    lab.dispatcher
+        .arrived(lab.now, logo, b"CONNECT I1:PUMP:Q1\r\n");
+    lab.dispatcher.gone(logo);
+    let saved = lab.dispatcher.unsaved().expect("it is not saved yet");
+    assert_eq!(saved.len(), 1);
+    // Who sits there now gets no answer that is not his.
+    let other = lab.connect();
+    lab.dispatcher.saved(&Ok(()));
+    assert_eq!(lab.hear(other), NOTHING);
+    assert!(lab.dispatcher.unsaved().is_none());
 }

@@ -61,32 +61,25 @@ const board = (() => {
   /** All clients: those that are here, and those that only cables remember. */
   function everyone(state) {
     const all = state.clients.map((client) => ({ ...client, isHere: true }));
-    const here = new Set(all.map((client) => client.name));
+    const here = new Map(all.map((client) => [client.name, new Set(client.channels.map(({ channel }) => channel))]));
     const away = new Map();
+    const missing = [];
     for (const { input, output } of state.connections) {
       for (const pin of [input, output]) {
         const [name, channel] = pin.split(':');
-        if (here.has(name)) continue;
-        if (!away.has(name)) away.set(name, new Set());
-        away.get(name).add(channel);
+        const channels = here.get(name) ?? away.get(name) ?? new Set();
+        if (channels.has(channel)) continue;
+        channels.add(channel);
+        if (!here.has(name)) away.set(name, channels);
+        else missing.push([name, channel]);
       }
     }
+    // A cable may remember a channel that its client no longer has.
+    const byName = new Map(all.map((client) => [client.name, client]));
+    for (const [name, channel] of missing) byName.get(name).channels.push({ channel, value: null, forced: null });
     for (const [name, channels] of away) {
       const list = [...channels].sort((one, other) => one.localeCompare(other, 'en', { numeric: true }));
       all.push({ name, isHere: false, channels: list.map((channel) => ({ channel, value: null, forced: null })) });
-    }
-    // A cable may remember a channel that its client no longer has.
-    for (const client of all) {
-      const has = new Set(client.channels.map(({ channel }) => channel));
-      for (const { input, output } of state.connections) {
-        for (const pin of [input, output]) {
-          const [name, channel] = pin.split(':');
-          if (name === client.name && !has.has(channel)) {
-            has.add(channel);
-            client.channels.push({ channel, value: null, forced: null });
-          }
-        }
-      }
     }
     return all;
   }
@@ -95,19 +88,22 @@ const board = (() => {
   function isOn(pin, value) {
     if (value === null) return false;
     const number = Number(value);
-    if (pin.isAnalog) return number !== 0;
+    if (pin.isAnalog) return Boolean(number);
     return number > 8 || (number >= 5 && pin.isOn);
   }
 
-  function describe(pin, value, sources) {
+  function describe(pin, value, own, sources) {
     const parts = [`${pin.name} ${pin.isAnalog ? 'analog' : 'digital'} ${pin.isInput ? 'input' : 'output'}`];
     parts.push(!pin.isHere ? 'not here' : value === null ? 'no value yet' : value);
-    if (pin.isForced) parts.push('forced');
+    if (pin.isForced) parts.push(own === null ? 'forced' : `forced, its client says ${own}`);
     if (sources) parts.push(`connected with ${sources.join(' and ')}`);
     return parts.join(', ');
   }
 
   function show(state) {
+    const focused = document.activeElement;
+    const focusedPin = focused?.dataset?.pin;
+    const focusedCable = focused?.closest?.('g.cable')?.dataset.input;
     const all = everyone(state);
     const names = new Set(all.map((client) => client.name));
     let isMoved = false;
@@ -120,12 +116,10 @@ const board = (() => {
       const shape = JSON.stringify([client.isHere, client.role, client.address, client.channels.map((it) => it.channel)]);
       let box = boxes.get(client.name);
       if (!box || box.shape !== shape) {
-        const focused = box && box.element.contains(document.activeElement) && document.activeElement.dataset.pin;
         if (box) forget(client.name, box);
         box = makeBox(client, shape);
         boxes.set(client.name, box);
         clients.insertBefore(box.element, clients.children[place] || null);
-        if (focused && pins.has(focused)) pins.get(focused).element.focus();
         isMoved = true;
       } else if (clients.children[place] !== box.element) {
         clients.insertBefore(box.element, clients.children[place] || null);
@@ -144,15 +138,22 @@ const board = (() => {
         pin.isForced = forced !== null;
         pin.isOn = isOn(pin, shown);
         pin.value = shown;
-        const own = pin.isForced && !pin.isInput && value !== null && value !== forced ? ` (${value})` : '';
-        setText(pin.text, pin.isForced ? `${forced} forced${own}` : shown ?? '–');
+        const own = pin.isForced && !pin.isInput && value !== forced ? value : null;
+        const behind = own === null ? '' : ` (${own})`;
+        setText(pin.text, pin.isForced ? `${forced} forced${behind}` : shown ?? '–');
         pin.element.classList.toggle('on', pin.isOn);
         pin.element.classList.toggle('forced', pin.isForced);
-        const label = describe(pin, shown, partners.get(pin.name));
-        if (pin.element.getAttribute('aria-label') !== label) pin.element.setAttribute('aria-label', label);
+        setAttribute(pin.element, 'aria-label', describe(pin, shown, own, partners.get(pin.name)));
       }
     }
     showCables(state.connections, isMoved);
+    // What had the focus may have been moved or made anew; where a cable was, its input has it.
+    const next = pins.get(focusedPin)?.element ?? wires.get(focusedCable)?.group ?? pins.get(focusedCable)?.element;
+    if (next && document.activeElement !== next) next.focus({ preventScroll: true });
+  }
+
+  function setAttribute(node, name, text) {
+    if (node.getAttribute(name) !== text) node.setAttribute(name, text);
   }
 
   function setText(node, text) {
@@ -181,14 +182,17 @@ const board = (() => {
         isChanged = true;
       }
       const source = pins.get(output);
-      wire.group.setAttribute('class',
-        `cable${source.isAnalog ? ' analog' : ''}${source.isOn ? ' on' : ''}${awake ? '' : ' asleep'}`);
+      const classes = wire.group.classList;
+      classes.toggle('analog', source.isAnalog);
+      classes.toggle('on', source.isOn);
+      classes.toggle('asleep', !awake);
     }
     if (isChanged) draw();
   }
 
   function makeCable(input, output) {
     const group = document.createElementNS(SVG, 'g');
+    group.setAttribute('class', 'cable');
     group.dataset.input = input;
     group.setAttribute('tabindex', '0');
     group.setAttribute('role', 'button');
@@ -233,11 +237,12 @@ const board = (() => {
   }
 
   function draw() {
-    for (const { paths, input, output } of wires.values()) {
+    // All of the layout is read before anything is written, which would have it made anew.
+    const lines = [...wires.values()].map(({ paths, input, output }) => {
       const [source, sink] = [pins.get(output), pins.get(input)];
-      const line = curve(place(source), place(sink), below(source, sink));
-      for (const path of paths) path.setAttribute('d', line);
-    }
+      return [paths, curve(place(source), place(sink), below(source, sink))];
+    });
+    for (const [paths, line] of lines) for (const path of paths) setAttribute(path, 'd', line);
   }
 
   const loose = document.createElementNS(SVG, 'path');
@@ -254,5 +259,5 @@ const board = (() => {
 
   new ResizeObserver(draw).observe(clients);
 
-  return { show, drag, drop: () => loose.remove(), pins, wires, clients, cables };
+  return { show, setAttribute, drag, drop: () => loose.remove(), pins, wires, clients, cables };
 })();

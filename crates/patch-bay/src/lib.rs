@@ -92,31 +92,42 @@ fn order(change: &Change) -> Result<Order, Refused> {
     let pin = Pin::parse(pin).ok_or_else(|| {
         wrong(
             400,
-            "the path has no channel of a client; write it such as /patch/LOGO:I1",
+            "the path does not end in a channel of a client; write it such as /patch/LOGO:I1",
         )
     })?;
     Ok(match (what, change.verb) {
         ("patch", Verb::Put) => {
             let other = Pin::parse(&change.body).ok_or_else(|| {
-                wrong(
-                    400,
-                    "the body is no channel of a client; send one such as PUMP:Q1",
-                )
+                let text = format!(
+                    "{} is not a channel of a client; send one such as PUMP:Q1",
+                    short(&change.body)
+                );
+                wrong(400, &text)
             })?;
             Order::Connect(pin, other)
         }
         ("patch", Verb::Delete) => Order::Disconnect(pin),
         (_, Verb::Put) => {
             let number = Number::parse(change.body.as_bytes()).ok_or_else(|| {
-                wrong(
-                    400,
-                    "the body is no number; send one such as 24 or -3.5, of at most 23 characters",
-                )
+                let text = format!(
+                    "{} is not a number; write one such as 24 or -3.5, of at most 23 characters",
+                    short(&change.body)
+                );
+                wrong(400, &text)
             })?;
             Order::Force(pin, number)
         }
         (_, Verb::Delete) => Order::Release(pin),
     })
+}
+
+/// The beginning of what was sent, to be quoted in an answer.
+fn short(body: &str) -> &str {
+    match body.char_indices().nth(40) {
+        _ if body.is_empty() => "an empty body",
+        Some((end, _)) => &body[..end],
+        None => body,
+    }
 }
 
 #[cfg(test)]

@@ -9,15 +9,25 @@
   const PATIENCE = 5000;
   let mayChange = false;
   let chosen = null;
+  /** The next channel that is chosen gets a cable to the chosen one; not after that was forced, released or cut. */
+  let isEnd = false;
   let heard = 0;
   let state = null;
 
-  // The token comes behind "#", which is sent to nobody, and leaves the address at once.
-  const given = /^#token=([0-9a-f]+)$/.exec(location.hash);
-  if (given) {
+  /** The token comes behind "#", which is sent to nobody, and leaves the address at once. */
+  function takeToken() {
+    const given = /^#token=([0-9a-f]+)$/.exec(location.hash);
+    if (!given) return;
     sessionStorage.setItem('token', given[1]);
     history.replaceState(null, '', location.pathname);
   }
+
+  takeToken();
+  // Another token that is put into the address of this tab loads nothing.
+  window.addEventListener('hashchange', () => {
+    takeToken();
+    askAccess();
+  });
 
   function headers() {
     const token = sessionStorage.getItem('token');
@@ -29,11 +39,14 @@
     get('status').classList.toggle('bad', isBad);
   }
 
+  /** Without an answer for this long, nobody waits any more. */
+  const ask = (path, options) => fetch(path, { ...options, headers: headers(), signal: AbortSignal.timeout(10000) });
+
   async function askAccess() {
     let text = 'read-only';
     let why = 'Read-only: open the address that the dispatcher printed, with its token, to change something.';
     try {
-      const answer = await fetch('/access', { headers: headers() });
+      const answer = await ask('/access');
       const access = await answer.json();
       mayChange = access.may_change === true;
       if (mayChange) text = 'may change';
@@ -45,18 +58,19 @@
     get('access').classList.toggle('good', mayChange);
     document.body.classList.toggle('read-only', !mayChange);
     if (!mayChange) say(why);
+    else if (get('status').textContent.startsWith('Read-only')) say('');
     showChosen();
   }
 
   async function change(method, path, body, done) {
     try {
-      const answer = await fetch(path, { method, body, headers: headers() });
+      const answer = await ask(path, { method, body });
       const said = await answer.json();
       if (answer.ok) say(done);
       else say(`ERR ${said.code} ${said.text}`, true);
       return answer.ok;
     } catch {
-      say('The dispatcher does not answer; nothing was changed.', true);
+      say('The dispatcher does not answer; check the change when it is back.', true);
       return false;
     }
   }
@@ -82,7 +96,7 @@
   }
 
   function choose(pin) {
-    if (chosen && chosen !== pin.name && mayChange) {
+    if (chosen && isEnd && chosen !== pin.name && mayChange) {
       const first = board.pins.get(chosen);
       if (first) {
         connect(first, pin);
@@ -95,6 +109,7 @@
       return;
     }
     chosen = pin.name;
+    isEnd = true;
     value.value = pin.value ?? '';
     const target = pin.isInput ? 'an output' : 'an input';
     say(mayChange ? `${pin.name} is chosen. Choose ${target} to connect it.` : `${pin.name}: ${pin.value ?? 'no value yet'}.`);
@@ -108,11 +123,14 @@
 
   function showChosen() {
     const pin = board.pins.get(chosen);
-    if (!pin) chosen = null;
+    if (chosen && !pin) {
+      say(`${chosen} has gone.`);
+      chosen = null;
+    }
     tray.hidden = !pin;
-    board.clients.classList.toggle('choosing', Boolean(pin) && mayChange);
+    board.clients.classList.toggle('choosing', Boolean(pin) && isEnd && mayChange);
     for (const other of board.pins.values()) {
-      other.element.setAttribute('aria-pressed', String(other === pin));
+      board.setAttribute(other.element, 'aria-pressed', String(other === pin));
       other.element.classList.toggle('fit', Boolean(pin) && fits(pin, other));
       other.element.classList.toggle('unfit', Boolean(pin) && other !== pin && !fits(pin, other));
     }
@@ -122,20 +140,39 @@
     if (!pin) return;
     get('chosen-name').textContent = pin.name;
     get('chosen-tools').hidden = !mayChange;
-    get('release').disabled = !pin.isForced;
-    get('cut').disabled = !state.connections.some(({ input, output }) => input === pin.name || output === pin.name);
+    enable(get('release'), pin.isForced, pin);
+    enable(get('cut'), state.connections.some(({ input, output }) => input === pin.name || output === pin.name), pin);
+  }
+
+  /** A button that cannot be pressed any more gives the focus back to its channel. */
+  function enable(button, isEnabled, pin) {
+    const isLost = !isEnabled && document.activeElement === button;
+    button.disabled = !isEnabled;
+    if (isLost) pin.element.focus({ preventScroll: true });
+  }
+
+  /** After this, the chosen channel is no longer the first end of a cable. */
+  function endChoice() {
+    isEnd = false;
+    showChosen();
   }
 
   tray.addEventListener('submit', (event) => {
     event.preventDefault();
     const pin = board.pins.get(chosen);
     if (!pin) return;
-    change('PUT', `/force/${pin.name}`, value.value, `${pin.name} is forced to ${value.value.trim()}.`);
+    const number = value.value.trim().replace(',', '.');
+    endChoice();
+    change('PUT', `/force/${pin.name}`, number, `${pin.name} is forced to ${number}.`);
   });
   get('release').addEventListener('click', () => {
+    endChoice();
     change('DELETE', `/force/${chosen}`, undefined, `${chosen} is released.`);
   });
-  get('cut').addEventListener('click', () => cut(chosen, `Cut what was connected with ${chosen}.`));
+  get('cut').addEventListener('click', () => {
+    endChoice();
+    cut(chosen, `Cut what was connected with ${chosen}.`);
+  });
   get('let-go').addEventListener('click', () => {
     const pin = board.pins.get(chosen);
     letGo();
@@ -155,31 +192,41 @@
     // By touch, only the jack is dragged: the rest of the box scrolls the page.
     const mayDrag = event.pointerType !== 'touch' || event.target.closest('.jack');
     if (!pin || !mayChange || !mayDrag || event.button !== 0) return;
-    held = { pin, x: event.clientX, y: event.clientY };
+    held = { name: pin.name, pointer: event.pointerId, x: event.clientX, y: event.clientY };
     if (event.target.hasPointerCapture(event.pointerId)) event.target.releasePointerCapture(event.pointerId);
   });
-  window.addEventListener('pointermove', (event) => {
-    if (!held) return;
-    if (!wasDragged && Math.hypot(event.clientX - held.x, event.clientY - held.y) < 6) return;
-    wasDragged = true;
-    board.drag(held.pin, event.clientX, event.clientY);
-  });
-  window.addEventListener('pointerup', (event) => {
-    if (!held) return;
-    const from = board.pins.get(held.pin.name);
+  function endDrag() {
     held = null;
     board.drop();
+  }
+
+  window.addEventListener('pointermove', (event) => {
+    if (held?.pointer !== event.pointerId) return;
+    const pin = board.pins.get(held.name);
+    // The button was let go outside of the window, or the client has gone.
+    if (event.buttons === 0 || !pin) {
+      endDrag();
+      return;
+    }
+    if (!wasDragged && Math.hypot(event.clientX - held.x, event.clientY - held.y) < 6) return;
+    wasDragged = true;
+    board.drag(pin, event.clientX, event.clientY);
+  });
+  window.addEventListener('pointerup', (event) => {
+    if (held?.pointer !== event.pointerId) return;
+    const from = board.pins.get(held.name);
+    endDrag();
     if (!wasDragged) return;
     const to = pinAt(document.elementFromPoint(event.clientX, event.clientY));
     if (from && to && to !== from) connect(from, to);
     else say('The cable was dropped beside a channel.');
   });
-  window.addEventListener('pointercancel', () => {
-    held = null;
-    board.drop();
+  window.addEventListener('pointercancel', (event) => {
+    if (held?.pointer === event.pointerId) endDrag();
   });
+  window.addEventListener('blur', endDrag);
   board.clients.addEventListener('click', (event) => {
-    // The click that ends a drag on its own pin is none.
+    // The click that ends a drag on its own pin does not count.
     if (wasDragged && event.detail > 0) return;
     const pin = pinAt(event.target);
     if (pin) choose(pin);
@@ -198,6 +245,10 @@
 
   window.addEventListener('keydown', (event) => {
     const isTyping = event.target === value;
+    if (event.key === 'Escape' && held) {
+      endDrag();
+      return;
+    }
     if (event.key === 'Escape' && chosen) {
       const pin = board.pins.get(chosen);
       letGo();
@@ -210,11 +261,14 @@
     const pin = pinAt(event.target);
     if (event.key === 'Delete' || event.key === 'Backspace') {
       if (group) cutCable(group);
-      else if (pin) cut(pin.name, `Cut what was connected with ${pin.name}.`);
-      else return;
+      else if (pin) {
+        endChoice();
+        cut(pin.name, `Cut what was connected with ${pin.name}.`);
+      } else return;
       event.preventDefault();
-    } else if (event.key === 'Enter' && group) {
+    } else if ((event.key === 'Enter' || event.key === ' ') && group) {
       cutCable(group);
+      event.preventDefault();
     } else if (event.key.toLowerCase() === 'f' && (pin || chosen) && mayChange) {
       if (pin && chosen !== pin.name) {
         letGo();
@@ -235,6 +289,7 @@
   function show(text) {
     state = JSON.parse(text);
     board.show(state);
+    if (held && !board.pins.has(held.name)) endDrag();
     const asleep = state.connections.filter(({ awake }) => !awake).length;
     const waiting = asleep ? `, ${asleep} of them waiting` : '';
     get('counts').textContent = `${count(state.clients.length, 'client', 'clients')}, ${count(state.connections.length, 'cable', 'cables')}${waiting}`;
@@ -243,7 +298,11 @@
   }
 
   function setAge() {
-    const isOld = performance.now() - heard > PATIENCE || source.readyState !== EventSource.OPEN;
+    const now = performance.now();
+    const isOpen = source?.readyState === EventSource.OPEN;
+    const isOld = now - heard > PATIENCE || !isOpen;
+    // A connection may be lost without a word, as when a computer sleeps or changes its network.
+    if (isOpen && now - Math.max(heard, begun) > PATIENCE) listen();
     document.body.classList.toggle('is-old', isOld);
     const link = isOld ? 'no connection' : 'live';
     if (get('link').textContent !== link) get('link').textContent = link;
@@ -256,14 +315,17 @@
   }
 
   let source = null;
+  /** When it was listened for the first time, or again. */
+  let begun = 0;
 
   function listen() {
+    source?.close();
+    source = null;
+    // A browser has few connections to one host for all of its tabs.
+    if (document.hidden) return;
+    begun = performance.now();
     source = new EventSource('/events');
-    source.onopen = () => {
-      heard = performance.now();
-      setAge();
-      askAccess();
-    };
+    source.onopen = askAccess;
     source.onmessage = (event) => {
       heard = performance.now();
       show(event.data);
@@ -271,14 +333,20 @@
     };
     source.addEventListener('beat', () => {
       heard = performance.now();
+      setAge();
     });
     source.onerror = () => {
       setAge();
       // A refusal ends the source for good; a broken connection it restores itself.
-      if (source.readyState === EventSource.CLOSED) setTimeout(listen, 1000);
+      if (source?.readyState === EventSource.CLOSED) setTimeout(listenAgain, 1000);
     };
   }
 
+  function listenAgain() {
+    if (source?.readyState === EventSource.CLOSED) listen();
+  }
+
+  document.addEventListener('visibilitychange', listen);
   listen();
   setInterval(setAge, 500);
 })();

@@ -173,7 +173,7 @@ fn a_program_patches_forces_and_sees_the_board() {
         page.refused("DELETE /force/LOGO:I1", "", 404, "LOGO:I1 is not forced");
         let text = "I1 and I1 cannot be connected; connect an output with an input, digital or analog both";
         page.refused("PUT /patch/LOGO:I1", "LOGO:I1", 422, text);
-        let text = "the body is no number; send one such as 24 or -3.5, of at most 23 characters";
+        let text = "on is not a number; write one such as 24 or -3.5, of at most 23 characters";
         page.refused("PUT /force/LOGO:I1", "on", 400, text);
     });
 }

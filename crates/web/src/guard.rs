@@ -44,20 +44,35 @@ impl Guard {
     }
 
     /// Whether the request is meant for this room, and comes from nowhere else; if not, why.
-    pub(crate) fn check_source(&self, headers: &HeaderMap) -> Result<(), &'static str> {
-        const HOSTS: &str = "the Host header is not this room's; open the address that was printed";
+    pub(crate) fn check_source(&self, headers: &HeaderMap) -> Result<(), String> {
+        const HOSTS: &str =
+            "the request does not say once for which host it is; send one Host header";
+        const OTHER: &str =
+            "the request comes from a page of another site; open the address that was printed";
 
         let host = only(headers, &HOST).ok_or(HOSTS)?;
         if !self.is_own(host) {
-            return Err(HOSTS);
+            let (name, port) = host.rsplit_once(':').unwrap_or((host, "80"));
+            return Err(format!(
+                "this page is not served under the name {name}; open it by the computer's IP address, or start it with \
+                 --page {name}:{port}"
+            ));
         }
         if headers.contains_key(ORIGIN) {
             let origin = only(headers, &ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
             if !origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
-                return Err(
-                    "the request comes from a page of another site; open the address that was printed",
-                );
+                return Err(OTHER.to_owned());
             }
+        }
+        // A browser sends no Origin with what a page of another site loads as a picture or a script. To follow a link from
+        // there is another thing.
+        let is_elsewhere = headers
+            .get_all("sec-fetch-site")
+            .iter()
+            .any(|site| site == "cross-site" || site == "same-site");
+        let mode = HeaderName::from_static("sec-fetch-mode");
+        if is_elsewhere && only(headers, &mode) != Some("navigate") {
+            return Err(OTHER.to_owned());
         }
         Ok(())
     }
@@ -163,6 +178,41 @@ mod tests {
         ] {
             assert!(guard.check_source(&of(origin)).is_err(), "{origin}");
         }
+    }
+
+    #[test]
+    fn what_another_site_loads_is_refused_but_its_links_may_be_followed() {
+        let guard = Guard::new("127.0.0.1").expect("random numbers");
+        let of = |site, mode| {
+            headers(&[
+                (HOST, "127.0.0.1:80"),
+                (HeaderName::from_static("sec-fetch-site"), site),
+                (HeaderName::from_static("sec-fetch-mode"), mode),
+            ])
+        };
+        for site in ["none", "same-origin"] {
+            assert_eq!(guard.check_source(&of(site, "no-cors")), Ok(()), "{site}");
+        }
+        for site in ["cross-site", "same-site"] {
+            assert_eq!(guard.check_source(&of(site, "navigate")), Ok(()), "{site}");
+            for mode in ["no-cors", "cors", "websocket"] {
+                assert!(
+                    guard.check_source(&of(site, mode)).is_err(),
+                    "{site} {mode}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_refusal_of_a_name_says_how_to_have_it() {
+        let guard = Guard::new("localhost").expect("random numbers");
+        let refused = guard.check_source(&headers(&[(HOST, "labpc:20080")]));
+        assert_eq!(
+            refused.expect_err("not its name"),
+            "this page is not served under the name labpc; open it by the computer's IP address, or start it with \
+             --page labpc:20080"
+        );
     }
 
     #[test]

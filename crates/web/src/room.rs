@@ -166,7 +166,7 @@ async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
         tokio::spawn(async move {
             let service = service_fn(|request| answer(&hall, request));
             let stream = TokioIo::new(Patient::new(stream, limits.patience));
-            // How a browser hangs up is nobody's business.
+            // It does not matter how a browser hangs up.
             let _ = http1::Builder::new()
                 .timer(TokioTimer::new())
                 .header_read_timeout(limits.patience)

@@ -10,20 +10,21 @@ use http_body_util::combinators::UnsyncBoxBody;
 use http_body_util::{BodyExt as _, Full, Limited, StreamBody};
 use hyper::body::{Bytes, Frame, Incoming};
 use hyper::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue, REFERRER_POLICY,
-    X_CONTENT_TYPE_OPTIONS,
+    ALLOW, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName, HeaderValue,
+    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
 };
 use hyper::{Method, Request, Response, StatusCode};
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout, timeout_at};
 
-use crate::feed::{Feed, Newest};
+use crate::feed::{Feed, Viewer};
 use crate::guard::{Guard, Token};
 use crate::site::{Answer, Change, Site, Verb};
 
 /// The largest body of a request, in bytes.
 const BODY: usize = 4096;
 
-/// A viewer hears something at least this often; a page that does not knows that what it shows is old.
+/// A viewer hears something at least this often while the site answers; a page that does not knows that what it shows
+/// is old.
 const BEAT: Duration = Duration::from_secs(2);
 
 /// The page and its own files; nothing from elsewhere, nothing inline, in nobody's frame.
@@ -46,7 +47,7 @@ type Body = UnsyncBoxBody<Bytes, Infallible>;
 type Refusal = (StatusCode, String);
 
 pub(crate) async fn answer(
-    hall: &Hall,
+    hall: &Arc<Hall>,
     request: Request<Incoming>,
 ) -> Result<Response<Body>, Infallible> {
     let answered = respond(hall, request).await;
@@ -56,6 +57,10 @@ pub(crate) async fn answer(
         let json = format!("{{\"code\":{},\"text\":{quoted}}}\n", status.as_u16());
         let mut response = full(JSON, json);
         *response.status_mut() = status;
+        if status == StatusCode::METHOD_NOT_ALLOWED {
+            let methods = HeaderValue::from_static("GET, PUT, DELETE");
+            response.headers_mut().insert(ALLOW, methods);
+        }
         response
     });
     let headers = response.headers_mut();
@@ -74,14 +79,14 @@ pub(crate) async fn answer(
     Ok(response)
 }
 
-async fn respond(hall: &Hall, request: Request<Incoming>) -> Result<Response<Body>, Refusal> {
+async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Response<Body>, Refusal> {
     if request.uri().authority().is_some() {
-        let text = "this is no proxy; ask for a path";
+        let text = "this is not a proxy; ask for a path";
         return Err((StatusCode::BAD_REQUEST, text.to_owned()));
     }
     hall.guard
         .check_source(request.headers())
-        .map_err(|why| (StatusCode::FORBIDDEN, why.to_owned()))?;
+        .map_err(|why| (StatusCode::FORBIDDEN, why))?;
     let token = hall.guard.token_of(request.headers());
     let path = request.uri().path().to_owned();
     let verb = match *request.method() {
@@ -100,7 +105,14 @@ async fn respond(hall: &Hall, request: Request<Incoming>) -> Result<Response<Bod
     let (answer, outcome) = Answer::new();
     hall.site.change(Change { verb, path, body }, answer);
     let outcome = outcome.await.map_err(|_| nobody())?;
-    hall.feed.changed();
+    // One that was refused changed nothing, unless the site itself failed.
+    if outcome
+        .as_ref()
+        .err()
+        .is_none_or(|refused| refused.status >= 500)
+    {
+        hall.feed.changed();
+    }
     outcome.map_err(|refused| {
         let status = StatusCode::from_u16(refused.status);
         (
@@ -111,17 +123,13 @@ async fn respond(hall: &Hall, request: Request<Incoming>) -> Result<Response<Bod
     Ok(full(JSON, "{\"code\":200,\"text\":\"done\"}\n".to_owned()))
 }
 
-async fn get(hall: &Hall, path: &str, token: Token) -> Result<Response<Body>, Refusal> {
+async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body>, Refusal> {
     match path {
         "/state" => {
-            let mut viewer = hall.feed.subscribe();
-            let newest = viewer.wait_for(|newest| *newest != Newest::Unknown).await;
-            match newest.as_deref() {
-                Ok(Newest::State(state)) => Ok(full(JSON, state.json())),
-                _ => Err(nobody()),
-            }
+            let state = hall.feed.subscribe().next().await;
+            Ok(full(JSON, state.ok_or_else(nobody)?.json()))
         }
-        "/events" => Ok(events(&hall.feed)),
+        "/events" => Ok(events(hall)),
         "/access" if token == Token::Wrong => Err(no_token(token)),
         "/access" => Ok(full(
             JSON,
@@ -137,24 +145,53 @@ async fn get(hall: &Hall, path: &str, token: Token) -> Result<Response<Body>, Re
 }
 
 /// The newest state, each time that it is another one and the viewer has taken the last.
-fn events(feed: &Feed) -> Response<Body> {
-    let stream = unfold(feed.subscribe(), |mut viewer| async {
-        loop {
-            let event = match timeout(BEAT, viewer.changed()).await {
-                Err(_) => Some(Bytes::from_static(b"event: beat\ndata:\n\n")),
-                Ok(Err(_)) => return None,
-                Ok(Ok(())) => match &*viewer.borrow_and_update() {
-                    Newest::Unknown => None,
-                    Newest::State(state) => Some(state.event()),
-                    Newest::Ended => return None,
-                },
-            };
-            if let Some(event) = event {
-                return Some((Ok(Frame::data(event)), viewer));
-            }
-        }
+fn events(hall: &Arc<Hall>) -> Response<Body> {
+    let events = Events {
+        hall: Arc::clone(hall),
+        viewer: hall.feed.subscribe(),
+        last: Bytes::new(),
+        looks: 0,
+        beat: Instant::now() + BEAT,
+    };
+    let stream = unfold(events, |mut events| async {
+        let event = events.next().await?;
+        Some((Ok(Frame::data(event)), events))
     });
     respond_with("text/event-stream", StreamBody::new(stream).boxed_unsync())
+}
+
+/// What one viewer hears.
+struct Events {
+    hall: Arc<Hall>,
+    viewer: Viewer,
+    /// The last state.
+    last: Bytes,
+    /// The looks that were answered when something was sent last.
+    looks: u64,
+    /// When the viewer is to hear something even if the state is the same.
+    beat: Instant,
+}
+
+impl Events {
+    async fn next(&mut self) -> Option<Bytes> {
+        let event = loop {
+            match timeout_at(self.beat, self.viewer.next()).await {
+                Ok(state) => {
+                    let event = state?.event();
+                    if event != self.last {
+                        self.last.clone_from(&event);
+                        break event;
+                    }
+                }
+                // This thread lives, but does the site? If it has answered nothing since, the viewer has to know.
+                Err(_) if self.hall.feed.looks() == self.looks => self.beat += BEAT,
+                Err(_) => break Bytes::from_static(b"event: beat\ndata:\n\n"),
+            }
+        };
+        self.looks = self.hall.feed.looks();
+        self.beat = Instant::now() + BEAT;
+        Some(event)
+    }
 }
 
 async fn body(hall: &Hall, request: Request<Incoming>) -> Result<String, Refusal> {
@@ -172,7 +209,7 @@ async fn body(hall: &Hall, request: Request<Incoming>) -> Result<String, Refusal
         }
     })?;
     let text = String::from_utf8(body.to_bytes().into());
-    let text = text.map_err(|_| (StatusCode::BAD_REQUEST, "the body is no UTF-8".to_owned()))?;
+    let text = text.map_err(|_| (StatusCode::BAD_REQUEST, "the body is not UTF-8".to_owned()))?;
     Ok(text.trim().to_owned())
 }
 

@@ -15,7 +15,7 @@ pub trait Site: Send + Sync + 'static {
     /// somebody looks.
     fn look(&self, answer: Answer<State>);
 
-    /// Carries a change out that somebody with the token has asked for.
+    /// Carries out a change asked for by somebody who has the token.
     fn change(&self, change: Change, answer: Answer<Outcome>);
 }
 
@@ -30,7 +30,8 @@ pub struct Asset {
     pub text: &'static str,
 }
 
-/// Makes the state as JSON in one line. It is called in the room's thread, so that who was asked need not format.
+/// Makes the state as JSON in one line. It is called in the room's thread, so that the thread that was asked need not do
+/// the formatting.
 pub type State = Box<dyn FnOnce() -> String + Send>;
 
 /// What became of a change.

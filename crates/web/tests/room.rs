@@ -3,11 +3,12 @@
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::Duration;
 
-use tickbus_base::time::Monotonic;
+use tickbus_base::time::{Manual, Nanos};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_web::{
     Answer, Asset, Change, Limits, Outcome, Refused, Room, Serving, Site, State, Verb,
@@ -18,6 +19,13 @@ use tickbus_web::{
 struct Toy {
     text: Mutex<String>,
     looks: AtomicU64,
+    /// Looks are not answered, but kept.
+    is_hung: AtomicBool,
+    kept: Mutex<Vec<Answer<State>>>,
+    clock: Arc<Manual>,
+    /// How far the clock goes on while a look waits for its answer, and while it is formatted.
+    waiting: AtomicI64,
+    formatting: AtomicI64,
 }
 
 impl Site for Toy {
@@ -31,6 +39,14 @@ impl Site for Toy {
 
     fn look(&self, answer: Answer<State>) {
         self.looks.fetch_add(1, Ordering::SeqCst);
+        self.clock
+            .advance(Nanos(self.waiting.load(Ordering::SeqCst)));
+        if self.is_hung.load(Ordering::SeqCst) {
+            self.kept.lock().expect("no panic").push(answer);
+            return;
+        }
+        let formatting = Nanos(self.formatting.load(Ordering::SeqCst));
+        let clock = Arc::clone(&self.clock);
         let text = self.text.lock().expect("no panic").clone();
         // More than sockets keep, without so much being put.
         let padding = " ".repeat(if text.starts_with("large") {
@@ -38,7 +54,10 @@ impl Site for Toy {
         } else {
             0
         });
-        answer.give(Box::new(move || format!("\"{text}\"{padding}")));
+        answer.give(Box::new(move || {
+            clock.advance(formatting);
+            format!("\"{text}\"{padding}")
+        }));
     }
 
     fn change(&self, change: Change, answer: Answer<Outcome>) {
@@ -72,7 +91,8 @@ fn serve(limits: Limits) -> Fixture {
     let token = url.strip_prefix(&prefix).expect(&url).to_owned();
     let toy = Arc::new(Toy::default());
     let site: Arc<Toy> = Arc::clone(&toy);
-    let serving = room.serve(site, Monotonic::shared()).expect("a thread");
+    let clock = Arc::clone(&toy.clock);
+    let serving = room.serve(site, clock).expect("a thread");
     Fixture {
         toy,
         address,
@@ -102,6 +122,16 @@ impl Fixture {
     fn put(&self, text: &str) -> String {
         let headers = format!("Authorization: Bearer {}\r\n", self.token);
         self.ask("PUT /text", &headers, text)
+    }
+
+    /// The next look that is kept.
+    fn kept(&self) -> Answer<State> {
+        loop {
+            if let Some(answer) = self.toy.kept.lock().expect("no panic").pop() {
+                return answer;
+            }
+            thread::yield_now();
+        }
     }
 
     fn view(&self) -> Viewer {
@@ -175,7 +205,9 @@ fn a_page_is_served_with_its_headers() {
         "the token is not in the page"
     );
     assert_status(&fixture.ask("GET /other", "", ""), 404);
-    assert_status(&fixture.ask("POST /text", "", ""), 405);
+    let refused = fixture.ask("POST /text", "", "");
+    assert_status(&refused, 405);
+    assert!(refused.contains("allow: GET, PUT, DELETE"), "{refused}");
     assert_status(&fixture.ask("OPTIONS /text", "", ""), 405);
 }
 
@@ -283,6 +315,73 @@ fn a_viewer_hears_the_newest_state_and_a_beat_without_one() {
     fixture.put("one");
     assert_eq!(viewer.state(), "\"one\"");
     while viewer.line() != "event: beat\n" {}
+}
+
+/// An hour.
+const HOUR: i64 = 3_600_000_000_000;
+
+#[test]
+fn a_site_that_was_slow_is_looked_at_again_at_once() {
+    for is_formatting in [false, true] {
+        let fixture = serve(Limits::default());
+        let span = if is_formatting {
+            &fixture.toy.formatting
+        } else {
+            &fixture.toy.waiting
+        };
+        span.store(HOUR, Ordering::SeqCst);
+        let mut viewer = fixture.view();
+        assert_eq!(viewer.state(), "\"\"");
+        // Not by a change that was asked for here, which would cut the pause short.
+        "slow".clone_into(&mut fixture.toy.text.lock().expect("no panic"));
+        assert_eq!(viewer.state(), "\"slow\"");
+        fixture.put("changed");
+        assert_eq!(viewer.state(), "\"changed\"");
+    }
+}
+
+#[test]
+fn a_change_during_a_look_keeps_nobody_from_seeing_it() {
+    let fixture = serve(Limits::default());
+    fixture.toy.is_hung.store(true, Ordering::SeqCst);
+    let mut viewer = fixture.view();
+    let answer = fixture.kept();
+    fixture.put("one");
+    answer.give(Box::new(|| "\"before\"".to_owned()));
+    assert_eq!(viewer.state(), "\"before\"");
+    // Who comes after the change gets none of the looks before it.
+    let answer = fixture.kept();
+    fixture.put("two");
+    let mut late = fixture.view();
+    answer.give(Box::new(|| "\"between\"".to_owned()));
+    assert_eq!(viewer.state(), "\"between\"");
+    fixture.kept().give(Box::new(|| "\"after\"".to_owned()));
+    assert_eq!(late.state(), "\"after\"");
+    assert_eq!(viewer.state(), "\"after\"");
+}
+
+#[test]
+fn a_site_that_answers_nothing_has_no_beat() {
+    let fixture = serve(Limits::default());
+    let mut viewer = fixture.view();
+    assert_eq!(viewer.state(), "\"\"");
+    fixture.toy.is_hung.store(true, Ordering::SeqCst);
+    let answer = fixture.kept();
+    // One may be for the looks that were answered before.
+    let stream = viewer.0.get_ref().try_clone().expect("a descriptor");
+    let patience = Some(Duration::from_secs(5));
+    stream.set_read_timeout(patience).expect("not zero");
+    let mut line = String::new();
+    let mut beats = 0;
+    while viewer.0.read_line(&mut line).is_ok() {
+        beats += usize::from(line == "event: beat\n");
+        assert!(beats < 2, "it beats, and nothing is answered");
+        line.clear();
+    }
+    stream.set_read_timeout(None).expect("none is fine");
+    fixture.toy.is_hung.store(false, Ordering::SeqCst);
+    answer.give(Box::new(|| "\"back\"".to_owned()));
+    assert_eq!(viewer.state(), "\"back\"");
 }
 
 #[test]

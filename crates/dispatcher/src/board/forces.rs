@@ -55,6 +55,7 @@ impl Board {
     pub(super) fn release_all(&mut self, client: &str) {
         let of_client = self.forces.keys().filter(|pin| pin.client == client);
         let pins: Vec<Pin> = of_client.cloned().collect();
+        self.begin_line();
         for pin in pins {
             self.release(&pin);
         }
@@ -73,6 +74,9 @@ impl Board {
             let from = self.place(pin).filter(|_| pin.channel.kind.is_output());
             for (to, from) in self.supplied(from) {
                 self.resume(to, from);
+                if self.said(pin).is_none() {
+                    self.deliver(to, Number::ZERO, false);
+                }
             }
         }
         was_forced
@@ -83,12 +87,21 @@ impl Board {
         self.forces.retain(|pin, _| pin.client != client);
     }
 
-    /// The value that an input is to have: its own forced one, or that of its source.
-    pub(super) fn wanted(&self, sink: &Pin) -> Option<Number> {
-        self.forced(sink).or_else(|| {
-            let source = self.patch.source(sink)?;
-            self.forced(source).or_else(|| self.said(source))
-        })
+    /// Sends an input the value that it is to have: its own forced one, or that of its source. Unless it is sent `again`,
+    /// only if it is another one. Returns whether there is such a value.
+    pub(super) fn deliver_wanted(&mut self, sink: &Pin, again: bool) -> bool {
+        let source = self.patch.source(sink);
+        let forced = self.forced(sink);
+        let forced = forced.or_else(|| self.forced(source?));
+        let wanted = forced.or_else(|| self.said(source?));
+        let (Some(value), Some(to)) = (wanted, self.place(sink)) else {
+            return false;
+        };
+        if let Some(input) = self.seats[to.seat].inputs.get_mut(to.channel) {
+            input.unforced = forced.map(|_| input.unforced.unwrap_or(input.value));
+        }
+        self.deliver(to, value, again);
+        true
     }
 
     /// What the client of an output has said of it.
@@ -110,9 +123,8 @@ impl Board {
 
     /// Sends an input the value that it is to have, if that is another one.
     fn follow(&mut self, sink: &Pin) {
-        match (self.wanted(sink), self.place(sink)) {
-            (Some(value), Some(to)) => self.deliver(to, value, false),
-            _ => self.lose(sink),
+        if !self.deliver_wanted(sink, false) {
+            self.lose(sink);
         }
     }
 }

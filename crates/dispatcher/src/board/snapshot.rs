@@ -34,7 +34,8 @@ pub struct ClientState {
 pub struct ChannelState {
     /// Which one.
     pub channel: Channel,
-    /// What the client has said of its output, or has been sent for its input.
+    /// What the client has said of its output, or has been sent for its input. `None` if it was never said, or if the
+    /// input's client has been sent that its source is lost.
     pub value: Option<Number>,
     /// What an operator holds it at.
     pub forced: Option<Number>,
@@ -66,7 +67,7 @@ impl Board {
             let has_forces = self.has_forces();
             let channels = outputs.chain(inputs).map(|(channel, value)| ChannelState {
                 channel,
-                value: value.is_known().then_some(value),
+                value: (value.is_known() && value != Number::LOST).then_some(value),
                 // A name is copied for each channel only while something is forced.
                 forced: has_forces
                     .then(|| self.forced(&Pin::new(name, channel)))

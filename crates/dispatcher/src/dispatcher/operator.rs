@@ -29,7 +29,8 @@ impl fmt::Debug for Reply {
     }
 }
 
-/// What an operator orders. An order that is refused has changed nothing.
+/// What an operator orders. An order that is refused has changed nothing, unless its code is [`Code::Internal`]: then the
+/// patch is changed, but could not be saved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
     /// Connects an output with an input, in either order.

@@ -1,6 +1,5 @@
 //! `tickbus dispatch`: the dispatcher of a virtual laboratory.
 
-#[cfg(feature = "page")]
 use std::io;
 use std::path::PathBuf;
 use std::thread;
@@ -9,7 +8,7 @@ use super::Outcome;
 use super::host::span;
 use super::lab::{self, address};
 use tickbus_base::os::raise_open_files;
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, system_time};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PORT, PatchFile, Post, Settings};
 use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};

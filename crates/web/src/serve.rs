@@ -14,7 +14,7 @@ use hyper::header::{
     REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS,
 };
 use hyper::{Method, Request, Response, StatusCode};
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::{Interval, interval, timeout};
 
 use crate::feed::{Feed, Viewer};
 use crate::guard::{Guard, Token};
@@ -146,13 +146,14 @@ async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body
 
 /// The newest state, each time that it is another one and the viewer has taken the last.
 fn events(hall: &Arc<Hall>) -> Response<Body> {
-    let events = Events {
+    let mut events = Events {
         hall: Arc::clone(hall),
         viewer: hall.feed.subscribe(),
         last: Bytes::new(),
         looks: 0,
-        beat: Instant::now() + BEAT,
+        beat: interval(BEAT),
     };
+    events.beat.reset();
     let stream = unfold(events, |mut events| async {
         let event = events.next().await?;
         Some((Ok(Frame::data(event)), events))
@@ -169,14 +170,15 @@ struct Events {
     /// The looks that were answered when something was sent last.
     looks: u64,
     /// When the viewer is to hear something even if the state is the same.
-    beat: Instant,
+    beat: Interval,
 }
 
 impl Events {
     async fn next(&mut self) -> Option<Bytes> {
         let event = loop {
-            match timeout_at(self.beat, self.viewer.next()).await {
-                Ok(state) => {
+            tokio::select! {
+                biased;
+                state = self.viewer.next() => {
                     let event = state?.event();
                     if event != self.last {
                         self.last.clone_from(&event);
@@ -184,12 +186,15 @@ impl Events {
                     }
                 }
                 // This thread lives, but does the site? If it has answered nothing since, the viewer has to know.
-                Err(_) if self.hall.feed.looks() == self.looks => self.beat += BEAT,
-                Err(_) => break Bytes::from_static(b"event: beat\ndata:\n\n"),
+                _ = self.beat.tick() => {
+                    if self.hall.feed.looks() != self.looks {
+                        break Bytes::from_static(b"event: beat\ndata:\n\n");
+                    }
+                }
             }
         };
         self.looks = self.hall.feed.looks();
-        self.beat = Instant::now() + BEAT;
+        self.beat.reset();
         Some(event)
     }
 }

@@ -30,9 +30,9 @@ at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
-# What the zip has beyond a plain build; with the rest it would be larger than 15 MB. Tests are built with all but Zenoh.
+# What the zip has beyond a plain build; with the rest it would be larger than 15 MB.
+# shellcheck disable=SC2034 # for the scripts that source this
 PRODUCT_FEATURES=opcua,page
-TEST_FEATURES=$PRODUCT_FEATURES,script,mqtt
 
 # The project's version, from Cargo.toml.
 version() {

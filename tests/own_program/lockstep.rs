@@ -75,7 +75,7 @@ fn in_lock_step_a_program_scans_as_on_the_ticks_of_a_loopback() {
     let stepped = seen(&mut driver);
     driver.close();
     let outcome = server.join().expect("no panic").expect("as planned");
-    assert_eq!(outcome.steps, STEPS.into());
+    assert_eq!(outcome.steps, u64::from(STEPS));
     assert_eq!((plc.fault(), plc.close()), (None, None));
 
     // In lock-step the machine's initial values are there in the first scan; on the loopback it comes before the machine.

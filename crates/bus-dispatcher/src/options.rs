@@ -31,7 +31,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `address`, `name` and `connect`. `moved` says that [`set_address`](Self::set_address) follows.
+    /// Reads `address`, `name` and `connect`. `moved` says that `set_address` follows.
     pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let name = table.take("name");

@@ -13,6 +13,7 @@ import tickbus.Tickbus;
 import tickbus.petri.Action;
 import tickbus.petri.Coordinator;
 import tickbus.petri.CoordinatorBuilder;
+import tickbus.petri.NetWatch;
 import tickbus.petri.Stop;
 
 /**
@@ -28,10 +29,13 @@ import tickbus.petri.Stop;
  * ticking thread; the driver stays the caller's, who closes it.
  */
 public final class NetController {
+    private static final String STALE = "the line is stale: no net is scanned";
+
     private final Tickbus bus;
     private final Latch latch;
     private final Map<String, Coordinator> coordinators = new LinkedHashMap<>();
     private final Coordinator[] order;
+    private final NetWatch watch;
     private long lastNanos;
     private long scans;
     private long staleScans;
@@ -70,6 +74,7 @@ public final class NetController {
         }
         conditions.forEach(Conditions::connect);
         order = coordinators.values().toArray(Coordinator[]::new);
+        watch = NetWatch.of(List.of(order));
     }
 
     /**
@@ -176,6 +181,7 @@ public final class NetController {
             }
         }
         bus.send();
+        watch.offer(status == Status.STALE.code() ? STALE : "");
         lastNanos = nanos;
         return fired;
     }
@@ -219,6 +225,14 @@ public final class NetController {
             throw new IllegalArgumentException("there is no net '" + net + "'; there are " + coordinators.keySet());
         }
         return found;
+    }
+
+    /**
+     * All nets as of one scan, for a page ({@link tickbus.petri.page.NetPage}) or a view of your own: beside each condition
+     * the values of its signals. There is one, so it is for one page, which many may look at. For any thread.
+     */
+    public NetWatch watch() {
+        return watch;
     }
 
     /** Why nets stopped, in the order of the nets; empty while all run. */

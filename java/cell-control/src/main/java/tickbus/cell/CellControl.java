@@ -17,11 +17,13 @@ import tickbus.petri.NetSvg;
 import tickbus.petri.Stop;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
+import tickbus.petri.page.NetPage;
 
 /**
- * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER}, with the cell's driver.cfg, the
- * tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the reader of code
- * carriers, and a folder for the results: each net with its marking, and its firings.
+ * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]}, with the cell's
+ * driver.cfg, the tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the
+ * reader of code carriers, a folder for the results (each net with its marking, and its firings), and the address of a live
+ * page about the nets, if there is to be one.
  *
  * <p>Until a signal ends it, or nobody reads its output any more, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
  */
@@ -55,7 +57,7 @@ public final class CellControl {
                 log.fired(scan, nanos, transition, choices);
             });
         }
-        nets = NetController.of(bus, all);
+        nets = CellNets.controller(bus, all);
         for (BoundNet one : all) {
             coordinators.add(nets.coordinator(one.net().name()));
         }
@@ -67,8 +69,8 @@ public final class CellControl {
      * @param args the command line
      */
     public static void main(String[] args) {
-        if (args.length != 4) {
-            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER");
+        if (args.length != 4 && args.length != 5) {
+            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]");
             System.exit(USAGE);
         }
         CountDownLatch ending = new CountDownLatch(1);
@@ -85,7 +87,11 @@ public final class CellControl {
         try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1]); Tickbus reader = Tickbus.open(Path.of(args[2]))) {
             CellControl control = new CellControl(bus, reader);
             control.prove();
-            control.run(ending, System.out);
+            if (args.length == 5) {
+                control.runWithPage(args[4], ending, System.out);
+            } else {
+                control.run(ending, System.out);
+            }
             control.leave(Path.of(args[3]));
         } catch (IOException | RuntimeException e) {
             System.err.println(e.getMessage() == null ? e.toString() : e.getMessage());
@@ -110,6 +116,13 @@ public final class CellControl {
         thread.setDaemon(true);
         thread.setPriority(Thread.MIN_PRIORITY);
         thread.start();
+    }
+
+    private void runWithPage(String address, CountDownLatch ending, PrintStream out) throws IOException {
+        try (NetPage page = NetPage.open(address, "The manufacturing cell", nets.watch())) {
+            out.println("nets: live at " + page.address());
+            run(ending, out);
+        }
     }
 
     private void run(CountDownLatch ending, PrintStream out) {

@@ -37,6 +37,9 @@ public final class NetController {
     private final Coordinator[] order;
     private final NetWatch watch;
     private long lastNanos;
+    /** The input that stops the nets' clock; -1 if none does. For how long it has. */
+    private int stopsClock = -1;
+    private long stoodNanos;
     private long scans;
     private long staleScans;
 
@@ -87,6 +90,22 @@ public final class NetController {
      */
     public static NetController of(Tickbus bus, BoundNet... nets) {
         return new NetController(bus, List.of(nets));
+    }
+
+    /**
+     * Lets the nets' clock stand still while an input is on, such as that of an emergency stop: what stood still then is not
+     * late afterwards. Delays, the times of firings and a page have the time of that clock.
+     *
+     * @param input not 0 while the clock is to stand still
+     * @return this
+     * @throws IllegalArgumentException if there is no such input
+     */
+    public NetController stopClockWhile(String input) {
+        if (bus.signal(input).isWritten()) {
+            throw new IllegalArgumentException("signal '" + input + "' is an output; the clock stands still while an input is on");
+        }
+        stopsClock = latch.names.indexOf(input);
+        return this;
     }
 
     /** Outputs that are on exactly while a place is marked. */
@@ -176,8 +195,11 @@ public final class NetController {
             staleScans++;
         } else {
             latch.take();
+            if (stopsClock >= 0 && latch.now[stopsClock] != 0 && scans > 1) {
+                stoodNanos += nanos - lastNanos;
+            }
             for (Coordinator coordinator : order) {
-                fired += coordinator.scan(nanos);
+                fired += coordinator.scan(nanos - stoodNanos);
             }
         }
         bus.send();

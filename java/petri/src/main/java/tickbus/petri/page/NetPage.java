@@ -36,6 +36,8 @@ public final class NetPage implements AutoCloseable {
     private static final int MOST_VIEWERS = 16;
     /** Beyond the viewers, for the files of the page. */
     private static final int MORE_THREADS = 8;
+    /** For how long a client may read or write. */
+    private static final long PATIENCE_NANOS = 10_000_000_000L;
     private static final int OK = 200;
     private static final int FORBIDDEN = 403;
     private static final int NOT_FOUND = 404;
@@ -50,17 +52,18 @@ public final class NetPage implements AutoCloseable {
     private final String title;
     private final String name;
     private final List<NetWatch> watches;
-    private final Workers workers = new Workers(MOST_VIEWERS + MORE_THREADS);
+    private final Workers workers;
     private final Feed feed;
     private final Guard guard;
     private final HttpServer server;
     private final Thread looker;
     private byte[] nets;
 
-    private NetPage(String name, InetSocketAddress at, String title, List<NetWatch> watches) throws IOException {
+    private NetPage(String name, InetSocketAddress at, String title, long patienceNanos, List<NetWatch> watches) throws IOException {
         this.name = name;
         this.title = title;
         this.watches = watches;
+        workers = new Workers(MOST_VIEWERS + MORE_THREADS, patienceNanos);
         feed = new Feed(run, watches, workers);
         guard = new Guard(name);
         server = HttpServer.create(at, 0);
@@ -81,6 +84,10 @@ public final class NetPage implements AutoCloseable {
      * @throws IOException if the address is not to be had
      */
     public static NetPage open(String address, String title, NetWatch... watches) throws IOException {
+        return open(address, title, PATIENCE_NANOS, List.of(watches));
+    }
+
+    static NetPage open(String address, String title, long patienceNanos, List<NetWatch> watches) throws IOException {
         int colon = address.lastIndexOf(':');
         String host = address.substring(0, Math.max(0, colon));
         int port = -1;
@@ -96,7 +103,7 @@ public final class NetPage implements AutoCloseable {
         }
         InetSocketAddress at = new InetSocketAddress(InetAddress.getByName(host), port);
         try {
-            return new NetPage(host, at, title, List.of(watches));
+            return new NetPage(host, at, title, patienceNanos, watches);
         } catch (IOException e) {
             throw new IOException("the page cannot be served at " + address + ": " + e.getMessage()
                 + "; give another port, or 0 for any", e);

@@ -12,9 +12,8 @@ import java.util.concurrent.Executor;
  * is interrupted, which closes its connection.
  */
 final class Workers implements Executor, AutoCloseable {
-    private static final long PATIENCE_NANOS = 10_000_000_000L;
-
     private final int most;
+    private final long patienceNanos;
     private final Deque<Runnable> waiting = new ArrayDeque<>();
     /** Since when each thread reads or writes. */
     private final Map<Thread, Long> busy = new HashMap<>();
@@ -22,8 +21,10 @@ final class Workers implements Executor, AutoCloseable {
     private int idle;
     private boolean closed;
 
-    Workers(int most) {
+    /** At most so many threads, each of which may read or write for so long. */
+    Workers(int most, long patienceNanos) {
         this.most = most;
+        this.patienceNanos = patienceNanos;
     }
 
     @Override
@@ -87,7 +88,7 @@ final class Workers implements Executor, AutoCloseable {
         long now = System.nanoTime();
         for (Iterator<Map.Entry<Thread, Long>> each = busy.entrySet().iterator(); each.hasNext();) {
             Map.Entry<Thread, Long> one = each.next();
-            if (now - one.getValue() > PATIENCE_NANOS) {
+            if (now - one.getValue() > patienceNanos) {
                 one.getKey().interrupt();
                 each.remove();
             }

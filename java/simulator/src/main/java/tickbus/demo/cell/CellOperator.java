@@ -28,6 +28,9 @@ final class CellOperator {
     private long emptySince = -1;
     private boolean begun;
     private boolean jammed;
+    /** Earlier rounds, and the refills in them. */
+    private int rounds;
+    private int refillsBefore;
 
     CellOperator(ManufacturingCell cell, Timeline timeline, int cylinders) {
         this.cell = cell;
@@ -45,7 +48,19 @@ final class CellOperator {
     }
 
     boolean done() {
-        return cell.delivered().size() >= cylinders;
+        return cell.delivered().size() >= ordered();
+    }
+
+    /** How many cylinders there are to be when it is {@link #done}. */
+    int ordered() {
+        return (rounds + 1) * cylinders;
+    }
+
+    /** As many cylinders again, with the same mishaps. */
+    void again() {
+        rounds++;
+        refillsBefore = refills;
+        begun = false;
     }
 
     /** Before each tick. */
@@ -59,7 +74,7 @@ final class CellOperator {
             Workpiece piece = out.get(delivered);
             timeline.add(nanos, "exit", "cylinder " + piece.number() + ", " + PieceKind.of(piece).name().toLowerCase(Locale.ROOT)
                     .replace('_', ' '));
-            mishapAfter(delivered + 1, nanos);
+            mishapAfter(delivered + 1 - rounds * cylinders, nanos);
         }
         if (cell.isJammed() != jammed) {
             jammed = !jammed;
@@ -78,7 +93,10 @@ final class CellOperator {
         }
         Collections.shuffle(sleeves, new Random(SEED));
         cell.fillSleeves(sleeves);
-        cell.fillParts(FIRST_PARTS);
+        if (rounds == 0) {
+            // Later rounds begin with what the refill has left.
+            cell.fillParts(FIRST_PARTS);
+        }
         cell.fillHeads(cylinders);
         cell.fillCaps(cylinders);
         cell.start(true);
@@ -109,7 +127,7 @@ final class CellOperator {
         } else if (emptySince < 0) {
             emptySince = nanos;
             timeline.add(nanos, "station 3", "its magazine is empty");
-        } else if (refills == 0 && nanos - emptySince >= WALK_NANOS) {
+        } else if (refills == refillsBefore && nanos - emptySince >= WALK_NANOS) {
             refills++;
             cell.fillParts(cylinders);
             timeline.add(nanos, "operator", "the magazine is filled");

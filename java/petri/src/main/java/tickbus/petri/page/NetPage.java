@@ -9,6 +9,7 @@ import java.io.OutputStream;
 import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.URI;
+import java.net.UnknownHostException;
 import java.nio.charset.StandardCharsets;
 import java.util.List;
 import java.util.Map;
@@ -101,7 +102,13 @@ public final class NetPage implements AutoCloseable {
             throw new IllegalArgumentException("the page's address '" + address + "': expected a host and a port, such as "
                 + "127.0.0.1:8080 or [::1]:8080");
         }
-        InetSocketAddress at = new InetSocketAddress(InetAddress.getByName(host), port);
+        InetSocketAddress at;
+        try {
+            at = new InetSocketAddress(InetAddress.getByName(host), port);
+        } catch (UnknownHostException e) {
+            throw new IOException("the page cannot be served at " + address + ": there is no host " + host + "; give one of this "
+                + "computer's addresses", e);
+        }
         try {
             return new NetPage(host, at, title, patienceNanos, watches);
         } catch (IOException e) {

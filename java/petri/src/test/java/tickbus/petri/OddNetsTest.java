@@ -130,7 +130,7 @@ class OddNetsTest {
     void aDamagedFileIsReadOrRefusedWithItsName() {
         SplitMix random = new SplitMix(11);
         String pnml = Pnml.write(Samples.everything());
-        for (int i = 0; i < 4000; i++) {
+        for (int i = 0; i < 500; i++) {
             refusedOnlyAsANet(mutated(random, pnml), text -> Pnml.parse("f", text));
             refusedOnlyAsANet(mutated(random, Samples.PAPER), text -> HpsimText.parse("f", text, Map.of()));
             refusedOnlyAsANet(mutated(random, HpxTest.NET), text -> Hpx.parse("f", text, 1_000_000));

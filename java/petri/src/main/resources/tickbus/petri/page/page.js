@@ -351,6 +351,10 @@
     if (!isHeld && latest && latest.run === run) display(latest);
     if (source) say(isHeld ? 'held still' : 'live', isHeld ? 'stale' : 'good');
   });
+  get('fit').addEventListener('click', () => {
+    const isFit = document.body.classList.toggle('fit');
+    get('fit').setAttribute('aria-pressed', String(isFit));
+  });
   setInterval(() => {
     const now = performance.now();
     views.forEach((view) => view.fade(now));

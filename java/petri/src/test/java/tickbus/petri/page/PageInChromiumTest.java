@@ -49,6 +49,7 @@ class PageInChromiumTest {
                 assertEquals("guard on 1", viewer.value("document.querySelector('.holds').textContent"));
                 assertEquals("held back", viewer.value(row(0, ".phase") + ".textContent"));
                 assertEquals("true", viewer.value("document.documentElement.scrollWidth <= innerWidth"));
+                assertEquals("true", viewer.value("document.querySelector('.part').offsetHeight < 40"), "it is not broken in pieces");
             }
             one.shoot(PICTURES.resolve("held.png"));
             scanning.part(true);
@@ -87,6 +88,9 @@ class PageInChromiumTest {
             assertEquals("start", viewer.value("document.querySelector('tr.chosen button').textContent"));
             viewer.value(row(1, "button") + ".click()");
             assertEquals("1", viewer.value("document.querySelector('.net-chosen').dataset.transition"));
+            viewer.value("document.getElementById('fit').click()");
+            assertEquals("true", viewer.value("document.getElementById('fit').getAttribute('aria-pressed')"));
+            viewer.await("document.querySelector('.drawing').scrollHeight <= document.querySelector('.drawing').clientHeight");
             viewer.value("document.getElementById('hold').click()");
             viewer.await("document.getElementById('link').textContent === 'held still'");
             String shown = viewer.value("document.body.dataset.shown");

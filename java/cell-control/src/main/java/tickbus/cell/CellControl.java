@@ -39,23 +39,15 @@ public final class CellControl {
     private final List<Coordinator> coordinators = new ArrayList<>();
     private final NetController nets;
     private final Heads heads;
-    /** How often each transition of each net fired. */
-    private final long[][] fired;
     private final CompletableFuture<Proof> proof = new CompletableFuture<>();
 
     private CellControl(Tickbus bus, Tickbus reader) {
         heads = Heads.on(reader, LocalDateTime::now);
         BoundNet[] all = CellNets.all(heads);
-        fired = new long[all.length][];
-        for (int i = 0; i < all.length; i++) {
-            FiringLog log = new FiringLog(all[i].net(), LOGGED);
-            long[] counts = new long[all[i].net().transitions().size()];
-            fired[i] = counts;
+        for (BoundNet one : all) {
+            FiringLog log = new FiringLog(one.net(), LOGGED);
             logs.add(log);
-            all[i].listener((scan, nanos, transition, choices) -> {
-                counts[transition]++;
-                log.fired(scan, nanos, transition, choices);
-            });
+            one.listener(log);
         }
         nets = CellNets.controller(bus, all);
         for (BoundNet one : all) {
@@ -173,7 +165,8 @@ public final class CellControl {
     }
 
     private long count(int net, String transition) {
-        return fired[net][coordinators.get(net).net().transition(transition).index()];
+        Coordinator one = coordinators.get(net);
+        return one.firings(one.net().transition(transition).index());
     }
 
     /** Each net with its marking, and its last firings. */

@@ -39,6 +39,7 @@ public final class NetPage implements AutoCloseable {
     private static final int MORE_THREADS = 8;
     /** For how long a client may read or write. */
     private static final long PATIENCE_NANOS = 10_000_000_000L;
+    private static final long LONGEST_END_MILLIS = 2000;
     private static final int OK = 200;
     private static final int FORBIDDEN = 403;
     private static final int NOT_FOUND = 404;
@@ -70,7 +71,8 @@ public final class NetPage implements AutoCloseable {
         server = HttpServer.create(at, 0);
         server.setExecutor(workers);
         server.createContext("/", this::answer);
-        server.start();
+        // The server's own thread is a daemon if the one that starts it is.
+        join(Workers.start(server::start, "start of a net page"));
         looker = Workers.start(feed, "net page");
     }
 
@@ -131,6 +133,16 @@ public final class NetPage implements AutoCloseable {
         looker.interrupt();
         server.stop(0);
         workers.close();
+        // Another page may ask the same watches from now on.
+        join(looker);
+    }
+
+    private static void join(Thread thread) {
+        try {
+            thread.join(LONGEST_END_MILLIS);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
     }
 
     private void answer(HttpExchange exchange) throws IOException {

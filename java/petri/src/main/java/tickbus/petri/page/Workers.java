@@ -60,16 +60,15 @@ final class Workers implements Executor, AutoCloseable {
 
     private synchronized Runnable next() {
         idle++;
-        try {
-            while (waiting.isEmpty() && !closed) {
+        while (waiting.isEmpty() && !closed) {
+            try {
                 wait();
+            } catch (InterruptedException e) {
+                // What it did before took too long, and is over.
             }
-            return closed ? null : waiting.poll();
-        } catch (InterruptedException e) {
-            return waiting.poll();
-        } finally {
-            idle--;
         }
+        idle--;
+        return closed ? null : waiting.poll();
     }
 
     /** This thread begins to read or to write. */

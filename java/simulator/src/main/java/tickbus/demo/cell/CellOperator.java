@@ -18,6 +18,9 @@ final class CellOperator {
     private static final int FIRST_PARTS = 7;
     private static final long WALK_NANOS = 500_000_000;
     private static final long SEED = 12;
+    /** In a later round station 1 has found its magazine empty: when the operator presses the rearm button, and for how long. */
+    private static final long REARM_AFTER_NANOS = 1_000_000_000;
+    private static final long PRESS_NANOS = 200_000_000;
 
     private final ManufacturingCell cell;
     private final Timeline timeline;
@@ -31,6 +34,7 @@ final class CellOperator {
     /** Earlier rounds, and the refills in them. */
     private int rounds;
     private int refillsBefore;
+    private long rearmAt = Long.MAX_VALUE;
 
     CellOperator(ManufacturingCell cell, Timeline timeline, int cylinders) {
         this.cell = cell;
@@ -69,6 +73,7 @@ final class CellOperator {
             begun = true;
             begin(nanos);
         }
+        rearm(nanos);
         List<Workpiece> out = cell.delivered();
         for (; delivered < out.size(); delivered++) {
             Workpiece piece = out.get(delivered);
@@ -96,11 +101,24 @@ final class CellOperator {
         if (rounds == 0) {
             // Later rounds begin with what the refill has left.
             cell.fillParts(FIRST_PARTS);
+        } else {
+            rearmAt = nanos + REARM_AFTER_NANOS;
         }
         cell.fillHeads(cylinders);
         cell.fillCaps(cylinders);
         cell.start(true);
         timeline.add(nanos, "operator", cylinders + " sleeves are in the magazine, and the cell is started");
+    }
+
+    private void rearm(long nanos) {
+        if (rearmAt != Long.MAX_VALUE && nanos >= rearmAt + PRESS_NANOS) {
+            cell.rearm(false);
+            rearmAt = Long.MAX_VALUE;
+            refills++;
+            refillsBefore++;
+        } else if (nanos >= rearmAt) {
+            cell.rearm(true);
+        }
     }
 
     private void mishapAfter(int count, long nanos) {

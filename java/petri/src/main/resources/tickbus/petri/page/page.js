@@ -80,6 +80,8 @@
       const drawing = this.find('.drawing');
       drawing.setAttribute('aria-label', `Drawing of ${net.name}`);
       drawing.innerHTML = net.svg;
+      // As a picture it would hide its transitions, which can be chosen here, from screen readers.
+      drawing.querySelector('svg').setAttribute('role', 'group');
       this.places = this.nodes('net-place', 'place');
       this.transitions = this.nodes('net-transition', 'transition');
       this.tokens = net.places.map(() => null);

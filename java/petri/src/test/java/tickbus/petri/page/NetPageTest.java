@@ -175,7 +175,12 @@ class NetPageTest {
                 end = -1;
             }
             assertEquals(-1, end);
-            assertEquals("200", status(page, "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"));
+            // On a busy computer another request may take as long.
+            String status = "closed";
+            while (status.equals("closed")) {
+                status = status(page, "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+            }
+            assertEquals("200", status);
         }
     }
 

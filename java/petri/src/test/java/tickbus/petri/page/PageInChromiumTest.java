@@ -82,6 +82,7 @@ class PageInChromiumTest {
                 Chromium viewer = new Chromium(900, 700, folder)) {
             viewer.go(page.address());
             viewer.await(START);
+            assertEquals("null", viewer.value(START + ".closest('[role=img]')"), "a picture would hide its buttons");
             viewer.value(START + ".focus()");
             assertEquals("transition start, held back", viewer.value("document.activeElement.getAttribute('aria-label')"));
             viewer.value(START + ".dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', bubbles: true}))");

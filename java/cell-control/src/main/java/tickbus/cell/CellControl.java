@@ -17,11 +17,13 @@ import tickbus.petri.NetSvg;
 import tickbus.petri.Stop;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
+import tickbus.petri.page.NetPage;
 
 /**
- * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER}, with the cell's driver.cfg, the
- * tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the reader of code
- * carriers, and a folder for the results: each net with its marking, and its firings.
+ * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]}, with the cell's
+ * driver.cfg, the tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the
+ * reader of code carriers, a folder for the results (each net with its marking, and its firings), and the address of a live
+ * page about the nets, if there is to be one.
  *
  * <p>Until a signal ends it, or nobody reads its output any more, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
  */
@@ -37,25 +39,17 @@ public final class CellControl {
     private final List<Coordinator> coordinators = new ArrayList<>();
     private final NetController nets;
     private final Heads heads;
-    /** How often each transition of each net fired. */
-    private final long[][] fired;
     private final CompletableFuture<Proof> proof = new CompletableFuture<>();
 
     private CellControl(Tickbus bus, Tickbus reader) {
         heads = Heads.on(reader, LocalDateTime::now);
         BoundNet[] all = CellNets.all(heads);
-        fired = new long[all.length][];
-        for (int i = 0; i < all.length; i++) {
-            FiringLog log = new FiringLog(all[i].net(), LOGGED);
-            long[] counts = new long[all[i].net().transitions().size()];
-            fired[i] = counts;
+        for (BoundNet one : all) {
+            FiringLog log = new FiringLog(one.net(), LOGGED);
             logs.add(log);
-            all[i].listener((scan, nanos, transition, choices) -> {
-                counts[transition]++;
-                log.fired(scan, nanos, transition, choices);
-            });
+            one.listener(log);
         }
-        nets = NetController.of(bus, all);
+        nets = CellNets.controller(bus, all);
         for (BoundNet one : all) {
             coordinators.add(nets.coordinator(one.net().name()));
         }
@@ -67,8 +61,8 @@ public final class CellControl {
      * @param args the command line
      */
     public static void main(String[] args) {
-        if (args.length != 4) {
-            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER");
+        if (args.length != 4 && args.length != 5) {
+            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]");
             System.exit(USAGE);
         }
         CountDownLatch ending = new CountDownLatch(1);
@@ -85,7 +79,11 @@ public final class CellControl {
         try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1]); Tickbus reader = Tickbus.open(Path.of(args[2]))) {
             CellControl control = new CellControl(bus, reader);
             control.prove();
-            control.run(ending, System.out);
+            if (args.length == 5) {
+                control.runWithPage(args[4], ending, System.out);
+            } else {
+                control.run(ending, System.out);
+            }
             control.leave(Path.of(args[3]));
         } catch (IOException | RuntimeException e) {
             System.err.println(e.getMessage() == null ? e.toString() : e.getMessage());
@@ -110,6 +108,13 @@ public final class CellControl {
         thread.setDaemon(true);
         thread.setPriority(Thread.MIN_PRIORITY);
         thread.start();
+    }
+
+    private void runWithPage(String address, CountDownLatch ending, PrintStream out) throws IOException {
+        try (NetPage page = NetPage.open(address, "The manufacturing cell", nets.watch())) {
+            out.println("nets: live at " + page.address());
+            run(ending, out);
+        }
     }
 
     private void run(CountDownLatch ending, PrintStream out) {
@@ -160,7 +165,8 @@ public final class CellControl {
     }
 
     private long count(int net, String transition) {
-        return fired[net][coordinators.get(net).net().transition(transition).index()];
+        Coordinator one = coordinators.get(net);
+        return one.firings(one.net().transition(transition).index());
     }
 
     /** Each net with its marking, and its last firings. */

@@ -1,11 +1,13 @@
 package tickbus.cell;
 
 import java.util.Arrays;
+import tickbus.Tickbus;
 import tickbus.petri.Delay;
 import tickbus.petri.NetBuilder;
 import tickbus.petri.PetriNet;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.Composition;
+import tickbus.petri.control.NetController;
 
 /** The nets of the transport and of the whole cell, and all nets together. */
 final class CellNets {
@@ -19,6 +21,11 @@ final class CellNets {
     /** The nets of stations 1, 3 and 4, of the transport and of the cell, bound to the signals of plc/cell/cell.cfg. */
     static BoundNet[] all(Heads heads) {
         return all(heads, 1, 3, 4);
+    }
+
+    /** The controller of the nets. The emergency stop cuts air and motors: what does not move then is not stuck. */
+    static NetController controller(Tickbus bus, BoundNet... all) {
+        return NetController.of(bus, all).stopClockWhile("S1 emergency");
     }
 
     private static BoundNet[] all(Heads heads, int... pallets) {

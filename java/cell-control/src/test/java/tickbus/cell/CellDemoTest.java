@@ -2,6 +2,7 @@ package tickbus.cell;
 
 import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertFalse;
+import static org.junit.jupiter.api.Assertions.assertNotNull;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.io.BufferedReader;
@@ -9,6 +10,10 @@ import java.io.ByteArrayOutputStream;
 import java.io.IOException;
 import java.io.OutputStream;
 import java.io.PrintStream;
+import java.net.URI;
+import java.net.http.HttpClient;
+import java.net.http.HttpRequest;
+import java.net.http.HttpResponse;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
@@ -149,11 +154,11 @@ class CellDemoTest {
         assertTrue(verdict().contains("there is no option '--cylinder'; did you mean '--cylinders'?"), verdict());
     }
 
-    private Process start() throws IOException {
+    private Process start(String... more) throws IOException {
         List<String> command = new ArrayList<>(List.of(Path.of(System.getProperty("java.home"), "bin", "java").toString(),
             "--enable-native-access=ALL-UNNAMED", "-Dtickbus.native.dir=" + System.getProperty("tickbus.native.dir"),
             "-cp", nets(), CellDemo.class.getName()));
-        command.addAll(arguments(nets()));
+        command.addAll(arguments(nets(), more));
         return new ProcessBuilder(command).redirectErrorStream(true).start();
     }
 
@@ -197,6 +202,34 @@ class CellDemoTest {
             assertTrue(demo.waitFor(30, TimeUnit.SECONDS));
             assertTrue(demo.exitValue() != 0, "exit code " + demo.exitValue());
             assertFalse(nets.get(0).isAlive());
+        } finally {
+            demo.destroyForcibly();
+        }
+    }
+
+    /** One cylinder a round, so that no round has a mishap. */
+    @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be asked to end, only be killed")
+    void withAPageTheNetsAreSeenLiveAndRoundFollowsRoundUntilASignal() throws Exception {
+        Process demo = start("--cylinders", "1", "--page");
+        try (BufferedReader out = demo.inputReader()) {
+            String line = out.readLine();
+            String page = null;
+            // If this machine stands still, all begins anew, with one cylinder and another page.
+            while (line != null && !(line.contains("cylinders=2 ") && line.contains("; the next one begins"))) {
+                page = line.contains("live at ") ? line.substring(line.indexOf("http")) : page;
+                line = out.readLine();
+            }
+            assertNotNull(line);
+            HttpResponse<String> state = HttpClient.newHttpClient().send(HttpRequest.newBuilder(URI.create(page + "state")).build(),
+                HttpResponse.BodyHandlers.ofString());
+            assertEquals(200, state.statusCode());
+            assertEquals(5, state.body().split("\"phases\":").length - 1, state.body());
+            // Process.destroy() would close the stream from which the verdict is read.
+            demo.toHandle().destroy();
+            List<String> rest = out.lines().toList();
+            assertTrue(rest.get(rest.size() - 1).matches("demo-cell: ok cylinders=[2-9] .*"), rest.toString());
+            assertTrue(demo.waitFor(30, TimeUnit.SECONDS));
         } finally {
             demo.destroyForcibly();
         }

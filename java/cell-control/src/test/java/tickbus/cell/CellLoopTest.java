@@ -74,7 +74,7 @@ class CellLoopTest {
             one.listener((scan, at, transition, choices) ->
                 fired.merge(one.net().name() + "." + one.net().transition(transition).name(), 1, Integer::sum));
         }
-        nets = NetController.of(plc, all);
+        nets = CellNets.controller(plc, all);
         written = machine.signals().stream().filter(Signal::isWritten).toList();
         read = machine.signals().stream().filter(signal -> !signal.isWritten()).toList();
         writes = written.stream().mapToInt(signal -> cell.outputs().indexOf(signal.name())).toArray();
@@ -333,5 +333,25 @@ class CellLoopTest {
         delivers(12);
         assertEquals(0, times("station 1.loader jams"));
         assertEquals(0, cell.counters().palletJams());
+    }
+
+    /** Each stop is longer than every delay, and they come at other moments of the cycle each time. */
+    @Test
+    void whatStoodStillInAnEmergencyStopDoesNotCountAsStuck() {
+        while (cell.delivered().size() < 12) {
+            for (int i = 0; i < 70; i++) {
+                tick();
+            }
+            cell.emergency(true);
+            for (int i = 0; i < 400; i++) {
+                tick();
+            }
+            cell.emergency(false);
+            assertTrue(nanos < 400_000_000_000L, this::state);
+        }
+        assertEquals(List.of(), nets.stops());
+        assertEquals(0, times("station 1.loader jams"));
+        assertEquals(0, fired.entrySet().stream().filter(one -> one.getKey().startsWith("transport.stuck"))
+            .mapToInt(Map.Entry::getValue).sum(), fired.toString());
     }
 }

@@ -1,8 +1,10 @@
 package tickbus.petri;
 
+import java.util.List;
 import java.util.Optional;
 import java.util.Set;
 import java.util.TreeSet;
+import java.util.concurrent.atomic.AtomicReference;
 
 /**
  * Runs a net as a control program, one {@link #scan} after the other.
@@ -16,7 +18,7 @@ import java.util.TreeSet;
  * <p>If something throws, or if the net does not come to rest, the controller stops for good with its outputs at their
  * fail-safe values, and {@link #stop} says why. Not for several threads at once.
  */
-public final class Coordinator {
+public final class Coordinator implements RunningNet {
     /** How many of the last firings a livelock report looks at. */
     private static final int RECENT = 256;
 
@@ -43,6 +45,12 @@ public final class Coordinator {
     private final long[] active;
     private final int[] candidates;
     private final int[] recent = new int[RECENT];
+    /** How often each transition has fired, and when it did last. */
+    private final long[] fired;
+    private final long[] lastFired;
+    /** The conditions that know their parts; null for the others. */
+    private final Conjunction[] conjunctions;
+    private final AtomicReference<NetWatch> watch = new AtomicReference<>();
     private long scans;
     private long now = Long.MIN_VALUE;
     private boolean scanning;
@@ -71,6 +79,12 @@ public final class Coordinator {
         holds = new boolean[transitions];
         active = new long[(net.places().size() + 63) / 64];
         candidates = new int[transitions];
+        fired = new long[transitions];
+        lastFired = new long[transitions];
+        conjunctions = new Conjunction[transitions];
+        for (int t = 0; t < transitions; t++) {
+            conjunctions[t] = bound.conditions[t] instanceof Conjunction parts ? parts : null;
+        }
         enabling = new Enabling(net, new Enabling.Watcher() {
             @Override
             public void enabled(int t) {
@@ -94,8 +108,29 @@ public final class Coordinator {
     }
 
     /** Its net. */
+    @Override
     public PetriNet net() {
         return net;
+    }
+
+    @Override
+    public List<String> inputNames() {
+        return inputs.signals.names();
+    }
+
+    @Override
+    public List<String> outputNames() {
+        return outputs.signals.names();
+    }
+
+    @Override
+    public Condition condition(int transition) {
+        return bound.conditions[transition];
+    }
+
+    /** How often the transition with this index has fired. */
+    public long firings(int transition) {
+        return fired[transition];
     }
 
     /** The marking now, as a copy; before the first scan, the initial one. */
@@ -142,9 +177,15 @@ public final class Coordinator {
         if (scanning) {
             throw new IllegalStateException("a scan within a scan; an action must not call scan");
         }
-        if (stop != null) {
-            return 0;
+        int count = stop == null ? guarded(nanos) : 0;
+        NetWatch viewer = watch.getOpaque();
+        if (viewer != null) {
+            viewer.offer();
         }
+        return count;
+    }
+
+    private int guarded(long nanos) {
         now = nanos;
         scans++;
         scanning = true;
@@ -182,15 +223,15 @@ public final class Coordinator {
         for (int i = 0; i < enabling.enabled.size(); i++) {
             consider(enabling.enabled.get(i));
         }
-        int fired = 0;
+        int count = 0;
         while (ready.size() > 0) {
-            if (fired == bound.limit) {
+            if (count == bound.limit) {
                 livelock();
                 return 0;
             }
             int choices = choose();
             int t = choices == 1 ? candidates[0] : candidates[random.below(choices)];
-            recent[fired++ % RECENT] = t;
+            recent[count++ % RECENT] = t;
             fire(t, choices);
         }
         for (int word = 0; word < active.length; word++) {
@@ -200,7 +241,7 @@ public final class Coordinator {
         }
         step = Step.WRITER;
         bound.writer.write(outputs.signals.values);
-        return fired;
+        return count;
     }
 
     private void act(Action[] actions, Step of, int index) {
@@ -269,6 +310,8 @@ public final class Coordinator {
         step = Step.FIRING;
         at = t;
         enabling.fire(t, now);
+        fired[t]++;
+        lastFired[t] = now;
         if (timed[t] && enabling.enabled.contains(t)) {
             arm(t);
         }
@@ -295,6 +338,53 @@ public final class Coordinator {
             long bit = 1L << p;
             active[p / 64] = enabling.tokens[p] > 0 ? active[p / 64] | bit : active[p / 64] & ~bit;
         }
+    }
+
+    void attach(NetWatch by) {
+        if (!watch.compareAndSet(null, by)) {
+            throw new IllegalStateException("net " + net.name() + " is watched already; close that watch first");
+        }
+    }
+
+    void detach(NetWatch by) {
+        watch.compareAndSet(by, null);
+    }
+
+    @Override
+    public void copyTo(NetState state) {
+        state.scans = scans;
+        state.nanos = now;
+        state.stop = stop;
+        System.arraycopy(inputs.signals.values, 0, state.inputs, 0, state.inputs.length);
+        System.arraycopy(outputs.signals.values, 0, state.outputs, 0, state.outputs.length);
+        System.arraycopy(fired, 0, state.fired, 0, fired.length);
+        System.arraycopy(lastFired, 0, state.lastFired, 0, fired.length);
+        if (scans == 0) {
+            for (int p = 0; p < state.tokens.length; p++) {
+                state.tokens[p] = net.place(p).initial();
+                state.available[p] = state.tokens[p];
+            }
+        } else {
+            enabling.copyTokens(state);
+        }
+        for (int t = 0; t < fired.length; t++) {
+            state.phases[t] = phase(t, state.tokens);
+            state.due[t] = state.phases[t] == NetState.Phase.DELAYED ? enabling.due.at(t) : Long.MAX_VALUE;
+            state.failed[t] = state.phases[t] == NetState.Phase.HELD && conjunctions[t] != null ? conjunctions[t].failed() : -1;
+        }
+    }
+
+    private NetState.Phase phase(int t, int[] tokens) {
+        if (scans == 0) {
+            return net.effects.isEnabled(tokens, t) ? NetState.Phase.READY : NetState.Phase.DISABLED;
+        }
+        if (!enabling.enabled.contains(t)) {
+            return NetState.Phase.DISABLED;
+        }
+        if (!ripe[t]) {
+            return NetState.Phase.DELAYED;
+        }
+        return testedIn[t] == scans && !holds[t] ? NetState.Phase.HELD : NetState.Phase.READY;
     }
 
     private void livelock() {

@@ -90,6 +90,10 @@ public final class Coverability {
 
     private void run() {
         Map<Key, Integer> numbers = new HashMap<>();
+        if (Arrays.stream(plain.initialMarking().tokens).anyMatch(count -> count == OMEGA)) {
+            throw new GaveUpException("net " + net.name() + ": gave up at the initial marking: a place has " + OMEGA
+                + " tokens, as many as can be counted");
+        }
         add(plain.initialMarking().tokens, -1, numbers);
         for (int number = 0; number < markings.size(); number++) {
             int[] tokens = markings.get(number);

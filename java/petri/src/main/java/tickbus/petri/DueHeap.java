@@ -19,6 +19,11 @@ final class DueHeap {
         return size == 0 ? Long.MAX_VALUE : due[heap[0]];
     }
 
+    /** When this index is due; {@link Long#MAX_VALUE} if it is not there. */
+    long at(int index) {
+        return position[index] == 0 ? Long.MAX_VALUE : due[index];
+    }
+
     boolean isDue(long now) {
         return size > 0 && due[heap[0]] <= now && now != Long.MAX_VALUE;
     }

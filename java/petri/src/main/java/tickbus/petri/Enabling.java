@@ -104,6 +104,21 @@ final class Enabling {
         }
     }
 
+    void copyTokens(NetState state) {
+        System.arraycopy(tokens, 0, state.tokens, 0, tokens.length);
+        System.arraycopy(available, 0, state.available, 0, tokens.length);
+    }
+
+    /** The tokens of a place that input and test arcs may use. */
+    int available(int place) {
+        return available[place];
+    }
+
+    /** When tokens of a place become available next; {@link Long#MAX_VALUE} if all are. */
+    long nextOf(int place) {
+        return ages[place] == null ? Long.MAX_VALUE : ages[place].next();
+    }
+
     /** Makes available the tokens of a place that are old enough. */
     void release(int place, long now) {
         while (ages[place].isDue(now)) {

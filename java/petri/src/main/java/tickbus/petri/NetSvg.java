@@ -1,6 +1,5 @@
 package tickbus.petri;
 
-import java.math.BigDecimal;
 import java.util.Arrays;
 import java.util.List;
 
@@ -50,18 +49,41 @@ public final class NetSvg {
 
     /** The net with a marking: one element {@code <svg>} with its own style. */
     public static String write(PetriNet net, Marking marking) {
+        return write(net, marking, "<style>" + STYLE + "</style>\n");
+    }
+
+    /**
+     * The net with a marking, without the style: for a page that has {@link #style} once.
+     *
+     * <p>A view may change it: {@code <g class="net-place" data-place="0">} has its tokens in {@code <g class="net-tokens">},
+     * and {@code <g class="net-transition" data-transition="0">} has the class {@code net-enabled} while it is enabled.
+     */
+    public static String writeWithoutStyle(PetriNet net, Marking marking) {
+        return write(net, marking, "");
+    }
+
+    /** The style of all drawings, as CSS. */
+    public static String style() {
+        return STYLE;
+    }
+
+    /** The dots of few tokens, for views that change the marking: x and y of each, by the number of tokens. */
+    public static int[][] dots() {
+        return Arrays.stream(DOTS).map(int[]::clone).toArray(int[][]::new);
+    }
+
+    private static String write(PetriNet net, Marking marking, String style) {
         NetSvg svg = new NetSvg();
-        svg.draw(Layout.of(net), marking);
+        svg.draw(Layout.of(net), marking, style);
         return svg.out.toString();
     }
 
-    private void draw(Layout layout, Marking marking) {
+    private void draw(Layout layout, Marking marking, String style) {
         PetriNet net = layout.net;
         String width = number(Math.ceil(layout.width));
         String height = number(Math.ceil(layout.height));
         add("<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"net\" role=\"img\" width=\"", width, "\" height=\"", height,
-            "\" viewBox=\"0 0 ", width, " ", height, "\" aria-label=\"", escaped("net " + net.name()), "\">\n<style>", STYLE,
-            "</style>\n");
+            "\" viewBox=\"0 0 ", width, " ", height, "\" aria-label=\"", escaped("net " + net.name()), "\">\n", style);
         List<Arc> arcs = net.arcs();
         for (int a = 0; a < arcs.size(); a++) {
             arc(arcs.get(a), layout.routes[a], layout.curved);
@@ -82,7 +104,7 @@ public final class NetSvg {
     private void place(Layout layout, Place place, int tokens) {
         int node = place.index();
         String limits = (place.isLimited() ? ", at most " + place.capacity() : "")
-            + (place.delay() > 0 ? ", tokens wait " + seconds(place.delay()) : "");
+            + (place.delay() > 0 ? ", tokens wait " + Stepper.seconds(place.delay()) : "");
         add("<g class=\"net-place\" data-place=\"", Integer.toString(node), "\" transform=\"translate(", number(layout.x[node]),
             " ", number(layout.y[node]), ")\"><title>", escaped(place.name() + limits), "</title><circle r=\"",
             number(Layout.RADIUS), "\"/>");
@@ -116,9 +138,9 @@ public final class NetSvg {
         boolean timed = delay.kind() != Delay.Kind.NONE;
         String extra = switch (delay.kind()) {
             case NONE -> "";
-            case FIXED -> ", after " + seconds(delay.first());
-            case EXPONENTIAL -> ", after " + seconds(delay.first()) + " on average";
-            case UNIFORM -> ", after " + seconds(delay.first()) + " to " + seconds(delay.second());
+            case FIXED -> ", after " + Stepper.seconds(delay.first());
+            case EXPONENTIAL -> ", after " + Stepper.seconds(delay.first()) + " on average";
+            case UNIFORM -> ", after " + Stepper.seconds(delay.first()) + " to " + Stepper.seconds(delay.second());
         } + (transition.priority() == 0 ? "" : ", priority " + transition.priority());
         add("<g class=\"net-transition", timed ? " net-timed" : "", enabled ? " net-enabled" : "", "\" data-transition=\"",
             Integer.toString(transition.index()), "\" transform=\"translate(", number(layout.x[node]), " ",
@@ -200,10 +222,6 @@ public final class NetSvg {
 
     private void add(String... parts) {
         Arrays.stream(parts).forEach(out::append);
-    }
-
-    private static String seconds(long nanos) {
-        return new BigDecimal(nanos).movePointLeft(9).stripTrailingZeros().toPlainString() + " s";
     }
 
     /** With at most one decimal. */

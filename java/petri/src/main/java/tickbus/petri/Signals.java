@@ -22,6 +22,10 @@ final class Signals {
         values = new double[names.size()];
     }
 
+    List<String> names() {
+        return names;
+    }
+
     int index(String name) {
         Integer found = index.get(name);
         if (found == null) {

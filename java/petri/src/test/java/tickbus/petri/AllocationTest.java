@@ -31,6 +31,9 @@ class AllocationTest {
             builder.when("start" + i, in -> in.get("tick") > least).during("busy" + i, (in, out) -> out.set("lamp", in.get(0)));
         }
         Coordinator coordinator = builder.build();
+        // Somebody looks at every scan, which is more often than a page does.
+        NetWatch watch = NetWatch.of(coordinator);
+        long looks = 0;
         long now = 0;
         long fired = 0;
         long allocated = Long.MAX_VALUE;
@@ -39,11 +42,14 @@ class AllocationTest {
             long before = threads.getCurrentThreadAllocatedBytes();
             for (int i = 0; i < SCANS; i++) {
                 now += 1_000_000;
+                watch.ask();
                 fired += coordinator.scan(now);
+                looks += watch.isThere() ? 1 : 0;
             }
             allocated = Math.min(allocated, threads.getCurrentThreadAllocatedBytes() - before);
         }
         assertEquals(0, allocated, "bytes in " + SCANS + " scans; " + fired + " firings, " + written[0]);
+        assertEquals(5 * SCANS, looks);
         assertEquals(java.util.Optional.empty(), coordinator.stop());
     }
 }

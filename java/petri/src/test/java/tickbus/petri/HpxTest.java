@@ -19,7 +19,7 @@ class HpxTest {
         LAST_TRAN_ID=2
         DOC_SIZE=SIZE(1000,1000)
         """;
-    private static final String NET = HEAD + place(1_000_000, 3, 2_147_483_647) + place(1_000_001, 0, 9)
+    static final String NET = HEAD + place(1_000_000, 3, 2_147_483_647) + place(1_000_001, 0, 9)
         + label(1_000_000, "store") + label(1_000_001, "belt") + label(0, "load") + label(1, "unload")
         + transition(0, 0, 0, 0) + transition(1, 3, 20, 30)
         + arc(2_000_000, 1_000_000, 0, 2, 0) + arc(2_000_001, 0, 1_000_001, 1, 0) + arc(2_000_002, 1_000_001, 1, 1, 0)

@@ -4,11 +4,12 @@ import java.util.List;
 import java.util.Map;
 import java.util.function.Function;
 import tickbus.petri.Condition;
+import tickbus.petri.Conjunction;
 import tickbus.petri.Coordinator;
 import tickbus.petri.Inputs;
 
 /** The terms of one transition's condition, with their indices looked up; all must hold. */
-final class Conditions implements Condition {
+final class Conditions implements Conjunction {
     private final Latch latch;
     private final Term.Kind[] kinds;
     private final int[] index;
@@ -17,6 +18,8 @@ final class Conditions implements Condition {
     private final Map<String, Coordinator> coordinators;
     private final String[] nets;
     private final Coordinator[] others;
+    private final List<Part> parts;
+    private int failed = -1;
 
     /**
      * Binds terms.
@@ -27,6 +30,7 @@ final class Conditions implements Condition {
     Conditions(List<Term> terms, Latch latch, Function<String, BoundNet> nets, Map<String, Coordinator> coordinators) {
         this.latch = latch;
         this.coordinators = coordinators;
+        parts = terms.stream().map(Term::part).toList();
         int count = terms.size();
         kinds = new Term.Kind[count];
         index = new int[count];
@@ -59,10 +63,22 @@ final class Conditions implements Condition {
     public boolean test(Inputs inputs) {
         for (int i = 0; i < kinds.length; i++) {
             if (!holds(i, inputs)) {
+                failed = i;
                 return false;
             }
         }
+        failed = -1;
         return true;
+    }
+
+    @Override
+    public List<Part> parts() {
+        return parts;
+    }
+
+    @Override
+    public int failed() {
+        return failed;
     }
 
     private boolean holds(int i, Inputs inputs) {

@@ -13,6 +13,7 @@ import tickbus.Tickbus;
 import tickbus.petri.Action;
 import tickbus.petri.Coordinator;
 import tickbus.petri.CoordinatorBuilder;
+import tickbus.petri.NetWatch;
 import tickbus.petri.Stop;
 
 /**
@@ -28,11 +29,17 @@ import tickbus.petri.Stop;
  * ticking thread; the driver stays the caller's, who closes it.
  */
 public final class NetController {
+    private static final String STALE = "the line is stale: no net is scanned";
+
     private final Tickbus bus;
     private final Latch latch;
     private final Map<String, Coordinator> coordinators = new LinkedHashMap<>();
     private final Coordinator[] order;
+    private final NetWatch watch;
     private long lastNanos;
+    /** The input that stops the nets' clock; -1 if none does. For how long it has. */
+    private int stopsClock = -1;
+    private long stoodNanos;
     private long scans;
     private long staleScans;
 
@@ -70,6 +77,7 @@ public final class NetController {
         }
         conditions.forEach(Conditions::connect);
         order = coordinators.values().toArray(Coordinator[]::new);
+        watch = NetWatch.of(List.of(order));
     }
 
     /**
@@ -82,6 +90,22 @@ public final class NetController {
      */
     public static NetController of(Tickbus bus, BoundNet... nets) {
         return new NetController(bus, List.of(nets));
+    }
+
+    /**
+     * Lets the nets' clock stand still while an input is on, such as that of an emergency stop: what stood still then is not
+     * late afterwards. Delays, the times of firings and a page have the time of that clock.
+     *
+     * @param input not 0 while the clock is to stand still
+     * @return this
+     * @throws IllegalArgumentException if there is no such input
+     */
+    public NetController stopClockWhile(String input) {
+        if (bus.signal(input).isWritten()) {
+            throw new IllegalArgumentException("signal '" + input + "' is an output; the clock stands still while an input is on");
+        }
+        stopsClock = latch.names.indexOf(input);
+        return this;
     }
 
     /** Outputs that are on exactly while a place is marked. */
@@ -171,11 +195,15 @@ public final class NetController {
             staleScans++;
         } else {
             latch.take();
+            if (stopsClock >= 0 && latch.now[stopsClock] != 0 && scans > 1) {
+                stoodNanos += nanos - lastNanos;
+            }
             for (Coordinator coordinator : order) {
-                fired += coordinator.scan(nanos);
+                fired += coordinator.scan(nanos - stoodNanos);
             }
         }
         bus.send();
+        watch.offer(status == Status.STALE.code() ? STALE : "");
         lastNanos = nanos;
         return fired;
     }
@@ -219,6 +247,14 @@ public final class NetController {
             throw new IllegalArgumentException("there is no net '" + net + "'; there are " + coordinators.keySet());
         }
         return found;
+    }
+
+    /**
+     * All nets as of one scan, for a page ({@link tickbus.petri.page.NetPage}) or a view of your own: beside each condition
+     * the values of its signals. There is one, so it is for one page, which many may look at. For any thread.
+     */
+    public NetWatch watch() {
+        return watch;
     }
 
     /** Why nets stopped, in the order of the nets; empty while all run. */

@@ -1,6 +1,8 @@
 package tickbus.petri.control;
 
+import java.math.BigDecimal;
 import tickbus.petri.Condition;
+import tickbus.petri.Conjunction;
 
 /**
  * One part of a condition, as it was written.
@@ -22,6 +24,28 @@ record Term(Kind kind, String name, String place, double value, Condition code) 
 
     static Term of(Kind kind, String signal, double value) {
         return new Term(kind, signal, null, value, null);
+    }
+
+    /** As views show it. */
+    Conjunction.Part part() {
+        String text = switch (kind) {
+            case ON -> name + " on";
+            case OFF -> name + " off";
+            case RISING -> name + " rising";
+            case FALLING -> name + " falling";
+            case AT_LEAST -> name + " ≥ " + number();
+            case BELOW -> name + " < " + number();
+            case EQUAL -> name + " = " + number();
+            case MARKED -> name + ": " + place + " marked";
+            case UNMARKED -> name + ": " + place + " not marked";
+            case CODE -> "a condition in code";
+        };
+        boolean ofPlace = kind.isOfPlace();
+        return new Conjunction.Part(text, ofPlace || kind == Kind.CODE ? null : name, ofPlace ? name : null, place);
+    }
+
+    private String number() {
+        return Double.isFinite(value) ? BigDecimal.valueOf(value).stripTrailingZeros().toPlainString() : Double.toString(value);
     }
 
     Term as(Kind other) {

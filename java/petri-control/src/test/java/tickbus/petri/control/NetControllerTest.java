@@ -17,8 +17,12 @@ import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
+import tickbus.petri.Conjunction;
+import tickbus.petri.Delay;
+import tickbus.petri.NetState;
 import tickbus.petri.PetriNet;
 import tickbus.petri.Reachability;
+import tickbus.petri.RunningNet;
 import tickbus.petri.Stop;
 import tickbus.petri.Verdict;
 
@@ -108,6 +112,53 @@ class NetControllerTest {
         assertEquals(1, scan());
         assertFalse(out("Gripper") || out("Brake"));
         assertEquals(plc.statistics().get("ticks"), Long.toString(nets.scans()));
+    }
+
+    @Test
+    void aWatchShowsWhichSignalHoldsATransitionBack() {
+        bind(bound());
+        machine.signal("Piece at stop").setBoolean(true);
+        scan();
+        machine.signal("Piece at stop").setBoolean(false);
+        scan();
+        machine.signal("Piece at stop").setBoolean(true);
+        machine.signal("Gripper closed").setBoolean(true);
+        machine.signal("Weight").set(120);
+        nets.watch().ask();
+        scan();
+        assertTrue(nets.watch().isThere());
+        NetState state = nets.watch().state(0);
+        RunningNet shown = nets.watch().nets().get(0);
+        assertEquals(NetState.Phase.HELD, state.phase(1));
+        List<Conjunction.Part> parts = ((Conjunction) shown.condition(1)).parts();
+        assertEquals(List.of("Gripper closed on", "Weight ≥ 50", "Weight < 100"), parts.stream().map(Conjunction.Part::text).toList());
+        assertEquals(2, state.failed(1));
+        assertEquals("Weight", parts.get(2).input());
+        assertEquals(120, state.input(shown.inputNames().indexOf("Weight")));
+        assertEquals(1, state.output(shown.outputNames().indexOf("Gripper")));
+        assertEquals("", nets.watch().note());
+    }
+
+    @Test
+    void theClockOfTheNetsStandsStillWhileAnInputIsOn() {
+        PetriNet late = PetriNet.named("late").place("a", 1).place("b").transition("go").input("a").output("b")
+            .delay(Delay.fixed(5_000_000)).build();
+        nets = NetController.of(plc, BoundNet.of(late)).stopClockWhile("Piece at stop");
+        machine.receive(0);
+        nets.scan(0);
+        scan();
+        machine.signal("Piece at stop").setBoolean(true);
+        for (int i = 0; i < 20; i++) {
+            assertEquals(0, scan());
+        }
+        machine.signal("Piece at stop").setBoolean(false);
+        int scans = 0;
+        while (scan() == 0) {
+            scans++;
+        }
+        assertTrue(scans >= 3 && scans <= 5, scans + " scans of 1 ms after one before the stop");
+        assertThrows(IllegalArgumentException.class, () -> nets.stopClockWhile("Gripper"));
+        assertThrows(IllegalArgumentException.class, () -> nets.stopClockWhile("Piece"));
     }
 
     @Test

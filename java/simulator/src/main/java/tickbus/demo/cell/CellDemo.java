@@ -52,6 +52,10 @@ public final class CellDemo {
     private final CellOperator operator;
     private Simulator simulator;
     private Map<String, String> nets = Map.of();
+    /** When the present round of cylinders began. */
+    private long roundNanos;
+    /** What the last whole round came to; null in the first one. */
+    private String lastRound;
 
     private CellDemo(CellOptions options, PrintStream out, List<String> notes) {
         this.options = options;
@@ -145,11 +149,12 @@ public final class CellDemo {
                 timeline.add(0, "reader", "on " + port);
                 operate(plc, guard);
             }
-            return check();
+            return lastRound == null ? check() : lastRound;
         } catch (IOException e) {
             return VERDICT.failed("the folder of the nets cannot be made, or emptied: " + e);
         } catch (RuntimeException | Error e) {
-            return VERDICT.failed(e, err);
+            // Ctrl-C, which ends rounds without an end, may have reached the nets' process first.
+            return lastRound != null && guard.triggered() ? lastRound : VERDICT.failed(e, err);
         }
     }
 
@@ -183,6 +188,9 @@ public final class CellDemo {
                 .forEach(name -> command.add("-D" + name + "=" + System.getProperty(name)));
         command.addAll(List.of("tickbus.cell.CellControl", cfg.toString(), client,
                 options.identification().toString(), CellPage.nets(options).toString()));
+        if (options.page() != null) {
+            command.add(options.page());
+        }
         return command;
     }
 
@@ -190,6 +198,9 @@ public final class CellDemo {
         simulator.unconnected().forEach(name -> timeline.add(0, "note", "no row of the control table writes " + name));
         simulator.run(TickMode.REAL_TIME, () -> {
             if (guard.triggered()) {
+                if (lastRound != null) {
+                    return false;
+                }
                 throw new DemoFailure("interrupted");
             }
             if (simulator.ticks() > 0) {
@@ -208,14 +219,22 @@ public final class CellDemo {
             }
             operator.act(simulator.simulationNanos());
             boolean over = operator.done() && !cell.showsRunning() && nets.containsKey("markings");
-            if (!over && simulator.simulationNanos() >= options.timeLimitNanos()) {
+            if (!over && simulator.simulationNanos() - roundNanos >= options.timeLimitNanos()) {
                 throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
-                        + " of simulation time is over with " + cell.delivered().size() + " of " + options.cylinders()
+                        + " of simulation time is over with " + cell.delivered().size() + " of " + operator.ordered()
                         + " cylinders" + (nets.containsKey("markings") ? "" : "; the analysis of the nets is not done"));
+            }
+            if (over && options.page() != null) {
+                nets = plc.statistics();
+                lastRound = check();
+                timeline.add(simulator.simulationNanos(), "round", lastRound + "; the next one begins, until Ctrl-C");
+                roundNanos = simulator.simulationNanos();
+                operator.again();
+                return true;
             }
             return !over;
         });
-        if (!operator.done()) {
+        if (lastRound == null && !operator.done()) {
             throw new DemoFailure("interrupted");
         }
         nets = plc.statistics();
@@ -224,8 +243,8 @@ public final class CellDemo {
     /** The verdict when all cylinders are out. */
     private String check() {
         Counters counters = cell.counters();
-        must(cell.delivered().size() == options.cylinders(), "there are " + cell.delivered().size() + " cylinders instead of "
-                + options.cylinders());
+        int ordered = operator.ordered();
+        must(cell.delivered().size() == ordered, "there are " + cell.delivered().size() + " cylinders instead of " + ordered);
         must(cell.delivered().stream().allMatch(Workpiece::isComplete), "a cylinder is not complete; the report has them all");
         long kinds = cell.delivered().stream().map(PieceKind::of).distinct().count();
         int all = PieceKind.values().length - 1;
@@ -249,7 +268,7 @@ public final class CellDemo {
         equal("stops", 0);
         must("true".equals(nets.get("all_markings")), "the analysis of the nets gave up at " + nets.get("markings") + " markings");
         equal("deadlocks", 0);
-        return VERDICT.ok("cylinders=" + options.cylinders() + " kinds=" + CellReport.kinds(cell) + " deadlocks=0 markings="
+        return VERDICT.ok("cylinders=" + ordered + " kinds=" + CellReport.kinds(cell) + " deadlocks=0 markings="
                 + nets.get("markings") + " jams=" + (counters.loaderJams() + counters.palletJams()) + " recovered="
                 + (number("loader_freed") + number("pallet_freed")) + " vacuum_lost=" + counters.vacuumLosses() + " missed="
                 + counters.carriersMissed() + " refills="

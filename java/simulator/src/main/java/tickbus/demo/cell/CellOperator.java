@@ -18,6 +18,9 @@ final class CellOperator {
     private static final int FIRST_PARTS = 7;
     private static final long WALK_NANOS = 500_000_000;
     private static final long SEED = 12;
+    /** In a later round station 1 has found its magazine empty: when the operator presses the rearm button, and for how long. */
+    private static final long REARM_AFTER_NANOS = 1_000_000_000;
+    private static final long PRESS_NANOS = 200_000_000;
 
     private final ManufacturingCell cell;
     private final Timeline timeline;
@@ -28,6 +31,10 @@ final class CellOperator {
     private long emptySince = -1;
     private boolean begun;
     private boolean jammed;
+    /** Earlier rounds, and the refills in them. */
+    private int rounds;
+    private int refillsBefore;
+    private long rearmAt = Long.MAX_VALUE;
 
     CellOperator(ManufacturingCell cell, Timeline timeline, int cylinders) {
         this.cell = cell;
@@ -45,7 +52,19 @@ final class CellOperator {
     }
 
     boolean done() {
-        return cell.delivered().size() >= cylinders;
+        return cell.delivered().size() >= ordered();
+    }
+
+    /** How many cylinders there are to be when it is {@link #done}. */
+    int ordered() {
+        return (rounds + 1) * cylinders;
+    }
+
+    /** As many cylinders again, with the same mishaps. */
+    void again() {
+        rounds++;
+        refillsBefore = refills;
+        begun = false;
     }
 
     /** Before each tick. */
@@ -54,12 +73,13 @@ final class CellOperator {
             begun = true;
             begin(nanos);
         }
+        rearm(nanos);
         List<Workpiece> out = cell.delivered();
         for (; delivered < out.size(); delivered++) {
             Workpiece piece = out.get(delivered);
             timeline.add(nanos, "exit", "cylinder " + piece.number() + ", " + PieceKind.of(piece).name().toLowerCase(Locale.ROOT)
                     .replace('_', ' '));
-            mishapAfter(delivered + 1, nanos);
+            mishapAfter(delivered + 1 - rounds * cylinders, nanos);
         }
         if (cell.isJammed() != jammed) {
             jammed = !jammed;
@@ -78,11 +98,27 @@ final class CellOperator {
         }
         Collections.shuffle(sleeves, new Random(SEED));
         cell.fillSleeves(sleeves);
-        cell.fillParts(FIRST_PARTS);
+        if (rounds == 0) {
+            // Later rounds begin with what the refill has left.
+            cell.fillParts(FIRST_PARTS);
+        } else {
+            rearmAt = nanos + REARM_AFTER_NANOS;
+        }
         cell.fillHeads(cylinders);
         cell.fillCaps(cylinders);
         cell.start(true);
         timeline.add(nanos, "operator", cylinders + " sleeves are in the magazine, and the cell is started");
+    }
+
+    private void rearm(long nanos) {
+        if (rearmAt != Long.MAX_VALUE && nanos >= rearmAt + PRESS_NANOS) {
+            cell.rearm(false);
+            rearmAt = Long.MAX_VALUE;
+            refills++;
+            refillsBefore++;
+        } else if (nanos >= rearmAt) {
+            cell.rearm(true);
+        }
     }
 
     private void mishapAfter(int count, long nanos) {
@@ -109,7 +145,7 @@ final class CellOperator {
         } else if (emptySince < 0) {
             emptySince = nanos;
             timeline.add(nanos, "station 3", "its magazine is empty");
-        } else if (refills == 0 && nanos - emptySince >= WALK_NANOS) {
+        } else if (refills == refillsBefore && nanos - emptySince >= WALK_NANOS) {
             refills++;
             cell.fillParts(cylinders);
             timeline.add(nanos, "operator", "the magazine is filled");

@@ -1,6 +1,7 @@
 package tickbus.demo.cell;
 
 import java.nio.file.Path;
+import java.util.ArrayList;
 import java.util.List;
 import tickbus.simulator.Arguments;
 
@@ -17,9 +18,13 @@ import tickbus.simulator.Arguments;
  * @param stepNanos simulation step size
  * @param cylinders cylinders to make
  * @param timeLimitNanos longest simulation time
+ * @param page where the nets are shown live, as host and port; null for nowhere
  */
 record CellOptions(Path drivers, Path control, Path report, String nets, Path identification, Path plc, Path recording,
-        long stepNanos, int cylinders, long timeLimitNanos) {
+        long stepNanos, int cylinders, long timeLimitNanos, String page) {
+    /** This computer alone, at any port. */
+    private static final String ANY_PORT = "127.0.0.1:0";
+
     static final String USAGE = """
             usage: demo-cell --drivers DIR --control FILE --report FILE --nets CLASSPATH --identification FILE [options]
 
@@ -37,19 +42,31 @@ record CellOptions(Path drivers, Path control, Path report, String nets, Path id
               --step TIME        simulation step size (default 2ms)
               --cylinders N      cylinders to make, of all kinds in turn (default 12)
               --time-limit TIME  longest simulation time (default 1min)
+              --page [HOST:PORT] shows the nets live in a browser, and goes on with as many cylinders again and again,
+                                 each time with its mishaps, until Ctrl-C (default 127.0.0.1, any port)
 
             The last line is "demo-cell: ok …" with exit code 0, or "demo-cell: failed reason=…" with exit
             code 1; 2 if the command line was wrong, 130 after Ctrl-C.
             """;
 
     static CellOptions read(String[] args) {
-        Arguments arguments = new Arguments(args, List.of("--drivers", "--control", "--report", "--nets",
-                "--identification", "--plc", "--recording", "--step", "--cylinders", "--time-limit"), List.of());
+        Arguments arguments = new Arguments(withPort(args), List.of("--drivers", "--control", "--report", "--nets",
+                "--identification", "--plc", "--recording", "--step", "--cylinders", "--time-limit", "--page"), List.of());
         return new CellOptions(arguments.path("--drivers"), arguments.path("--control"), arguments.path("--report"),
                 String.valueOf(arguments.path("--nets")), arguments.path("--identification"),
                 arguments.has("--plc") ? arguments.path("--plc") : null,
                 arguments.has("--recording") ? arguments.path("--recording") : null,
                 arguments.duration("--step", "2ms"), arguments.count("--cylinders", 12),
-                arguments.duration("--time-limit", "1min"));
+                arguments.duration("--time-limit", "1min"), arguments.has("--page") ? String.join(" ", arguments.words("--page")) : null);
+    }
+
+    /** Behind {@code --page} nothing need stand. */
+    private static String[] withPort(String[] args) {
+        List<String> words = new ArrayList<>(List.of(args));
+        int page = words.indexOf("--page");
+        if (page >= 0 && (page + 1 == words.size() || words.get(page + 1).startsWith("--"))) {
+            words.add(page + 1, ANY_PORT);
+        }
+        return words.toArray(String[]::new);
     }
 }

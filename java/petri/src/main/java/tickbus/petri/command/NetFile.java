@@ -1,0 +1,103 @@
+package tickbus.petri.command;
+
+import java.io.IOException;
+import java.io.InputStream;
+import java.io.PrintStream;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.NoSuchFileException;
+import java.nio.file.Path;
+import java.util.HashMap;
+import java.util.List;
+import java.util.Locale;
+import java.util.Map;
+import tickbus.petri.Delay;
+import tickbus.petri.Hpx;
+import tickbus.petri.HpsimText;
+import tickbus.petri.Imported;
+import tickbus.petri.PetriNet;
+import tickbus.petri.Pnml;
+
+/** Reads a net from a file of any of the formats. */
+final class NetFile {
+    static final List<String> OPTIONS = List.of("--unit", "--delay");
+    private static final int BEGINNING = 512;
+
+    private NetFile() {
+    }
+
+    /** Reads it; what had to be assumed goes to {@code err}. */
+    static PetriNet read(CommandLine line, PrintStream err) throws IOException {
+        Path file = Path.of(line.file());
+        String unit = line.one("--unit", null);
+        Map<String, Delay> delays = delays(line);
+        long nanos = unit == null ? 1_000_000 : time("--unit", unit);
+        if (nanos < 1) {
+            throw new UsageException("--unit " + unit + ": expected more than 0");
+        }
+        String format = format(file);
+        if (unit != null && !format.equals("hpx")) {
+            throw new UsageException("--unit is for .hpx files; " + file + " is none");
+        }
+        if (!delays.isEmpty() && !format.equals("text")) {
+            throw new UsageException("--delay is for HPSim's text; " + file + " has its delays itself");
+        }
+        if (format.equals("pnml")) {
+            return Pnml.read(file);
+        }
+        Imported imported = format.equals("hpx") ? Hpx.read(file, nanos) : HpsimText.read(file, delays);
+        imported.warnings().forEach(warning -> err.println("warning: " + warning));
+        if (format.equals("hpx") && unit == null
+                && imported.net().transitions().stream().anyMatch(one -> one.delay().kind() != Delay.Kind.NONE)) {
+            err.println("note: the delays of " + file + " have no unit; they are taken as milliseconds, --unit says otherwise");
+        }
+        for (String name : delays.keySet()) {
+            // Names what there is.
+            imported.net().transition(name);
+        }
+        return imported.net();
+    }
+
+    private static Map<String, Delay> delays(CommandLine line) {
+        Map<String, Delay> delays = new HashMap<>();
+        for (String one : line.all("--delay")) {
+            int equals = one.lastIndexOf('=');
+            if (equals < 1) {
+                throw new UsageException("--delay " + one + ": expected NAME=TIME, NAME=exp TIME or NAME=TIME..TIME");
+            }
+            try {
+                delays.put(one.substring(0, equals), Times.delay(one.substring(equals + 1)));
+            } catch (IllegalArgumentException wrong) {
+                throw new UsageException("--delay " + one + ": " + wrong.getMessage());
+            }
+        }
+        return delays;
+    }
+
+    private static long time(String option, String text) {
+        try {
+            return Times.nanos(text);
+        } catch (IllegalArgumentException wrong) {
+            throw new UsageException(option + ": " + wrong.getMessage());
+        }
+    }
+
+    /** By the name, or else by how the file begins. */
+    private static String format(Path file) throws IOException {
+        String name = file.toString().toLowerCase(Locale.ROOT);
+        if (!Files.exists(file)) {
+            throw new NoSuchFileException(file.toString());
+        }
+        if (name.endsWith(".pnml") || name.endsWith(".xml")) {
+            return "pnml";
+        }
+        if (name.endsWith(".hpx")) {
+            return "hpx";
+        }
+        String text;
+        try (InputStream bytes = Files.newInputStream(file)) {
+            text = new String(bytes.readNBytes(BEGINNING), StandardCharsets.UTF_8).replaceFirst("^\\uFEFF?\\s*", "");
+        }
+        return text.startsWith("<") ? "pnml" : text.startsWith("[") ? "hpx" : "text";
+    }
+}

@@ -1,0 +1,2 @@
+/** The command of this jar: step through a net, analyse it, draw it. */
+package tickbus.petri.command;

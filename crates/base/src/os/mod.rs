@@ -18,6 +18,7 @@ mod pseudo_terminal;
 mod serial;
 #[cfg(unix)]
 mod shared_memory;
+mod time_stamp_counter;
 mod timer_slack;
 
 pub use library::{Library, one_line};
@@ -40,4 +41,5 @@ pub use serial::SerialPort;
 pub use serial::{Parity, SerialSettings};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;
+pub use time_stamp_counter::TimeStampCounter;
 pub use timer_slack::wake_on_time;

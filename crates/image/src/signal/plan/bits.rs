@@ -1,15 +1,13 @@
 //! Runs of BOOL signals: bytes that are all signals, and bytes of which only some bits are.
 
-use std::array;
-
-use wide::{CmpNe, f64x4};
+use wide::{CmpNe, f64x2};
 
 use super::run::{Member, Run};
 use super::{Conversions, index};
 use crate::signal::Slot;
 
-/// Arranges `members`, all BOOL, into runs. A byte with any of them is encoded as a whole, by one run.
-pub(super) fn lay_out(members: &[Member]) -> Vec<Box<dyn Run>> {
+/// Arranges `members`, all BOOL. A byte with any of them is encoded as a whole, either by the octets or by a run.
+pub(super) fn lay_out(members: &[Member]) -> (Octets, Option<Box<dyn Run>>) {
     let mut members = members.to_vec();
     members.sort_by_key(|(_, signal)| (signal.byte, signal.bit));
     let mut octets = Vec::new();
@@ -20,19 +18,14 @@ pub(super) fn lay_out(members: &[Member]) -> Vec<Box<dyn Run>> {
             None => partials.push(in_byte),
         }
     }
-    let mut runs: Vec<Box<dyn Run>> = Vec::new();
-    if !octets.is_empty() {
-        runs.push(Box::new(Octets(octets)));
-    }
-    if !partials.bytes.is_empty() {
-        runs.push(Box::new(partials));
-    }
-    runs
+    let partials = (!partials.bytes.is_empty()).then(|| Box::new(partials) as Box<dyn Run>);
+    (Octets(octets), partials)
 }
 
-/// Bytes whose bits 0 to 7 are eight consecutive slots.
-#[derive(Debug)]
-struct Octets(Vec<Octet>);
+/// Bytes whose bits 0 to 7 are eight consecutive slots. Not among the runs, since groups of BOOLs are what many machines
+/// consist of: they are converted without a call.
+#[derive(Debug, Default)]
+pub(super) struct Octets(Vec<Octet>);
 
 #[derive(Debug)]
 struct Octet {
@@ -58,7 +51,33 @@ impl Octet {
 }
 
 impl Octets {
-    /// Encodes values some of which are NaN.
+    /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN, or was infinite.
+    #[inline]
+    pub(super) fn word(&self, slots: &[Slot]) -> Option<u64> {
+        let (mut word, mut sum) = (0, f64x2::ZERO);
+        for octet in &self.0 {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
+                word |= u64::from(pack(slots, &mut sum)) << (8 * octet.byte);
+            }
+        }
+        (!has_nan(sum)).then_some(word)
+    }
+
+    /// Encodes the slots into their bytes of the frame.
+    #[inline]
+    pub(super) fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+        let mut sum = f64x2::ZERO;
+        for octet in &self.0 {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
+                frame[octet.byte as usize] = pack(slots, &mut sum);
+            }
+        }
+        if has_nan(sum) {
+            self.encode_any(slots, frame, conversions);
+        }
+    }
+
+    /// Encodes values some of which may be NaN.
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
@@ -68,22 +87,9 @@ impl Octets {
             }
         }
     }
-}
 
-impl Run for Octets {
-    fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        let mut nans = f64x4::ZERO;
-        for octet in &self.0 {
-            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                frame[octet.byte as usize] = pack(slots, &mut nans);
-            }
-        }
-        if nans.any() {
-            self.encode_any(slots, frame, conversions);
-        }
-    }
-
-    fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
+    /// Decodes the bytes of the frame into their slots.
+    pub(super) fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
         for octet in &self.0 {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk_mut() {
                 unpack(frame[octet.byte as usize], slots);
@@ -157,15 +163,23 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0; notes in `nans` whether any of them is NaN, and then the byte is
-/// wrong.
+/// Eight slots as one byte, the first slot as bit 0. Adds them to `sum`: that is NaN when one of them is, and then the byte
+/// is wrong.
 #[inline]
-fn pack(slots: &[Slot; 8], nans: &mut f64x4) -> u8 {
-    let [low, high] = [0, 4].map(|first| f64x4::new(array::from_fn(|i| slots[first + i].real())));
-    *nans = *nans | low.is_nan() | high.is_nan();
-    let [low_bits, high_bits] = [low, high].map(|four| four.cmp_ne(f64x4::ZERO).move_mask());
-    let [byte, ..] = (low_bits | high_bits << 4).to_le_bytes();
+fn pack(slots: &[Slot; 8], sum: &mut f64x2) -> u8 {
+    let pair = |first: usize| f64x2::new([slots[first].real(), slots[first + 1].real()]);
+    let pairs = [pair(0), pair(2), pair(4), pair(6)];
+    *sum += (pairs[0] + pairs[1]) + (pairs[2] + pairs[3]);
+    let [a, b, c, d] = pairs.map(|pair| pair.cmp_ne(f64x2::ZERO).move_mask());
+    let [byte, ..] = (a | b << 2 | c << 4 | d << 6).to_le_bytes();
     byte
+}
+
+/// Whether one of the values that were added is NaN. Infinities of both signs also make one: rare enough to be looked at
+/// value by value.
+#[inline]
+fn has_nan(sum: f64x2) -> bool {
+    sum.is_nan().move_mask() != 0
 }
 
 /// As [`pack`], checking each value; NaN slots take their bit from `fail_safe` and are counted.

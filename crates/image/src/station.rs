@@ -474,6 +474,44 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_at_hand_as_a_word_is_written_like_any_other() {
+        let (mut tick, mut bus) = one_latched_byte();
+        for level in [0x80, 1, 0, 0] {
+            tick.write_word(Nanos(1), level);
+        }
+        assert_eq!(bus.outgoing(Nanos(2), None), [1], "the pulse is not lost");
+        bus.sent();
+        assert_eq!(bus.outgoing(Nanos(2), None), [0]);
+        tick.write(Nanos(5), |bytes| bytes[0] = 6);
+        tick.write_word(Nanos(7), 6);
+        assert_eq!(bus.tick_age(Nanos(8)), Nanos(1), "alive, though unchanged");
+        assert_eq!(bus.outgoing(Nanos(8), None), [6]);
+        tick.write_word(Nanos(8), 2);
+        assert_eq!(bus.outgoing(Nanos(8), None), [2]);
+    }
+
+    #[test]
+    fn a_tick_without_news_has_nothing_to_read() {
+        let (mut tick, mut bus) = one_latched_byte();
+        assert_eq!(tick.unchanged(Nanos(1)), Some((Nanos::MAX, 0)));
+        bus.received(Nanos(5), &[1]);
+        bus.received(Nanos(5), &[0]);
+        assert_eq!(tick.unchanged(Nanos(8)), None, "a frame");
+        read(&mut tick, 8);
+        assert_eq!(tick.unchanged(Nanos(9)), None, "the pulse is still shown");
+        read(&mut tick, 9);
+        assert_eq!(tick.unchanged(Nanos(9)), None, "and its end once more");
+        read(&mut tick, 10);
+        assert_eq!(tick.unchanged(Nanos(10)), Some((Nanos(5), 2)));
+        tick.shown_instead();
+        assert_eq!(
+            tick.unchanged(Nanos(10)),
+            None,
+            "the levels are to be shown"
+        );
+    }
+
+    #[test]
     fn a_pulse_between_two_exchanges_is_sent_until_one_was_completed() {
         let (mut tick, mut bus) = one_latched_byte();
         for level in [0, 1, 0] {

@@ -203,7 +203,11 @@ mod tests {
             assert!(now >= last, "back from {last} to {now}");
             last = now;
         }
-        assert!(computer.looks <= 11, "one in a millisecond: {}", computer.looks);
+        assert!(
+            computer.looks <= 11,
+            "one in a millisecond: {}",
+            computer.looks
+        );
     }
 
     #[test]

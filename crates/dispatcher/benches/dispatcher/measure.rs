@@ -82,7 +82,11 @@ pub(crate) fn run() {
     let connect = |count| {
         let mut all = vec![ours(address, count), bare(hub::start(), count)];
         all.extend(nats.as_ref().map(|server| through_nats(server, count)));
-        all.extend(broker.as_ref().map(|broker| through_mosquitto(broker, count)));
+        all.extend(
+            broker
+                .as_ref()
+                .map(|broker| through_mosquitto(broker, count)),
+        );
         all
     };
     let mut one = connect(1);

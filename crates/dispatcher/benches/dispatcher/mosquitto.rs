@@ -28,12 +28,14 @@ impl Mosquitto {
         )
         .expect("room in the file");
         // Debian keeps it where only administrators look.
-        let child = ["mosquitto", "/usr/sbin/mosquitto"].iter().find_map(|name| {
-            let mut command = Command::new(name);
-            command.arg("-c").arg(settings.path());
-            let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
-            quiet.spawn().ok()
-        });
+        let child = ["mosquitto", "/usr/sbin/mosquitto"]
+            .iter()
+            .find_map(|name| {
+                let mut command = Command::new(name);
+                command.arg("-c").arg(settings.path());
+                let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+                quiet.spawn().ok()
+            });
         let mut broker = Self {
             child: child?,
             address,

@@ -213,3 +213,74 @@ fn unpack(byte: u8, slots: &mut [Slot; 8]) {
     low.copy_from_slice(&NIBBLES[usize::from(byte & 15)]);
     high.copy_from_slice(&NIBBLES[usize::from(byte >> 4)]);
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use crate::signal::{Area, DataType, Plan, Signal, SignalTable, Slot};
+
+    /// BOOLs in this many bytes without gaps.
+    fn bools(bytes: usize) -> Plan {
+        let signal = |at: usize| Signal {
+            bit: u8::try_from(at % 8).expect("a bit"),
+            fail_safe: Slot::from_real(1.0),
+            ..Signal::new(format!("{at}"), Area::Input, at / 8, DataType::Bool)
+        };
+        let signals = (0..8 * bytes).map(signal).collect();
+        Plan::new(
+            &SignalTable::of_one_station(bytes, 0, signals),
+            0,
+            Area::Input,
+        )
+    }
+
+    #[test]
+    fn the_word_of_a_frame_has_its_bytes() {
+        for bytes in 1..=9 {
+            let plan = bools(bytes);
+            let mut slots = vec![Slot::from_real(0.0); 8 * bytes];
+            for step in 0..200_usize {
+                let values = [1.0, 0.0, -0.0, -3.5, 1e-300, f64::INFINITY];
+                slots[step * 7 % (8 * bytes)] = Slot::from_real(values[step % values.len()]);
+                let mut frame = vec![0; bytes];
+                plan.encode(&slots, &mut frame);
+                let mut expected = [0; 8];
+                if bytes <= 8 {
+                    expected[..bytes].copy_from_slice(&frame);
+                    assert_eq!(plan.word(&slots), Some(u64::from_le_bytes(expected)));
+                } else {
+                    assert_eq!(plan.word(&slots), None, "it has more than a word");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn values_that_are_looked_at_one_by_one_have_no_word() {
+        let plan = bools(2);
+        let mut frame = [0; 2];
+        let mut slots = vec![Slot::from_real(1.0); 16];
+        slots[9] = Slot::from_real(f64::NAN);
+        assert_eq!(plan.word(&slots), None);
+        assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 1);
+        assert_eq!(frame, [0xFF; 2], "the fail-safe value is 1");
+        // Their sum is NaN, though neither is.
+        slots[9] = Slot::from_real(f64::INFINITY);
+        slots[3] = Slot::from_real(f64::NEG_INFINITY);
+        assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 0);
+        assert_eq!(frame, [0xFF; 2]);
+    }
+
+    #[test]
+    fn a_frame_that_is_not_all_octets_has_no_word() {
+        let mut signals: Vec<_> = (0..8)
+            .map(|bit| Signal {
+                bit,
+                ..Signal::new(format!("{bit}"), Area::Input, 0, DataType::Bool)
+            })
+            .collect();
+        signals.push(Signal::new("byte", Area::Input, 1, DataType::Byte));
+        let table = SignalTable::of_one_station(2, 0, signals);
+        let slots = vec![Slot::from_real(1.0); 9];
+        assert_eq!(Plan::new(&table, 0, Area::Input).word(&slots), None);
+    }
+}

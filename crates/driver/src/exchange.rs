@@ -64,7 +64,7 @@ impl Driver {
             code: station.status,
             sequence: arrival.sequence,
             age: arrival.age,
-            granted: self.given.unwrap_or(now - self.first_now),
+            granted: self.given.unwrap_or_else(|| now - self.first_now),
         };
         self.last = found;
         self.counters.count(found.code);

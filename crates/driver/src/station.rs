@@ -56,6 +56,7 @@ impl Station {
         }
     }
 
+    #[inline(never)]
     fn send_any(&mut self, now: Nanos, slots: &[Slot], counters: &mut TickCounters) {
         let encode = &self.encode;
         let bent = self.tick.write(now, |frame| encode.encode(slots, frame));

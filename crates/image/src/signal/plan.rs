@@ -82,7 +82,7 @@ impl Plan {
             .map_or(station_bytes, |end| end.max(station_bytes));
         let gaps = gaps(&members, bytes);
         let (octets, mut runs) = runs(&members);
-        let is_word = runs.is_empty() && bytes <= size_of::<u64>();
+        let is_word = runs.is_empty() && bytes <= size_of::<u64>() && octets.fit_into_a_word();
         if !gaps.is_empty() {
             runs.push(Box::new(Gaps(gaps)));
         }

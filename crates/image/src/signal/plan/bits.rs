@@ -19,13 +19,20 @@ pub(super) fn lay_out(members: &[Member]) -> (Octets, Option<Box<dyn Run>>) {
         }
     }
     let partials = (!partials.bytes.is_empty()).then(|| Box::new(partials) as Box<dyn Run>);
-    (Octets(octets), partials)
+    (Octets::new(octets), partials)
 }
 
 /// Bytes whose bits 0 to 7 are eight consecutive slots. Not among the runs, since groups of BOOLs are what many machines
 /// consist of: they are converted without a call.
-#[derive(Debug, Default)]
-pub(super) struct Octets(Vec<Octet>);
+#[derive(Debug)]
+pub(super) struct Octets {
+    all: Vec<Octet>,
+    /// The first of their slots.
+    first: usize,
+    /// Per octet, how many eights of slots are before it from the first on, and its bit in a word; if all of them stand
+    /// so, in up to eight bytes.
+    in_word: Option<Vec<(usize, u32)>>,
+}
 
 #[derive(Debug)]
 struct Octet {
@@ -51,14 +58,34 @@ impl Octet {
 }
 
 impl Octets {
-    /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN, or was infinite.
+    fn new(all: Vec<Octet>) -> Self {
+        let slots = all.iter().map(|octet| octet.slot as usize);
+        let first = slots.min().unwrap_or_default();
+        let place = |octet: &Octet| {
+            let from_first = octet.slot as usize - first;
+            let is_fit = from_first.is_multiple_of(8) && octet.byte < 8;
+            is_fit.then_some((from_first / 8, 8 * octet.byte))
+        };
+        Self {
+            in_word: all.iter().map(place).collect(),
+            first,
+            all,
+        }
+    }
+
+    /// Whether [`word`](Self::word) can be asked for.
+    pub(super) fn fit_into_a_word(&self) -> bool {
+        self.in_word.is_some()
+    }
+
+    /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN, or if there are
+    /// infinite ones of both signs.
     #[inline]
     pub(super) fn word(&self, slots: &[Slot]) -> Option<u64> {
         let (mut word, mut sum) = (0, f64x2::ZERO);
-        for octet in &self.0 {
-            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                word |= u64::from(pack(slots, &mut sum)) << (8 * octet.byte);
-            }
+        let (eights, _) = slots.get(self.first..)?.as_chunks::<8>();
+        for (at, bit) in self.in_word.as_deref()? {
+            word |= u64::from(pack(eights.get(*at)?, &mut sum)) << bit;
         }
         (!has_nan(sum)).then_some(word)
     }
@@ -67,7 +94,7 @@ impl Octets {
     #[inline]
     pub(super) fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
         let mut sum = f64x2::ZERO;
-        for octet in &self.0 {
+        for octet in &self.all {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
                 frame[octet.byte as usize] = pack(slots, &mut sum);
             }
@@ -81,7 +108,7 @@ impl Octets {
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        for octet in &self.0 {
+        for octet in &self.all {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
                 frame[octet.byte as usize] = pack_any(slots, octet.fail_safe, conversions);
             }
@@ -90,7 +117,7 @@ impl Octets {
 
     /// Decodes the bytes of the frame into their slots.
     pub(super) fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
-        for octet in &self.0 {
+        for octet in &self.all {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk_mut() {
                 unpack(frame[octet.byte as usize], slots);
             }
@@ -251,6 +278,31 @@ mod tests {
                     assert_eq!(plan.word(&slots), None, "it has more than a word");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_a_word_may_be_in_any_order() {
+        for slots_between in [0, 3] {
+            let mut signals: Vec<_> = (0..16_usize)
+                .map(|at| Signal {
+                    bit: u8::try_from(at % 8).expect("a bit"),
+                    ..Signal::new(format!("{at}"), Area::Input, 1 - at / 8, DataType::Bool)
+                })
+                .collect();
+            for at in 0..slots_between {
+                let other = Signal::new(format!("out {at}"), Area::Output, at, DataType::Byte);
+                signals.insert(8, other);
+            }
+            let plan = Plan::new(&SignalTable::of_one_station(2, 3, signals), 0, Area::Input);
+            let mut slots = vec![Slot::from_real(0.0); 16 + slots_between];
+            slots[1] = Slot::from_real(1.0);
+            slots[15 + slots_between] = Slot::from_real(1.0);
+            let mut frame = [0; 2];
+            plan.encode(&slots, &mut frame);
+            assert_eq!(frame, [0x80, 0x02]);
+            let word = plan.word(&slots);
+            assert_eq!(word, (slots_between == 0).then_some(0x0280));
         }
     }
 

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use tickbus_base::time::{Clock, Nanos, QuickClock};
+use tickbus_base::QuickClock;
+use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Link, LinkStatus};
 use tickbus_image::signal::Slot;

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
-use tickbus_base::time::{Clock, Manual, Nanos, QuickClock};
+use tickbus_base::QuickClock;
+use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Bus, Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
 use tickbus_image::image;

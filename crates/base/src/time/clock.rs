@@ -38,7 +38,7 @@ pub trait Clock: Send + Sync + fmt::Debug {
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick looks at it as well, by a [`QuickClock`](super::QuickClock): on the systems that tickbus runs on that is not a
+/// The tick looks at it as well, by a [`QuickClock`](crate::QuickClock): on the systems that tickbus runs on that is not a
 /// system call (on Linux some 25 ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy
 /// machine it would lag by the tens of milliseconds for which that thread is not scheduled.
 ///

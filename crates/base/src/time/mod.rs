@@ -8,7 +8,6 @@ mod clock;
 mod histogram;
 mod nanos;
 mod pace;
-mod quick;
 mod stop;
 mod wall;
 
@@ -16,6 +15,5 @@ pub use clock::{Clock, Manual, Monotonic};
 pub use histogram::TimeHistogram;
 pub use nanos::Nanos;
 pub use pace::Pace;
-pub use quick::QuickClock;
 pub use stop::{Stop, Waker};
 pub use wall::{WallClock, system_time};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{Clock, Nanos};
 use crate::os::TimeStampCounter;
+use crate::time::{Clock, Nanos};
 
 /// The longest span between two looks at the clock.
 const SPAN: u64 = 1_000_000;

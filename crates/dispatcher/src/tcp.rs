@@ -24,9 +24,6 @@ const ACCEPTS: usize = 64;
 /// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 64 * 1024;
 
-/// Turns that begin within this span of each other are a stream of lines, and no single ones.
-const STREAM: Nanos = Nanos::from_micros(50);
-
 /// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
@@ -109,7 +106,6 @@ impl Listener {
             buffer: vec![0; BUFFER].into(),
             ready: Vec::new(),
             accept_paused_until: None,
-            last_turn: Nanos::ZERO,
         };
         let mut outcome = Ok(());
         while outcome.is_ok() && !host.hosting.stop.is_stopped() {
@@ -142,8 +138,6 @@ struct Host<'d, 'h> {
     buffer: Box<[u8]>,
     ready: Vec<Ready>,
     accept_paused_until: Option<Nanos>,
-    /// When the last turn began.
-    last_turn: Nanos,
 }
 
 impl Host<'_, '_> {
@@ -201,12 +195,6 @@ impl Host<'_, '_> {
             self.accept_paused_until = None;
             self.set.add(LISTENER, &self.listener, Interest::Read)?;
         }
-        // Who sends a stream on the same core would be interrupted for each line. It may run on until it waits itself: then
-        // many lines are here at once.
-        if now - self.last_turn < STREAM {
-            std::thread::yield_now();
-        }
-        self.last_turn = now;
         Ok(())
     }
 

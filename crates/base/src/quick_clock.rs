@@ -99,7 +99,7 @@ impl Course {
             return None;
         }
         // Below 2^63: the limit is a millisecond.
-        let span = (since * self.rate >> 32).cast_signed() + 1;
+        let span = ((since * self.rate) >> 32).cast_signed() + 1;
         self.latest = self.latest.max(Nanos(self.time.0 + span));
         Some(self.latest)
     }
@@ -113,7 +113,7 @@ impl Course {
         if is_interrupted || span < SHORTEST {
             return self.latest;
         }
-        let rate = self.rate_of(before.wrapping_sub(self.count_after), span);
+        let rate = Self::rate_of(before.wrapping_sub(self.count_after), span);
         // A pace that was not the same twice is none.
         let is_even = rate > 0 && rate.abs_diff(self.rate) <= rate >> TOLERANCE;
         self.limit = if is_even { (SPAN << 32) / rate } else { 0 };
@@ -124,7 +124,7 @@ impl Course {
     }
 
     /// The rate of a counter that counted so far in a span; zero if that cannot be.
-    fn rate_of(&self, counts: u64, span: u64) -> u64 {
+    fn rate_of(counts: u64, span: u64) -> u64 {
         // From 16 MHz to 64 GHz.
         if span > LONGEST || counts < span >> 6 || counts > span << 6 {
             return 0;

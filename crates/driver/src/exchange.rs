@@ -42,7 +42,7 @@ impl Driver {
     }
 
     /// The exchange of a driver that has nothing to do but to exchange, which is what most of them do in most ticks: what
-    /// [`exchange_at`](Self::exchange_at) comes to, in a third of its instructions. `None` if there is more to do: a
+    /// [`exchange_at`](Self::exchange_at) comes to, in half of its instructions. `None` if there is more to do: a
     /// first tick, one in the sample, or one that another has to be ended before.
     #[inline(always)]
     fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Link, LinkStatus};
@@ -26,6 +27,8 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: BusHandle,
     pub(super) clock: Arc<dyn Clock>,
+    /// The same clock, for the tick.
+    pub(super) quick: QuickClock,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
     pub(super) counters: TickCounters,
@@ -41,6 +44,8 @@ pub struct Driver {
     pub(super) last: Exchange,
     /// What is done around every exchange; nothing in most drivers.
     pub(super) extras: Option<Box<Extras>>,
+    /// A free bus, one station, no extras and no recorder.
+    pub(super) is_simple: bool,
     pub(super) board: Arc<FaultBoard>,
     pub(super) events: Consumer,
     pub(super) program: Option<Program>,

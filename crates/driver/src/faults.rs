@@ -15,6 +15,7 @@ impl Driver {
     ///
     /// Too many faults wait or are active.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Mistake> {
+        self.is_simple = false;
         let board = &self.board;
         let extras = self.extras.get_or_insert_default();
         let faults = extras

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
+use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Bus, Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
@@ -91,6 +92,7 @@ impl Driver {
             recorder,
             stations,
             line,
+            quick: QuickClock::new(Arc::clone(&clock)),
             clock,
             max_age: config.timing.max_age,
             status,
@@ -102,6 +104,7 @@ impl Driver {
             tick: None,
             last: Exchange::NONE,
             extras: Extras::new(reflexes, Beat::all(&config, config.role)),
+            is_simple: false,
             board,
             events: tick.events,
             program,
@@ -110,6 +113,7 @@ impl Driver {
         for fault in &list {
             driver.inject(fault).map_err(DriverError::Fault)?;
         }
+        driver.simplify();
         Ok(driver)
     }
 

@@ -50,6 +50,14 @@ impl Station {
 
     #[inline]
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut TickCounters) {
+        match self.encode.word(slots) {
+            Some(word) => self.tick.write_word(now, word),
+            None => self.send_any(now, slots, counters),
+        }
+    }
+
+    #[inline(never)]
+    fn send_any(&mut self, now: Nanos, slots: &[Slot], counters: &mut TickCounters) {
         let encode = &self.encode;
         let bent = self.tick.write(now, |frame| encode.encode(slots, frame));
         if bent != Conversions::default() {
@@ -58,6 +66,7 @@ impl Station {
         }
     }
 
+    /// Receives into the slots, and sets the status.
     #[inline]
     pub(super) fn receive(
         &mut self,
@@ -67,11 +76,24 @@ impl Station {
         map: &SlotMap,
     ) -> Arrival {
         let valid = self.tick.is_valid();
-        self.receive_as(valid, (now, max_age), slots, map)
+        match self.tick.unchanged(now) {
+            // Nothing is read that a second look at the validity would have to vouch for.
+            Some((age, sequence)) => {
+                let arrival = Arrival {
+                    fresh: false,
+                    changed: false,
+                    age,
+                    sequence,
+                };
+                self.judge(arrival, is_stale(age, max_age, valid), slots);
+                arrival
+            }
+            None => self.receive_as(valid, (now, max_age), slots, map),
+        }
     }
 
     /// Receives data that were `valid` a moment ago.
-    #[inline]
+    #[inline(never)]
     fn receive_as(
         &mut self,
         valid: bool,
@@ -94,12 +116,22 @@ impl Station {
             self.tick.shown_instead();
             arrival = self.tick.read(now, &mut receiver);
         }
-        let stale = is_stale(arrival.age, max_age, still_valid);
+        self.judge(arrival, is_stale(arrival.age, max_age, still_valid), slots);
+        arrival
+    }
+
+    /// Sets the status after an arrival, and shows fail-safe values if the data do not count.
+    #[inline]
+    fn judge(&mut self, arrival: Arrival, stale: bool, slots: &mut [Slot]) {
         if stale && (arrival.changed || !self.stale) {
             self.show_fail_safe(slots);
         }
         self.stale = stale;
-        arrival
+        self.status = match arrival {
+            _ if stale => Code::Stale,
+            Arrival { fresh: true, .. } => Code::Fresh,
+            Arrival { .. } => Code::Unchanged,
+        };
     }
 
     #[cold]

@@ -47,7 +47,11 @@ pub struct TickStation {
     tx_sequence: u64,
     /// The bytes published last: most ticks change nothing, and need no hand-over.
     published: Box<[u8]>,
+    /// The same as a number whose least significant byte comes first, if there are no more than eight.
+    published_word: u64,
     rx: Reader<Frame>,
+    /// Of the frame shown last.
+    rx_sequence: u64,
     rx_shaper: PulseShaper,
     shaped: Box<[u8]>,
     /// Whether `shaped` holds what was shown last, rather than the frame.
@@ -117,8 +121,10 @@ pub fn station(directions: StationStreams) -> (TickStation, BusStation) {
         tx: tx_writer,
         tx_edges: EdgeCounter::new(&tx_latched, &tx_fail_safe),
         tx_sequence: 0,
+        published_word: as_word(&tx_fail_safe),
         published: tx_fail_safe.clone(),
         rx: rx_reader,
+        rx_sequence: 0,
         rx_shaper: PulseShaper::new(rx_latched.clone(), &rx_fail_safe),
         shaped: rx_fail_safe.clone(),
         forced: false,
@@ -139,12 +145,22 @@ pub fn station(directions: StationStreams) -> (TickStation, BusStation) {
 }
 
 /// `now - then`, for a `then` that may be [`NEVER`].
+#[inline]
 fn age(now: Nanos, then: i64) -> Nanos {
     if then == NEVER {
         Nanos::MAX
     } else {
         (now - Nanos(then)).max(Nanos::ZERO)
     }
+}
+
+/// The first eight bytes, or as many as there are, as a number whose least significant byte comes first.
+fn as_word(bytes: &[u8]) -> u64 {
+    let mut word = [0; size_of::<u64>()];
+    for (to, from) in word.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    u64::from_le_bytes(word)
 }
 
 /// Whether two frames differ. Small ones were written byte by byte a moment ago: compared as words, they would be waited
@@ -175,11 +191,36 @@ impl TickStation {
             (changed, result)
         });
         if changed {
+            self.published_word = as_word(&self.published);
             self.tx_sequence = sequence;
             self.tx.publish();
         }
         self.beside.tick_alive.store(now.0, Ordering::Relaxed);
         result
+    }
+
+    /// As [`write`](Self::write), of a frame of up to eight bytes that are at hand as a number, the least significant byte
+    /// first: a tick that changes nothing then touches no frame.
+    #[inline]
+    pub fn write_word(&mut self, now: Nanos, word: u64) {
+        if word == self.published_word {
+            self.beside.tick_alive.store(now.0, Ordering::Relaxed);
+        } else {
+            self.write(now, |bytes| {
+                for (to, from) in bytes.iter_mut().zip(word.to_le_bytes()) {
+                    *to = from;
+                }
+            });
+        }
+    }
+
+    /// The age of the peer and the sequence number of the frame shown, if [`read`](Self::read) would find nothing to show.
+    #[inline]
+    pub fn unchanged(&self, now: Nanos) -> Option<(Nanos, u64)> {
+        if self.forced || self.rx_shaper.is_busy() || self.rx.has_news() {
+            return None;
+        }
+        Some((self.peer_age(now), self.rx_sequence))
     }
 
     /// Takes over the newest rx frame and shows it to `receiver`, if there is anything new to show.
@@ -196,7 +237,7 @@ impl TickStation {
             fresh,
             changed,
             age,
-            sequence: self.rx.with(|frame| frame.sequence),
+            sequence: self.rx_sequence,
         }
     }
 
@@ -205,6 +246,7 @@ impl TickStation {
     fn show(&mut self, now: Nanos, receiver: &mut impl Receiver) {
         let (shaper, shaped, forced) = (&mut self.rx_shaper, &mut self.shaped, &mut self.forced);
         self.rx.with(|frame| {
+            self.rx_sequence = frame.sequence;
             let shapes = shaper.needs_shaping(&frame.edges);
             if shapes {
                 for (bit, count) in shaper.bits().iter().zip(shaper.new_edges(&frame.edges)) {
@@ -240,6 +282,7 @@ impl TickStation {
     }
 
     /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
+    #[inline]
     pub fn peer_age(&self, now: Nanos) -> Nanos {
         age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
@@ -428,6 +471,44 @@ mod tests {
         assert_eq!((shown, edges), (Some(0), vec![(7, 0)]));
         read(&mut tick, 10);
         assert_eq!(read(&mut tick, 11).1, None);
+    }
+
+    #[test]
+    fn a_frame_at_hand_as_a_word_is_written_like_any_other() {
+        let (mut tick, mut bus) = one_latched_byte();
+        for level in [0x80, 1, 0, 0] {
+            tick.write_word(Nanos(1), level);
+        }
+        assert_eq!(bus.outgoing(Nanos(2), None), [1], "the pulse is not lost");
+        bus.sent();
+        assert_eq!(bus.outgoing(Nanos(2), None), [0]);
+        tick.write(Nanos(5), |bytes| bytes[0] = 6);
+        tick.write_word(Nanos(7), 6);
+        assert_eq!(bus.tick_age(Nanos(8)), Nanos(1), "alive, though unchanged");
+        assert_eq!(bus.outgoing(Nanos(8), None), [6]);
+        tick.write_word(Nanos(8), 2);
+        assert_eq!(bus.outgoing(Nanos(8), None), [2]);
+    }
+
+    #[test]
+    fn a_tick_without_news_has_nothing_to_read() {
+        let (mut tick, mut bus) = one_latched_byte();
+        assert_eq!(tick.unchanged(Nanos(1)), Some((Nanos::MAX, 0)));
+        bus.received(Nanos(5), &[1]);
+        bus.received(Nanos(5), &[0]);
+        assert_eq!(tick.unchanged(Nanos(8)), None, "a frame");
+        read(&mut tick, 8);
+        assert_eq!(tick.unchanged(Nanos(9)), None, "the pulse is still shown");
+        read(&mut tick, 9);
+        assert_eq!(tick.unchanged(Nanos(9)), None, "and its end once more");
+        read(&mut tick, 10);
+        assert_eq!(tick.unchanged(Nanos(10)), Some((Nanos(5), 2)));
+        tick.shown_instead();
+        assert_eq!(
+            tick.unchanged(Nanos(10)),
+            None,
+            "the levels are to be shown"
+        );
     }
 
     #[test]

@@ -91,11 +91,17 @@ impl<T> Writer<T> {
 }
 
 impl<T> Reader<T> {
+    /// Whether there is a value that was not seen yet.
+    #[inline]
+    pub fn has_news(&self) -> bool {
+        // Relaxed suffices for a look: whoever acts on it takes the value over by `update`, which orders the accesses.
+        self.shared.state.load(Ordering::Relaxed) & FRESH != 0
+    }
+
     /// Takes over the newest value, if it was not seen yet; tells whether there was one.
     #[inline]
     pub fn update(&mut self) -> bool {
-        // Relaxed suffices for this check: the exchange below orders the accesses.
-        if self.shared.state.load(Ordering::Relaxed) & FRESH == 0 {
+        if !self.has_news() {
             return false;
         }
         self.index = self.shared.state.swap(self.index, Ordering::AcqRel) & INDEX;

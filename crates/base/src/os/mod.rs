@@ -1,5 +1,6 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
+mod barrier;
 mod library;
 #[cfg(unix)]
 mod linked_terminal;
@@ -18,8 +19,10 @@ mod pseudo_terminal;
 mod serial;
 #[cfg(unix)]
 mod shared_memory;
+mod time_stamp_counter;
 mod timer_slack;
 
+pub use barrier::OneSidedBarrier;
 pub use library::{Library, one_line};
 #[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;
@@ -40,4 +43,5 @@ pub use serial::SerialPort;
 pub use serial::{Parity, SerialSettings};
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;
+pub use time_stamp_counter::TimeStampCounter;
 pub use timer_slack::wake_on_time;

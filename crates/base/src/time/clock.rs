@@ -23,6 +23,12 @@ pub trait Clock: Send + Sync + fmt::Debug {
     /// `stop` wakes it. It may return early; the caller then looks at the clock again.
     fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>));
 
+    /// Whether it advances by itself, at the pace of the computer's clock, so that its time between two looks at it can be
+    /// told by a counter.
+    fn is_steady(&self) -> bool {
+        false
+    }
+
     /// The date at which this clock read zero, as the time since 1 January 1970 UTC; `None` for a clock
     /// without dates.
     fn epoch(&self) -> Option<Nanos> {
@@ -32,9 +38,9 @@ pub trait Clock: Send + Sync + fmt::Debug {
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick reads it as well: on the systems that tickbus runs on that is not a system call (on Linux some 25
-/// ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy machine it would
-/// lag by the tens of milliseconds for which that thread is not scheduled.
+/// The tick looks at it as well, by a [`QuickClock`](crate::QuickClock): on the systems that tickbus runs on that is not a
+/// system call (on Linux some 25 ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy
+/// machine it would lag by the tens of milliseconds for which that thread is not scheduled.
 ///
 /// It stands still while the computer sleeps.
 #[derive(Debug)]
@@ -72,6 +78,10 @@ impl Clock for Monotonic {
 
     fn wait_with(&self, deadline: Nanos, _stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
         sleep((deadline != Nanos::MAX).then(|| (deadline - monotonic_now()).to_duration()));
+    }
+
+    fn is_steady(&self) -> bool {
+        true
     }
 
     fn epoch(&self) -> Option<Nanos> {

@@ -1,5 +1,5 @@
-//! The dispatcher compared with a bare hub that only passes lines on, and with NATS if installed, in alternating rounds of
-//! one run.
+//! The dispatcher compared with a bare hub that only passes lines on, and with NATS and Mosquitto where they are installed,
+//! in alternating rounds of one run.
 //!
 //! Value lines through one pair of clients, written one by one and 64 at a time; through 100 pairs; the latency at 500
 //! lines/s; 1,000 active clients beside 10,000 idle ones. Medians over the rounds; prints one `rust NAME VALUE` per line on
@@ -17,6 +17,8 @@
 mod hub;
 #[cfg(unix)]
 mod measure;
+#[cfg(unix)]
+mod mosquitto;
 #[cfg(unix)]
 mod nats;
 

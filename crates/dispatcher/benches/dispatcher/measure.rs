@@ -13,6 +13,7 @@ use tickbus_dispatcher::{Dispatcher, Patch, Settings, Traffic};
 use tickbus_fieldbus::tcp::Address;
 
 use crate::hub;
+use crate::mosquitto::{self, Mosquitto};
 use crate::nats::Nats;
 
 /// The argument that makes this program the idle clients.
@@ -72,11 +73,20 @@ pub(crate) fn run() {
     if nats.is_none() {
         eprintln!("dispatcher: there is no nats-server; it is left out");
     }
+    let broker = is_measured.then(Mosquitto::start).flatten();
+    if broker.is_none() {
+        eprintln!("dispatcher: there is no mosquitto; it is left out");
+    }
     let stop = Stop::new();
     let (address, served) = start(&stop);
     let connect = |count| {
         let mut all = vec![ours(address, count), bare(hub::start(), count)];
         all.extend(nats.as_ref().map(|server| through_nats(server, count)));
+        all.extend(
+            broker
+                .as_ref()
+                .map(|broker| through_mosquitto(broker, count)),
+        );
         all
     };
     let mut one = connect(1);
@@ -177,6 +187,20 @@ fn through_nats(server: &Nats, count: usize) -> Pairs {
             let text = format!("P Q1={value}");
             format!("PUB s{pair} {}\r\n{text}\r\n", text.len())
         },
+    }
+}
+
+fn through_mosquitto(broker: &Mosquitto, count: usize) -> Pairs {
+    let pair = |at| {
+        let topic = format!("s{at}");
+        let name = format!("{count}-{at}");
+        let receiver = broker.connect(&format!("to-{name}"), Some(&topic));
+        (broker.connect(&format!("from-{name}"), None), receiver)
+    };
+    Pairs {
+        name: ".mosquitto",
+        streams: (0..count).map(pair).collect(),
+        message: |pair, value| mosquitto::publish(&format!("s{pair}"), &format!("P Q1={value}")),
     }
 }
 

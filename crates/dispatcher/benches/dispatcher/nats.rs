@@ -12,14 +12,16 @@ impl Nats {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("it is bound");
         drop(listener);
-        let mut command = Command::new("nats-server");
-        command.args(["-a", "127.0.0.1", "-p", &address.port().to_string()]);
-        let child = command
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .ok()?;
-        let mut server = Self(child, address);
+        // Debian keeps it where only administrators look.
+        let child = ["nats-server", "/usr/sbin/nats-server"]
+            .iter()
+            .find_map(|name| {
+                let mut command = Command::new(name);
+                command.args(["-a", "127.0.0.1", "-p", &address.port().to_string()]);
+                let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+                quiet.spawn().ok()
+            });
+        let mut server = Self(child?, address);
         while TcpStream::connect(address).is_err() {
             if server.0.try_wait().is_ok_and(|ended| ended.is_some()) {
                 return None;

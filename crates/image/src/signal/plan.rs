@@ -11,6 +11,7 @@ mod word;
 
 use std::ops::Range;
 
+use self::bits::Octets;
 use self::number::{Codec, Integer64, Number, Real, Unscaled};
 use self::run::{Gaps, Member, Run};
 use super::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot};
@@ -52,7 +53,10 @@ pub struct Plan {
     /// The number of slots and frame bytes that the plan needs.
     slots: usize,
     bytes: usize,
+    octets: Octets,
     runs: Vec<Box<dyn Run>>,
+    /// Whether there is nothing but octets in a frame of up to eight bytes.
+    is_word: bool,
     fail_safes: Vec<(usize, Slot)>,
 }
 
@@ -77,14 +81,17 @@ impl Plan {
             .max()
             .map_or(station_bytes, |end| end.max(station_bytes));
         let gaps = gaps(&members, bytes);
-        let mut runs = runs(&members);
+        let (octets, mut runs) = runs(&members);
+        let is_word = runs.is_empty() && bytes <= size_of::<u64>() && octets.fit_into_a_word();
         if !gaps.is_empty() {
             runs.push(Box::new(Gaps(gaps)));
         }
         Self {
             slots: members.last().map_or(0, |(slot, _)| slot + 1),
             bytes,
+            octets,
             runs,
+            is_word,
             fail_safes: (members.iter().map(|(slot, s)| (*slot, s.fail_safe))).collect(),
         }
     }
@@ -94,13 +101,32 @@ impl Plan {
     /// # Panics
     ///
     /// When `frame` or `slots` is shorter than the plan needs.
+    #[inline]
     pub fn encode(&self, slots: &[Slot], frame: &mut [u8]) -> Conversions {
         self.check(slots.len(), frame.len());
         let mut conversions = Conversions::default();
+        self.octets.encode(slots, frame, &mut conversions);
         for run in &self.runs {
             run.encode(slots, frame, &mut conversions);
         }
         conversions
+    }
+
+    /// The frame that [`encode`](Self::encode) would make, as a number whose least significant byte comes first, of up to
+    /// eight bytes that are all BOOLs, eight to a byte in the order of the slots. `None` for other frames, and if a value
+    /// has to be looked at by itself.
+    ///
+    /// # Panics
+    ///
+    /// When `slots` is shorter than the plan needs.
+    #[inline]
+    pub fn word(&self, slots: &[Slot]) -> Option<u64> {
+        self.check(slots.len(), self.bytes);
+        if self.is_word {
+            self.octets.word(slots)
+        } else {
+            None
+        }
     }
 
     /// Decodes `frame` into the area's slots; other slots are not touched.
@@ -110,6 +136,7 @@ impl Plan {
     /// When `frame` or `slots` is shorter than the plan needs.
     pub fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
         self.check(slots.len(), frame.len());
+        self.octets.decode(frame, slots);
         for run in &self.runs {
             run.decode(frame, slots);
         }
@@ -128,6 +155,7 @@ impl Plan {
     }
 
     /// The only check of lengths: all indices below are within what it has checked.
+    #[inline]
     fn check(&self, slots: usize, bytes: usize) {
         assert!(
             slots >= self.slots && bytes >= self.bytes,
@@ -170,10 +198,10 @@ impl Kind {
         }
     }
 
-    /// The runs of `members`, all of this kind.
+    /// The runs of `members`, all of this kind, which is not BOOL.
     fn runs(self, members: &[Member]) -> Vec<Box<dyn Run>> {
         match self.data_type {
-            DataType::Bool => bits::lay_out(members),
+            DataType::Bool => Vec::new(),
             DataType::Sint => self.number::<i8>(members),
             DataType::Byte | DataType::Usint => self.number::<u8>(members),
             DataType::Int => self.number::<i16>(members),
@@ -206,19 +234,21 @@ impl Kind {
     }
 }
 
-/// The runs of all signals.
-fn runs(members: &[Member]) -> Vec<Box<dyn Run>> {
+/// The octets and the runs of all signals.
+fn runs(members: &[Member]) -> (Octets, Vec<Box<dyn Run>>) {
     let mut kinds: Vec<(Kind, Vec<Member>)> = Vec::new();
-    for member in members {
+    let (bools, numbers): (Vec<Member>, Vec<Member>) =
+        (members.iter().copied()).partition(|(_, signal)| signal.data_type == DataType::Bool);
+    let (octets, partials) = bits::lay_out(&bools);
+    for member in &numbers {
         let kind = Kind::of(member.1);
         match kinds.iter_mut().find(|(known, _)| *known == kind) {
             Some((_, alike)) => alike.push(*member),
             None => kinds.push((kind, vec![*member])),
         }
     }
-    (kinds.iter())
-        .flat_map(|(kind, members)| kind.runs(members))
-        .collect()
+    let numbers = (kinds.iter()).flat_map(|(kind, members)| kind.runs(members));
+    (octets, partials.into_iter().chain(numbers).collect())
 }
 
 /// The bytes of a frame that no signal touches.

@@ -1,15 +1,13 @@
 //! Runs of BOOL signals: bytes that are all signals, and bytes of which only some bits are.
 
-use std::array;
-
-use wide::{CmpNe, f64x4};
+use wide::{CmpNe, f64x2};
 
 use super::run::{Member, Run};
 use super::{Conversions, index};
 use crate::signal::Slot;
 
-/// Arranges `members`, all BOOL, into runs. A byte with any of them is encoded as a whole, by one run.
-pub(super) fn lay_out(members: &[Member]) -> Vec<Box<dyn Run>> {
+/// Arranges `members`, all BOOL. A byte with any of them is encoded as a whole, either by the octets or by a run.
+pub(super) fn lay_out(members: &[Member]) -> (Octets, Option<Box<dyn Run>>) {
     let mut members = members.to_vec();
     members.sort_by_key(|(_, signal)| (signal.byte, signal.bit));
     let mut octets = Vec::new();
@@ -20,19 +18,21 @@ pub(super) fn lay_out(members: &[Member]) -> Vec<Box<dyn Run>> {
             None => partials.push(in_byte),
         }
     }
-    let mut runs: Vec<Box<dyn Run>> = Vec::new();
-    if !octets.is_empty() {
-        runs.push(Box::new(Octets(octets)));
-    }
-    if !partials.bytes.is_empty() {
-        runs.push(Box::new(partials));
-    }
-    runs
+    let partials = (!partials.bytes.is_empty()).then(|| Box::new(partials) as Box<dyn Run>);
+    (Octets::new(octets), partials)
 }
 
-/// Bytes whose bits 0 to 7 are eight consecutive slots.
+/// Bytes whose bits 0 to 7 are eight consecutive slots. Not among the runs, since groups of BOOLs are what many machines
+/// consist of: they are converted without a call.
 #[derive(Debug)]
-struct Octets(Vec<Octet>);
+pub(super) struct Octets {
+    all: Vec<Octet>,
+    /// The first of their slots.
+    first: usize,
+    /// Per octet, how many eights of slots are before it from the first on, and its bit in a word; if all of them stand
+    /// so, in up to eight bytes.
+    in_word: Option<Vec<(usize, u32)>>,
+}
 
 #[derive(Debug)]
 struct Octet {
@@ -58,33 +58,66 @@ impl Octet {
 }
 
 impl Octets {
-    /// Encodes values some of which are NaN.
+    fn new(all: Vec<Octet>) -> Self {
+        let slots = all.iter().map(|octet| octet.slot as usize);
+        let first = slots.min().unwrap_or_default();
+        let place = |octet: &Octet| {
+            let from_first = octet.slot as usize - first;
+            let is_fit = from_first.is_multiple_of(8) && octet.byte < 8;
+            is_fit.then_some((from_first / 8, 8 * octet.byte))
+        };
+        Self {
+            in_word: all.iter().map(place).collect(),
+            first,
+            all,
+        }
+    }
+
+    /// Whether [`word`](Self::word) can be asked for.
+    pub(super) fn fit_into_a_word(&self) -> bool {
+        self.in_word.is_some()
+    }
+
+    /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN, or if there are
+    /// infinite ones of both signs.
+    #[inline]
+    pub(super) fn word(&self, slots: &[Slot]) -> Option<u64> {
+        let (mut word, mut sum) = (0, f64x2::ZERO);
+        let (eights, _) = slots.get(self.first..)?.as_chunks::<8>();
+        for (at, bit) in self.in_word.as_deref()? {
+            word |= u64::from(pack(eights.get(*at)?, &mut sum)) << bit;
+        }
+        (!has_nan(sum)).then_some(word)
+    }
+
+    /// Encodes the slots into their bytes of the frame.
+    #[inline]
+    pub(super) fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
+        let mut sum = f64x2::ZERO;
+        for octet in &self.all {
+            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
+                frame[octet.byte as usize] = pack(slots, &mut sum);
+            }
+        }
+        if has_nan(sum) {
+            self.encode_any(slots, frame, conversions);
+        }
+    }
+
+    /// Encodes values some of which may be NaN.
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        for octet in &self.0 {
+        for octet in &self.all {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
                 frame[octet.byte as usize] = pack_any(slots, octet.fail_safe, conversions);
             }
         }
     }
-}
 
-impl Run for Octets {
-    fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        let mut nans = f64x4::ZERO;
-        for octet in &self.0 {
-            if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                frame[octet.byte as usize] = pack(slots, &mut nans);
-            }
-        }
-        if nans.any() {
-            self.encode_any(slots, frame, conversions);
-        }
-    }
-
-    fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
-        for octet in &self.0 {
+    /// Decodes the bytes of the frame into their slots.
+    pub(super) fn decode(&self, frame: &[u8], slots: &mut [Slot]) {
+        for octet in &self.all {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk_mut() {
                 unpack(frame[octet.byte as usize], slots);
             }
@@ -157,15 +190,23 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0; notes in `nans` whether any of them is NaN, and then the byte is
-/// wrong.
+/// Eight slots as one byte, the first slot as bit 0. Adds them to `sum`: that is NaN when one of them is, and then the byte
+/// is wrong.
 #[inline]
-fn pack(slots: &[Slot; 8], nans: &mut f64x4) -> u8 {
-    let [low, high] = [0, 4].map(|first| f64x4::new(array::from_fn(|i| slots[first + i].real())));
-    *nans = *nans | low.is_nan() | high.is_nan();
-    let [low_bits, high_bits] = [low, high].map(|four| four.cmp_ne(f64x4::ZERO).move_mask());
-    let [byte, ..] = (low_bits | high_bits << 4).to_le_bytes();
+fn pack(slots: &[Slot; 8], sum: &mut f64x2) -> u8 {
+    let pair = |first: usize| f64x2::new([slots[first].real(), slots[first + 1].real()]);
+    let pairs = [pair(0), pair(2), pair(4), pair(6)];
+    *sum += (pairs[0] + pairs[1]) + (pairs[2] + pairs[3]);
+    let [a, b, c, d] = pairs.map(|pair| pair.cmp_ne(f64x2::ZERO).move_mask());
+    let [byte, ..] = (a | b << 2 | c << 4 | d << 6).to_le_bytes();
     byte
+}
+
+/// Whether one of the values that were added is NaN. Infinities of both signs also make one: rare enough to be looked at
+/// value by value.
+#[inline]
+fn has_nan(sum: f64x2) -> bool {
+    sum.is_nan().move_mask() != 0
 }
 
 /// As [`pack`], checking each value; NaN slots take their bit from `fail_safe` and are counted.
@@ -198,4 +239,100 @@ fn unpack(byte: u8, slots: &mut [Slot; 8]) {
     let (low, high) = slots.split_at_mut(4);
     low.copy_from_slice(&NIBBLES[usize::from(byte & 15)]);
     high.copy_from_slice(&NIBBLES[usize::from(byte >> 4)]);
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use crate::signal::{Area, DataType, Plan, Signal, SignalTable, Slot};
+
+    /// BOOLs in this many bytes without gaps.
+    fn bools(bytes: usize) -> Plan {
+        let signal = |at: usize| Signal {
+            bit: u8::try_from(at % 8).expect("a bit"),
+            fail_safe: Slot::from_real(1.0),
+            ..Signal::new(format!("{at}"), Area::Input, at / 8, DataType::Bool)
+        };
+        let signals = (0..8 * bytes).map(signal).collect();
+        Plan::new(
+            &SignalTable::of_one_station(bytes, 0, signals),
+            0,
+            Area::Input,
+        )
+    }
+
+    #[test]
+    fn the_word_of_a_frame_has_its_bytes() {
+        for bytes in 1..=9 {
+            let plan = bools(bytes);
+            let mut slots = vec![Slot::from_real(0.0); 8 * bytes];
+            for step in 0..200_usize {
+                let values = [1.0, 0.0, -0.0, -3.5, 1e-300, f64::INFINITY];
+                slots[step * 7 % (8 * bytes)] = Slot::from_real(values[step % values.len()]);
+                let mut frame = vec![0; bytes];
+                plan.encode(&slots, &mut frame);
+                let mut expected = [0; 8];
+                if bytes <= 8 {
+                    expected[..bytes].copy_from_slice(&frame);
+                    assert_eq!(plan.word(&slots), Some(u64::from_le_bytes(expected)));
+                } else {
+                    assert_eq!(plan.word(&slots), None, "it has more than a word");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_a_word_may_be_in_any_order() {
+        for slots_between in [0, 3] {
+            let mut signals: Vec<_> = (0..16_usize)
+                .map(|at| Signal {
+                    bit: u8::try_from(at % 8).expect("a bit"),
+                    ..Signal::new(format!("{at}"), Area::Input, 1 - at / 8, DataType::Bool)
+                })
+                .collect();
+            for at in 0..slots_between {
+                let other = Signal::new(format!("out {at}"), Area::Output, at, DataType::Byte);
+                signals.insert(8, other);
+            }
+            let plan = Plan::new(&SignalTable::of_one_station(2, 3, signals), 0, Area::Input);
+            let mut slots = vec![Slot::from_real(0.0); 16 + slots_between];
+            slots[1] = Slot::from_real(1.0);
+            slots[15 + slots_between] = Slot::from_real(1.0);
+            let mut frame = [0; 2];
+            plan.encode(&slots, &mut frame);
+            assert_eq!(frame, [0x80, 0x02]);
+            let word = plan.word(&slots);
+            assert_eq!(word, (slots_between == 0).then_some(0x0280));
+        }
+    }
+
+    #[test]
+    fn values_that_are_looked_at_one_by_one_have_no_word() {
+        let plan = bools(2);
+        let mut frame = [0; 2];
+        let mut slots = vec![Slot::from_real(1.0); 16];
+        slots[9] = Slot::from_real(f64::NAN);
+        assert_eq!(plan.word(&slots), None);
+        assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 1);
+        assert_eq!(frame, [0xFF; 2], "the fail-safe value is 1");
+        // Their sum is NaN, though neither is.
+        slots[9] = Slot::from_real(f64::INFINITY);
+        slots[3] = Slot::from_real(f64::NEG_INFINITY);
+        assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 0);
+        assert_eq!(frame, [0xFF; 2]);
+    }
+
+    #[test]
+    fn a_frame_that_is_not_all_octets_has_no_word() {
+        let mut signals: Vec<_> = (0..8)
+            .map(|bit| Signal {
+                bit,
+                ..Signal::new(format!("{bit}"), Area::Input, 0, DataType::Bool)
+            })
+            .collect();
+        signals.push(Signal::new("byte", Area::Input, 1, DataType::Byte));
+        let table = SignalTable::of_one_station(2, 0, signals);
+        let slots = vec![Slot::from_real(1.0); 9];
+        assert_eq!(Plan::new(&table, 0, Area::Input).word(&slots), None);
+    }
 }

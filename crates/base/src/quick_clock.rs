@@ -1,0 +1,283 @@
+//! A clock for who looks at it millions of times per second.
+
+use std::sync::Arc;
+
+use crate::os::TimeStampCounter;
+use crate::time::{Clock, Nanos};
+
+/// The longest span between two looks at the clock.
+const SPAN: u64 = 1_000_000;
+
+/// The shortest span from which the counter's pace is learnt.
+const SHORTEST: u64 = SPAN / 2;
+
+/// The longest span from which the counter's pace is learnt: in a longer one the computer may have slept.
+const LONGEST: u64 = 1_000_000_000;
+
+/// The most counts that a look at the clock may take. If it takes longer, the thread was interrupted, and clock and counter
+/// do not belong together.
+const MOST: u64 = 20_000;
+
+/// The share by which the counter is taken to be slower than it was, as a power of two: a system that corrects its clock makes
+/// it faster by less.
+const MARGIN: u32 = 10;
+
+/// The share by which the pace of the counter may differ between two spans, as a power of two.
+const TOLERANCE: u32 = 6;
+
+/// A clock for who looks at it millions of times per second: between two looks at the system's, which are a millisecond
+/// apart or less, it takes the time from the processor's counter, in a third of the time.
+///
+/// It is never behind the clock that it was made of, and at most 2 us ahead of it: ages that are measured with it are not
+/// understated. It never goes back. A system that corrects its clock by more than one part in a thousand can put it
+/// behind by as much of one millisecond; systems correct theirs by half of that, unless they are made to set the time
+/// right in a hurry.
+///
+/// It belongs to one thread. Times of the clock that it was made of, read by others, can be compared with its own.
+#[derive(Debug)]
+pub struct QuickClock {
+    clock: Arc<dyn Clock>,
+    counter: Option<TimeStampCounter>,
+    course: Course,
+}
+
+impl QuickClock {
+    /// Reads `clock`, with the help of the processor's counter if that can be trusted.
+    pub fn new(clock: Arc<dyn Clock>) -> Self {
+        let counter = clock.is_steady().then(TimeStampCounter::trusted).flatten();
+        Self {
+            clock,
+            counter,
+            course: Course::default(),
+        }
+    }
+
+    /// The time now.
+    #[inline]
+    pub fn now(&mut self) -> Nanos {
+        let Some(counter) = self.counter else {
+            return self.clock.now();
+        };
+        match self.course.time_at(counter.read()) {
+            Some(now) => now,
+            None => self.look(counter),
+        }
+    }
+
+    /// Looks at the clock.
+    #[cold]
+    fn look(&mut self, counter: TimeStampCounter) -> Nanos {
+        let before = counter.read();
+        let now = self.clock.now();
+        self.course.learn([before, counter.read()], now)
+    }
+}
+
+/// What is known of the counter.
+#[derive(Debug, Default)]
+struct Course {
+    /// The last look at the clock: the counter before it, and the time.
+    count: u64,
+    time: Nanos,
+    /// The counter after it.
+    count_after: u64,
+    /// For how many counts the time is taken from the counter.
+    limit: u64,
+    /// Nanoseconds per count, not less than they are, in 2^32nds; in the last span, whether that is used or not.
+    rate: u64,
+    /// The latest time that was given: no earlier one is given after it.
+    latest: Nanos,
+}
+
+impl Course {
+    /// The time at `count`; `None` if the clock has to be looked at.
+    #[inline]
+    fn time_at(&mut self, count: u64) -> Option<Nanos> {
+        // Also none if the counter went back.
+        let since = count.wrapping_sub(self.count);
+        if since >= self.limit {
+            return None;
+        }
+        // Below 2^63: the limit is a millisecond.
+        let span = ((since * self.rate) >> 32).cast_signed() + 1;
+        self.latest = self.latest.max(Nanos(self.time.0 + span));
+        Some(self.latest)
+    }
+
+    /// The clock showed `now`, and the counter `counts` before and after that. Returns the time to be given.
+    fn learn(&mut self, counts: [u64; 2], now: Nanos) -> Nanos {
+        self.latest = self.latest.max(now);
+        let [before, after] = counts;
+        let is_interrupted = after.wrapping_sub(before) > MOST;
+        let span = u64::try_from((now - self.time).0).unwrap_or(u64::MAX);
+        if is_interrupted || span < SHORTEST {
+            return self.latest;
+        }
+        let rate = Self::rate_of(before.wrapping_sub(self.count_after), span);
+        // A pace that was not the same twice is none.
+        let is_even = rate > 0 && rate.abs_diff(self.rate) <= rate >> TOLERANCE;
+        self.limit = if is_even { (SPAN << 32) / rate } else { 0 };
+        self.rate = rate;
+        (self.count, self.count_after) = (before, after);
+        self.time = now;
+        self.latest
+    }
+
+    /// The rate of a counter that counted so far in a span; zero if that cannot be.
+    fn rate_of(counts: u64, span: u64) -> u64 {
+        // From 16 MHz to 64 GHz.
+        if span > LONGEST || counts < span >> 6 || counts > span << 6 {
+            return 0;
+        }
+        let rate = (span << 32) / counts;
+        rate + (rate >> MARGIN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::{Manual, Monotonic};
+
+    /// A computer with a counter of 3 counts per nanosecond, and a clock of its own.
+    struct Computer {
+        course: Course,
+        nanos: u64,
+        count: u64,
+        looks: usize,
+    }
+
+    impl Computer {
+        fn new() -> Self {
+            Self {
+                course: Course::default(),
+                nanos: 5_000_000,
+                count: u64::MAX - 1_000,
+                looks: 0,
+            }
+        }
+
+        fn pass(&mut self, nanos: u64) {
+            self.nanos += nanos;
+            self.count = self.count.wrapping_add(3 * nanos);
+        }
+
+        fn clock(&self) -> Nanos {
+            Nanos(i64::try_from(self.nanos).expect("it is small"))
+        }
+
+        fn now(&mut self) -> Nanos {
+            let count = self.count;
+            self.course.time_at(count).unwrap_or_else(|| {
+                self.looks += 1;
+                self.pass(20);
+                let now = self.clock();
+                self.pass(20);
+                self.course.learn([count, self.count], now)
+            })
+        }
+
+        /// Looks until the counter is used.
+        fn learnt() -> Self {
+            let mut computer = Self::new();
+            for _ in 0..4 {
+                computer.now();
+                computer.pass(600_000);
+            }
+            computer.now();
+            computer
+        }
+    }
+
+    #[test]
+    fn between_two_looks_at_the_clock_the_counter_tells_the_time() {
+        let mut computer = Computer::learnt();
+        computer.looks = 0;
+        let mut last = Nanos::ZERO;
+        for _ in 0..100_000 {
+            computer.pass(100);
+            let before = computer.clock();
+            let now = computer.now();
+            assert!(now >= before, "behind the clock: {now} at {before}");
+            assert!(now - computer.clock() < Nanos(2_000), "far ahead: {now}");
+            assert!(now >= last, "back from {last} to {now}");
+            last = now;
+        }
+        assert!(
+            computer.looks <= 11,
+            "one in a millisecond: {}",
+            computer.looks
+        );
+    }
+
+    #[test]
+    fn a_thread_that_paused_looks_at_the_clock() {
+        let mut computer = Computer::learnt();
+        for pause in [2_000_000, 3_000_000_000, 50_000] {
+            computer.pass(pause);
+            let before = computer.clock();
+            assert!((before..before + Nanos(2_000)).contains(&computer.now()));
+        }
+    }
+
+    #[test]
+    fn a_counter_that_jumps_or_changes_its_pace_is_not_asked_until_it_is_even_again() {
+        for jump in [u64::MAX / 2, 1_000_000_000_000, 2 << 40] {
+            let mut computer = Computer::learnt();
+            computer.count = computer.count.wrapping_sub(jump);
+            for _ in 0..10_000 {
+                computer.pass(100);
+                let before = computer.clock();
+                let now = computer.now();
+                assert!((before..before + Nanos(2_000)).contains(&now), "{jump}");
+            }
+        }
+        let mut computer = Computer::learnt();
+        computer.pass(2_000_000);
+        computer.now();
+        // At half the pace.
+        for _ in 0..5 {
+            computer.pass(2_000_000);
+            computer.count = computer.count.wrapping_sub(3_000_000);
+            let (before, looks) = (computer.clock(), computer.looks);
+            assert!(computer.now() >= before);
+            assert_eq!(computer.looks, looks + 1);
+        }
+    }
+
+    #[test]
+    fn a_look_that_was_interrupted_teaches_nothing() {
+        let mut computer = Computer::learnt();
+        computer.pass(1_100_000);
+        let (count, time) = (computer.course.count, computer.course.time);
+        let counts = [computer.count, computer.count.wrapping_add(MOST + 1)];
+        let now = computer.clock();
+        assert_eq!(computer.course.learn(counts, now), now);
+        assert_eq!((computer.course.count, computer.course.time), (count, time));
+    }
+
+    #[test]
+    fn it_is_never_behind_the_computers_clock() {
+        let clock = Monotonic::shared();
+        let mut quick = QuickClock::new(Arc::clone(&clock) as _);
+        let mut last = Nanos::ZERO;
+        let end = clock.now() + Nanos::from_millis(20);
+        while last < end {
+            let before = clock.now();
+            let now = quick.now();
+            assert!(now >= before, "{now} at {before}");
+            assert!(now >= last);
+            last = now;
+        }
+    }
+
+    #[test]
+    fn a_clock_that_is_moved_by_hand_is_looked_at_each_time() {
+        let clock = Manual::new();
+        let mut quick = QuickClock::new(Arc::clone(&clock) as _);
+        for _ in 0..3 {
+            clock.advance(Nanos(7));
+            assert_eq!(quick.now(), clock.now());
+        }
+    }
+}

@@ -65,13 +65,13 @@ extern "system" fn Java_tickbus_Tickbus_initializeNative<'local>(
 /// `static native int xChangeData(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_xChangeData(
-    env: *mut jni::sys::JNIEnv,
+    _env: *mut jni::sys::JNIEnv,
     _class: jclass,
     handle: jlong,
 ) -> jint {
-    // The handle table catches a panic of the driver; nothing else here can panic. Each thread has an `env` of its own.
+    // The handle table catches a panic of the driver; nothing else here can panic.
     DRIVERS
-        .tick(handle, env.addr(), Device::exchange)
+        .with(handle, Device::exchange)
         .unwrap_or_else(|refused| refused)
         .code()
 }
@@ -79,12 +79,12 @@ extern "system" fn Java_tickbus_Tickbus_xChangeData(
 /// `static native int receiveNative(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_receiveNative(
-    env: *mut jni::sys::JNIEnv,
+    _env: *mut jni::sys::JNIEnv,
     _class: jclass,
     handle: jlong,
 ) -> jint {
     DRIVERS
-        .tick(handle, env.addr(), Device::receive)
+        .with(handle, Device::receive)
         .unwrap_or_else(|refused| refused)
         .code()
 }
@@ -92,12 +92,12 @@ extern "system" fn Java_tickbus_Tickbus_receiveNative(
 /// `static native int sendNative(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_sendNative(
-    env: *mut jni::sys::JNIEnv,
+    _env: *mut jni::sys::JNIEnv,
     _class: jclass,
     handle: jlong,
 ) -> jint {
     DRIVERS
-        .tick(handle, env.addr(), Device::send)
+        .with(handle, Device::send)
         .unwrap_or_else(|refused| refused)
         .code()
 }

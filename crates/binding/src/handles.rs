@@ -3,11 +3,6 @@
 //! A handle is an index into a fixed table, and a generation that distinguishes the current tenant of the
 //! place from all previous ones. Any number either denotes a tenant that is open now, or is answered with a
 //! status code.
-//!
-//! Whoever uses a tenant claims it. The thread that ticks does so millions of times per second, and a claim by an atomic
-//! exchange would take longer than all that the tick does. So where the system has the barrier for it, the first thread
-//! that ticks gets the place [`dedicated`](Dedication) to it: it then only says that it is in there, and all others look
-//! for that after they have claimed the place. When another thread ticks, that ends, and both claim.
 
 #![allow(
     unsafe_code,
@@ -17,10 +12,8 @@
 use std::any::Any;
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::ptr;
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use tickbus_base::os::OneSidedBarrier;
 use tickbus_driver::{Code, panic_text};
 
 use crate::refusal::Refusal;
@@ -52,10 +45,7 @@ const fn word(generation: u64, state: u64) -> u64 {
 #[repr(align(128))]
 struct HandleEntry<T> {
     word: AtomicU64,
-    /// Null if it is dedicated to nobody. Changed only by a thread that has claimed the place.
-    dedication: AtomicPtr<Dedication>,
-    /// Only accessed by the thread that has moved the word to [`CLAIMED`], until it moves it on, and by the one that the
-    /// place is dedicated to, while it says so.
+    /// Only accessed by the thread that has moved the word to [`CLAIMED`], until it moves it on.
     content: UnsafeCell<Content<T>>,
 }
 
@@ -63,25 +53,6 @@ struct Content<T> {
     tenant: Option<T>,
     /// The text of the panic that ended in [`FAILED`].
     panic: String,
-    has_failed: bool,
-    /// Those of all threads that ever had this place to themselves, and one for the next: the tick allocates nothing. They
-    /// are never freed, since a thread may look at its own at any time.
-    dedications: Vec<&'static Dedication>,
-    /// Several threads tick this tenant.
-    is_shared: bool,
-}
-
-/// The number of no thread.
-const NO_THREAD: usize = 0;
-
-/// The sign by which one thread says that it uses a place without having claimed it.
-struct Dedication {
-    /// The thread, by a number that no other thread has as long as it lives; [`NO_THREAD`] until there is one. Then it
-    /// stays.
-    thread: AtomicUsize,
-    barrier: OneSidedBarrier,
-    /// Written by that thread alone.
-    is_inside: AtomicBool,
 }
 
 /// A table of tenants of type `T`.
@@ -89,18 +60,10 @@ pub struct Handles<T, const N: usize = MAX_DRIVERS> {
     places: [HandleEntry<T>; N],
 }
 
-// SAFETY: the one part that is not Sync by itself is `content`. It is reached through `Claim` and `Visit` alone. A `Claim`
-// exists only between a successful compare-and-exchange to CLAIMED (acquire) and the store that ends it (release), so one
-// thread at a time has one, and sees all that the one before it did.
-// A `Visit` exists only while the sign of a dedication is set. Its thread sets the sign, passes the light side of a
-// barrier, and then finds the word OPEN and the dedication in force (`HandleEntry::visit`). Whoever claims moves the word,
-// passes the heavy side, and then finds the sign unset, or gives up (`Claim::take`). So if both are under way at once, the
-// visitor finds the word CLAIMED or the claimer finds the sign, and at least one gives up. If the visitor finds the word
-// OPEN because a claim has ended, it has acquired what that claim released: also that the claim ended the dedication. If the
-// claimer finds the sign unset after a visit, it has acquired what the visit released. One thread alone writes a sign, and
-// one thread makes one visit at a time, since a tenant is not reached from within `work`: the sign would be found by the
-// claim, and a visit finds its own sign (`HandleEntry::visit`).
-// A tenant may thus be used and dropped by another thread than the one that made it, hence `T: Send`.
+// SAFETY: the one part that is not Sync by itself is `content`. It is reached through `Claim` alone,
+// which exists only between a successful compare-and-exchange to CLAIMED (acquire) and the store that
+// ends it (release), so one thread at a time has it, and sees all that the one before it did. A tenant
+// may thus be used and dropped by another thread than the one that made it, hence `T: Send`.
 unsafe impl<T: Send, const N: usize> Sync for Handles<T, N> {}
 
 impl<T, const N: usize> Default for Handles<T, N> {
@@ -115,13 +78,9 @@ impl<T, const N: usize> Handles<T, N> {
         let places = [const {
             HandleEntry {
                 word: AtomicU64::new(word(0, FREE)),
-                dedication: AtomicPtr::new(ptr::null_mut()),
                 content: UnsafeCell::new(Content {
                     tenant: None,
                     panic: String::new(),
-                    has_failed: false,
-                    dedications: Vec::new(),
-                    is_shared: false,
                 }),
             }
         }; N];
@@ -138,9 +97,8 @@ impl<T, const N: usize> Handles<T, N> {
             let found = place.word.load(Ordering::Relaxed);
             let generation = (found >> STATE_BITS) + 1;
             if found & STATE == FREE
-                && let Some(mut claim) = Claim::take(place, found, generation, FREE)
+                && let Some(claim) = Claim::take(place, found, generation, FREE)
             {
-                claim.content().prepare();
                 return Ok(Reservation { claim, index });
             }
         }
@@ -157,40 +115,18 @@ impl<T, const N: usize> Handles<T, N> {
     /// The handle was never open, is closed, in use by another thread, or its tenant has failed.
     #[inline]
     pub fn with<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
-        self.claim(handle, OPEN)?.run(work)
-    }
-
-    /// As [`with`](Self::with), for the tick: after its first call, `thread` reaches the tenant without an atomic exchange,
-    /// as long as no other thread ticks it. `thread` is a number that no other living thread has, and not zero.
-    ///
-    /// # Errors
-    ///
-    /// As [`with`](Self::with).
-    #[inline]
-    pub fn tick<R>(
-        &self,
-        handle: i64,
-        thread: usize,
-        work: impl FnOnce(&mut T) -> R,
-    ) -> Result<R, Code> {
-        let (place, generation) = self.place(handle)?;
-        match place.visit(generation, thread) {
-            Some(mut visit) => visit.run(work),
-            None => self.tick_by_claim(handle, thread, work),
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn tick_by_claim<R>(
-        &self,
-        handle: i64,
-        thread: usize,
-        work: impl FnOnce(&mut T) -> R,
-    ) -> Result<R, Code> {
         let mut claim = self.claim(handle, OPEN)?;
-        claim.dedicate(thread);
-        claim.run(work)
+        let Some(tenant) = claim.content().tenant.as_mut() else {
+            return Err(Code::Internal);
+        };
+        match catch_unwind(AssertUnwindSafe(|| work(tenant))) {
+            Ok(done) => Ok(done),
+            Err(payload) => {
+                claim.content().panic = panic_message(payload);
+                claim.end = FAILED;
+                Err(Code::Internal)
+            }
+        }
     }
 
     /// As [`with`](Self::with); a failed tenant is refused with the message of its panic.
@@ -228,7 +164,6 @@ impl<T, const N: usize> Handles<T, N> {
         };
         claim.end = FREE;
         claim.content().panic = String::new();
-        claim.end_dedication();
         let tenant = claim.content().tenant.take();
         drop(claim);
         tenant.map(close).ok_or(Code::Internal)
@@ -241,55 +176,18 @@ impl<T, const N: usize> Handles<T, N> {
     }
 
     #[inline]
-    fn place(&self, handle: i64) -> Result<(&HandleEntry<T>, u64), Code> {
+    fn claim(&self, handle: i64, from: u64) -> Result<Claim<'_, T>, Code> {
         // A negative handle becomes a generation that no place will ever reach.
         let handle = handle.cast_unsigned();
         let generation = handle >> INDEX_BITS;
         let index = usize::try_from(handle & ((1 << INDEX_BITS) - 1)).unwrap_or(usize::MAX);
         let place = self.places.get(index).ok_or(Code::NotOpen)?;
-        Ok((place, generation))
-    }
-
-    #[inline]
-    fn claim(&self, handle: i64, from: u64) -> Result<Claim<'_, T>, Code> {
-        let (place, generation) = self.place(handle)?;
         Claim::take(place, word(generation, from), generation, from)
             .ok_or_else(|| place.refusal(generation))
     }
 }
 
 impl<T> HandleEntry<T> {
-    /// Who the place is dedicated to.
-    #[inline]
-    fn dedication(&self) -> Option<&'static Dedication> {
-        let dedication = self.dedication.load(Ordering::Acquire);
-        // SAFETY: it is null, or was made of a `&'static Dedication`, which is only ever shared.
-        unsafe { dedication.as_ref() }
-    }
-
-    /// Lets the thread in that the place is dedicated to, if the tenant of this generation is open and nobody else is
-    /// about to use it.
-    #[inline]
-    fn visit(&self, generation: u64, thread: usize) -> Option<Visit<'_, T>> {
-        let dedication = self.dedication()?;
-        let is_its = dedication.thread.load(Ordering::Relaxed) == thread;
-        // It is in there already if this is called from within.
-        if !is_its || dedication.is_inside.load(Ordering::Acquire) {
-            return None;
-        }
-        dedication.is_inside.store(true, Ordering::Relaxed);
-        let visit = Visit {
-            place: self,
-            generation,
-            dedication,
-        };
-        dedication.barrier.light();
-        // In this order: the word tells whether the dedication is in force.
-        let is_open = self.word.load(Ordering::Acquire) == word(generation, OPEN);
-        let is_in_force = ptr::eq(self.dedication.load(Ordering::Relaxed), dedication);
-        (is_open && is_in_force).then_some(visit)
-    }
-
     /// Why a claim with this generation failed.
     #[cold]
     fn refusal(&self, generation: u64) -> Code {
@@ -316,85 +214,6 @@ struct Claim<'a, T> {
     end: u64,
 }
 
-/// Use of a place by the thread that it is dedicated to; ends when dropped.
-struct Visit<'a, T> {
-    place: &'a HandleEntry<T>,
-    generation: u64,
-    dedication: &'static Dedication,
-}
-
-impl<T> Visit<'_, T> {
-    /// Calls `work` with the tenant; a panic makes it fail.
-    #[inline]
-    fn run<R>(&mut self, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
-        // SAFETY: `HandleEntry::visit` has let this thread in; `&mut self` keeps it to one reference.
-        let content = unsafe { &mut *self.place.content.get() };
-        let done = content.run(work);
-        if done.is_err() {
-            // Before the sign is unset, so that nobody finds the tenant open.
-            let from = word(self.generation, OPEN);
-            let to = word(self.generation, FAILED);
-            // Not if somebody is about to claim it, and gives up: the next one finds that it has failed.
-            let order = (Ordering::Release, Ordering::Relaxed);
-            let _ = self.place.word.compare_exchange(from, to, order.0, order.1);
-        }
-        done
-    }
-}
-
-impl<T> Drop for Visit<'_, T> {
-    #[inline]
-    fn drop(&mut self) {
-        self.dedication.is_inside.store(false, Ordering::Release);
-    }
-}
-
-impl<T> Content<T> {
-    /// Calls `work` with the tenant. An error says that it has failed.
-    #[inline]
-    fn run<R>(&mut self, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
-        let tenant = self.tenant.as_mut().filter(|_| !self.has_failed);
-        let Some(tenant) = tenant else {
-            return Err(Code::Internal);
-        };
-        match catch_unwind(AssertUnwindSafe(|| work(tenant))) {
-            Ok(done) => Ok(done),
-            Err(payload) => {
-                self.panic = panic_message(payload);
-                self.has_failed = true;
-                Err(Code::Internal)
-            }
-        }
-    }
-
-    /// Prepares for a new tenant.
-    fn prepare(&mut self) {
-        self.is_shared = false;
-        self.has_failed = false;
-        let mut all = self.dedications.iter();
-        if let Some(barrier) = OneSidedBarrier::get()
-            && all.all(|known| known.thread.load(Ordering::Relaxed) != NO_THREAD)
-        {
-            self.dedications.push(Box::leak(Box::new(Dedication {
-                thread: AtomicUsize::new(NO_THREAD),
-                barrier,
-                is_inside: AtomicBool::new(false),
-            })));
-        }
-    }
-
-    /// The sign of this thread: the one that it had before, or the spare one.
-    fn dedication_of(&self, thread: usize) -> Option<&'static Dedication> {
-        let with = |number| {
-            let mut all = self.dedications.iter();
-            all.find(|known| known.thread.load(Ordering::Relaxed) == number)
-        };
-        let found = with(thread).or_else(|| with(NO_THREAD))?;
-        found.thread.store(thread, Ordering::Relaxed);
-        Some(found)
-    }
-}
-
 impl<'a, T> Claim<'a, T> {
     #[inline]
     fn take(place: &'a HandleEntry<T>, found: u64, generation: u64, end: u64) -> Option<Self> {
@@ -409,51 +228,6 @@ impl<'a, T> Claim<'a, T> {
                 generation,
                 end,
             })
-            .filter(Self::is_alone)
-    }
-
-    /// Whether the thread that the place is dedicated to is not in there. If it comes, it finds the place claimed.
-    #[inline]
-    fn is_alone(&self) -> bool {
-        let Some(dedication) = self.place.dedication() else {
-            return true;
-        };
-        dedication.barrier.heavy() && !dedication.is_inside.load(Ordering::Acquire)
-    }
-
-    /// Dedicates the place to a thread that is the first to tick; if another was, to none.
-    fn dedicate(&mut self, thread: usize) {
-        match self.place.dedication() {
-            Some(dedication) if dedication.thread.load(Ordering::Relaxed) == thread => {}
-            Some(_) => {
-                self.end_dedication();
-                self.content().is_shared = true;
-            }
-            None if self.content().is_shared => {}
-            None => {
-                if let Some(dedication) = self.content().dedication_of(thread) {
-                    let dedication = ptr::from_ref(dedication).cast_mut();
-                    self.place.dedication.store(dedication, Ordering::Release);
-                }
-            }
-        }
-    }
-
-    /// The place is dedicated to nobody any more.
-    fn end_dedication(&mut self) {
-        self.place
-            .dedication
-            .store(ptr::null_mut(), Ordering::Release);
-    }
-
-    /// Calls `work` with the tenant; a panic makes it fail.
-    #[inline]
-    fn run<R>(mut self, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
-        let done = self.content().run(work);
-        if done.is_err() {
-            self.end = FAILED;
-        }
-        done
     }
 
     #[inline]
@@ -497,4 +271,149 @@ pub fn panic_message(payload: Box<dyn Any + Send>) -> String {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+    use std::sync::atomic::AtomicUsize;
+
+    fn open<const N: usize>(handles: &Handles<u32, N>, tenant: u32) -> i64 {
+        handles.reserve().expect("a place is free").fill(tenant)
+    }
+
+    #[test]
+    fn what_was_never_opened_is_not_open() {
+        let handles: Handles<u32, 3> = Handles::new();
+        let real = open(&handles, 7);
+        for handle in [
+            0,
+            1,
+            2,
+            3,
+            255,
+            -1,
+            i64::MIN,
+            i64::MAX,
+            real + 1,
+            real + 256,
+            real | 1 << 62,
+        ] {
+            assert_eq!(
+                handles.with(handle, |_| ()),
+                Err(Code::NotOpen),
+                "{handle:#x}"
+            );
+            assert_eq!(
+                handles.close(handle, |_| ()),
+                Err(Code::NotOpen),
+                "{handle:#x}"
+            );
+        }
+        assert_eq!(handles.with(real, |tenant| *tenant), Ok(7));
+    }
+
+    #[test]
+    fn a_stale_handle_stays_closed_though_its_place_has_a_new_tenant() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let old = open(&handles, 1);
+        assert_eq!(handles.close(old, |tenant| tenant), Ok(1));
+        assert_eq!(handles.with(old, |_| ()), Err(Code::Closed));
+        let new = open(&handles, 2);
+        assert_eq!(handles.with(old, |_| ()), Err(Code::Closed));
+        assert_eq!(handles.close(old, |_| ()), Err(Code::Closed));
+        assert_eq!(handles.with(new, |tenant| *tenant), Ok(2));
+    }
+
+    #[test]
+    fn places_run_out_and_come_back() {
+        let handles: Handles<u32, 2> = Handles::new();
+        let first = open(&handles, 1);
+        open(&handles, 2);
+        let refusal = handles.reserve().err().expect("both places are taken");
+        assert_eq!(refusal.code, Code::TooManyDrivers);
+        handles.close(first, drop).expect("it is open");
+        drop(handles.reserve().expect("the place is free again"));
+        open(&handles, 3);
+    }
+
+    #[test]
+    fn a_tenant_in_use_is_busy_and_stays_open() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let answers = handles.with(handle, |_| {
+            (handles.with(handle, |_| ()), handles.close(handle, |_| ()))
+        });
+        assert_eq!(answers, Ok((Err(Code::Busy), Err(Code::Busy))));
+        assert_eq!(handles.with(handle, |tenant| *tenant), Ok(1));
+    }
+
+    #[test]
+    fn a_panic_fails_the_tenant_until_it_is_closed() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let text = "formatted at run time".to_owned();
+        assert_eq!(
+            handles.with(handle, |_| panic!("{text}")),
+            Err::<(), _>(Code::Internal)
+        );
+        assert_eq!(handles.with(handle, |_| ()), Err(Code::Internal));
+        assert_eq!(handles.panic_of(handle), Some(text));
+        assert_eq!(handles.close(handle, |tenant| tenant), Ok(1));
+        assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
+        assert_eq!(handles.panic_of(handle), None);
+    }
+
+    #[test]
+    fn a_tenant_that_takes_its_time_to_close_keeps_nobody_waiting() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let met = handles.close(handle, |_| {
+            let next = open(&handles, 2);
+            (
+                handles.with(handle, |_| ()),
+                handles.with(next, |tenant| *tenant),
+            )
+        });
+        assert_eq!(met, Ok((Err(Code::Closed), Ok(2))));
+    }
+
+    #[test]
+    fn a_panic_while_closing_frees_the_place() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 1);
+        let closing = catch_unwind(AssertUnwindSafe(|| {
+            handles.close(handle, |_| panic!("stuck"))
+        }));
+        assert_eq!(panic_message(closing.expect_err("close panicked")), "stuck");
+        assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
+        open(&handles, 2);
+    }
+
+    #[test]
+    fn two_threads_never_have_the_tenant_at_once() {
+        let handles: Handles<u32, 1> = Handles::new();
+        let handle = open(&handles, 0);
+        let (inside, start) = (AtomicUsize::new(0), Barrier::new(2));
+        let rounds = if cfg!(miri) { 200 } else { 100_000 };
+        let work = || {
+            start.wait();
+            let mut done = 0;
+            for _ in 0..rounds {
+                let entered = handles.with(handle, |tenant| {
+                    assert_eq!(inside.fetch_add(1, Ordering::Relaxed), 0);
+                    *tenant += 1;
+                    assert_eq!(inside.fetch_sub(1, Ordering::Relaxed), 1);
+                });
+                match entered {
+                    Ok(()) => done += 1,
+                    Err(refusal) => assert_eq!(refusal, Code::Busy),
+                }
+            }
+            done
+        };
+        let done: u32 = std::thread::scope(|scope| {
+            let other = scope.spawn(work);
+            work() + other.join().expect("no panic")
+        });
+        assert_eq!(handles.with(handle, |tenant| *tenant), Ok(done));
+    }
+}

@@ -1,6 +1,5 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
-mod barrier;
 mod library;
 #[cfg(unix)]
 mod linked_terminal;
@@ -22,7 +21,6 @@ mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
 
-pub use barrier::OneSidedBarrier;
 pub use library::{Library, one_line};
 #[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;

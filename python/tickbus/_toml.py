@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
-Tables: TypeAlias = "str | Mapping[str, Any]"
+Tables: TypeAlias = str | Mapping[str, Any]
 
 _ESCAPES = {'"': '\\"', "\\": "\\\\"}
 

@@ -15,7 +15,7 @@ from ._watch import Watch
 _PRESS = "200ms"
 """How long a button is pressed: about as long as a finger does, and longer than any scan."""
 
-Duration: TypeAlias = "float | str"
+Duration: TypeAlias = float | str
 
 
 class Machine(Protocol):

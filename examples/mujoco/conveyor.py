@@ -16,8 +16,9 @@ import mujoco
 import tickbus
 
 HERE = Path(__file__).parent
-BELT_SPEED = 0.5  # m/s
+BELT_SPEED = 0.4  # m/s
 STROKE = 0.5  # m
+WIDTH = 0.44  # m, of the belt with its fences; what the light barrier sees beyond does not interrupt it
 PITCH = 0.2  # m: the pattern of the belt repeats
 
 
@@ -34,7 +35,7 @@ def simulate(plc, model, data, seconds, watch):
         mujoco.mj_step(model, data)
         if data.joint("belt").qpos > PITCH:
             data.joint("belt").qpos -= PITCH
-        barrier.value = data.sensor("barrier").data[0] > 0.5
+        barrier.value = not 0 <= data.sensor("barrier").data[0] < WIDTH
         home.value = data.sensor("pusher").data[0] < 0.02
         out.value = data.sensor("pusher").data[0] > STROKE - 0.02
         plc.send()
@@ -90,8 +91,9 @@ def main():
     data = mujoco.MjData(model)
     camera = Camera(model, data, arguments.picture)
     with tickbus.open(arguments.config) as plc:
-        # A real one would be there already; nothing moves before it is.
         print(f"conveyor: listening on {address(plc)}", flush=True)
+        # Nothing moves before the PLC is there.
+        plc["Light barrier"].value = plc["Pusher is home"].value = True
         while plc.exchange() is tickbus.Status.STALE or not plc["Belt run"].value:
             time.sleep(0.01)
         inside = simulate(plc, model, data, arguments.seconds, camera.watch)

@@ -3,7 +3,7 @@
 
     conveyor_plc.py --address 127.0.0.1:1502
 
-A box that interrupts the light barrier goes on until it lies before the pusher; the belt stops, and the pusher pushes it into the bin.
+Where a box interrupts the light barrier, the belt stops, and the pusher pushes the box into the bin.
 The machine's %I are input register 0, its %Q holding register 0. Runs until it is told to end.
 """
 
@@ -21,9 +21,7 @@ from pyrung import (
     Program,
     RegisterType,
     TagType,
-    Timer,
     latch,
-    on_delay,
     out,
     pack_bits,
     receive,
@@ -43,8 +41,7 @@ BeltRun, PusherOut = Outputs[1], Outputs[2]
 
 Reading, Read, ReadFailed, ReadCode = Bool("Reading"), Bool("Read"), Bool("ReadFailed"), Int("ReadCode")
 Writing, Written, WriteFailed, WriteCode = Bool("Writing"), Bool("Written"), Bool("WriteFailed"), Int("WriteCode")
-Heard, Waiting, Pushing, Returning = Bool("Heard"), Bool("Waiting"), Bool("Pushing"), Bool("Returning")
-Centred = Timer.clone("Centred")
+Heard, Pushing, Returning = Bool("Heard"), Bool("Pushing"), Bool("Returning")
 
 
 def ladder(machine):
@@ -56,13 +53,8 @@ def ladder(machine):
         unpack_to_bits(Told[1], Inputs.select(1, 16))
     with rung(Read):
         latch(Heard)
-    # Interrupted: the box still has to go on to the pusher.
+    # Interrupted: there is a box before the pusher.
     with rung(Heard, ~Barrier, ~Pushing, ~Returning):
-        latch(Waiting)
-    with rung(Waiting):
-        on_delay(Centred, 380)
-    with rung(Centred.Done):
-        reset(Waiting)
         latch(Pushing)
     with rung(Pushing, IsOut):
         reset(Pushing)

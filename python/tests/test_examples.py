@@ -66,6 +66,7 @@ def conveyor(tmp_path_factory: pytest.TempPathFactory) -> Run:
         for process in filter(None, (simulation, plc)):
             process.terminate()
             process.wait(30)
+        simulation.stdout.close()
     return Run(told, picture, why)
 
 

@@ -148,7 +148,8 @@ impl Handle {
             let signals: Vec<Description> = (0..config.table.signals.len())
                 .map(|index| Description::of(&SignalDescription::of(&driver, index), &config))
                 .collect();
-            let is_written = |slot: usize| signals.get(slot).is_some_and(|signal| signal.is_written);
+            let is_written =
+                |slot: usize| signals.get(slot).is_some_and(|signal| signal.is_written);
             let slots = driver.initial_slots();
             let memory = Arc::new(Memory::new(&slots));
             let is_stepped = driver.is_stepped();

@@ -115,6 +115,10 @@ fn seconds(nanos: Nanos) -> f64 {
 #[pymethods]
 impl Driver {
     #[new]
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "what is made of Python's objects belongs to the function"
+    )]
     #[pyo3(signature = (path, overlay = String::new()))]
     fn new(py: Python<'_>, path: PathBuf, overlay: String) -> PyResult<Self> {
         let Facts {

@@ -49,6 +49,10 @@ mod _native {
 
     /// Makes an HTML page from a recording, and returns its path.
     #[pyfunction]
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "what is made of Python's objects belongs to the function"
+    )]
     fn report(
         py: Python<'_>,
         recording: PathBuf,

@@ -33,7 +33,7 @@ enum Kind {
 }
 
 impl Kind {
-    fn show<'py>(self, py: Python<'py>, slot: Slot) -> PyResult<Bound<'py, PyAny>> {
+    fn show(self, py: Python<'_>, slot: Slot) -> PyResult<Bound<'_, PyAny>> {
         match self {
             Self::Bool => (slot.real() != 0.0).into_bound_py_any(py),
             Self::Whole if slot.real().fract() == 0.0 && slot.real().abs() < ALL_WHOLE => {

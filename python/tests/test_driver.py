@@ -8,7 +8,7 @@ import pytest
 import tickbus
 from tickbus import Status
 
-from conftest import SIGNALS
+from conftest import SIGNALS, root
 
 
 def test_a_value_that_is_set_comes_back_from_the_plc(line):
@@ -297,3 +297,14 @@ def test_events_are_told_one_by_one(tmp_path):
         assert server["Run"].value is True
 
 
+
+
+def test_the_tank_of_the_manual_runs(tmp_path, monkeypatch):
+    program = root("docs", "python.md").read_text().split("```python\n")[1].split("```")[0]
+    config = root("README.md").read_text().split("```toml\n")[1].split("```")[0]
+    (tmp_path / "tank.cfg").write_text(config.replace('scan    = "10ms"', 'scan    = "10ms"\nmode    = "stepped"'))
+    monkeypatch.chdir(tmp_path)
+    found = {}
+    exec(program, found)
+    # The mirror opens the valve below 150 mm, a scan later: it stays there.
+    assert 145 < found["mm"] < 155

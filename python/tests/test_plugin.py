@@ -2,6 +2,8 @@
 
 import pytest
 
+from conftest import root
+
 CONFIG = """
 [driver]
 id   = 7
@@ -262,3 +264,11 @@ def test_a_machine_that_is_not_there_is_told(tests):
     tests.makepyfile(HEAD + "\ndef test(machine):\n    pass\n")
     result = tests.runpytest_inprocess()
     result.stdout.fnmatch_lines(["E *the test's mark plc names no machine; write machine=*"])
+
+
+def test_the_tests_of_the_manual_pass(pytester):
+    blocks = root("docs", "python.md").read_text().split("```python\n")
+    (tests,) = (block.split("```")[0] for block in blocks if "import pytest" in block)
+    pytester.path.joinpath("driver.cfg").write_text(root("driver.cfg").read_text())
+    pytester.makepyfile(tests)
+    pytester.runpytest_inprocess().assert_outcomes(passed=2)

@@ -9,13 +9,15 @@ mod device;
 mod fault;
 mod handles;
 mod opening;
+mod panics;
 mod refusal;
 mod shared;
 
 pub use description::{SignalDescription, SlotKind};
 pub use device::{Device, EVENT_WORDS, EVENTS};
 pub use fault::{faults, inject, read_fault};
-pub use handles::{Handles, MAX_DRIVERS, Reservation, panic_message};
+pub use handles::{Handles, MAX_DRIVERS, Reservation};
 pub use opening::{closing, open};
+pub use panics::panic_message;
 pub use refusal::Refusal;
 pub use shared::{NO_TIME, Shared, Word};

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use tickbus_base::statistics::entries;
 use tickbus_driver::{Code, DriverError, Snapshot};
 
-use crate::handles::panic_message;
+use crate::panics::panic_message;
 
 /// A status code, and what happened. Shows as one text: the code's name and number, what happened, and in a second line what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 //!
 //! It holds what a tick needs and what only the driver knows; all else of the package is in Python. An open driver is a
 //! number in a table of [`Handles`](tickbus_binding::Handles), as in the other bindings, and its values pass through
-//! [`Memory`](memory::Memory), of which the driver has a copy: whatever Python does to that memory, on whatever thread, can make
+//! `memory::Memory`, of which the driver has a copy: whatever Python does to that memory, on whatever thread, can make
 //! wrong values and nothing worse.
 
 mod driver;

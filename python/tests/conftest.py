@@ -1,6 +1,7 @@
 """What the tests share."""
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -98,6 +99,18 @@ def line(line_cfg: Path) -> Iterator[tickbus.Driver]:
     """The same, open."""
     with tickbus.open(line_cfg) as driver:
         yield driver
+
+
+@pytest.fixture(autouse=True)
+def no_unexpected_warning(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
+    """As tools/test has it for Java: states of a line and injected faults are expected, other warnings in the log are not."""
+    yield
+    told = capfd.readouterr()
+    sys.stdout.write(told.out)
+    sys.stderr.write(told.err)
+    warnings = (line for line in told.err.splitlines() if re.search(r"^\[\S+ (WARN|ERROR) +tickbus", line))
+    unexpected = [line for line in warnings if not re.search(r'" is (opening|stale|failed): |": injected fault "', line)]
+    assert not unexpected
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test bench soak lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -26,6 +26,9 @@ demo-cell: ## build, then watch Petri nets make twelve cylinders in the manufact
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test
+
+python: setup ## the wheel of the Python package, built and tested
+	@tools/peers --python && exec tools/python
 
 bench: setup ## measure, and print each figure beside the one asked for
 	@exec tools/bench

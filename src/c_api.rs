@@ -11,17 +11,15 @@
 use std::cell::RefCell;
 use std::collections::HashSet;
 use std::ffi::{CStr, CString, c_char};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::catch_unwind;
 use std::path::Path;
 use std::ptr::{NonNull, null_mut};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use once_cell::sync::Lazy;
-use tickbus_base::statistics::entries;
 use tickbus_base::toml_text::nearest;
 use tickbus_binding::{
-    Device, EVENT_WORDS, EVENTS, Handles, Refusal, Shared, closing, faults, open, panic_message,
-    read_fault,
+    Device, EVENT_WORDS, EVENTS, Handles, Refusal, Shared, closing, faults, open, read_fault,
 };
 use tickbus_driver::Code;
 use tickbus_image::signal::Signal;
@@ -130,14 +128,7 @@ fn failed(refusal: &Refusal) -> i32 {
 
 /// Does what may fail, and returns a count or a status.
 fn answer(work: impl FnOnce() -> Result<i32, Refusal>) -> i32 {
-    match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(Ok(done)) => done,
-        Ok(Err(refusal)) => failed(&refusal),
-        Err(payload) => {
-            let text = format!("panic: {}", panic_message(payload));
-            failed(&Refusal::new(Code::Internal, text))
-        }
-    }
+    Refusal::instead_of_panic(work).unwrap_or_else(|refusal| failed(&refusal))
 }
 
 fn tick(driver: i64, work: impl FnOnce(&mut Device<()>) -> Code) -> i32 {
@@ -189,14 +180,9 @@ fn why(driver: i64, code: Code) -> Refusal {
         return DRIVERS.reason(driver, code);
     }
     let snapshot = DRIVERS.with(driver, |opened| opened.device.snapshot());
-    let Ok(snapshot) = snapshot else {
-        return DRIVERS.reason(driver, code);
-    };
-    let statistics = snapshot.to_string();
-    let reason = entries(&statistics).find_map(|(key, text)| (key == "reason").then_some(text));
-    match reason.filter(|reason| !reason.is_empty()) {
-        Some(reason) => Refusal::new(code, format!("{}: {reason}", code.text())),
-        None => Refusal::plain(code),
+    match snapshot {
+        Ok(snapshot) => Refusal::of_tick(code, &snapshot),
+        Err(_) => DRIVERS.reason(driver, code),
     }
 }
 

@@ -58,7 +58,7 @@ fn crates(root: &Path) -> Vec<String> {
     let mut found: Vec<String> = names
         .map(|name| format!("crates/{}/src", name.to_str().expect("UTF-8")))
         .collect();
-    found.push("src".to_owned());
+    found.extend(["src".to_owned(), "python/src".to_owned()]);
     found.sort();
     found
 }

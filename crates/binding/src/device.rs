@@ -9,7 +9,7 @@ use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
 
 use crate::description::SignalDescription;
-use crate::fault::not_injected;
+use crate::fault::inject;
 use crate::refusal::Refusal;
 use crate::shared::{NO_TIME, Shared, Word};
 
@@ -102,7 +102,7 @@ impl<K> Device<K> {
     ///
     /// `BAD_ARGUMENT` if there are too many.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Refusal> {
-        self.driver.inject_read(fault).map_err(not_injected)
+        inject(&mut self.driver, fault)
     }
 
     /// Ends a fault; false if no fault has this number.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use tickbus_driver::Code;
+use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Fault, FaultBoard, FaultStatus, read_one};
 
@@ -17,7 +17,16 @@ pub fn read_fault(text: &str, config: &Config) -> Result<Fault, Refusal> {
     read_one(text, config.fault_scope()).map_err(not_injected)
 }
 
-pub(crate) fn not_injected(why: impl std::fmt::Display) -> Refusal {
+/// Injects a fault and returns its number.
+///
+/// # Errors
+///
+/// `BAD_ARGUMENT` if there are too many.
+pub fn inject(driver: &mut Driver, fault: &Fault) -> Result<u32, Refusal> {
+    driver.inject_read(fault).map_err(not_injected)
+}
+
+fn not_injected(why: impl std::fmt::Display) -> Refusal {
     let text = format!("the fault cannot be injected:\n{why}");
     Refusal::new(Code::BadArgument, text)
 }

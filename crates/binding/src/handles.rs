@@ -9,13 +9,13 @@
     reason = "a claim by one atomic word stands in for a lock, which the tick must not take"
 )]
 
-use std::any::Any;
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use tickbus_driver::{Code, panic_text};
+use tickbus_driver::Code;
 
+use crate::panics::panic_message;
 use crate::refusal::Refusal;
 
 /// How many drivers can be open in one process at once.
@@ -260,14 +260,6 @@ impl<T> Reservation<'_, T> {
         self.claim.end = OPEN;
         (self.claim.generation << INDEX_BITS | self.index as u64).cast_signed()
     }
-}
-
-/// The message of a panic.
-pub fn panic_message(payload: Box<dyn Any + Send>) -> String {
-    let text = panic_text(&*payload).to_owned();
-    // Dropping a payload of unknown type could panic again.
-    std::mem::forget(payload);
-    text
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! What the bindings to other languages share: everything that Java and C do with an open driver, without either.
+//! What the bindings to other languages share: everything that Java, C and Python do with an open
+//! driver, without any of them.
 //!
 //! [`Handles`] is the table of open drivers: checked numbers instead of pointers. A [`Device`] is one of them, with the
 //! [`Shared`] buffer of slots through which its values go.
@@ -8,13 +9,15 @@ mod device;
 mod fault;
 mod handles;
 mod opening;
+mod panics;
 mod refusal;
 mod shared;
 
 pub use description::{SignalDescription, SlotKind};
 pub use device::{Device, EVENT_WORDS, EVENTS};
-pub use fault::{faults, read_fault};
-pub use handles::{Handles, MAX_DRIVERS, Reservation, panic_message};
+pub use fault::{faults, inject, read_fault};
+pub use handles::{Handles, MAX_DRIVERS, Reservation};
 pub use opening::{closing, open};
+pub use panics::panic_message;
 pub use refusal::Refusal;
 pub use shared::{NO_TIME, Shared, Word};

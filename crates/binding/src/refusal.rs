@@ -1,6 +1,11 @@
 //! Why a call of another language failed.
 
-use tickbus_driver::{Code, DriverError};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use tickbus_base::statistics::entries;
+use tickbus_driver::{Code, DriverError, Snapshot};
+
+use crate::panics::panic_message;
 
 /// A status code, and what happened. Shows as one text: the code's name and number, what happened, and in a second line what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +25,31 @@ impl Refusal {
     pub fn new(code: Code, what: impl std::fmt::Display) -> Self {
         let what = what.to_string();
         Self { code, what }
+    }
+
+    /// Of a tick that failed: with the line's own reason, which the statistics have, if it is the line that failed.
+    pub fn of_tick(code: Code, snapshot: &Snapshot) -> Self {
+        if code != Code::BusFailed {
+            return Self::plain(code);
+        }
+        let statistics = snapshot.to_string();
+        let reason = entries(&statistics).find_map(|(key, text)| (key == "reason").then_some(text));
+        match reason.filter(|reason| !reason.is_empty()) {
+            Some(reason) => Self::new(code, format!("{}: {reason}", code.text())),
+            None => Self::plain(code),
+        }
+    }
+
+    /// What `work` returns; a panic in it is refused as `INTERNAL`.
+    ///
+    /// # Errors
+    ///
+    /// Those of `work`.
+    pub fn instead_of_panic<R>(work: impl FnOnce() -> Result<R, Self>) -> Result<R, Self> {
+        catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
+            let text = format!("panic: {}", panic_message(payload));
+            Err(Self::new(Code::Internal, text))
+        })
     }
 }
 

@@ -63,6 +63,11 @@ impl Driver {
         &self.slots
     }
 
+    /// Whether the bus is stepped: a tick may wait for it.
+    pub fn is_stepped(&self) -> bool {
+        matches!(self.line, BusHandle::Stepped { .. })
+    }
+
     /// The slots before the first exchange: every signal at its fail-safe value.
     pub fn initial_slots(&self) -> Vec<Slot> {
         let mut slots = vec![Slot::default(); self.slots.count];

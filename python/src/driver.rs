@@ -1,0 +1,329 @@
+//! The native half of the class `tickbus.Driver`.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyMemoryView, PyTuple};
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::nearest;
+use tickbus_binding::{Refusal, faults, read_fault};
+use tickbus_driver::Code;
+
+use crate::failure::{raised, unknown_signal};
+use crate::opened::{Facts, Half, Handle};
+use crate::signal::{Event, Signal};
+use crate::view::Slots;
+
+const NANOS_PER_SECOND: f64 = 1e9;
+/// Beyond this, a double of seconds is no time in nanoseconds of 64 bits.
+const MOST_SECONDS: f64 = 9.2e9;
+
+/// Statuses as members of the enumeration of the package: those that ticks return, made once.
+static DONE: PyOnceLock<[Py<PyAny>; 3]> = PyOnceLock::new();
+
+/// An open driver; the package's class is made of it.
+#[pyclass(frozen, subclass, module = "tickbus._native")]
+pub(crate) struct Driver {
+    handle: Handle,
+    id: i32,
+    name: String,
+    signals: Vec<Py<Signal>>,
+    by_name: HashMap<String, usize>,
+    slots: Py<Slots>,
+    integer_slots: Py<Slots>,
+}
+
+impl Driver {
+    fn status(py: Python<'_>, code: Code) -> PyResult<Py<PyAny>> {
+        let done = DONE.get_or_try_init(py, || {
+            let status = py.import("tickbus._status")?.getattr("Status")?;
+            let member = |code: Code| status.call1((code.code(),)).map(Bound::unbind);
+            PyResult::Ok([
+                member(Code::Fresh)?,
+                member(Code::Unchanged)?,
+                member(Code::Stale)?,
+            ])
+        })?;
+        let at = usize::try_from(code.code()).unwrap_or_default();
+        Ok(done[at].clone_ref(py))
+    }
+
+    fn tick(&self, py: Python<'_>, half: Half, time: Option<Nanos>) -> PyResult<Py<PyAny>> {
+        // Only a stepped bus waits. Everywhere else a tick takes less time than letting the interpreter's lock go.
+        let code = if self.handle.is_stepped {
+            py.detach(|| self.handle.tick(half, time))
+        } else {
+            self.handle.tick(half, time)
+        };
+        if code.code() < 0 {
+            return Err(raised(py, &self.handle.reason(code)));
+        }
+        Self::status(py, code)
+    }
+
+    fn find(&self, py: Python<'_>, name: &str) -> PyResult<&Py<Signal>> {
+        if let Some(&at) = self.by_name.get(name) {
+            return Ok(&self.signals[at]);
+        }
+        let known = self.signals.iter().map(|signal| signal.get().name());
+        let near = match nearest(name, known) {
+            Some(near) => format!("; did you mean '{near}'?"),
+            None => String::new(),
+        };
+        let what = format!("driver '{}' has no signal '{name}'{near}", self.name);
+        Err(unknown_signal(py, what))
+    }
+
+    fn done<R>(py: Python<'_>, result: Result<R, Refusal>) -> PyResult<R> {
+        result.map_err(|refusal| raised(py, &refusal))
+    }
+}
+
+/// The time of a tick, from seconds or from nanoseconds.
+fn time(seconds: Option<f64>, nanos: Option<i64>) -> PyResult<Option<Nanos>> {
+    match (seconds, nanos) {
+        (None, None) => Ok(None),
+        (None, Some(nanos)) => Ok(Some(Nanos(nanos))),
+        (Some(seconds), None) if seconds.abs() <= MOST_SECONDS => {
+            #[expect(clippy::cast_possible_truncation, reason = "the range is checked")]
+            let nanos = (seconds * NANOS_PER_SECOND).round() as i64;
+            Ok(Some(Nanos(nanos)))
+        }
+        (Some(seconds), None) => Err(PyValueError::new_err(format!(
+            "{seconds} is no simulation time; seconds since the simulation began are needed"
+        ))),
+        (Some(_), Some(_)) => Err(PyTypeError::new_err(
+            "the simulation time is given either in seconds or as ns=, not both",
+        )),
+    }
+}
+
+/// Seconds, for people and simulators.
+#[expect(clippy::cast_precision_loss, reason = "to the nearest double")]
+fn seconds(nanos: Nanos) -> f64 {
+    if nanos == Nanos::MAX {
+        f64::INFINITY
+    } else {
+        nanos.0 as f64 / NANOS_PER_SECOND
+    }
+}
+
+#[pymethods]
+impl Driver {
+    #[new]
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "what is made of Python's objects belongs to the function"
+    )]
+    #[pyo3(signature = (path, overlay = String::new()))]
+    fn new(py: Python<'_>, path: PathBuf, overlay: String) -> PyResult<Self> {
+        let Facts {
+            handle,
+            id,
+            name,
+            signals,
+        } = Self::done(py, py.detach(|| Handle::open(&path, &overlay)))?;
+        let names = signals.iter().map(|signal| signal.name.clone());
+        let by_name = names.enumerate().map(|(at, name)| (name, at)).collect();
+        let memory = &handle.memory;
+        let objects: PyResult<Vec<_>> = signals
+            .into_iter()
+            .map(|signal| Py::new(py, Signal::new(signal, memory)))
+            .collect();
+        let views = (
+            Py::new(py, Slots::reals(memory)),
+            Py::new(py, Slots::integers(memory)),
+        );
+        match (objects, views) {
+            (Ok(signals), (Ok(slots), Ok(integer_slots))) => Ok(Self {
+                handle,
+                id,
+                name,
+                signals,
+                by_name,
+                slots,
+                integer_slots,
+            }),
+            (Err(error), _) | (_, (Err(error), _) | (_, Err(error))) => {
+                // There is no memory left; what cannot be used must not stay open.
+                let _ = handle.close();
+                Err(error)
+            }
+        }
+    }
+
+    /// One tick: sends the signals that this end writes, then receives those that it reads.
+    ///
+    /// ``time`` is the simulation's, in seconds since it began, or ``ns`` in nanoseconds; stepped buses run the PLC by it,
+    /// and recordings use it. Without it the last one given is kept; if none was ever given, it is the computer's time since
+    /// the first tick. Returns ``Status.FRESH``, ``UNCHANGED`` or ``STALE``; raises ``FieldbusError``.
+    #[pyo3(signature = (time = None, *, ns = None))]
+    fn exchange(&self, py: Python<'_>, time: Option<f64>, ns: Option<i64>) -> PyResult<Py<PyAny>> {
+        self.tick(py, Half::Exchange, self::time(time, ns)?)
+    }
+
+    /// Begins a tick: receives the signals that this end reads. The model computes, and ``send()`` ends the tick.
+    ///
+    /// Time and result are as with ``exchange()``.
+    #[pyo3(signature = (time = None, *, ns = None))]
+    fn receive(&self, py: Python<'_>, time: Option<f64>, ns: Option<i64>) -> PyResult<Py<PyAny>> {
+        self.tick(py, Half::Receive, self::time(time, ns)?)
+    }
+
+    /// Ends the tick that ``receive()`` began: sends the signals that this end writes.
+    fn send(&self, py: Python<'_>) -> PyResult<()> {
+        self.tick(py, Half::Send, None).map(drop)
+    }
+
+    /// A signal by its name, always the same object; ``plc["Valve"]`` is the same.
+    ///
+    /// Raises ``UnknownSignalError``, a ``KeyError``, whose message has the nearest name.
+    fn signal(&self, py: Python<'_>, name: &str) -> PyResult<Py<Signal>> {
+        Ok(self.find(py, name)?.clone_ref(py))
+    }
+
+    fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Py<Signal>> {
+        self.signal(py, name)
+    }
+
+    fn __contains__(&self, name: &Bound<'_, PyAny>) -> bool {
+        name.extract::<String>()
+            .is_ok_and(|name| self.by_name.contains_key(&name))
+    }
+
+    /// All signals, in the order of driver.cfg.
+    #[getter]
+    fn signals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, &self.signals)
+    }
+
+    /// The values of all signals as a writable buffer of doubles, in the order of ``signals``, then the counts of edges.
+    ///
+    /// ``numpy.asarray(plc.slots)`` copies nothing: take it once, and what is written there is sent with the next tick. What the
+    /// other end writes is overwritten by the next tick.
+    #[getter]
+    fn slots<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMemoryView>> {
+        PyMemoryView::from(self.slots.bind(py))
+    }
+
+    /// The same memory as ``slots``, as signed integers: for the 64-bit integers without scale, for which doubles are too
+    /// coarse (``Signal.is_integer_slot``).
+    #[getter]
+    fn integer_slots<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMemoryView>> {
+        PyMemoryView::from(self.integer_slots.bind(py))
+    }
+
+    /// The events since the last call, at most 4096 at once.
+    fn events(&self, py: Python<'_>) -> PyResult<Vec<Event>> {
+        let events = Self::done(py, self.handle.events())?;
+        let with_signal = events.iter().filter_map(|event| {
+            let signal = self.signals.get(usize::try_from(event.signal).ok()?)?;
+            Some((signal, event))
+        });
+        with_signal
+            .map(|(signal, event)| Event::new(py, signal, event))
+            .collect()
+    }
+
+    /// Age in seconds of the data that the last tick read; infinite if nothing has arrived yet.
+    #[getter]
+    fn age(&self) -> f64 {
+        seconds(self.handle.memory.age())
+    }
+
+    /// How many bus cycles had arrived by the last tick.
+    #[getter]
+    fn sequence(&self) -> u64 {
+        self.handle.memory.sequence()
+    }
+
+    /// How many ticks there were.
+    #[getter]
+    fn ticks(&self) -> u64 {
+        self.handle.memory.ticks()
+    }
+
+    /// The time in seconds up to which the simulation may run before it has to exchange again, on a stepped bus; on others the
+    /// time that was given.
+    #[getter]
+    fn granted(&self) -> f64 {
+        seconds(self.handle.memory.granted())
+    }
+
+    /// The same in nanoseconds.
+    #[getter]
+    fn granted_ns(&self) -> i64 {
+        self.handle.memory.granted().0
+    }
+
+    /// Whether the bus is stepped: the PLC runs by the simulation's time, and a tick waits for it.
+    #[getter]
+    fn is_stepped(&self) -> bool {
+        self.handle.is_stepped
+    }
+
+    /// The id in driver.cfg.
+    #[getter]
+    fn id(&self) -> i32 {
+        self.id
+    }
+
+    /// The name in driver.cfg.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether the driver can no longer be used: it is closed, or the parent's of this forked process.
+    #[getter]
+    fn closed(&self) -> bool {
+        self.handle.memory.is_closed() || self.handle.is_forked()
+    }
+
+    /// Sends what was set last, and closes; a second time it does nothing.
+    ///
+    /// In a forked child of the process that opened the driver it does nothing, too. Arrays of ``slots`` stay valid memory.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        Self::done(py, py.detach(|| self.handle.close()))
+    }
+
+    fn _statistics(&self, py: Python<'_>) -> PyResult<String> {
+        let snapshot = Self::done(py, self.handle.snapshot())?;
+        Ok(snapshot.to_string())
+    }
+
+    fn _inject(&self, py: Python<'_>, fault: &str) -> PyResult<u32> {
+        let read = || {
+            let config = self.handle.config()?;
+            let fault = read_fault(fault, &config)?;
+            self.handle.inject(&fault)
+        };
+        Self::done(py, Refusal::instead_of_panic(read))
+    }
+
+    fn _end_fault(&self, py: Python<'_>, id: u32) -> PyResult<bool> {
+        Self::done(py, self.handle.end_fault(id))
+    }
+
+    fn _faults(&self, py: Python<'_>) -> PyResult<String> {
+        let board = Self::done(py, self.handle.board())?;
+        Ok(faults(&board))
+    }
+
+    fn __repr__(&self) -> String {
+        let state = if self.closed() { " closed" } else { "" };
+        format!("<Driver '{}' ({}){state}>", self.name, self.id)
+    }
+}
+
+/// A driver that nobody refers to any more is closed.
+impl Drop for Driver {
+    fn drop(&mut self) {
+        // Nobody is left who could be told.
+        let _ = self.handle.close();
+    }
+}

@@ -1,0 +1,71 @@
+//! The extension module `tickbus._native` of the Python package `tickbus`.
+//!
+//! It holds what a tick needs and what only the driver knows; all else of the package is in Python. An open driver is a
+//! number in a table of [`Handles`](tickbus_binding::Handles), as in the other bindings, and its values pass through
+//! `memory::Memory`, of which the driver has a copy: whatever Python does to that memory, on whatever thread, can make
+//! wrong values and nothing worse.
+
+mod driver;
+mod failure;
+mod memory;
+mod opened;
+mod signal;
+mod view;
+
+use pyo3::prelude::*;
+
+/// The native half of tickbus; use the package `tickbus`.
+#[pymodule]
+mod _native {
+    use std::path::PathBuf;
+
+    use pyo3::prelude::*;
+
+    use tickbus_binding::Refusal;
+    use tickbus_driver::Code;
+    use tickbus_report::page_beside;
+
+    use crate::failure::raised;
+
+    #[pymodule_export]
+    use crate::driver::Driver;
+    #[pymodule_export]
+    use crate::signal::{Event, Signal};
+    #[pymodule_export]
+    use crate::view::Slots;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        let table = Code::ALL.map(|code| (code.code(), code.name(), code.text(), code.remedy()));
+        module.add("STATUS_TABLE", table)
+    }
+
+    /// To be called in a child process right after a fork: drivers of the parent are not the child's.
+    #[pyfunction]
+    fn forked() {
+        crate::opened::forked();
+    }
+
+    /// Makes an HTML page from a recording, and returns its path.
+    #[pyfunction]
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "what is made of Python's objects belongs to the function"
+    )]
+    fn report(
+        py: Python<'_>,
+        recording: PathBuf,
+        title: String,
+        statistics: String,
+        texts: Vec<(String, String)>,
+    ) -> PyResult<PathBuf> {
+        let made = py.detach(|| {
+            Refusal::instead_of_panic(|| {
+                page_beside(&recording, &title, Some(&statistics), &texts)
+                    .map_err(|error| Refusal::new(Code::BadArgument, error))
+            })
+        });
+        made.map_err(|refusal| raised(py, &refusal))
+    }
+}

@@ -1,0 +1,264 @@
+//! Open drivers, by checked numbers.
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use tickbus_base::time::Nanos;
+use tickbus_binding::{Handles, Refusal, SignalDescription, closing, open};
+use tickbus_driver::{Code, Driver, Exchange, Snapshot};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::{Fault, FaultBoard};
+use tickbus_image::Event;
+use tickbus_image::signal::Slot;
+
+use crate::memory::Memory;
+use crate::signal::Description;
+
+/// Every driver that is open in this process.
+static DRIVERS: Handles<Opened> = Handles::new();
+
+/// How often this process and those before it have been forked.
+static FORKS: AtomicU64 = AtomicU64::new(0);
+
+/// How often a call that meets another one tries again: a tick, while the other one copies statistics, or the reverse.
+const PATIENCE: u32 = 200;
+
+/// The most events that a call hands over: as many as the driver's ring holds.
+const MOST_EVENTS: usize = 4096;
+/// The most that are taken at once.
+const EVENTS: usize = 64;
+
+/// Called in a child process after a fork.
+pub(crate) fn forked() {
+    FORKS.fetch_add(1, Ordering::Relaxed);
+}
+
+/// A tick, or one of its halves.
+#[derive(Clone, Copy)]
+pub(crate) enum Half {
+    Exchange,
+    Receive,
+    Send,
+}
+
+/// An open driver with slots of its own.
+struct Opened {
+    driver: Driver,
+    slots: Vec<Slot>,
+    memory: Arc<Memory>,
+    /// The slots that this end writes, and those that it reads.
+    written: Vec<Range<usize>>,
+    read: Vec<Range<usize>>,
+}
+
+impl Opened {
+    fn tick(&mut self, half: Half, time: Option<Nanos>) -> Code {
+        if !matches!(half, Half::Send) {
+            self.memory.count();
+        }
+        if !matches!(half, Half::Receive) {
+            self.gather();
+        }
+        let done = match half {
+            Half::Exchange => self.driver.exchange(time, &mut self.slots),
+            Half::Receive => self.driver.receive(time, &mut self.slots),
+            Half::Send => self.driver.send(&mut self.slots),
+        };
+        if !matches!(half, Half::Send) {
+            self.scatter();
+        }
+        self.tell(done)
+    }
+
+    fn gather(&mut self) {
+        for range in &self.written {
+            self.memory.gather(range, &mut self.slots);
+        }
+    }
+
+    fn scatter(&self) {
+        for range in &self.read {
+            self.memory.scatter(range, &self.slots);
+        }
+    }
+
+    fn tell(&self, done: Exchange) -> Code {
+        self.memory.tell(done);
+        done.code
+    }
+
+    fn events(&mut self) -> Vec<Event> {
+        let mut found = Vec::new();
+        let mut events = [Event::default(); EVENTS];
+        while found.len() < MOST_EVENTS {
+            let count = self.driver.poll_events(&mut events);
+            found.extend_from_slice(&events[..count]);
+            if count < EVENTS {
+                break;
+            }
+        }
+        found
+    }
+
+    fn close(mut self) {
+        self.gather();
+        self.driver.end_tick(&self.slots);
+        self.driver.close();
+    }
+}
+
+/// The slots for which `wanted` holds, in runs.
+fn runs(count: usize, wanted: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for slot in (0..count).filter(|&slot| wanted(slot)) {
+        match runs.last_mut() {
+            Some(run) if run.end == slot => run.end += 1,
+            _ => runs.push(slot..slot + 1),
+        }
+    }
+    runs
+}
+
+/// A driver that was opened. Dropping it leaves the driver open.
+pub(crate) struct Handle {
+    number: i64,
+    forks: u64,
+    pub(crate) memory: Arc<Memory>,
+    pub(crate) is_stepped: bool,
+}
+
+/// What is known of a driver when it has been opened.
+pub(crate) struct Facts {
+    pub(crate) handle: Handle,
+    pub(crate) id: i32,
+    pub(crate) name: String,
+    pub(crate) signals: Vec<Description>,
+}
+
+impl Handle {
+    /// Opens what a driver.cfg describes, with `tables` in place of its own.
+    pub(crate) fn open(path: &Path, tables: &str) -> Result<Facts, Refusal> {
+        Refusal::instead_of_panic(|| {
+            tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
+            let place = DRIVERS.reserve()?;
+            let driver = open(path, tables)?;
+            let config = Arc::clone(driver.config());
+            let signals: Vec<Description> = (0..config.table.signals.len())
+                .map(|index| Description::of(&SignalDescription::of(&driver, index), &config))
+                .collect();
+            let is_written =
+                |slot: usize| signals.get(slot).is_some_and(|signal| signal.is_written);
+            let slots = driver.initial_slots();
+            let memory = Arc::new(Memory::new(&slots));
+            let is_stepped = driver.is_stepped();
+            let number = place.fill(Opened {
+                written: runs(slots.len(), is_written),
+                read: runs(slots.len(), |slot| !is_written(slot)),
+                driver,
+                slots,
+                memory: Arc::clone(&memory),
+            });
+            Ok(Facts {
+                handle: Self {
+                    number,
+                    forks: FORKS.load(Ordering::Relaxed),
+                    memory,
+                    is_stepped,
+                },
+                id: config.id,
+                name: config.name.clone(),
+                signals,
+            })
+        })
+    }
+
+    /// Whether this process is a forked child of the one that opened the driver.
+    pub(crate) fn is_forked(&self) -> bool {
+        self.forks != FORKS.load(Ordering::Relaxed)
+    }
+
+    /// Calls `work` with the driver, if it is this process's and open. A call that meets another thread's tries again for a while.
+    fn with<R>(&self, mut work: impl FnMut(&mut Opened) -> R) -> Result<R, Code> {
+        if self.is_forked() {
+            return Err(Code::NotOpen);
+        }
+        let mut patience = PATIENCE;
+        loop {
+            match DRIVERS.with(self.number, &mut work) {
+                Err(Code::Busy) if patience > 0 => std::thread::yield_now(),
+                other => return other,
+            }
+            patience -= 1;
+        }
+    }
+
+    fn with_reason<R>(&self, work: impl FnMut(&mut Opened) -> R) -> Result<R, Refusal> {
+        self.with(work).map_err(|code| self.reason(code))
+    }
+
+    /// A tick or a half of one; a code below zero if it failed.
+    pub(crate) fn tick(&self, half: Half, time: Option<Nanos>) -> Code {
+        self.with(|opened| opened.tick(half, time))
+            .unwrap_or_else(|refused| refused)
+    }
+
+    /// Why a call failed with this code.
+    #[cold]
+    pub(crate) fn reason(&self, code: Code) -> Refusal {
+        if self.is_forked() {
+            let text = "this driver was opened by the parent process, and a forked child has none of its threads; \
+                        open it in the child, or start the child by \"spawn\"";
+            return Refusal::new(Code::NotOpen, text);
+        }
+        match self.with(|opened| opened.driver.snapshot()) {
+            Ok(snapshot) => Refusal::of_tick(code, &snapshot),
+            Err(_) => DRIVERS.reason(self.number, code),
+        }
+    }
+
+    pub(crate) fn snapshot(&self) -> Result<Snapshot, Refusal> {
+        self.with_reason(|opened| opened.driver.snapshot())
+    }
+
+    pub(crate) fn config(&self) -> Result<Arc<Config>, Refusal> {
+        self.with_reason(|opened| Arc::clone(opened.driver.config()))
+    }
+
+    pub(crate) fn events(&self) -> Result<Vec<Event>, Refusal> {
+        self.with_reason(Opened::events)
+    }
+
+    pub(crate) fn inject(&self, fault: &Fault) -> Result<u32, Refusal> {
+        self.with_reason(|opened| tickbus_binding::inject(&mut opened.driver, fault))?
+    }
+
+    pub(crate) fn end_fault(&self, id: u32) -> Result<bool, Refusal> {
+        self.with_reason(|opened| opened.driver.end_fault(id))
+    }
+
+    pub(crate) fn board(&self) -> Result<Arc<FaultBoard>, Refusal> {
+        self.with_reason(|opened| Arc::clone(opened.driver.board()))
+    }
+
+    /// Closes the driver; does nothing if it is closed already, or the parent process's.
+    pub(crate) fn close(&self) -> Result<(), Refusal> {
+        if self.is_forked() {
+            return Ok(());
+        }
+        Refusal::instead_of_panic(|| {
+            let mut patience = PATIENCE;
+            loop {
+                match closing(|| DRIVERS.close(self.number, Opened::close)) {
+                    Ok(()) | Err(Code::Closed | Code::NotOpen) => break,
+                    Err(Code::Busy) if patience > 0 => std::thread::yield_now(),
+                    Err(code) => return Err(Refusal::plain(code)),
+                }
+                patience -= 1;
+            }
+            self.memory.close();
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,127 @@
+"""What the tests share."""
+
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import tickbus
+
+pytest_plugins = ["pytester"]
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SIGNALS = """
+[[signal]]
+name    = "Start"
+address = "%IX0.0"
+latch   = "rising"
+
+[[signal]]
+name    = "Height"
+address = "%IW2"
+type    = "INT"
+unit    = "mm"
+scale   = { raw = [0, 27648], value = [0.0, 500.0] }
+
+[[signal]]
+name    = "Parts"
+address = "%IW4"
+
+[[signal]]
+name    = "whole"
+address = "%IL8"
+type    = "LINT"
+
+[[signal]]
+name    = "natural"
+address = "%IL16"
+
+[[signal]]
+name    = "Run"
+address = "%QX0.0"
+latch   = "rising"
+
+[[signal]]
+name      = "Speed"
+address   = "%QW2"
+type      = "INT"
+unit      = "mm"
+scale     = { raw = [0, 27648], value = [0.0, 500.0] }
+fail_safe = 7.5
+
+[[signal]]
+name    = "Parts back"
+address = "%QW4"
+
+[[signal]]
+name    = "whole back"
+address = "%QL8"
+type    = "LINT"
+
+[[signal]]
+name    = "natural back"
+address = "%QL16"
+"""
+
+MIRROR = """
+[driver]
+id   = 7
+name = "Line"
+
+[fieldbus]
+kind    = "loopback"
+program = "mirror"
+mode    = "stepped"
+scan    = "2ms"
+"""
+
+
+def root(*parts: str) -> Path:
+    """A file of the project."""
+    return ROOT.joinpath(*parts)
+
+
+@pytest.fixture
+def line_cfg(tmp_path: Path) -> Path:
+    """A driver.cfg whose PLC brings every %I back on the %Q of the same address."""
+    file = tmp_path / "line.cfg"
+    file.write_text(MIRROR + SIGNALS)
+    return file
+
+
+@pytest.fixture
+def line(line_cfg: Path) -> Iterator[tickbus.Driver]:
+    """The same, open."""
+    with tickbus.open(line_cfg) as driver:
+        yield driver
+
+
+@pytest.fixture(autouse=True)
+def no_unexpected_warning(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
+    """As tools/test has it for Java: states of a line and injected faults are expected, other warnings in the log are not."""
+    yield
+    told = capfd.readouterr()
+    sys.stdout.write(told.out)
+    sys.stderr.write(told.err)
+    warnings = (line for line in told.err.splitlines() if re.search(r"^\[\S+ (WARN|ERROR) +tickbus", line))
+    unexpected = [line for line in warnings if not re.search(r'" is (opening|stale|failed): |": injected fault "', line)]
+    assert not unexpected
+
+
+@pytest.fixture
+def python(tmp_path: Path) -> Callable[..., Any]:
+    """Runs a program in a Python process of its own, which must not go down."""
+    import subprocess
+
+    def run(program: str, *arguments: Any) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-X", "faulthandler", "-c", program, *map(str, arguments)]
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, timeout=60, env=os.environ | {"TICKBUS_LOG": "warn"}
+        )
+
+    return run

@@ -1,0 +1,274 @@
+"""The plug-in for pytest, by pytest itself: tests that pass, and tests that fail, with what they say."""
+
+import pytest
+
+from conftest import root
+
+CONFIG = """
+[driver]
+id   = 7
+name = "Line"
+
+[fieldbus]
+kind    = "loopback"
+program = "mirror"
+scan    = "2ms"
+
+[[signal]]
+name    = "Start"
+address = "%IX0.0"
+
+[[signal]]
+name    = "Height"
+address = "%IW2"
+type    = "INT"
+unit    = "mm"
+
+[[signal]]
+name    = "Run"
+address = "%QX0.0"
+
+[[signal]]
+name    = "Speed"
+address = "%QW2"
+type    = "INT"
+unit    = "mm/s"
+"""
+
+HEAD = """
+import pytest
+from tickbus.testing import above, below, falls, is_, minutes, ms, near, off, on, rises, s, ticks, when
+
+pytestmark = pytest.mark.plc(config="line.cfg", step="2ms")
+"""
+
+GREEN = """
+class Lift:
+    height = 0
+
+    def connect(self, plc):
+        plc.set("Height", 100)
+        self.height = 100
+
+    def step(self, plc, time):
+        self.height += 1 if plc.is_on("Run") else 0
+        plc.set("Height", self.height)
+
+
+def test_every_test_begins_at_tick_null(plc):
+    assert plc.ticks == 0 and plc.time == 0 and not plc.is_on("Start")
+    plc.set("Start", True).tick()
+    plc.expect(on("Run"))
+
+
+def test_again_at_tick_null(plc):
+    assert plc.ticks == 0 and plc.time_ns == 0
+    plc.expect(off("Start").and_(off("Run")))
+
+
+@pytest.mark.parametrize("value", [-300, 7, 32767])
+def test_values_come_back(plc, value):
+    plc.set("Height", value)
+    assert plc.await_(is_("Speed", value)).within(3) == 1
+    plc.expect(near("Speed", value + 0.5, 0.5))
+
+
+def test_durations_are_whole_ticks(plc):
+    assert plc.run("3ms").ticks == 2 and plc.run(4, ms).ticks == 4 and plc.tick(0).ticks == 4
+    assert plc.time == 0.008 and plc.run(0.01, s).ticks == 9 and plc.run(3, ticks).ticks == 12
+
+
+def test_limits_are_ticks_or_time(plc):
+    for limit in ((3,), (3, ticks), ("6ms",), (6, ms), (0.006, s), (0.0001, minutes)):
+        plc.set("Start", not plc.is_on("Start"))
+        assert plc.await_(on("Run") if plc.is_on("Start") else off("Run")).within(*limit) == 1
+
+
+def test_forced_signals_stay_what_the_machine_says(plc):
+    plc.connect(Lift())
+    plc.force("Height", 5).tick(10)
+    plc.expect(is_("Height", 5) & is_("Speed", 5))
+    plc.force("Height", 6).tick()
+    plc.expect(is_("Speed", 6))
+    plc.release("Height").tick()
+    plc.expect(is_("Speed", 100))
+
+
+def test_pressed_buttons_are_released(plc):
+    plc.press("Start")
+    plc.expect(on("Run"))
+    plc.await_(off("Run")).within(2)
+    assert plc.ticks == 101 and plc.rises("Run") == 1 and plc.falls("Run") == 1 and plc.falls("Start") == 1
+
+
+def test_faults_are_injected_and_ended(plc):
+    plc.set("Start", True).tick()
+    wire = plc.inject(kind="stuck", signal="Start", value=False)
+    plc.await_(off("Run")).within(3)
+    assert wire.is_active and len(plc.faults()) == 1
+    wire.end()
+    plc.await_(on("Run")).within(3)
+
+
+def test_conditions_join(plc):
+    plc.expect(on("Run").or_(off("Run")))
+    plc.expect(~on("Run") & above("Speed", -1) & below("Speed", 1))
+    plc.expect(off("Run")).during("20ms").expect(off("Start")).during(5)
+    assert plc.ticks == 15
+
+
+def test_edges_count_from_where_the_wait_begins(plc):
+    plc.set("Start", True).tick().set("Start", False)
+    assert plc.await_(falls("Run")).within(2) == 1
+    plc.set("Start", True)
+    assert plc.await_(rises("Run").or_(when("never", lambda: False))).within(2) == 1
+
+
+@pytest.mark.plc(step="5ms", machine=Lift)
+def test_a_mark_adds_to_that_of_the_module(plc, machine):
+    assert plc.step_ns == 5_000_000 and isinstance(machine, Lift)
+    plc.force("Start", True).tick(11)
+    # The first exchange delivers Run, so the lift has taken ten steps with it.
+    assert machine.height == 110
+
+
+@pytest.mark.plc("socket.cfg", program="mirror", scan="2ms")
+class TestSocket:
+    def test_the_plants_own_bus_does_not_matter(self, plc):
+        plc.set("Start", True).tick()
+        plc.expect(on("Run"))
+"""
+
+# What a test says, by its body.
+RED = [
+    (
+        'plc.set("Height", 2).tick(3); plc.set("Height", 3).tick(2); plc.await_(above("Speed", 3)).within("40ms")',
+        "tick 25 (50ms): 'Speed' is 3 mm/s, expected above 3 within 20 ticks (40ms) of tick 5\n"
+        "*last changes of 'Speed' (%QW2): 0 mm/s → 2 mm/s at tick 1 (2ms) → 3 mm/s at tick 4 (8ms)",
+    ),
+    ('plc.expect(on("Run"))', "tick 0 (0s): 'Run' is off, expected on"),
+    (
+        'plc.set("Start", True); plc.expect(off("Run")).during("1s")',
+        "tick 1 (2ms): 'Run' is on, expected off for 500 ticks (1s) from tick 0",
+    ),
+    (
+        'plc.never(on("Run")); plc.tick(3).press("Start")',
+        "tick 4 (8ms): 'Run' is on, expected not on at every tick since tick 0",
+    ),
+    (
+        'plc.set("Start", True).tick(); plc.await_(rises("Run")).within(5)',
+        "tick 6 (12ms): 'Run' is on without one, expected a rising edge within 5 ticks (10ms) of tick 1",
+    ),
+    (
+        'plc.await_(off("Run").and_(is_("Speed", 4))).within(1)',
+        "tick 1 (2ms): 'Speed' is 0 mm/s, expected 4 within 1 tick (2ms) of tick 0",
+    ),
+    (
+        'plc.await_(when("the cow is in the barn", lambda: False)).within(2)',
+        'tick 2 (4ms): "the cow is in the barn" is false, expected true within 2 ticks (4ms) of tick 0',
+    ),
+    ("plc.tick(12); raise AssertionError('of its own')", "of its own\n*the test stood at tick 12 (24ms); recording: *.vcd; report: *.html"),
+    ('plc.expect(on("Rnu"))', "driver 'Line' has no signal 'Rnu'; did you mean 'Run'?"),
+    ('plc.set("Run", True)', "signal 'Run' at %QX0.0 is written by the other end"),
+    ('plc.await_(on("Run")).within(0)', "a limit of 0 ticks; give it a whole number, at least 1, or use expect"),
+    ('plc.await_(on("Run")).within("1ms")', "a limit of 1ms is shorter than one tick of 2ms"),
+    ("plc.tick(-1)", "-1 ticks; time does not run backwards"),
+    ("plc.connect(lambda same, time: same.tick()).tick()", "a machine must not let time pass in its own step"),
+    ("plc.connect(3)", "3 is no machine: it has no method step"),
+    ('plc.run("soon")', '"soon" is no duration'),
+    ("plc.run(3)", "3 of what? Write a duration"),
+    ('plc.run("3s", ms)', '"3s" has its unit already'),
+    ('assert on("Run")', "a condition is neither true nor false by itself"),
+    ('near("Speed", 1, -1)', "a tolerance of -1; expected 0 or more"),
+]
+
+# Marks that are wrong.
+WRONG = [
+    ('step="0s"', 'step = "0s": a tick takes more than no time'),
+    ('config="lien.cfg"', "there is none of the files *lien.cfg"),
+    ('program="rigg"', 'there is no program "rigg"; did you mean "rig"?'),
+    ('confg="line.cfg"', "@pytest.mark.plc has no 'confg'; it has config, program"),
+    ('recording="maybe"', "recording='maybe'; expected one of 'on failure', 'always', 'never'"),
+    ('scan="2ms"', "options and scan are of a program; name it"),
+    ('config="socket.cfg"', 'the bus "socket" of the driver.cfg has no mode; name a PLC program'),
+]
+
+
+@pytest.fixture
+def tests(pytester: pytest.Pytester) -> pytest.Pytester:
+    """A folder of tests."""
+    pytester.path.joinpath("line.cfg").write_text(CONFIG)
+    socket = CONFIG.replace('"loopback"\nprogram = "mirror"\nscan    = "2ms"', '"socket"\naddress = "127.0.0.1:0"\ncycle   = "2ms"')
+    pytester.path.joinpath("socket.cfg").write_text(socket)
+    return pytester
+
+
+def test_tests_with_all_words_of_the_kit_pass(tests):
+    tests.makepyfile(HEAD + GREEN)
+    tests.runpytest_inprocess("--strict-markers").assert_outcomes(passed=14)
+    assert not tests.path.joinpath("tickbus-reports").exists()
+
+
+def test_failures_say_what_happened(tests):
+    tests.makepyfile(HEAD + "".join(f"\ndef test_{number}(plc):\n    {body}\n" for number, (body, _) in enumerate(RED)))
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(failed=len(RED))
+    result.stdout.fnmatch_lines([f"E *{line.lstrip('*')}*" for _, told in RED for line in told.split("\n")])
+
+
+def test_wrong_marks_are_told(tests):
+    bodies = (f"\n@pytest.mark.plc({mark})\ndef test_{number}(plc):\n    pass\n" for number, (mark, _) in enumerate(WRONG))
+    tests.makepyfile(HEAD + "".join(bodies))
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(errors=len(WRONG))
+    result.stdout.fnmatch_lines([f"E *{told}*" for _, told in WRONG])
+
+
+def test_without_a_mark_it_says_what_to_write(tests):
+    tests.makepyfile("def test(plc):\n    pass\n")
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(['E *needs a driver.cfg; write @pytest.mark.plc(config="driver.cfg"*'])
+
+
+def test_a_wait_without_a_limit_fails_the_test(tests):
+    tests.makepyfile(HEAD + '\ndef test(plc):\n    plc.await_(on("Run"))\n')
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(passed=1, errors=1)
+    result.stdout.fnmatch_lines(["E *await_('Run' on) was given no limit, so that it never waited; add .within*"])
+
+
+def test_a_failed_test_leaves_its_recording_and_a_good_one_none(tests):
+    body = "\ndef test_good(plc):\n    plc.tick(3)\n\n\ndef test_bad(plc):\n    plc.tick(12)\n    assert plc.ticks == 13\n"
+    name = tests.makepyfile(HEAD + body).stem
+    tests.runpytest_inprocess("--tickbus-reports", "kept").assert_outcomes(passed=1, failed=1)
+    kept = sorted(file.name for file in tests.path.joinpath("kept").iterdir())
+    assert kept == [f"{name}.py.test_bad.html", f"{name}.py.test_bad.vcd"]
+    recording, page = (tests.path.joinpath("kept", f"{name}.py.test_bad.{kind}").read_text() for kind in ("vcd", "html"))
+    assert "#24" in recording, "the last tick"
+    assert "assert 12 == 13" in page
+
+
+def test_a_recording_is_kept_always_or_never_where_asked(tests):
+    body = '\n@pytest.mark.plc(recording="always")\ndef test_good(plc):\n    plc.tick(3)\n'
+    body += '\n\n@pytest.mark.plc(recording="never")\ndef test_bad(plc):\n    plc.tick(2)\n    assert False\n'
+    tests.makepyfile(HEAD + body)
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["E *the test stood at tick 2 (4ms)"])
+    kept = [file.name for file in tests.path.joinpath("tickbus-reports").iterdir()]
+    assert len(kept) == 2 and all("test_good" in name for name in kept)
+
+
+def test_a_machine_that_is_not_there_is_told(tests):
+    tests.makepyfile(HEAD + "\ndef test(machine):\n    pass\n")
+    result = tests.runpytest_inprocess()
+    result.stdout.fnmatch_lines(["E *the test's mark plc names no machine; write machine=*"])
+
+
+def test_the_tests_of_the_manual_pass(pytester):
+    blocks = root("docs", "python.md").read_text().split("```python\n")
+    (tests,) = (block.split("```")[0] for block in blocks if "import pytest" in block)
+    pytester.path.joinpath("driver.cfg").write_text(root("driver.cfg").read_text())
+    pytester.makepyfile(tests)
+    pytester.runpytest_inprocess().assert_outcomes(passed=2)

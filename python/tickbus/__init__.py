@@ -1,0 +1,35 @@
+"""Your simulated machine, on the PLC's fieldbus.
+
+``open`` a driver.cfg, take its signals by name, and exchange at every step of your simulation::
+
+    import tickbus
+
+    with tickbus.open("tank.cfg") as plc:
+        valve, level = plc["Valve"], plc["Level"]
+        mm = 100.0
+        while simulating:
+            plc.receive()                       # Status.FRESH, UNCHANGED or STALE
+            mm += 2 if valve.value else -1      # your machine
+            level.value = mm
+            plc.send()
+
+Directions are the PLC's: a simulated machine writes ``%I`` and reads ``%Q``. ``tickbus.testing`` tests PLC programs with pytest.
+"""
+
+from ._driver import Driver, Fault, open, report
+from ._errors import FieldbusError, UnknownSignalError
+from ._native import Event, Signal, __version__
+from ._status import Status
+
+__all__ = [
+    "Driver",
+    "Event",
+    "Fault",
+    "FieldbusError",
+    "Signal",
+    "Status",
+    "UnknownSignalError",
+    "__version__",
+    "open",
+    "report",
+]

@@ -1,0 +1,181 @@
+"""An open driver."""
+
+import atexit
+import os
+import re
+import warnings
+import weakref
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from . import _native, _toml
+from ._errors import FieldbusError
+from ._status import Status
+
+_ENTRY = re.compile(r"((?:[^=\\]|\\.)+)=(.*)")
+
+
+def open(path: str | os.PathLike[str], overlay: _toml.Tables | None = None) -> "Driver":
+    """Open the driver that a driver.cfg describes, and start its fieldbus.
+
+    Returns at once, whether or not the PLC is there: until it is, ticks return ``Status.STALE``.
+
+    ``overlay`` takes the place of tables of the file, for example to put the plant's own signals on another bus::
+
+        tickbus.open("plant.cfg", {"fieldbus": {"kind": "loopback", "program": "mirror", "mode": "stepped"},
+                                   "record": {"file": "run.vcd"}})
+
+    It is a mapping of such tables, or the same as a text in TOML. Raises ``FieldbusError`` with ``Status.BAD_CONFIG`` and every
+    mistake at its line and column, or with the reason why the bus cannot be opened.
+    """
+    return Driver(os.fspath(path), _toml.document(overlay) if overlay is not None else "")
+
+
+class Driver(_native.Driver):
+    """One open driver: a simulation's end of a PLC's fieldbus. ``tickbus.open`` makes it.
+
+    A tick is either ``receive()``, the model, ``send()``, or one ``exchange()``. The first way answers within the tick;
+    ``exchange()`` sends first and then receives, so that an answer goes out with the next tick. Neither waits for the bus,
+    unless it is a stepped one; there the interpreter's lock is released meanwhile.
+
+    One thread at a time uses a driver. On a stepped bus, a call that meets a tick of another thread raises ``FieldbusError``
+    with ``Status.BUSY``.
+    """
+
+    __slots__ = ("__weakref__",)
+
+    def __init__(self, path: str, overlay: str = "") -> None:
+        _open.add(self)
+
+    def statistics(self) -> dict[str, str]:
+        """The state of the line and all counters, by key: docs/statistics.md has their meanings."""
+        entries = filter(None, map(_ENTRY.fullmatch, self._statistics().splitlines()))
+        return {re.sub(r"\\(.)", r"\1", entry[1]): entry[2] for entry in entries}
+
+    def inject(self, fault: str = "", /, **keys: Any) -> "Fault":
+        """Inject a fault, such as a stuck signal or a broken line. It can begin with the next tick.
+
+        The keys are those of a ``[[fault]]`` section of driver.cfg, and durations are texts::
+
+            plc.inject(kind="stuck", signal="LA1 bottom", value=True, at="2s")
+            plc.inject(kind="link-down", for_="500ms")
+
+        A key that is a word of Python's takes an underscore: ``for_``, ``while_``. A text in TOML will do, too.
+        """
+        keys = {name.removesuffix("_"): value for name, value in keys.items()}
+        if not isinstance(fault, str):
+            raise TypeError(f"a fault is a text in TOML, or keys such as kind='stuck', not {type(fault).__name__}")
+        number = self._inject(fault + "\n" + _toml.section(keys))
+        return next(fault for fault in self.faults() if fault.id == number)
+
+    def faults(self) -> list["Fault"]:
+        """The faults in driver.cfg and those that were injected; of those long over some may be missing."""
+        return [Fault(self, *line.split("\t")) for line in self._faults().splitlines()]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if not self.closed:
+            warnings.warn(f"unclosed driver {self!r}", ResourceWarning, stacklevel=2, source=self)
+            self.close()
+
+
+class Fault:
+    """A fault that was injected: ``Driver.inject`` makes it. In a ``with`` statement it ends with the block."""
+
+    def __init__(self, driver: Driver, id: str, state: str, begun: str, kind: str, name: str, what: str) -> None:
+        self._driver = driver
+        self.id = int(id)
+        """Its number, from 1."""
+        self.kind = kind
+        """Its kind, such as ``link-down``."""
+        self.name = name
+        """Its name, its own or made from what it does."""
+        self.what = what
+        """What it does, for people."""
+        self._last = (state, begun)
+
+    def _now(self) -> tuple[str, str]:
+        for line in self._driver._faults().splitlines():
+            number, state, begun, *_ = line.split("\t")
+            if int(number) == self.id:
+                self._last = (state, begun)
+                return self._last
+        # It is over for so long that the driver has forgotten it.
+        self._last = ("over", self._last[1])
+        return self._last
+
+    @property
+    def state(self) -> Literal["waiting", "active", "over"]:
+        """``waiting``: it has not begun, or may begin again; ``active``; ``over``: for good. As of the last tick."""
+        return self._now()[0]  # type: ignore[return-value]
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it has its effect, as of the last tick."""
+        return self.state == "active"
+
+    @property
+    def begun(self) -> int:
+        """How often it has begun."""
+        return int(self._now()[1])
+
+    def end(self) -> None:
+        """End it at the next tick, which has the true values again."""
+        self._driver._end_fault(self.id)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._driver.closed:
+            self.end()
+
+    def __repr__(self) -> str:
+        return f"<Fault {self.id} '{self.name}' ({self.kind}): {self.what}>"
+
+
+def report(
+    recording: str | os.PathLike[str],
+    title: str = "",
+    statistics: Mapping[str, str] | None = None,
+    texts: Mapping[str, str] | None = None,
+) -> Path:
+    """Make an HTML page from a recording: a chart of all signals, faults, states of the line.
+
+    ``recording`` is the VCD or CSV file that a ``[record]`` table named; its driver must be closed. The page is written beside it,
+    and its path returned. ``statistics`` are those of the driver, ``texts`` are shown under their headings. Raises
+    ``FieldbusError`` with ``Status.BAD_ARGUMENT`` if the recording cannot be read.
+    """
+    escaped = ((re.sub(r"([=\\])", r"\\\1", key), value) for key, value in (statistics or {}).items())
+    lines = "".join(f"{key}={value}\n" for key, value in escaped)
+    return Path(_native.report(Path(recording), title or Path(recording).stem, lines, list((texts or {}).items())))
+
+
+_open: weakref.WeakSet[Driver] = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    """Lets the drivers that are open send what was set last, and finish their recordings."""
+    for driver in list(_open):
+        try:
+            driver.close()
+        except FieldbusError as error:
+            # Another thread is in a tick, and the process ends.
+            if error.status is not Status.BUSY:
+                raise
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_native.forked)

@@ -1,0 +1,24 @@
+"""The exceptions."""
+
+from ._status import Status
+
+
+class FieldbusError(Exception):
+    """Something that the driver refused or could not do; the message says what happened and what to do."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(code, message)
+        self.status = Status(code)
+        self.message = message
+
+    @property
+    def code(self) -> int:
+        """The status code, below zero."""
+        return self.status.value
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class UnknownSignalError(FieldbusError, KeyError):
+    """No signal of the driver has this name; the message has the nearest one. It is a ``KeyError``, too."""

@@ -1,0 +1,39 @@
+"""Tests of PLC programs: the program and a model of the machine, tick by tick, on simulation time.
+
+The plug-in for pytest, which is there as soon as tickbus is installed, hands a ``Plc`` to tests as the fixture ``plc``::
+
+    import pytest
+    from tickbus.testing import off, on
+
+    pytestmark = pytest.mark.plc(config="driver.cfg", program="rig", step="2ms", machine=Cell)
+
+    def test_start_begins_a_run(plc):
+        plc.await_(on("Ready lamp")).within("25s")
+        plc.press("Start button")
+        plc.await_(on("Running lamp")).within(40)
+"""
+
+from ._conditions import Condition, above, below, falls, is_, near, off, on, rises, when
+from ._durations import minutes, ms, s, ticks
+from ._plc import Await, Expectation, Machine, Plc
+
+__all__ = [
+    "Await",
+    "Condition",
+    "Expectation",
+    "Machine",
+    "Plc",
+    "above",
+    "below",
+    "falls",
+    "is_",
+    "minutes",
+    "ms",
+    "near",
+    "off",
+    "on",
+    "rises",
+    "s",
+    "ticks",
+    "when",
+]

@@ -1,0 +1,295 @@
+"""The PLC under test, from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeAlias
+
+from .._driver import Driver, Fault
+from .._native import Signal
+from . import _durations
+from ._conditions import Bound, Condition
+from ._durations import Unit
+from ._watch import Watch
+
+_PRESS = "200ms"
+"""How long a button is pressed: about as long as a finger does, and longer than any scan."""
+
+Duration: TypeAlias = float | str
+
+
+class Machine(Protocol):
+    """A model of the machine, as detailed as the tests need. ``connect(plc)``, if it has that, is called once before the first tick."""
+
+    def step(self, plc: Plc, time: float) -> object:
+        """One tick: reads what the PLC has commanded, moves on, sets the sensors. ``time`` in seconds is that of its end."""
+
+
+class Plc:
+    """The PLC under test: set its inputs, read its outputs, let time pass.
+
+    In each tick the machine takes a step with the PLC's commands, its sensors and all forced values are sent to the PLC, the PLC is
+    scanned if a scan is due, and its outputs come back. Between two calls time stands still.
+    """
+
+    def __init__(self, driver: Driver, step: str = "1ms") -> None:
+        self.step_ns = _durations.parse(step)
+        """The simulation time of a tick."""
+        if self.step_ns == 0:
+            raise ValueError(f'step = "{step}": a tick takes more than no time; write such as "2ms"')
+        self._driver = driver
+        self._slots = driver.slots
+        self._seen = self._slots.tobytes()
+        self._watches = {signal.name: Watch(signal) for signal in driver.signals}
+        self._machines: list[Callable[[Plc, float], object]] = []
+        self._forced: dict[str, float] = {}
+        self._standing: list[tuple[Bound, int]] = []
+        self._open: list[Await] = []
+        self._ticks = 0
+        self._in_step = False
+
+    def connect(self, machine: Machine | Callable[[Plc, float], object]) -> Plc:
+        """Connect a machine, beside those that are there: an object with ``step(plc, time)``, or a function."""
+        step = getattr(machine, "step", machine)
+        if not callable(step):
+            raise TypeError(f"{machine!r} is no machine: it has no method step(plc, time)")
+        connect = getattr(machine, "connect", None)
+        if connect is not None:
+            connect(self)
+        self._machines.append(step)
+        return self
+
+    # Signals
+
+    def signal(self, name: str) -> Signal:
+        """A signal, which is faster than its name in a machine that uses it at every tick."""
+        return self._watch(name).signal
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """All signals, in the order of driver.cfg."""
+        return self._driver.signals
+
+    def set(self, signal: str, value: float) -> Plc:
+        """Set an input of the PLC (``%I``), to be sent with the next tick. A machine that sets it, too, overwrites it: see ``force``."""
+        self.signal(signal).value = value
+        return self
+
+    def force(self, signal: str, value: float) -> Plc:
+        """Force an input of the PLC to a value, whatever the machine sets, until ``release``."""
+        self.set(signal, value)
+        self._forced[signal] = value
+        return self
+
+    def release(self, signal: str) -> Plc:
+        """End ``force``. The signal keeps its value until the machine or the test sets another."""
+        self._watch(signal)
+        self._forced.pop(signal, None)
+        return self
+
+    def press(self, button: str) -> Plc:
+        """Press a push button: force the signal on, let 200 ms pass, let it go off again."""
+        return self.force(button, True).run(_PRESS).release(button).set(button, False)
+
+    def get(self, signal: str) -> float:
+        """The value at the end of the last tick, in the signal's unit."""
+        return self.signal(signal).value
+
+    def is_on(self, signal: str) -> bool:
+        """Whether the signal is on."""
+        return self.get(signal) != 0
+
+    def rises(self, signal: str) -> int:
+        """How often the signal has gone on since the test began, as seen from tick to tick."""
+        return self._watch(signal).rises
+
+    def falls(self, signal: str) -> int:
+        """How often the signal has gone off since the test began, as seen from tick to tick."""
+        return self._watch(signal).falls
+
+    def statistics(self) -> dict[str, str]:
+        """The counters of the driver and of the PLC's program."""
+        return self._driver.statistics()
+
+    # Faults
+
+    def inject(self, fault: str = "", /, **keys: Any) -> Fault:
+        """Inject a fault, as ``Driver.inject``: ``plc.inject(kind="stuck", signal="LA1 bottom", value=False)``."""
+        return self._driver.inject(fault, **keys)
+
+    def faults(self) -> list[Fault]:
+        """The faults in driver.cfg and those that were injected."""
+        return self._driver.faults()
+
+    # Time
+
+    def tick(self, count: int = 1) -> Plc:
+        """Let some ticks pass."""
+        if count < 0:
+            raise ValueError(f"{count} ticks; time does not run backwards")
+        for _ in range(count):
+            self._step()
+        return self
+
+    def run(self, duration: Duration, unit: Unit | None = None) -> Plc:
+        """Let simulation time pass: ``run("1.5s")``, ``run(1.5, s)``; rounded up to whole ticks."""
+        return self.tick(-(-self._nanos(duration, unit) // self.step_ns))
+
+    @property
+    def ticks(self) -> int:
+        """How many ticks there were."""
+        return self._ticks
+
+    @property
+    def time(self) -> float:
+        """The simulation time so far, in seconds."""
+        return self.time_ns / 1e9
+
+    @property
+    def time_ns(self) -> int:
+        """The simulation time so far, in nanoseconds."""
+        return self._ticks * self.step_ns
+
+    def _step(self) -> None:
+        if self._in_step:
+            raise RuntimeError(
+                "a machine must not let time pass in its own step; set signals there, and let the test tick"
+            )
+        self._in_step = True
+        try:
+            nanos = self.time_ns + self.step_ns
+            for step in self._machines:
+                step(self, nanos / 1e9)
+            for signal, value in self._forced.items():
+                self._watches[signal].signal.value = value
+            self._driver.exchange(ns=nanos)
+        finally:
+            self._in_step = False
+        self._ticks += 1
+        seen = self._slots.tobytes()
+        if seen != self._seen:
+            self._seen = seen
+            for watch in self._watches.values():
+                watch.look(self._ticks)
+        for bound, since in self._standing:
+            self._check(bound, f"at every tick since tick {since}")
+
+    # Expectations
+
+    def expect(self, condition: Condition) -> Expectation:
+        """Fail unless the condition holds now; ``.during("5s")`` watches it for a while."""
+        bound = condition.bind(self)
+        self._check(bound, "")
+        return Expectation(self, bound)
+
+    def always(self, condition: Condition) -> Plc:
+        """Require the condition at the end of every tick from now on."""
+        bound = condition.bind(self)
+        self._check(bound, f"at every tick since tick {self._ticks}")
+        self._standing.append((bound, self._ticks))
+        return self
+
+    def never(self, condition: Condition) -> Plc:
+        """Forbid the condition at the end of every tick from now on."""
+        return self.always(condition.negated())
+
+    def await_(self, condition: Condition) -> Await:
+        """Wait for a condition: ``plc.await_(on("Ready lamp")).within("25s")``. Without a limit the test fails."""
+        waiting = Await(self, condition.bind(self))
+        self._open.append(waiting)
+        return waiting
+
+    # For the plug-in
+
+    def _watch(self, name: str) -> Watch:
+        watch = self._watches.get(name)
+        # Asked for a signal that it does not have, the driver tells the nearest one.
+        return watch if watch is not None else self._watches[self._driver.signal(name).name]
+
+    def _where(self) -> str:
+        return f"tick {self._ticks} ({_durations.text(self.time_ns)})"
+
+    def _span(self, count: int) -> str:
+        return f"{count} {'tick' if count == 1 else 'ticks'} ({_durations.text(count * self.step_ns)})"
+
+    def _nanos(self, amount: Duration, unit: Unit | None) -> int:
+        if isinstance(amount, str):
+            if unit is not None:
+                raise TypeError(f'"{amount}" has its unit already')
+            return _durations.parse(amount)
+        if unit is None:
+            raise TypeError(f'{amount} of what? Write a duration, such as "1.5s", or name the unit: {amount}, s')
+        nanos = round(amount * (self.step_ns if unit.nanos is None else unit.nanos))
+        if nanos < 0:
+            raise ValueError(f"{amount} {unit}; time does not run backwards")
+        return nanos
+
+    def _check(self, bound: Bound, span: str) -> None:
+        if not bound.holds():
+            raise self._failure(bound, span)
+
+    def _failure(self, bound: Bound, span: str) -> AssertionError:
+        text = f"{self._where()}: {bound.subject} is {bound.seen()}, expected {bound.expected}"
+        text += f" {span}" if span else ""
+        return AssertionError("\n  ".join([text, *(watch.history(self.step_ns) for watch in bound.watches)]))
+
+    def _unfinished(self) -> AssertionError | None:
+        """The failure of a test that waited without a limit."""
+        return self._open[0]._unlimited() if self._open else None
+
+
+class Await:
+    """A wait that needs its limit: ``plc.await_(on("Running lamp")).within(40)``."""
+
+    def __init__(self, plc: Plc, bound: Bound) -> None:
+        self._plc, self._bound = plc, bound
+
+    def within(self, limit: Duration, unit: Unit | None = None) -> int:
+        """Let ticks pass until the condition holds, none if it does already; returns how many it took.
+
+        The limit is a number of ticks, ``within(40)`` or ``within(40, ticks)``, or simulation time, ``within("3s")`` or ``within(3, s)``.
+        """
+        plc = self._plc
+        plc._open.remove(self)
+        if isinstance(limit, str) or unit is not None and unit.nanos is not None:
+            most = plc._nanos(limit, unit) // plc.step_ns
+            if most < 1:
+                text = limit if isinstance(limit, str) else f"{limit} {unit}"
+                raise ValueError(
+                    f"a limit of {text} is shorter than one tick of {_durations.text(plc.step_ns)}; give it more time,"
+                    " or use expect(…)"
+                )
+        else:
+            most = int(limit)
+            if most < 1 or most != limit:
+                raise ValueError(f"a limit of {limit} ticks; give it a whole number, at least 1, or use expect(…)")
+        begin = plc.ticks
+        while not self._bound.holds():
+            if plc.ticks - begin == most:
+                raise plc._failure(self._bound, f"within {plc._span(most)} of tick {begin}")
+            plc.tick()
+        return plc.ticks - begin
+
+    def _unlimited(self) -> AssertionError:
+        what = f"{self._bound.subject} {self._bound.expected}"
+        return AssertionError(f"await_({what}) was given no limit, so that it never waited; add .within(…)")
+
+
+class Expectation:
+    """A condition that holds now, and may have to go on: ``plc.expect(off("Not OK")).during("5s")``."""
+
+    def __init__(self, plc: Plc, bound: Bound) -> None:
+        self._plc, self._bound = plc, bound
+
+    def during(self, span: Duration, unit: Unit | None = None) -> Plc:
+        """Let ticks or simulation time pass, and fail at the first tick at whose end the condition does not hold."""
+        plc = self._plc
+        if not isinstance(span, str) and (unit is None or unit.nanos is None):
+            count = int(span)
+        else:
+            count = -(-plc._nanos(span, unit) // plc.step_ns)
+        begin = plc.ticks
+        for _ in range(count):
+            plc.tick()
+            plc._check(self._bound, f"for {plc._span(count)} from tick {begin}")
+        return plc

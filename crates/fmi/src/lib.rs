@@ -9,6 +9,8 @@
 
 pub mod foreign;
 pub mod made;
+mod real_time;
 mod value;
 
+pub use real_time::RealTime;
 pub use value::{Number, Status, Value, ValueType, Version};

@@ -21,4 +21,4 @@ pub use helper::serve;
 pub use join::{Join, Joined, Unjoined};
 pub use machine::{Machine, MachineOptions};
 pub use map::Map;
-pub use slave::{Failure, Slave, Stepped};
+pub use slave::{Failure, Stepped};

@@ -9,7 +9,7 @@ use crate::value::{Status, Value, ValueType, Version};
 
 /// What a run of an FMU begins with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Setup {
+pub(super) struct Setup {
     /// The FMU, as messages name it.
     pub file: String,
     /// The name of the instance.
@@ -47,7 +47,7 @@ pub enum Stepped {
 pub struct Failure(pub String);
 
 /// A running FMU. Dropping it ends the run.
-pub trait Slave: std::fmt::Debug {
+pub(super) trait Slave: std::fmt::Debug {
     /// Sets the inputs, lets `length` seconds pass from `from` on, and reads the outputs.
     ///
     /// # Errors

@@ -21,14 +21,14 @@ const STEP: Nanos = Nanos::from_millis(10);
 const STOP: u32 = 10;
 
 /// The categories of log lines: name and description.
-pub const CATEGORIES: [(&str, &str); 3] = [
+pub(super) const CATEGORIES: [(&str, &str); 3] = [
     ("logStatusError", "What ends the run"),
     ("logStatusWarning", "Lines that fail or are stale"),
     ("logEvents", "Every change of the line"),
 ];
 
 /// The name of the library, without its ending, and the prefix of its functions in C: the driver's name as C can write it.
-pub fn identifier(config: &Config) -> String {
+pub(super) fn identifier(config: &Config) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = config.name.chars().take(64).map(plain).collect();
     if name.starts_with(|c: char| c.is_ascii_digit()) {

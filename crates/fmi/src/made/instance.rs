@@ -12,13 +12,11 @@ use tickbus_record as record;
 
 use super::resources::token;
 use super::variables::{Cell, Exposed, Place, default_pace, initial_slots, seconds};
+use crate::real_time::RealTime;
 use crate::value::{Number, Value, ValueType, Version};
 
 /// How far the beginning of a step may be from the end of the last one, in seconds, and in its parts.
 const TOLERANCE: f64 = 1e-9;
-
-/// How late a paced step may be and still be made up for; a later one begins the pace anew.
-const LATE: Nanos = Nanos::from_millis(100);
 
 /// Where an instance stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,9 +40,7 @@ pub struct Instance {
     driver: Option<Driver>,
     /// The end of the last step, in seconds.
     time: f64,
-    pace: f64,
-    /// The time at which the pace began: the simulation's, and the clock's.
-    begun: Option<(f64, Nanos)>,
+    real_time: RealTime,
     address: CString,
     record: CString,
     clock: Arc<Monotonic>,
@@ -81,8 +77,7 @@ impl Instance {
             phase: Phase::Before,
             driver: None,
             time: 0.0,
-            pace: 0.0,
-            begun: None,
+            real_time: RealTime::new(0.0),
             address: CString::default(),
             record: CString::default(),
             clock: Monotonic::shared(),
@@ -105,8 +100,7 @@ impl Instance {
         self.found = Exchange::NONE;
         self.phase = Phase::Before;
         self.time = 0.0;
-        self.pace = default_pace(&self.config);
-        self.begun = None;
+        self.real_time = RealTime::new(default_pace(&self.config));
         let file = self.config.record.as_ref().map(|record| &record.file);
         let file = file.map(|file| file.to_string_lossy().into_owned());
         self.address = CString::default();
@@ -192,25 +186,18 @@ impl Instance {
             let reason = driver.link().reason;
             return Err(failed(self.found.code, &reason));
         }
-        if self.pace > 0.0 {
-            self.wait();
+        if self.real_time.pace > 0.0 {
+            self.wait(at);
         }
         Ok(())
     }
 
     /// Waits until the clock on the wall is where the simulation is.
-    fn wait(&mut self) {
-        let now = self.clock.now();
-        let (from, begun) = *self.begun.get_or_insert((self.time, now));
-        #[expect(clippy::cast_possible_truncation, reason = "it saturates")]
-        let due = begun + Nanos(((self.time - from) / self.pace * 1e9) as i64);
-        if now > due + LATE {
-            // What was missed is not made up for: the PLC has not stood still meanwhile.
-            self.begun = Some((self.time, now));
-            return;
-        }
-        while self.clock.now() < due {
-            self.clock.wait_until(due, &self.stop);
+    fn wait(&mut self, time: Nanos) {
+        if let Some(due) = self.real_time.due(time, self.clock.now()) {
+            while self.clock.now() < due {
+                self.clock.wait_until(due, &self.stop);
+            }
         }
     }
 
@@ -249,8 +236,7 @@ impl Instance {
         let place = self.checked(reference, given)?;
         match place {
             Place::Pace if value.real().is_finite() && value.real() >= 0.0 => {
-                self.pace = value.real();
-                self.begun = None;
+                self.real_time = RealTime::new(value.real());
                 Ok(())
             }
             Place::Pace => Err(format!(
@@ -286,7 +272,7 @@ impl Instance {
     fn other(&self, reference: u32, asked: ValueType) -> Result<Value, String> {
         Ok(match self.checked(reference, asked)? {
             Place::Time => Value::Real(self.time),
-            Place::Pace => Value::Real(self.pace),
+            Place::Pace => Value::Real(self.real_time.pace),
             Place::Status => Value::Signed(self.found.code.code().into()),
             Place::Age => Value::Real(seconds(&self.found)),
             Place::Sequence => Value::Unsigned(self.found.sequence),

@@ -26,7 +26,7 @@ use tickbus_fmi::{Status, Version};
 /// Every instance of FMUs that this library is in.
 static INSTANCES: Handles<Tenant> = Handles::new();
 
-/// `fmi2CallbackLogger`, without its further arguments: they would follow the format, which is always "%s".
+/// `fmi2CallbackLogger`. Its further arguments, which would be those of the format, are never there.
 type LoggerOfTwo = unsafe extern "C" fn(
     env: *mut c_void,
     name: *const c_char,
@@ -76,18 +76,24 @@ struct Tenant {
 impl Journal {
     /// Tells the tool one message.
     fn tell(&self, status: Status, category: &CStr, text: &str) {
-        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let text = text.replace('\0', " ");
+        // The text is the format itself: tools that do not format would show "%s".
+        let text = match self.logger {
+            None => return eprintln!("tickbus: {text}"),
+            Some(Logger::Two(_)) => text.replace('%', "%%"),
+            Some(Logger::Three(_)) => text,
+        };
+        let text = CString::new(text).unwrap_or_default();
         match self.logger {
-            None => eprintln!("tickbus: {}", text.to_string_lossy()),
+            None => {}
             // SAFETY: the tool has handed in this function with this `env`, to be called during its calls; all texts outlive the
-            // call. "%s" takes the one argument that follows.
+            // call, and the format asks for no further argument.
             Some(Logger::Two(logger)) => unsafe {
                 logger(
                     self.env,
                     self.name.as_ptr(),
                     status as c_int,
                     category.as_ptr(),
-                    c"%s".as_ptr(),
                     text.as_ptr(),
                 );
             },

@@ -11,7 +11,7 @@ use tickbus_image::signal::Slot;
 use tickbus_record as record;
 
 use super::resources::token;
-use super::variables::{Cell, Exposed, Place, default_pace, initial_slots, seconds};
+use super::variables::{Cell, Exposed, Place, Variable, default_pace, initial_slots, seconds};
 use crate::real_time::RealTime;
 use crate::value::{Number, Value, ValueType, Version};
 
@@ -32,6 +32,7 @@ enum Phase {
 /// One instance of an FMU.
 #[derive(Debug)]
 pub struct Instance {
+    version: Version,
     config: Config,
     exposed: Exposed,
     slots: Vec<Slot>,
@@ -71,6 +72,7 @@ impl Instance {
         let config = Config::load(&path).map_err(|mistakes| mistakes.to_string())?;
         let exposed = Exposed::of(&config, version);
         let mut new = Self {
+            version,
             exposed,
             slots: Vec::new(),
             found: Exchange::NONE,
@@ -233,8 +235,12 @@ impl Instance {
 
     /// Sets a variable that is no input.
     fn set_other(&mut self, reference: u32, given: ValueType, value: Value) -> Result<(), String> {
-        let place = self.checked(reference, given)?;
+        let place = self.number(reference, given)?;
         match place {
+            Place::Slot(slot) if self.exposed.cells[slot].is_input || self.phase == Phase::Before => {
+                self.slots[slot] = value.slot(self.exposed.cells[slot].kind);
+                Ok(())
+            }
             Place::Pace if value.real().is_finite() && value.real() >= 0.0 => {
                 self.real_time = RealTime::new(value.real());
                 Ok(())
@@ -270,7 +276,7 @@ impl Instance {
     }
 
     fn other(&self, reference: u32, asked: ValueType) -> Result<Value, String> {
-        Ok(match self.checked(reference, asked)? {
+        Ok(match self.number(reference, asked)? {
             Place::Time => Value::Real(self.time),
             Place::Pace => Value::Real(self.real_time.pace),
             Place::Status => Value::Signed(self.found.code.code().into()),
@@ -309,6 +315,20 @@ impl Instance {
             Place::Address => &self.address,
             _ => &self.record,
         })
+    }
+
+    /// As [`checked`](Self::checked), for numbers. In FMI 2.0 some tools get and set every variable as a Real, and that is answered,
+    /// too: nothing is lost.
+    fn number(&self, reference: u32, asked: ValueType) -> Result<Place, String> {
+        let is_text = |one: &Variable| one.value_type == ValueType::String;
+        match (Place::of(reference), self.exposed.variable(reference)) {
+            (Some(place), Some(variable))
+                if self.version == Version::Two && asked == ValueType::Float64 && !is_text(variable) =>
+            {
+                Ok(place)
+            }
+            _ => self.checked(reference, asked),
+        }
     }
 
     /// What a reference stands for, if that is of this type.

@@ -267,15 +267,20 @@ fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
     let real = ValueType::Float64;
     let record = config.record.as_ref();
     let record = record.map(|record| record.file.to_string_lossy().into_owned());
-    let mut all = vec![
-        variable(
+    let mut all = Vec::new();
+    // FMI 2.0 can do without, and a library of some of its tools complains of it.
+    if version == Version::Three {
+        let time = variable(
             "time",
             Place::Time,
             real,
             Use::Independent,
             Start::None,
             "Simulation time",
-        ),
+        );
+        all.push(time);
+    }
+    all.push(
         variable(
             "pace",
             Place::Pace,
@@ -284,7 +289,7 @@ fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
             number(Value::Real(default_pace(config))),
             "Seconds of simulation in one of the clock on the wall: 1 for real time, 0 for as fast as possible",
         ),
-    ];
+    );
     if has_address(config) {
         all.push(variable(
             "address",
